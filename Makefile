@@ -1,0 +1,63 @@
+# Every entry point. `make help` lists the targets from their `##` comments; the recipes that need more than a few
+# lines live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style).
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+BSLAM := $(VENV)/bin/bslam
+
+include mk/config.mk
+include mk/unit.mk
+include mk/firmware.mk
+include mk/lint.mk
+
+.PHONY: help
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile mk/*.mk | expand -t 20
+
+# --- Setting up -------------------------------------------------------------------------------------------------
+
+.PHONY: setup setup-run
+setup: ## install what is missing, make .venv, build the extension; quick when nothing is missing
+	@tools/setup.sh test
+	@$(MAKE) --no-print-directory extension
+
+setup-run:
+	@tools/setup.sh run
+	@$(MAKE) --no-print-directory extension
+
+EXTENSION_STAMP := build/extension.stamp
+EXTENSION_BUILD := $(wildcard host_sim/bslam/core/build.py)
+
+.PHONY: extension
+extension: $(if $(EXTENSION_BUILD),$(EXTENSION_STAMP))
+
+$(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/run.stamp
+	@echo "setup: building the cffi extensions"
+	@$(PYTHON) -m bslam.core.build
+	@mkdir -p $(@D) && touch $@
+
+# --- The main job -----------------------------------------------------------------------------------------------
+
+.PHONY: run
+run: setup-run ## the main job: the paper's room, then a real log where the data is at hand
+	$(BSLAM) run paper_room --seeds 0:1 --out out/run
+
+# --- Testing ----------------------------------------------------------------------------------------------------
+
+.PHONY: test pytest proof bench
+test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation, pytest
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit firmware pytest \
+	    || { echo "make test: FAILED, see above" >&2; exit 1; }
+	@echo "make test: all passed (lint, C unit tests in float and double, firmware build, pytest)"
+
+pytest: ## the Python tests only
+	@$(PYTHON) -m pytest --quiet
+
+.PHONY: clean
+clean: ## remove what was built; .venv and out/ stay
+	rm -rf build
+	find host_sim -name '*.so' -delete
