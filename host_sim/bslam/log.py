@@ -1,0 +1,333 @@
+"""A log: what a robot recorded on one drive, and the folder format it is kept in.
+
+A log is data only. It comes out of the simulator, a data set or a folder, and goes into the replay; nobody
+changes it on the way. Times are integer microseconds, lengths metres, angles radians in (-pi, pi], axes as in
+REP-103 (x forward, y left, counter-clockwise positive).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.csvtable import Column, Table, is_count, read_table
+from bslam.errors import BslamError
+from bslam.settings import (
+    ANY,
+    FIELD_OF_VIEW,
+    NOT_NEGATIVE,
+    POSITIVE,
+    POSITIVE_OR_INF,
+    integer,
+    load_toml,
+    parse_table,
+    setting,
+)
+
+ODOMETRY_COLUMNS = {
+    "wheels": ("left_m", "right_m"),
+    "ticks": ("left_ticks", "right_ticks"),
+    "velocity": ("v_mps", "omega_radps"),
+}
+TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """What the wheels said; `time_us` rises strictly.
+
+    kind "wheels": a, b = left, right wheel travel since the row before (first row: since the start), m.
+    kind "ticks": a, b = left, right encoder counter values; the first row is the counters' starting point.
+    kind "velocity": a, b = forward speed m/s and turning rate rad/s, held over the interval that ENDS at
+    time_us.
+    """
+
+    kind: str
+    time_us: NDArray[np.int64]  # (n,)
+    a: NDArray[np.float64]  # (n,)
+    b: NDArray[np.float64]  # (n,)
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Beacons seen, in order of time; rows of equal `time_us` belong to one image."""
+
+    time_us: NDArray[np.int64]  # (m,)
+    beacon_id: NDArray[np.int64]  # (m,) -1: identity not known
+    bearing_rad: NDArray[np.float64]  # (m,) from the sensor's forward axis
+    range_m: NDArray[np.float64]  # (m,) NaN: no range
+    mappable: NDArray[np.bool_]  # (m,) False: the detector says it is a moving thing
+
+
+@dataclass(frozen=True)
+class Truth:
+    """True poses. Frame: the start pose (simulation, csv folders) or the data set's own frame."""
+
+    time_us: NDArray[np.int64]  # (k,)
+    x_m: NDArray[np.float64]  # (k,)
+    y_m: NDArray[np.float64]  # (k,)
+    theta_rad: NDArray[np.float64]  # (k,)
+
+
+@dataclass(frozen=True)
+class Beacons:
+    """True beacon positions, in the frame of the truth; every identity once."""
+
+    beacon_id: NDArray[np.int64]  # (b,)
+    x_m: NDArray[np.float64]  # (b,)
+    y_m: NDArray[np.float64]  # (b,)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Geometry and noise of the robot that recorded the log; the keys of `robot.toml`.
+
+    The sd of a range r is sqrt(floor^2 + (fraction r)^2 + (r^2 / scale)^2). A sighting stamped t was taken at
+    t - sighting_delay_us by a sensor at (sensor_x_m, sensor_y_m, sensor_yaw_rad) on the robot.
+    The last four keys describe the encoders; a log with tick odometry must have them.
+    """
+
+    wheelbase_m: float = setting(POSITIVE)
+    wheel_speed_sigma_mps: float = setting(NOT_NEGATIVE)  # each wheel, each step, independent
+    step_us: int = setting(integer(1))  # nominal time from one odometry row to the next
+    field_of_view_rad: float = setting(FIELD_OF_VIEW)
+    bearing_sigma_rad: float = setting(NOT_NEGATIVE)
+    range_sigma_fraction: float = setting(NOT_NEGATIVE)
+    range_sigma_scale_m: float = setting(POSITIVE_OR_INF)
+    range_sigma_floor_m: float = setting(NOT_NEGATIVE, 0.0)
+    sensor_x_m: float = setting(ANY, 0.0)
+    sensor_y_m: float = setting(ANY, 0.0)
+    sensor_yaw_rad: float = setting(ANY, 0.0)
+    sighting_delay_us: int = setting(integer(0), 0)
+    left_radius_m: float | None = setting(POSITIVE, None)
+    right_radius_m: float | None = setting(POSITIVE, None)
+    ticks_per_revolution: float | None = setting(POSITIVE, None)
+    counter_bits: int | None = setting(integer(8, 32), None)
+
+
+@dataclass(frozen=True)
+class Log:
+    """One drive. `truth` and `beacons` (the true map) are there only if somebody knows them."""
+
+    name: str
+    odometry: Odometry
+    sightings: Sightings
+    truth: Truth | None
+    beacons: Beacons | None
+    robot: Robot
+
+
+def read_folder(path: str | Path) -> Log:
+    """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`, `beacons.csv`).
+
+    Each .csv may be a .csv.gz. Raises BslamError that names the file, the line and column or key, the value
+    and what is allowed there.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise BslamError(
+            f"{folder}: no such folder; a log is a folder with odometry.csv, sightings.csv, robot.toml"
+        )
+    robot = _read_robot(folder / "robot.toml")
+    return Log(
+        name=folder.resolve().name,
+        odometry=_read_odometry(folder, robot),
+        sightings=_read_sightings(folder),
+        truth=_read_truth(folder),
+        beacons=_read_beacons(folder),
+        robot=robot,
+    )
+
+
+def write_folder(log: Log, path: str | Path) -> None:
+    """Write the log as a folder that `read_folder` reads back to the last bit; files there are replaced.
+
+    Raises BslamError if the folder cannot be written.
+    """
+    folder = Path(path)
+    odometry, sightings = log.odometry, log.sightings
+    number = int if odometry.kind == "ticks" else float
+    a_name, b_name = ODOMETRY_COLUMNS[odometry.kind]
+    tables: dict[str, dict[str, list[str]] | None] = {
+        "odometry": {
+            "time_us": _texts(odometry.time_us, int),
+            a_name: _texts(odometry.a, number),
+            b_name: _texts(odometry.b, number),
+        },
+        "sightings": _sightings_texts(sightings),
+        "truth": None if log.truth is None else _texts_by_field(log.truth),
+        "beacons": None if log.beacons is None else _texts_by_field(log.beacons),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for stem, columns in tables.items():
+            for name in (f"{stem}.csv", f"{stem}.csv.gz"):
+                (folder / name).unlink(missing_ok=True)
+            if columns is not None:
+                _write_csv(folder / f"{stem}.csv", columns)
+        (folder / "robot.toml").write_text(_robot_text(log.robot), encoding="utf-8")
+    except OSError as error:
+        raise BslamError(f"{folder}: cannot write the log there: {error}") from error
+
+
+# --- writing ------------------------------------------------------------------------------------------------
+
+
+def _texts(values: NDArray[Any], kind: Callable[[Any], Any]) -> list[str]:
+    return [repr(kind(value)) for value in values.tolist()]
+
+
+def _texts_by_field(table: Truth | Beacons) -> dict[str, list[str]]:
+    columns = {field.name: getattr(table, field.name) for field in fields(table)}
+    return {
+        name: _texts(values, int if values.dtype == np.int64 else float) for name, values in columns.items()
+    }
+
+
+def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
+    """Columns of sightings.csv; range_m and mappable only where they say something."""
+    columns = {
+        "time_us": _texts(sightings.time_us, int),
+        "beacon_id": ["" if one < 0 else str(one) for one in sightings.beacon_id.tolist()],
+        "bearing_rad": _texts(sightings.bearing_rad, float),
+    }
+    if not np.isnan(sightings.range_m).all():
+        columns["range_m"] = ["" if math.isnan(one) else repr(one) for one in sightings.range_m.tolist()]
+    if not sightings.mappable.all():
+        columns["mappable"] = _texts(sightings.mappable, int)
+    return columns
+
+
+def _write_csv(path: Path, columns: dict[str, list[str]]) -> None:
+    lines = [",".join(columns), *map(",".join, zip(*columns.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _robot_text(robot: Robot) -> str:
+    return "".join(f"{key} = {value!r}\n" for key, value in asdict(robot).items() if value is not None)
+
+
+# --- reading ------------------------------------------------------------------------------------------------
+
+_COUNT = Column("an integer from 0", is_count)
+_NUMBER = Column("a finite number", np.isfinite)
+_COLUMNS = {
+    "time_us": _COUNT,
+    "left_m": _NUMBER,
+    "right_m": _NUMBER,
+    "left_ticks": _COUNT,
+    "right_ticks": _COUNT,
+    "v_mps": _NUMBER,
+    "omega_radps": _NUMBER,
+    "beacon_id": Column("an integer from 0, or empty in sightings", is_count, empty=-1.0),
+    "bearing_rad": Column("radians from -2 pi to 2 pi", lambda values: np.abs(values) <= 2.0 * math.pi),
+    "range_m": Column(
+        "a finite number above 0, or empty", lambda v: np.isfinite(v) & (v > 0), empty=math.nan
+    ),
+    "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
+    "x_m": _NUMBER,
+    "y_m": _NUMBER,
+    "theta_rad": _NUMBER,
+}
+
+
+def _find_csv(folder: Path, stem: str) -> Path | None:
+    found = [path for path in (folder / f"{stem}.csv", folder / f"{stem}.csv.gz") if path.is_file()]
+    if len(found) > 1:
+        raise BslamError(f"{folder}: both {stem}.csv and {stem}.csv.gz are there; allowed: one of them")
+    return found[0] if found else None
+
+
+def _require_csv(folder: Path, stem: str) -> Path:
+    path = _find_csv(folder, stem)
+    if path is None:
+        raise BslamError(f"{folder}: {stem}.csv is missing; a log needs {stem}.csv or {stem}.csv.gz")
+    return path
+
+
+def _columns(*names: str) -> dict[str, Column]:
+    return {name: _COLUMNS[name] for name in names}
+
+
+def _wrap(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same angles in (-pi, pi]; those already there are kept to the last bit."""
+    outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
+    return np.where(outside, math.pi - np.mod(math.pi - angle_rad, 2.0 * math.pi), angle_rad)
+
+
+def _read_odometry(folder: Path, robot: Robot) -> Odometry:
+    layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
+    table = read_table(_require_csv(folder, "odometry"), layouts)
+    if table.rows == 0:
+        raise BslamError(f"{table.path}: no rows below the header; allowed: at least one")
+    table.require_order("time_us", strict=True)
+    kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
+    if kind == "ticks":
+        _require_tick_range(table, robot)
+    return Odometry(kind, table.integers("time_us"), table.values[a_name], table.values[b_name])
+
+
+def _require_tick_range(table: Table, robot: Robot) -> None:
+    if robot.counter_bits is None:
+        raise BslamError(
+            f"{table.path}: ticks need {', '.join(TICK_KEYS)} in robot.toml; allowed: all four there"
+        )
+    highest = 2**robot.counter_bits - 1
+    for name in ODOMETRY_COLUMNS["ticks"]:
+        good = table.values[name] <= highest
+        table.require(
+            name, good, f"an integer from 0 to {highest} (robot.toml: {robot.counter_bits} counter_bits)"
+        )
+
+
+def _read_sightings(folder: Path) -> Sightings:
+    layout = _columns("time_us", "beacon_id", "bearing_rad")
+    table = read_table(_require_csv(folder, "sightings"), [layout], _columns("range_m", "mappable"))
+    table.require_order("time_us", strict=False)
+    return Sightings(
+        time_us=table.integers("time_us"),
+        beacon_id=table.integers("beacon_id"),
+        bearing_rad=_wrap(table.values["bearing_rad"]),
+        range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
+        mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
+    )
+
+
+def _read_truth(folder: Path) -> Truth | None:
+    path = _find_csv(folder, "truth")
+    if path is None:
+        return None
+    table = read_table(path, [_columns("time_us", "x_m", "y_m", "theta_rad")])
+    table.require_order("time_us", strict=True)
+    values = table.values
+    return Truth(table.integers("time_us"), values["x_m"], values["y_m"], _wrap(values["theta_rad"]))
+
+
+def _read_beacons(folder: Path) -> Beacons | None:
+    path = _find_csv(folder, "beacons")
+    if path is None:
+        return None
+    table = read_table(path, [_columns("beacon_id", "x_m", "y_m")])
+    beacon_id = table.integers("beacon_id")
+    first = np.isin(np.arange(table.rows), np.unique(beacon_id, return_index=True)[1])
+    table.require("beacon_id", (beacon_id >= 0) & first, "an integer from 0 that no row above has")
+    return Beacons(beacon_id, table.values["x_m"], table.values["y_m"])
+
+
+def _read_robot(path: Path) -> Robot:
+    if not path.is_file():
+        raise BslamError(f"{path.parent}: robot.toml is missing; a log needs it (geometry and noise)")
+    robot = parse_table(Robot, load_toml(path), str(path))
+    encoder = {key: getattr(robot, key) for key in TICK_KEYS}
+    missing = [key for key, value in encoder.items() if value is None]
+    if missing and len(missing) < len(encoder):
+        raise BslamError(
+            f"{path}, key {missing[0]}: is missing; allowed: all of {', '.join(encoder)}, or none"
+        )
+    return robot

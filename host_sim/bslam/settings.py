@@ -1,0 +1,92 @@
+"""Tables of settings in TOML files, read strictly into frozen dataclasses.
+
+A dataclass field made by `setting(rule)` says what its key may hold; `parse_table` checks a table against all
+fields of a class, and every error names the file, the key, the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bslam.errors import BslamError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a key may hold: its TOML type (`float` takes integers too), a test, and the words for both."""
+
+    allowed: str
+    kind: type
+    holds: Callable[[Any], bool] = lambda value: True
+
+    def convert(self, value: object, where: str) -> Any:
+        """The value as `kind`, or a BslamError that starts with `where` (file and key)."""
+        right_type = isinstance(value, (int, float) if self.kind is float else self.kind)
+        if isinstance(value, bool) and self.kind is not bool:
+            right_type = False
+        try:
+            if right_type and self.holds(self.kind(value)):
+                return self.kind(value)
+        except OverflowError:  # an integer that no double can hold
+            pass
+        raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}")
+
+
+def one_of(*words: str) -> Rule:
+    return Rule(" or ".join(repr(word) for word in words), str, lambda value: value in words)
+
+
+def integer(lowest: int, highest: int | None = None) -> Rule:
+    if highest is None:
+        return Rule(f"an integer from {lowest}", int, lambda value: value >= lowest)
+    return Rule(f"an integer from {lowest} to {highest}", int, lambda value: lowest <= value <= highest)
+
+
+ANY = Rule("a finite number", float, math.isfinite)
+POSITIVE = Rule("a finite number above 0", float, lambda value: 0.0 < value < math.inf)
+NOT_NEGATIVE = Rule("a finite number from 0", float, lambda value: 0.0 <= value < math.inf)
+POSITIVE_OR_INF = Rule("a number above 0, or inf", float, lambda value: value > 0.0)
+SHARE = Rule("a number from 0 to 1", float, lambda value: 0.0 <= value <= 1.0)
+FIELD_OF_VIEW = Rule("above 0, at most 6.2832 (a full turn)", float, lambda value: 0.0 < value <= 6.2832)
+
+
+def setting(rule: Rule, default: Any = MISSING) -> Any:
+    """A dataclass field with its rule; without a default the key must be there."""
+    return field(default=default, metadata={"rule": rule})
+
+
+def load_toml(path: Path) -> dict[str, Any]:
+    """The document in a TOML file; BslamError if it cannot be read or is not TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise BslamError(f"{path}: cannot be read: {error}; allowed: a UTF-8 text file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BslamError(f"{path}: not TOML: {error}; allowed: lines of key = value") from error
+
+
+def parse_table(cls: type[T], table: Mapping[str, object], where: str) -> T:
+    """`cls` from a TOML table; `where` (the file, and the table in it) starts every error."""
+    known: dict[str, Field[Any]] = {one.name: one for one in fields(cls)}  # type: ignore[arg-type]
+    check_keys(table, known, where)
+    for name, one in known.items():
+        if one.default is MISSING and name not in table:
+            raise BslamError(f"{where}, key {name}: is missing; allowed: {one.metadata['rule'].allowed}")
+    values = {
+        key: known[key].metadata["rule"].convert(value, f"{where}, key {key}") for key, value in table.items()
+    }
+    return cls(**values)
+
+
+def check_keys(table: Mapping[str, object], known: Mapping[str, object], where: str) -> None:
+    """Raise BslamError for a key that nobody knows: most often a misspelt one."""
+    for key in table:
+        if key not in known:
+            raise BslamError(f"{where}, key {key}: no such key; allowed: {', '.join(known)}")
