@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.csvtable import Column, Table, is_count, read_table
 from bslam.errors import BslamError
-from bslam.settings import (
+from bslam.parsing.csvtable import Column, Table, is_count, read_table
+from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
     NOT_NEGATIVE,
