@@ -1,5 +1,5 @@
-# Every entry point. `make help` lists the targets from their `##` comments; the recipes that need more than a few
-# lines live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style).
+# Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
+# live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -18,7 +18,7 @@ include mk/lint.mk
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile mk/*.mk | expand -t 20
 
-# --- Setting up -------------------------------------------------------------------------------------------------
+# --- Setting up ---------------------------------------------------------------------------------------------
 
 .PHONY: setup setup-run
 setup: ## install what is missing, make .venv, build the extension; quick when nothing is missing
@@ -40,13 +40,13 @@ $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/r
 	@$(PYTHON) -m bslam.core.build
 	@mkdir -p $(@D) && touch $@
 
-# --- The main job -----------------------------------------------------------------------------------------------
+# --- The main job -------------------------------------------------------------------------------------------
 
 .PHONY: run
 run: setup-run ## the main job: the paper's room, then a real log where the data is at hand
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
 
-# --- Testing ----------------------------------------------------------------------------------------------------
+# --- Testing ------------------------------------------------------------------------------------------------
 
 .PHONY: test pytest proof bench
 test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation, pytest

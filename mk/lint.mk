@@ -1,0 +1,49 @@
+# Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
+
+C_FILES = $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(wildcard tests/unit/*.[ch] tests/unit/*/*.[ch]))
+PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
+
+LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \
+    lint-complexity lint-version
+
+.PHONY: lint $(LINTS)
+lint: $(LINTS) firmware ## formatting, static analysis, layers, symbols, complexity
+
+# The files that no formatter watches; 110 columns is what the formatters allow.
+lint-columns:
+	@! LC_ALL=C.UTF-8 grep -HnoE '^.{110}.+' $(wildcard Makefile mk/*.mk tools/*.sh) $(C_FILES)
+
+lint-c-format:
+	@$(VENV)/bin/clang-format --dry-run -Werror $(C_FILES)
+
+# clang-tidy is slow, so a file that passed is not looked at again until it, a header or the rules change.
+TIDY_STAMPS := $(CORE_SOURCES:%.c=build/tidy/%.ok)
+lint-c-tidy: $(TIDY_STAMPS)
+
+$(TIDY_STAMPS): build/tidy/%.ok: %.c $(CORE_HEADERS) .clang-tidy mk/config.mk mk/lint.mk
+	@mkdir -p $(@D)
+	@$(VENV)/bin/clang-tidy --quiet $< -- $(C_STANDARD) $(C_INCLUDES) >$@.log 2>&1 \
+	    || { cat $@.log >&2; exit 1; }
+	@touch $@
+
+lint-python:
+	@$(PYTHON) -m ruff check --quiet $(PYTHON_DIRS)
+	@$(PYTHON) -m ruff format --check --quiet $(PYTHON_DIRS)
+
+lint-types:
+	@$(PYTHON) -m mypy --no-error-summary
+
+lint-layers:
+	@$(PYTHON) tools/check_layers.py
+
+lint-complexity:
+	@$(PYTHON) tools/check_complexity.py $(CORE_SOURCES) $(CORE_HEADERS) $(PYTHON_DIRS)
+
+lint-version:
+	@$(PYTHON) tools/check_version.py
+
+.PHONY: format
+format: ## rewrite C and Python files in the house format
+	$(VENV)/bin/clang-format -i $(C_FILES)
+	$(PYTHON) -m ruff check --fix-only --quiet $(PYTHON_DIRS)
+	$(PYTHON) -m ruff format $(PYTHON_DIRS)

@@ -1,0 +1,64 @@
+# C unit tests: tests/unit/<layer>/test_<module>.c mirrors firmware/bslam/<layer>/<module>.c. Each is a CMocka
+# program linked with the whole core, built under sanitizers twice: float (the target), double (the twin).
+
+UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c))
+
+# Helpers that several tests share (tests/unit/*.c); linked to every test.
+UNIT_HELPERS := $(sort $(wildcard tests/unit/*.c))
+
+SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+
+# A test may compare in double, and need not look at CMocka's `state`.
+UNIT_WARNINGS := $(C_WARNINGS) -Wno-unused-parameter
+
+UNIT_REALS := float double
+UNIT_FLAGS_float := -DBSLAM_REAL_DOUBLE=0
+UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1
+UNIT_CORE_WARNINGS_float := $(C_WARNINGS) $(C_WARNINGS_FLOAT)
+UNIT_CORE_WARNINGS_double := $(C_WARNINGS)
+
+.PHONY: unit
+unit: $(UNIT_REALS:%=unit-%) ## the C unit tests, in float and in double, under ASan and UBSan
+
+# The rules for one scalar type: $(1) is float or double.
+define unit_rules
+UNIT_DIR_$(1) := build/unit/$(1)
+UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(SANITIZE) -MMD -MP
+
+UNIT_CORE_$(1) := $$(CORE_SOURCES:%.c=build/unit/$(1)/%.o)
+UNIT_HELPERS_$(1) := $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.o)
+UNIT_PROGRAMS_$(1) := $$(UNIT_SOURCES:tests/unit/%.c=build/unit/$(1)/bin/%)
+
+.PHONY: unit-$(1)
+unit-$(1): $$(UNIT_PROGRAMS_$(1):%=%.run)
+
+$$(UNIT_CORE_$(1)): build/unit/$(1)/%.o: %.c mk/config.mk mk/unit.mk
+	@mkdir -p $$(@D)
+	@$$(UNIT_COMPILE_$(1)) $$(UNIT_CORE_WARNINGS_$(1)) -c $$< -o $$@
+
+build/unit/$(1)/tests/%.o: tests/%.c mk/config.mk mk/unit.mk
+	@mkdir -p $$(@D)
+	@$$(UNIT_COMPILE_$(1)) $$(UNIT_WARNINGS) -Itests/unit $$(CMOCKA_CFLAGS) -c $$< -o $$@
+
+$$(UNIT_PROGRAMS_$(1)): build/unit/$(1)/bin/%: build/unit/$(1)/tests/unit/%.o \
+    $$(UNIT_HELPERS_$(1)) $$(UNIT_CORE_$(1))
+	@mkdir -p $$(@D)
+	@$$(CC) $$(SANITIZE) $$^ $$(CMOCKA_LIBS) -lm -o $$@
+
+# One line for a program that passes, everything it wrote for one that fails.
+.PHONY: $$(UNIT_PROGRAMS_$(1):%=%.run)
+$$(UNIT_PROGRAMS_$(1):%=%.run): %.run: %
+	@if $$< >$$<.log 2>&1; then sed -n 's|^\[  PASSED  \]|unit $(1) $$(notdir $$<):|p' $$<.log; \
+	 else cat $$<.log >&2; echo "unit $(1) $$(notdir $$<): FAILED" >&2; exit 1; fi
+
+-include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_HELPERS_$(1):.o=.d)
+-include $$(UNIT_SOURCES:%.c=build/unit/$(1)/%.d)
+endef
+$(foreach real,$(UNIT_REALS),$(eval $(call unit_rules,$(real))))
+
+# Asked when a test is compiled, not when make starts: `make setup` may have installed CMocka in between.
+CMOCKA_CFLAGS = $(shell pkg-config --cflags cmocka)
+CMOCKA_LIBS = $(shell pkg-config --libs cmocka)
+
+# The objects of the tests are wanted again at the next run.
+.SECONDARY:

@@ -5,7 +5,7 @@
 #   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, linters
 #   tools/setup.sh bench   that, and what `make bench` needs: valgrind
 #
-# Quick when nothing is missing; asks no question. NO_INSTALL=1 forbids apt-get: the command is printed instead.
+# Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
 # Exit status 0: ready. 2: something is missing that could not be installed; the first line says what.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
@@ -19,8 +19,9 @@ fail() {
     exit 2
 }
 
-# --- Python: the first interpreter on PATH that really starts and is new enough (a pyenv shim may be neither) ---
+# --- Python -------------------------------------------------------------------------------------------------
 
+# The first interpreter on PATH that starts and is new enough; a pyenv shim may be neither.
 find_python() {
     local name
     for name in python3 python3.11 python3.12 python3.13 python3.14; do
@@ -36,7 +37,7 @@ python_can() {
     "$python" -c "$1" </dev/null >/dev/null 2>&1
 }
 
-# --- System packages -------------------------------------------------------------------------------------------
+# --- System packages ----------------------------------------------------------------------------------------
 
 packages=() # Debian names of what is missing
 reasons=()  # "what it is for", one per package
@@ -90,10 +91,11 @@ install_missing() {
     why=$(printf ', %s' "${reasons[@]}")
     why=${why:2}
     [[ $(id -u) -eq 0 ]] || root=(sudo -n)
-    local command="${root[*]:+sudo }apt-get install -y --no-install-recommends ${packages[*]}"
+    local apt_get_install="apt-get install -y --no-install-recommends"
+    local command="${root[*]:+sudo }$apt_get_install ${packages[*]}"
 
     [[ ${NO_INSTALL:-0} != 1 ]] || fail "missing: $why (NO_INSTALL=1 is set)" "install with: $command"
-    command -v apt-get >/dev/null || fail "missing: $why (no apt-get here)" "on Debian this would be: $command"
+    command -v apt-get >/dev/null || fail "missing: $why (no apt-get here)" "on Debian: $command"
     [[ ${#root[@]} -eq 0 ]] || sudo -n true 2>/dev/null ||
         fail "missing: $why (not root, and sudo would ask)" "install with: $command"
 
@@ -102,21 +104,21 @@ install_missing() {
     # A failed update is no reason to stop: the lists at hand may do, and the check below has the last word.
     local log
     log=$("${root[@]}" apt-get -qq update </dev/null 2>&1) || true
-    log+=$("${root[@]}" apt-get -qq install -y --no-install-recommends "${packages[@]}" </dev/null 2>&1) || true
+    log+=$("${root[@]}" $apt_get_install -qq "${packages[@]}" </dev/null 2>&1) || true
     find_missing
     [[ ${#packages[@]} -eq 0 ]] ||
-        fail "apt-get could not install: ${packages[*]}" "the command was: $command" "its output was: $log"
+        fail "apt-get could not install: ${packages[*]}" "the command was: $command" "it said: $log"
 }
 
-# --- The virtual environment -----------------------------------------------------------------------------------
+# --- The virtual environment --------------------------------------------------------------------------------
 
 pip_install() {
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input "$@" </dev/null ||
         fail "pip could not install into $venv; the command was: $venv/bin/python -m pip install $*"
 }
 
-# Runs a step unless its stamp says it was done, here, from the same inputs. Scripts in a venv hold its absolute
-# path, so that path is part of the fingerprint.
+# Runs a step unless its stamp says it was done, here, from the same inputs. Scripts in a venv hold its
+# absolute path, so that is part of the fingerprint.
 once() { # STAMP INPUT_FILES -- COMMAND...
     local stamp=$venv/$1 inputs=() fingerprint
     shift

@@ -1,0 +1,51 @@
+"""Prints how much RAM one SLAM instance takes, by compiler and number of beacons.
+
+Nothing is run: the size of the struct is read from an object file, so that a cross-compiler does as well.
+"""
+
+import argparse
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PROBE = """#include "bslam/slam/slam.h"
+unsigned char bslam_size_probe[sizeof(bslam_slam_t)];
+"""
+
+
+def instance_bytes(compiler: str, nm: str, beacons_max: int) -> int:
+    """sizeof(bslam_slam_t) for a map of `beacons_max`; `compiler` is a command with its flags."""
+    with tempfile.TemporaryDirectory() as folder:
+        probe = Path(folder) / "probe.o"
+        compile_probe = f"{compiler} -DBSLAM_BEACONS_MAX={beacons_max} -x c - -c -o {shlex.quote(str(probe))}"
+        subprocess.run(shlex.split(compile_probe), input=PROBE, check=True, text=True)
+        list_symbols = [nm, "--portability", str(probe)]
+        listing = subprocess.run(list_symbols, check=True, capture_output=True, text=True).stdout
+    _name, _kind, _address, size = listing.split()
+    return int(size, 16)
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--beacons", type=int, nargs="+", required=True, help="map sizes")
+    parser.add_argument(
+        "--compiler",
+        nargs=3,
+        action="append",
+        required=True,
+        metavar=("NAME", "COMMAND", "NM"),
+        help="a column: its heading, the compiler with its flags, the nm that goes with it",
+    )
+    options = parser.parse_args(argv)
+    print("RAM of one instance, bytes (BSLAM_BEACONS_MAX = number of beacons)")
+    print(f"{'beacons':>8}" + "".join(f"{name:>10}" for name, _, _ in options.compiler))
+    for beacons in options.beacons:
+        sizes = [instance_bytes(compiler, nm, beacons) for _, compiler, nm in options.compiler]
+        print(f"{beacons:>8}" + "".join(f"{size:>10}" for size in sizes))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
