@@ -23,11 +23,11 @@ help: ## list the targets
 .PHONY: setup setup-run
 setup: ## install what is missing, make .venv, build the extension; quick when nothing is missing
 	@tools/setup.sh test
-	@$(MAKE) --no-print-directory extension
+	@$(MAKE) --silent extension
 
 setup-run:
 	@tools/setup.sh run
-	@$(MAKE) --no-print-directory extension
+	@$(MAKE) --silent extension
 
 EXTENSION_STAMP := build/extension.stamp
 EXTENSION_BUILD := $(wildcard host_sim/bslam/core/build.py)

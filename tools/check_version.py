@@ -1,6 +1,6 @@
 """Checks that bslam.h, pyproject.toml and CHANGELOG.md speak of the same version.
 
-Exit status 0: they do. 1: they do not; says what each holds.
+Exit status 0: they do. 1: they do not; says what each holds, "?" for none.
 """
 
 import argparse
@@ -11,20 +11,20 @@ from pathlib import Path
 
 
 def header_version(text: str) -> str:
-    """ "1.2.3" from the macros BSLAM_VERSION_MAJOR, _MINOR and _PATCH; "?" stands for one that is missing."""
+    """ "1.2.3" from the macros BSLAM_VERSION_MAJOR, _MINOR and _PATCH."""
     parts = [re.search(rf"#define BSLAM_VERSION_{name} (\d+)", text) for name in ("MAJOR", "MINOR", "PATCH")]
     return ".".join(part[1] if part else "?" for part in parts)
 
 
-def changelog_version(text: str) -> str:
-    """The newest entry, "## 1.2.3 ..."; "?" if there is none."""
-    match = re.search(r"^## (\d+\.\d+\.\d+)", text, re.MULTILINE)
-    return match[1] if match else "?"
-
-
 def project_version(text: str) -> str:
     """What pip reads from pyproject.toml."""
-    return str(tomllib.loads(text)["project"]["version"])
+    return str(tomllib.loads(text).get("project", {}).get("version", "?"))
+
+
+def changelog_version(text: str) -> str:
+    """The newest entry, "## 1.2.3 ..."."""
+    match = re.search(r"^## (\d+\.\d+\.\d+)", text, re.MULTILINE)
+    return match[1] if match else "?"
 
 
 READERS = {
@@ -34,14 +34,19 @@ READERS = {
 }
 
 
+def version(file: Path, name: str) -> str:
+    """What the file of the repository called `name` says."""
+    return READERS[name](file.read_text(encoding="utf-8")) if file.is_file() else "?"
+
+
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--root", type=Path, default=Path(), help="the repository (default: here)")
     root: Path = parser.parse_args(argv).root
-    found = {file: read((root / file).read_text(encoding="utf-8")) for file, read in READERS.items()}
+    found = {name: version(root / name, name) for name in READERS}
     if len(set(found.values())) == 1:
         return 0
-    differing = ", ".join(f"{file} has {version}" for file, version in found.items())
+    differing = ", ".join(f"{name} has {number}" for name, number in found.items())
     print(f"versions differ: {differing}", file=sys.stderr)
     return 1
 
