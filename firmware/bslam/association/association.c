@@ -1,0 +1,165 @@
+#include "bslam/association/association.h"
+
+#include "bslam/math/trig.h"
+
+/// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
+typedef bslam_real_t (*distance2_fn)(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon);
+
+static bool is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
+{
+    const bool mappable = sighting->beacon_class != BSLAM_CLASS_NOT_MAPPABLE;
+    match->verdict = BSLAM_VERDICT_REJECT;
+    match->reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS;
+    match->beacon = -1;
+    match->distance2 = -1;
+    return mappable;
+}
+
+/// True if two sightings of different classes are asked to be one beacon.
+static bool classes_differ(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
+{
+    return sighting->beacon_class != BSLAM_CLASS_NONE && beacon->beacon_class != BSLAM_CLASS_NONE &&
+           sighting->beacon_class != beacon->beacon_class;
+}
+
+/// Leaves each beacon to the nearest of the sightings that chose it, the first of equals.
+static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
+{
+    for (int i = 1; i < frame->count; i++) {
+        for (int j = 0; j < i && matches[i].verdict == BSLAM_VERDICT_MATCH; j++) {
+            if (matches[j].verdict == BSLAM_VERDICT_MATCH && matches[j].beacon == matches[i].beacon) {
+                bslam_match_t *loser = matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
+                loser->verdict = BSLAM_VERDICT_REJECT;
+                loser->reason = BSLAM_REASON_DUPLICATE;
+            }
+        }
+    }
+}
+
+// ---- known identity ------------------------------------------------------------------------------------------------
+
+static int find_label(const bslam_ekf_t *ekf, int32_t label)
+{
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        if (ekf->beacons[b].label == label) {
+            return b;
+        }
+    }
+    return -1;
+}
+
+static bool label_is_repeated(const bslam_frame_t *frame, int i)
+{
+    for (int j = 0; j < i; j++) {
+        const bslam_sighting_t *earlier = &frame->sightings[j];
+        if (earlier->label == frame->sightings[i].label && earlier->beacon_class != BSLAM_CLASS_NOT_MAPPABLE) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches)
+{
+    for (int i = 0; i < frame->count; i++) {
+        const bslam_sighting_t *sighting = &frame->sightings[i];
+        bslam_match_t *match = &matches[i];
+        if (!is_mappable(sighting, match)) {
+            continue;
+        }
+        if (sighting->label == BSLAM_LABEL_NONE) {
+            match->reason = BSLAM_REASON_NO_IDENTITY;
+        } else if (label_is_repeated(frame, i)) {
+            match->reason = BSLAM_REASON_DUPLICATE;
+        } else {
+            match->beacon = find_label(frame->ekf, sighting->label);
+            match->verdict = match->beacon >= 0 ? BSLAM_VERDICT_MATCH : BSLAM_VERDICT_NEW;
+        }
+    }
+}
+
+// ---- by distance ---------------------------------------------------------------------------------------------------
+
+/// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
+static void associate_by_distance(const bslam_frame_t *frame, distance2_fn distance2, bslam_real_t match2,
+                                  bslam_real_t new2, bslam_match_t *matches)
+{
+    for (int i = 0; i < frame->count; i++) {
+        const bslam_sighting_t *sighting = &frame->sightings[i];
+        bslam_match_t *match = &matches[i];
+        if (!is_mappable(sighting, match)) {
+            continue;
+        }
+        for (int b = 0; b < frame->ekf->beacon_count; b++) {
+            if (classes_differ(sighting, &frame->ekf->beacons[b])) {
+                continue;
+            }
+            const bslam_real_t d2 = distance2(frame, sighting, b);
+            if (d2 >= 0 && (match->beacon < 0 || d2 < match->distance2)) {
+                match->beacon = b;
+                match->distance2 = d2;
+            }
+        }
+        if (match->beacon >= 0 && match->distance2 <= match2) {
+            match->verdict = BSLAM_VERDICT_MATCH;
+        } else if (match->beacon < 0 || match->distance2 > new2) {
+            match->verdict = BSLAM_VERDICT_NEW;
+            match->beacon = -1;
+        } else {
+            match->reason = BSLAM_REASON_AMBIGUOUS;
+            match->beacon = -1;
+        }
+    }
+    keep_one_to_one(frame, matches);
+}
+
+/// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
+static bslam_real_t euclidean2(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
+    bslam_real_t x;
+    bslam_real_t y;
+    bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
+    if (sighting->has_range) {
+        const bslam_sighted_point_t seen =
+            bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
+        const bslam_real_t limit = frame->params->nearest_threshold_m;
+        const bslam_real_t dx = (seen.x_m - x) / limit;
+        const bslam_real_t dy = (seen.y_m - y) / limit;
+        return dx * dx + dy * dy;
+    }
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);
+    const bslam_real_t direction = bslam_atan2(y - sensor.pose.y_m, x - sensor.pose.x_m);
+    const bslam_real_t difference =
+        bslam_angle_wrap(direction - sensor.pose.theta_rad - bslam_angle_wrap(sighting->bearing_rad)) /
+        frame->params->nearest_threshold_rad;
+    return difference * difference;
+}
+
+static bslam_real_t mahalanobis2(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+{
+    bslam_innovation_t innovation;
+    bslam_real_t d2;
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) != BSLAM_OK ||
+        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
+        return -1;
+    }
+    return d2;
+}
+
+void bslam_associate_nearest(const bslam_frame_t *frame, bslam_match_t *matches)
+{
+    associate_by_distance(frame, euclidean2, 1, 1, matches);
+}
+
+void bslam_associate_mahalanobis(const bslam_frame_t *frame, bslam_match_t *matches)
+{
+    associate_by_distance(frame, mahalanobis2, frame->params->match_d2, frame->params->new_d2, matches);
+}
+
+bslam_associate_fn bslam_associate_method(const bslam_params_t *params)
+{
+    static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
+                                                 bslam_associate_mahalanobis};
+    return methods[params->association];
+}

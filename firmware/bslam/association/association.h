@@ -1,0 +1,61 @@
+/// Data association: which beacon does each sighting of a frame show? One signature for every method, so that they plug
+/// into the same place. MATH "Association".
+#ifndef BSLAM_ASSOCIATION_ASSOCIATION_H
+#define BSLAM_ASSOCIATION_ASSOCIATION_H
+
+#include "bslam/ekf/ekf.h"
+
+/// Why a sighting was not used.
+typedef enum bslam_reason {
+    BSLAM_REASON_NONE = 0,
+    BSLAM_REASON_CLASS,        ///< its class is BSLAM_CLASS_NOT_MAPPABLE
+    BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
+    BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
+    BSLAM_REASON_AMBIGUOUS,    ///< neither near enough to a beacon to match nor far enough to be new
+    BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
+    BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
+    BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
+    BSLAM_REASON_COUNT
+} bslam_reason_t;
+
+/// What a method decides.
+typedef enum bslam_verdict {
+    BSLAM_VERDICT_REJECT = 0,
+    BSLAM_VERDICT_MATCH,
+    BSLAM_VERDICT_NEW,
+    BSLAM_VERDICT_DEFER  ///< undecided: used for nothing
+} bslam_verdict_t;
+
+typedef struct bslam_match {
+    bslam_verdict_t verdict;
+    bslam_reason_t reason;
+    int32_t beacon;          ///< index into the map for a match, else -1
+    bslam_real_t distance2;  ///< to the nearest beacon in the method's own measure; negative: not computed
+} bslam_match_t;
+
+/// All a method may look at.
+typedef struct bslam_frame {
+    const bslam_ekf_t *ekf;
+    const bslam_params_t *params;
+    const bslam_pose_t *mount;  ///< the sensor relative to the robot's present pose
+    const bslam_sighting_t *sightings;
+    int count;
+} bslam_frame_t;
+
+/// Decides for every sighting of the frame: matches[0..count). A beacon is matched at most once in a frame.
+typedef void (*bslam_associate_fn)(const bslam_frame_t *frame, bslam_match_t *matches);
+
+/// By label: the detector knows which beacon it is. O(count * beacons).
+void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches);
+
+/// The paper's baseline (Bailey's flowchart): far from any found feature is new, else it is the nearest one. Measured in
+/// the map, or as an angle where there is no distance. O(count * beacons).
+void bslam_associate_nearest(const bslam_frame_t *frame, bslam_match_t *matches);
+
+/// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
+void bslam_associate_mahalanobis(const bslam_frame_t *frame, bslam_match_t *matches);
+
+/// The method that params->association names.
+bslam_associate_fn bslam_associate_method(const bslam_params_t *params);
+
+#endif

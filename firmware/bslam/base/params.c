@@ -1,0 +1,100 @@
+#include "bslam/base/params.h"
+
+#include <stddef.h>
+
+#define INFO_REAL(name, value, low, high, meaning) {#name, meaning, BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), false},
+#define INFO_INTEGER(name, value, low, high, meaning) \
+    {#name, meaning, (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
+static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)};
+
+#define OFFSET(name, value, low, high, meaning) offsetof(bslam_params_t, name),
+static const size_t offsets[] = {BSLAM_PARAMS(OFFSET, OFFSET)};
+
+#define PARAMS_COUNT ((int)(sizeof infos / sizeof infos[0]))
+
+int bslam_params_count(void)
+{
+    return PARAMS_COUNT;
+}
+
+const bslam_param_info_t *bslam_params_info(int id)
+{
+    return id >= 0 && id < PARAMS_COUNT ? &infos[id] : NULL;
+}
+
+void bslam_params_default(bslam_params_t *params)
+{
+#define DEFAULT_REAL(name, value, low, high, meaning) params->name = BSLAM_R(value);
+#define DEFAULT_INTEGER(name, value, low, high, meaning) params->name = (value);
+    BSLAM_PARAMS(DEFAULT_REAL, DEFAULT_INTEGER)
+}
+
+/// The field at a table line, as bytes of the struct.
+static const void *field(const bslam_params_t *params, int id)
+{
+    return (const unsigned char *)params + offsets[id];
+}
+
+bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
+{
+    if (id < 0 || id >= PARAMS_COUNT) {
+        return 0;
+    }
+    if (infos[id].is_integer) {
+        return (bslam_real_t) * (const int32_t *)field(params, id);
+    }
+    return *(const bslam_real_t *)field(params, id);
+}
+
+bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value)
+{
+    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, infos[id].low, infos[id].high)) {
+        return BSLAM_E_PARAMETER;
+    }
+    void *target = (unsigned char *)params + offsets[id];
+    if (!infos[id].is_integer) {
+        *(bslam_real_t *)target = value;
+        return BSLAM_OK;
+    }
+    const int32_t whole = (int32_t)value;
+    if ((bslam_real_t)whole != value) {
+        return BSLAM_E_PARAMETER;
+    }
+    *(int32_t *)target = whole;
+    return BSLAM_OK;
+}
+
+/// The table line of a field.
+static int id_at(size_t offset)
+{
+    int id = 0;
+    while (offsets[id] != offset) {
+        id++;
+    }
+    return id;
+}
+
+bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)
+{
+    for (int id = 0; id < PARAMS_COUNT; id++) {
+        if (!bslam_in_range(bslam_params_get(params, id), infos[id].low, infos[id].high)) {
+            *bad_id = id;
+            return BSLAM_E_PARAMETER;
+        }
+    }
+    if (params->velocity_states != 0) {
+        if (params->scale_states != 0) {
+            *bad_id = id_at(offsetof(bslam_params_t, scale_states));
+            return BSLAM_E_PARAMETER;
+        }
+        if (!(params->left_speed_sd_mps > 0)) {
+            *bad_id = id_at(offsetof(bslam_params_t, left_speed_sd_mps));
+            return BSLAM_E_PARAMETER;
+        }
+        if (!(params->right_speed_sd_mps > 0)) {
+            *bad_id = id_at(offsetof(bslam_params_t, right_speed_sd_mps));
+            return BSLAM_E_PARAMETER;
+        }
+    }
+    return BSLAM_OK;
+}

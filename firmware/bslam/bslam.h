@@ -1,0 +1,13 @@
+/// bslam: simultaneous localisation and mapping with beacons, in fixed memory.
+///
+/// Includes the whole library. Start at slam/slam.h. Sizes: base/config.h. Parameters: base/params.h.
+#ifndef BSLAM_H
+#define BSLAM_H
+
+#define BSLAM_VERSION_MAJOR 0
+#define BSLAM_VERSION_MINOR 1
+#define BSLAM_VERSION_PATCH 0
+
+#include "bslam/slam/slam.h"
+
+#endif

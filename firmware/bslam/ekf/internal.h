@@ -1,0 +1,16 @@
+/// What the files of the filter share. Not for users.
+#ifndef BSLAM_EKF_INTERNAL_H
+#define BSLAM_EKF_INTERNAL_H
+
+#include "bslam/ekf/ekf.h"
+
+/// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
+void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
+
+/// row · vector.
+bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);
+
+/// Fuses one scalar measurement whose innovation, at the mean before the frame, and variance are given.
+void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation, bslam_real_t variance);
+
+#endif

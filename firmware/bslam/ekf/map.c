@@ -1,0 +1,279 @@
+// The map: beacons come into the state, leave it, and turn from rays into points. MATH "Augment", "Direction only".
+#include <string.h>
+
+#include "bslam/ekf/ekf.h"
+#include "bslam/math/trig.h"
+#include "bslam/model/noise.h"
+
+static const bslam_real_t FAR_INVERSE_PER_M = BSLAM_R(1e-3);
+
+void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
+{
+    *ekf = (bslam_ekf_t){0};
+    ekf->dim = 3;
+    if (params->velocity_states != 0) {
+        ekf->dim = 5;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] =
+            params->velocity_sd_mps * params->velocity_sd_mps;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] =
+            params->turn_rate_sd_radps * params->turn_rate_sd_radps;
+    } else if (params->scale_states != 0) {
+        ekf->dim = 5;
+        const bslam_real_t variance = params->scale_sd * params->scale_sd;
+        ekf->mean[BSLAM_STATE_FORWARD] = params->forward_scale;
+        ekf->mean[BSLAM_STATE_TURN] = params->turn_scale;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] = variance;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] = variance;
+    }
+    ekf->base_dim = ekf->dim;
+}
+
+// ---- growing -------------------------------------------------------------------------------------------------------
+
+/// A new state value that depends on the robot's pose, and through `own_var` on the sighting: writes its row of P.
+static void append_value(bslam_ekf_t *ekf, bslam_real_t value, const bslam_real_t by_pose[3], bslam_real_t own_var)
+{
+    const int at = ekf->dim;
+    bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
+    memset(row, 0, (size_t)BSLAM_SYMMAT_PADDED(at + 1) * sizeof *row);
+    for (int k = 0; k < 3; k++) {
+        if (by_pose[k] != 0) {
+            bslam_symmat_add_column(ekf->covariance, at, k, by_pose[k], row);
+        }
+    }
+    row[at] = by_pose[0] * row[0] + by_pose[1] * row[1] + by_pose[2] * row[2] + own_var;
+    ekf->mean[at] = value;
+    ekf->dim = at + 1;
+}
+
+static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                         const bslam_sighting_t *sighting)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_sighted_point_t point = bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
+    const bslam_real_t range_var = bslam_range_variance_m2(params, sighting->range_m);
+    const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, true);
+    const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
+    const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
+    const int at = ekf->dim;
+    append_value(ekf, point.x_m, x_by_pose,
+                 point.x_by_range * point.x_by_range * range_var + point.x_by_bearing * point.x_by_bearing * bearing_var);
+    append_value(ekf, point.y_m, y_by_pose,
+                 point.y_by_range * point.y_by_range * range_var + point.y_by_bearing * point.y_by_bearing * bearing_var);
+    ekf->covariance[bslam_symmat_at(at + 1, at)] +=
+        point.x_by_range * point.y_by_range * range_var + point.x_by_bearing * point.y_by_bearing * bearing_var;
+}
+
+static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                       const bslam_sighting_t *sighting)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
+    const bslam_real_t x_by_pose[3] = {1, 0, sensor.x_by_theta};
+    const bslam_real_t y_by_pose[3] = {0, 1, sensor.y_by_theta};
+    const bslam_real_t direction_by_pose[3] = {0, 0, 1};
+    const bslam_real_t distance_by_pose[3] = {0, 0, 0};
+    const bslam_real_t sd = params->ray_inverse_distance_sd_per_m;
+    append_value(ekf, sensor.pose.x_m, x_by_pose, 0);
+    append_value(ekf, sensor.pose.y_m, y_by_pose, 0);
+    append_value(ekf, bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad), direction_by_pose,
+                 bslam_bearing_variance_rad2(params, false));
+    append_value(ekf, params->ray_inverse_distance_per_m, distance_by_pose, sd * sd);
+}
+
+/// The next free place, filled with a beacon of this kind whose state values begin at the end of the state.
+static int append_beacon(bslam_ekf_t *ekf, bslam_beacon_kind_t kind)
+{
+    const int index = ekf->beacon_count;
+    ekf->beacons[index] = (bslam_beacon_t){
+        .uid = ekf->next_uid, .label = BSLAM_LABEL_NONE, .kind = kind, .at = kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim};
+    ekf->next_uid++;
+    ekf->beacon_count++;
+    return index;
+}
+
+bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                             const bslam_sighting_t *sighting, int *index)
+{
+    const bool ray = !sighting->has_range;
+    if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && ekf->ray_count == BSLAM_RAYS_MAX)) {
+        return BSLAM_E_MAP_FULL;
+    }
+    *index = append_beacon(ekf, ray ? BSLAM_BEACON_RAY : BSLAM_BEACON_POINT);
+    if (ray) {
+        append_ray(ekf, params, mount, sighting);
+        ekf->ray_count++;
+    } else {
+        append_point(ekf, params, mount, sighting);
+    }
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m, int *index)
+{
+    if (ekf->beacon_count == BSLAM_BEACONS_MAX) {
+        return BSLAM_E_MAP_FULL;
+    }
+    *index = append_beacon(ekf, BSLAM_BEACON_KNOWN);
+    ekf->beacons[*index].known_x_m = x_m;
+    ekf->beacons[*index].known_y_m = y_m;
+    ekf->beacons[*index].confirmed = true;
+    return BSLAM_OK;
+}
+
+// ---- shrinking -----------------------------------------------------------------------------------------------------
+
+/// Takes `count` state values out; beacons behind them move up.
+static void remove_values(bslam_ekf_t *ekf, int first, int count)
+{
+    bslam_symmat_remove(ekf->covariance, ekf->dim, first, count);
+    memmove(&ekf->mean[first], &ekf->mean[first + count], (size_t)(ekf->dim - first - count) * sizeof ekf->mean[0]);
+    ekf->dim -= count;
+    memset(&ekf->mean[ekf->dim], 0, (size_t)count * sizeof ekf->mean[0]);
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        if (ekf->beacons[b].at > first) {
+            ekf->beacons[b].at -= count;
+        }
+    }
+}
+
+void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    if (beacon->kind == BSLAM_BEACON_RAY) {
+        ekf->ray_count--;
+        remove_values(ekf, beacon->at, BSLAM_RAY_DIM);
+    } else if (beacon->kind == BSLAM_BEACON_POINT) {
+        remove_values(ekf, beacon->at, BSLAM_POINT_DIM);
+    }
+    ekf->beacon_count--;
+    memmove(&ekf->beacons[index], &ekf->beacons[index + 1],
+            (size_t)(ekf->beacon_count - index) * sizeof ekf->beacons[0]);
+}
+
+// ---- rays ----------------------------------------------------------------------------------------------------------
+
+/// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the sensor.
+static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount, int at)
+{
+    const bslam_real_t *ray = &ekf->mean[at];
+    const bslam_real_t inverse = ray[3];
+    const bslam_real_t variance = bslam_symmat_get(ekf->covariance, at + 3, at + 3);
+    if (!(inverse > FAR_INVERSE_PER_M) || !(variance > 0)) {
+        return false;
+    }
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
+    const bslam_ray_point_t point = bslam_ray_to_point(ray);
+    const bslam_real_t dx = point.x_m - sensor.pose.x_m;
+    const bslam_real_t dy = point.y_m - sensor.pose.y_m;
+    const bslam_real_t square = dx * dx + dy * dy;
+    const bslam_real_t along = bslam_abs((point.x_m - ray[0]) * dx + (point.y_m - ray[1]) * dy) * inverse;
+    const bslam_real_t distance_sd = bslam_sqrt(variance) / (inverse * inverse);
+    return 4 * distance_sd * along < params->ray_linear_limit * square;
+}
+
+bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount, int index)
+{
+    bslam_beacon_t *beacon = &ekf->beacons[index];
+    const int at = beacon->at;
+    if (beacon->kind != BSLAM_BEACON_RAY || !ray_is_linear(ekf, params, mount, at)) {
+        return false;
+    }
+    const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
+    bslam_real_t *x_row = ekf->shift;
+    bslam_real_t *y_row = ekf->mirror;
+    memset(ekf->shift, 0, sizeof ekf->shift);
+    memset(ekf->mirror, 0, sizeof ekf->mirror);
+    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
+        bslam_symmat_add_column(ekf->covariance, ekf->dim, at + k, point.x_by_ray[k], x_row);
+        bslam_symmat_add_column(ekf->covariance, ekf->dim, at + k, point.y_by_ray[k], y_row);
+    }
+    bslam_sym2_t own = {0, 0, 0};
+    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
+        own.xx += point.x_by_ray[k] * x_row[at + k];
+        own.xy += point.y_by_ray[k] * x_row[at + k];
+        own.yy += point.y_by_ray[k] * y_row[at + k];
+    }
+    for (int i = 0; i < ekf->dim; i++) {
+        bslam_symmat_set(ekf->covariance, i, at, x_row[i]);
+        bslam_symmat_set(ekf->covariance, i, at + 1, y_row[i]);
+    }
+    bslam_symmat_set(ekf->covariance, at, at, own.xx);
+    bslam_symmat_set(ekf->covariance, at + 1, at, own.xy);
+    bslam_symmat_set(ekf->covariance, at + 1, at + 1, own.yy);
+    ekf->mean[at] = point.x_m;
+    ekf->mean[at + 1] = point.y_m;
+    remove_values(ekf, at + 2, BSLAM_RAY_DIM - BSLAM_POINT_DIM);
+    beacon->kind = BSLAM_BEACON_POINT;
+    ekf->ray_count--;
+    return true;
+}
+
+// ---- queries -------------------------------------------------------------------------------------------------------
+
+bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
+{
+    const bslam_pose_t pose = {ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y], ekf->mean[BSLAM_STATE_THETA]};
+    return pose;
+}
+
+/// A ray's values with an inverse distance that has a point.
+static bslam_ray_point_t ray_point(const bslam_ekf_t *ekf, int at)
+{
+    const bslam_real_t inverse = ekf->mean[at + 3];
+    const bslam_real_t ray[BSLAM_RAY_DIM] = {ekf->mean[at], ekf->mean[at + 1], ekf->mean[at + 2],
+                                             inverse > FAR_INVERSE_PER_M ? inverse : FAR_INVERSE_PER_M};
+    return bslam_ray_to_point(ray);
+}
+
+void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *x_m, bslam_real_t *y_m)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    if (beacon->kind == BSLAM_BEACON_KNOWN) {
+        *x_m = beacon->known_x_m;
+        *y_m = beacon->known_y_m;
+    } else if (beacon->kind == BSLAM_BEACON_RAY) {
+        const bslam_ray_point_t point = ray_point(ekf, beacon->at);
+        *x_m = point.x_m;
+        *y_m = point.y_m;
+    } else {
+        *x_m = ekf->mean[beacon->at];
+        *y_m = ekf->mean[beacon->at + 1];
+    }
+}
+
+bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const int at = beacon->at;
+    bslam_sym2_t result = {0, 0, 0};
+    if (beacon->kind == BSLAM_BEACON_POINT) {
+        result.xx = bslam_symmat_get(ekf->covariance, at, at);
+        result.xy = bslam_symmat_get(ekf->covariance, at + 1, at);
+        result.yy = bslam_symmat_get(ekf->covariance, at + 1, at + 1);
+    } else if (beacon->kind == BSLAM_BEACON_RAY) {
+        const bslam_ray_point_t point = ray_point(ekf, at);
+        for (int i = 0; i < BSLAM_RAY_DIM; i++) {
+            for (int j = 0; j < BSLAM_RAY_DIM; j++) {
+                const bslam_real_t p = bslam_symmat_get(ekf->covariance, at + i, at + j);
+                result.xx += point.x_by_ray[i] * p * point.x_by_ray[j];
+                result.xy += point.x_by_ray[i] * p * point.y_by_ray[j];
+                result.yy += point.y_by_ray[i] * p * point.y_by_ray[j];
+            }
+        }
+    }
+    return result;
+}
+
+bool bslam_ekf_is_sane(const bslam_ekf_t *ekf)
+{
+    for (int i = 0; i < ekf->dim; i++) {
+        const bslam_real_t variance = bslam_symmat_get(ekf->covariance, i, i);
+        // Exactly zero is the pose before the first motion, and a ray's anchor taken from it.
+        if (!bslam_is_number(ekf->mean[i]) || !bslam_in_range(variance, 0, BSLAM_R(1e30))) {
+            return false;
+        }
+    }
+    return true;
+}

@@ -1,0 +1,299 @@
+// Sightings: innovation, gain, down-date, and the end of a frame. MATH "Update".
+#include <string.h>
+
+#include "bslam/ekf/ekf.h"
+#include "bslam/ekf/internal.h"
+#include "bslam/math/trig.h"
+#include "bslam/model/noise.h"
+#include "bslam/model/pose.h"
+
+// ---- rows of H -----------------------------------------------------------------------------------------------------
+
+bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
+{
+    bslam_real_t sum = 0;
+    for (int k = 0; k < row->count; k++) {
+        sum += row->value[k] * vector[row->index[k]];
+    }
+    return sum;
+}
+
+void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+{
+    memset(out, 0, BSLAM_STATE_PADDED * sizeof *out);
+    for (int k = 0; k < row->count; k++) {
+        bslam_symmat_add_column(ekf->covariance, ekf->dim, row->index[k], row->value[k], out);
+    }
+    for (int p = 0; p < ekf->pending_count; p++) {
+        const bslam_real_t *column = ekf->pending[p];
+        const bslam_real_t factor = ekf->pending_scale[p] * bslam_ekf_dot(row, column);
+        for (int i = 0; i < ekf->dim; i++) {
+            out[i] += factor * column[i];
+        }
+    }
+}
+
+static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3], const bslam_real_t *by_beacon,
+                     bslam_row_t *row)
+{
+    const int beacon_dim = beacon->kind == BSLAM_BEACON_RAY     ? BSLAM_RAY_DIM
+                           : beacon->kind == BSLAM_BEACON_POINT ? BSLAM_POINT_DIM
+                                                                : 0;
+    for (int k = 0; k < 3; k++) {
+        row->index[k] = k;
+        row->value[k] = by_pose[k];
+    }
+    for (int k = 0; k < beacon_dim; k++) {
+        row->index[3 + k] = beacon->at + k;
+        row->value[3 + k] = by_beacon[k];
+    }
+    row->count = 3 + beacon_dim;
+}
+
+// ---- innovation ----------------------------------------------------------------------------------------------------
+
+static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
+                              bslam_observation_t *seen)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_real_t *state = &ekf->mean[beacon->at];
+    switch (beacon->kind) {
+    case BSLAM_BEACON_RAY:
+        return bslam_observe_ray(&pose, mount, state, seen);
+    case BSLAM_BEACON_KNOWN:
+        return bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+    case BSLAM_BEACON_POINT:
+    default:
+        return bslam_observe_point(&pose, mount, state[0], state[1], seen);
+    }
+}
+
+bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                                    const bslam_sighting_t *sighting, int index, bslam_innovation_t *innovation)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    bslam_observation_t seen;
+    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    if (sighting->has_range && !(seen.range_m > 0)) {
+        return BSLAM_E_SINGULAR;
+    }
+    innovation->has_range = sighting->has_range;
+    innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
+    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
+    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    if (sighting->has_range) {
+        innovation->range_m = sighting->range_m - seen.range_m;
+        innovation->range_var_m2 = bslam_range_variance_m2(params, seen.range_m);
+        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+    }
+    return BSLAM_OK;
+}
+
+/// a P bᵀ for two rows of one sighting, which have the same places.
+static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
+{
+    bslam_real_t sum = 0;
+    for (int i = 0; i < a->count; i++) {
+        bslam_real_t inner = 0;
+        for (int j = 0; j < b->count; j++) {
+            inner += bslam_symmat_get(ekf->covariance, a->index[i], b->index[j]) * b->value[j];
+        }
+        sum += a->value[i] * inner;
+    }
+    return sum;
+}
+
+bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
+                                   bslam_real_t *distance2)
+{
+    bslam_sym2_t s = {.xx = 1, .xy = 0, .yy = 0};
+    s.yy = quadratic(ekf, &innovation->bearing_row, &innovation->bearing_row) + innovation->bearing_var_rad2;
+    if (!innovation->has_range) {
+        return bslam_sym2_mahalanobis(&s, 0, innovation->bearing_rad, distance2);
+    }
+    s.xx = quadratic(ekf, &innovation->range_row, &innovation->range_row) + innovation->range_var_m2;
+    s.xy = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
+    return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
+}
+
+// ---- gain and down-date --------------------------------------------------------------------------------------------
+
+/// The waiting down-dates as terms of one pass; places without one add nothing.
+static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t terms[BSLAM_PENDING_MAX])
+{
+    for (int p = 0; p < BSLAM_PENDING_MAX; p++) {
+        const bool waits = p < ekf->pending_count;
+        terms[p].row_factors = ekf->pending[waits ? p : 0];
+        terms[p].columns = ekf->pending[waits ? p : 0];
+        terms[p].scale = waits ? ekf->pending_scale[p] : 0;
+    }
+}
+
+/// Brings the stored covariance up to date: one pass over the triangle for all that waits.
+static void flush(bslam_ekf_t *ekf)
+{
+    if (ekf->pending_count > 0) {
+        bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
+        fill_terms(ekf, terms);
+        bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
+        ekf->pending_count = 0;
+    }
+}
+
+/// Takes the column P hᵀ, which stands in the next free pending slot, into the correction and the pending down-dates.
+static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s)
+{
+    const bslam_real_t *column = ekf->pending[ekf->pending_count];
+    const bslam_real_t step = innovation / s;
+    for (int i = 0; i < ekf->dim; i++) {
+        ekf->correction[i] += column[i] * step;
+    }
+    ekf->pending_scale[ekf->pending_count] = -1 / s;
+    ekf->pending_count++;
+    ekf->has_correction = true;
+}
+
+void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation, bslam_real_t variance)
+{
+    if (ekf->pending_count == BSLAM_PENDING_MAX) {
+        flush(ekf);
+    }
+    bslam_real_t *column = ekf->pending[ekf->pending_count];
+    bslam_ekf_project(ekf, row, column);
+    const bslam_real_t left = innovation - bslam_ekf_dot(row, ekf->correction);
+    accept_column(ekf, left, bslam_ekf_dot(row, column) + variance);
+}
+
+/// Gate and Huber's rule. The weight divides the measurement's variances.
+static bslam_status_t judge(const bslam_params_t *params, bslam_fusion_t *fusion)
+{
+    if (params->gate_d2 > 0 && !(fusion->distance2 <= params->gate_d2)) {
+        fusion->weight = 0;
+        return BSLAM_E_RANGE;
+    }
+    const bslam_real_t limit = params->huber_d;
+    fusion->weight = limit > 0 && fusion->distance2 > limit * limit ? limit / bslam_sqrt(fusion->distance2) : 1;
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_innovation_t *innovation,
+                              bslam_fusion_t *fusion)
+{
+    if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
+        flush(ekf);
+    }
+    const bslam_row_t *bearing_row = &innovation->bearing_row;
+    bslam_real_t *bearing_column = ekf->pending[ekf->pending_count];
+    bslam_real_t *range_column = ekf->pending[ekf->pending_count + 1];
+    bslam_sym2_t hph = {0, 0, 0};
+    bslam_real_t range_left = 0;
+    const bslam_real_t bearing_left = innovation->bearing_rad - bslam_ekf_dot(bearing_row, ekf->correction);
+    bslam_ekf_project(ekf, bearing_row, bearing_column);
+    hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
+    if (innovation->has_range) {
+        bslam_ekf_project(ekf, &innovation->range_row, range_column);
+        range_left = innovation->range_m - bslam_ekf_dot(&innovation->range_row, ekf->correction);
+        hph.xx = bslam_ekf_dot(&innovation->range_row, range_column);
+        hph.xy = bslam_ekf_dot(&innovation->range_row, bearing_column);
+    }
+    const bslam_sym2_t s = {.xx = innovation->has_range ? hph.xx + innovation->range_var_m2 : 1,
+                            .xy = hph.xy,
+                            .yy = hph.yy + innovation->bearing_var_rad2};
+    bslam_status_t status = bslam_sym2_mahalanobis(&s, range_left, bearing_left, &fusion->distance2);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    status = judge(params, fusion);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    const bslam_real_t bearing_s = hph.yy + innovation->bearing_var_rad2 / fusion->weight;
+    accept_column(ekf, bearing_left, bearing_s);
+    if (innovation->has_range) {
+        // The range's column and innovation, given the bearing.
+        const bslam_real_t share = hph.xy / bearing_s;
+        for (int i = 0; i < ekf->dim; i++) {
+            range_column[i] -= share * bearing_column[i];
+        }
+        accept_column(ekf, range_left - share * bearing_left,
+                      hph.xx - share * hph.xy + innovation->range_var_m2 / fusion->weight);
+    }
+    return BSLAM_OK;
+}
+
+// ---- end of a frame ------------------------------------------------------------------------------------------------
+
+/// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the transport.
+static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
+{
+    bslam_real_t dx = ekf->correction[at];
+    bslam_real_t dy = ekf->correction[at + 1];
+    bslam_pose_exp_translation(turn_rad, &dx, &dy);
+    ekf->mean[at] += dx;
+    ekf->mean[at + 1] += dy;
+    ekf->shift[at] = -dy;
+    ekf->shift[at + 1] = dx;
+}
+
+/// mean <- exp(correction) mean, whose translation is V(turn) correction; with turn = 0, mean + correction.
+static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
+{
+    memset(ekf->shift, 0, sizeof ekf->shift);
+    move_position(ekf, BSLAM_STATE_X, turn_rad);
+    ekf->mean[BSLAM_STATE_THETA] =
+        bslam_angle_wrap(ekf->mean[BSLAM_STATE_THETA] + ekf->correction[BSLAM_STATE_THETA]);
+    for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
+        ekf->mean[i] += ekf->correction[i];
+    }
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        const bslam_beacon_t *beacon = &ekf->beacons[b];
+        const int at = beacon->at;
+        if (beacon->kind != BSLAM_BEACON_KNOWN) {
+            move_position(ekf, at, turn_rad);
+        }
+        if (beacon->kind == BSLAM_BEACON_RAY) {
+            ekf->mean[at + 2] = bslam_angle_wrap(ekf->mean[at + 2] + ekf->correction[at + 2]);
+            ekf->mean[at + 3] += ekf->correction[at + 3];
+        }
+    }
+}
+
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need anyway:
+/// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
+static void transport_covariance(bslam_ekf_t *ekf)
+{
+    const bslam_row_t theta_row = {.count = 1, .index = {BSLAM_STATE_THETA}, .value = {1}};
+    bslam_ekf_project(ekf, &theta_row, ekf->mirror);
+    const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
+    for (int i = 0; i < ekf->dim; i++) {
+        ekf->mirror[i] += ekf->shift[i] * half_variance;
+    }
+    if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
+        flush(ekf);
+    }
+    bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
+    fill_terms(ekf, terms);
+    terms[2] = (bslam_symmat_term_t){.row_factors = ekf->shift, .scale = 1, .columns = ekf->mirror};
+    terms[3] = (bslam_symmat_term_t){.row_factors = ekf->mirror, .scale = 1, .columns = ekf->shift};
+    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
+    ekf->pending_count = 0;
+}
+
+void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params)
+{
+    if (!ekf->has_correction) {
+        return;
+    }
+    const bool invariant = params->filter != 0;
+    move_mean(ekf, invariant ? ekf->correction[BSLAM_STATE_THETA] : 0);
+    if (invariant) {
+        transport_covariance(ekf);
+    } else {
+        flush(ekf);
+    }
+    memset(ekf->correction, 0, sizeof ekf->correction);
+    ekf->has_correction = false;
+}
