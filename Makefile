@@ -1,5 +1,6 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
-# live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style).
+# live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style),
+# bench.mk (instruction counts).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -13,10 +14,11 @@ include mk/config.mk
 include mk/unit.mk
 include mk/firmware.mk
 include mk/lint.mk
+include mk/bench.mk
 
 .PHONY: help
 help: ## list the targets
-	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile mk/*.mk | expand -t 20
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile mk/*.mk | expand -t 22
 
 # --- Setting up ---------------------------------------------------------------------------------------------
 
@@ -48,7 +50,7 @@ run: setup-run ## the main job: the paper's room, then a real log where the data
 
 # --- Testing ------------------------------------------------------------------------------------------------
 
-.PHONY: test pytest proof bench
+.PHONY: test pytest
 test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation, pytest
 	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit firmware pytest \
 	    || { echo "make test: FAILED, see above" >&2; exit 1; }

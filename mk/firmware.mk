@@ -35,6 +35,10 @@ $(TARGET_OBJECTS): $(TARGET_DIR)/%.o: %.c mk/config.mk mk/firmware.mk
 
 -include $(TARGET_OBJECTS:.o=.d)
 
+.PHONY: firmware-all
+firmware-all: ## the same for every TARGET
+	@set -e; for target in $(sort $(TARGETS)); do $(MAKE) --silent firmware TARGET=$$target; done
+
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons
 	@$(PYTHON) tools/sizes.py --beacons 6 20 50 \

@@ -47,7 +47,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "view": LOG,
 }
 # The command line ties the parts together and may import them all.
-PYTHON_TOP = frozenset({"cli", "__main__", "__init__"})
+PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})
 RAW_LAYERS = frozenset({"core/build.py", "core/raw.py"})
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
