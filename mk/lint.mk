@@ -1,6 +1,7 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
-C_FILES = $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(wildcard tests/unit/*.[ch] tests/unit/*/*.[ch]))
+C_TEST_FILES := $(wildcard tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch])
+C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES))
 PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
 
 LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \

@@ -131,8 +131,8 @@ once() { # STAMP INPUT_FILES -- COMMAND...
 }
 
 make_venv() {
-    # A venv dies with the interpreter it was made from.
-    "$venv/bin/python" -c '' 2>/dev/null && return
+    # A venv dies with the interpreter it was made from, and is of no use if its making was cut short.
+    "$venv/bin/python" -c 'import pip' 2>/dev/null && return
     echo "setup: making $venv with $python"
     "$python" -m venv --clear "$venv" </dev/null || fail "$python could not make $venv"
 }
