@@ -1,0 +1,100 @@
+"""Builds the C library into Python extensions, one a scalar type and size class (cffi, API mode).
+
+The declarations that cffi reads are the real headers, run through the C preprocessor with the C library's own headers
+left empty: there is no second copy to keep. `python -m bslam.core.build` builds all of them beside this file.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from cffi import FFI
+
+from bslam.core.builds import REALS, SIZE_CLASSES, extension_name
+
+CORE_DIR = Path(__file__).resolve().parent
+FIRMWARE_DIR = CORE_DIR.parents[2] / "firmware"
+LIBRARY_DIR = FIRMWARE_DIR / "bslam"
+
+LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limits.h", "float.h")
+
+
+def _macros(real: str, beacons_max: int) -> list[tuple[str, str]]:
+    return [
+        ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
+        ("BSLAM_BEACONS_MAX", str(beacons_max)),
+        ("BSLAM_RAYS_MAX", str(beacons_max)),
+        ("BSLAM_SIGHTINGS_MAX", "64"),
+        ("BSLAM_HISTORY_MAX", "128"),
+    ]
+
+
+def _drop_inline_functions(text: str) -> str:
+    """Takes `static inline` functions out: cffi declares, it does not define."""
+    kept = []
+    at = 0
+    for match in re.finditer(r"static inline[^{;]*\{", text):
+        if match.start() < at:
+            continue
+        kept.append(text[at : match.start()])
+        depth, at = 1, match.end()
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[at], 0)
+            at += 1
+    kept.append(text[at:])
+    return "".join(kept)
+
+
+def declarations(real: str, beacons_max: int) -> str:
+    """The public headers as cffi reads them."""
+    with tempfile.TemporaryDirectory() as empty:
+        for header in LIBC_HEADERS:
+            Path(empty, header).touch()
+        defines = [f"-D{name}={value}" for name, value in _macros(real, beacons_max)]
+        command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
+        command += [*defines, "-D__attribute__(x)=", str(LIBRARY_DIR / "bslam.h")]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return _drop_inline_functions(text)
+
+
+def build(real: str, beacons_max: int) -> Path:
+    """Compiles one extension and puts it beside this file; returns where."""
+    ffi = FFI()
+    ffi.cdef(declarations(real, beacons_max))
+    name = extension_name(real, beacons_max)
+    with tempfile.TemporaryDirectory() as work:
+        ffi.set_source(
+            name,
+            '#include "bslam/bslam.h"',
+            sources=sorted(str(path) for path in LIBRARY_DIR.rglob("*.c")),
+            include_dirs=[str(FIRMWARE_DIR)],
+            define_macros=_macros(real, beacons_max),
+            extra_compile_args=["-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-w"],
+            libraries=["m"],
+        )
+        built = Path(ffi.compile(tmpdir=work, verbose=False))
+        target = CORE_DIR / (name.rsplit(".", 1)[1] + sysconfig.get_config_var("EXT_SUFFIX"))
+        # Replaced by a rename, so that a running process keeps the old file and an interrupted build leaves none.
+        part = target.with_suffix(".part")
+        shutil.copyfile(built, part)
+        part.replace(target)
+    return target
+
+
+def main() -> int:
+    """Builds every extension, as many at a time as there are cores (processes: cffi changes the directory)."""
+    sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
+    with ProcessPoolExecutor() as pool:
+        for path in pool.map(build, reals, sizes):
+            print(f"built {path.name}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,12 @@
+"""Which builds of the C library there are: one a scalar type and size class."""
+
+SIZE_CLASSES = (20, 80)
+"""Beacons that a build holds; `Slam` takes the smallest that suffices."""
+
+REALS = ("float", "double")
+"""Scalar types: float as on the target, double for the twin."""
+
+
+def extension_name(real: str, beacons_max: int) -> str:
+    """The module of one build: `bslam.core._float_20`."""
+    return f"bslam.core._{real}_{beacons_max}"

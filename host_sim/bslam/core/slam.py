@@ -1,0 +1,231 @@
+"""The pipeline of the C library as a class."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.raw import library
+from bslam.errors import BslamError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One run-time parameter of the C library."""
+
+    name: str
+    meaning: str
+    default: float
+    low: float
+    high: float
+    is_integer: bool
+
+
+@dataclass(frozen=True)
+class Account:
+    """What became of a sighting: result "matched", "new", "rejected" or "deferred", and why."""
+
+    result: str
+    reason: str
+    beacon_uid: int | None
+    test_ratio: float | None
+    weight: float
+
+
+@dataclass(frozen=True)
+class Beacon:
+    """A beacon of the map. Position in m in the start pose's frame; covariance (2, 2) in m²; polar from the start."""
+
+    uid: int
+    label: int
+    kind: str
+    confirmed: bool
+    sightings: int
+    x_m: float
+    y_m: float
+    covariance: NDArray[np.float64]
+    range_m: float
+    phi_rad: float
+
+
+
+
+class Slam:
+    """A robot that localises itself and maps beacons: one instance of the C pipeline.
+
+    params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must hold.
+    real: "float", as on the target, or "double", the twin. Raises BslamError for what is no parameter or out of range.
+    """
+
+    def __init__(self, params: Mapping[str, float] | None = None, *, beacons_max: int = 20, real: str = "float") -> None:
+        self._raw = library(real, beacons_max)
+        self._lib, self._ffi = self._raw.lib, self._raw.ffi
+        self._slam = self._ffi.new("bslam_slam_t *")
+        self._reading = self._ffi.new("bslam_odometry_reading_t *")
+        self._pose = self._ffi.new("bslam_pose_t *")
+        self._lower = self._ffi.new("bslam_real_t[6]")
+        self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
+        self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
+        self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
+        self._sources = {
+            "wheels": (self._lib.BSLAM_ODOMETRY_WHEELS, "left_m", "right_m"),
+            "ticks": (self._lib.BSLAM_ODOMETRY_TICKS, "left_ticks", "right_ticks"),
+            "velocity": (self._lib.BSLAM_ODOMETRY_VELOCITY, "v_mps", "omega_radps"),
+        }
+        self._init(params or {})
+
+    def _init(self, params: Mapping[str, float]) -> None:
+        table = {p.name: p for p in self.parameters(self._raw.real)}
+        c_params = self._ffi.new("bslam_params_t *")
+        self._lib.bslam_params_default(c_params)
+        for name, value in params.items():
+            if name not in table:
+                raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(table)}")
+            parameter = table[name]
+            if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
+                kind = "a whole number" if parameter.is_integer else "a number"
+                raise BslamError(
+                    f"parameter {name} = {value}: allowed is {kind} from {parameter.low:g} to {parameter.high:g}"
+                )
+            setattr(c_params, name, int(value) if parameter.is_integer else value)
+        bad_id = self._ffi.new("int *", -1)
+        status = self._lib.bslam_slam_init(self._slam, c_params, bad_id)
+        bad = self._lib.bslam_params_info(bad_id[0])
+        name = self._raw.text(bad.name) if bad else ""
+        self._raw.ensure(status, f"parameter {name} contradicts another (see `bslam params`)")
+
+    @staticmethod
+    def parameters(real: str = "float") -> list[Parameter]:
+        """Every parameter with its meaning, default and range, in the order of the C table."""
+        raw = library(real, 1)
+        found = []
+        for index in range(raw.lib.bslam_params_count()):
+            info = raw.lib.bslam_params_info(index)
+            # Float's 0.1 prints as 0.10000000149; nine digits round-trip float and read as written.
+            initial, low, high = (float(f"{value:.7g}") for value in (info.initial, info.low, info.high))
+            found.append(Parameter(raw.text(info.name), raw.text(info.meaning), initial, low, high, info.is_integer))
+        return found
+
+    @staticmethod
+    def defaults() -> dict[str, float]:
+        """Every parameter's default by name."""
+        return {p.name: int(p.default) if p.is_integer else p.default for p in Slam.parameters()}
+
+    @property
+    def params(self) -> dict[str, float]:
+        """The values in force."""
+        return self._raw.fields(self._slam.params, "bslam_params_t")
+
+    @property
+    def state_bytes(self) -> bytes:
+        """Every byte of the C instance: for tests that a refused input changes nothing."""
+        return bytes(self._ffi.buffer(self._slam))
+
+    def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
+        """One reading: kind "wheels" (a, b = left_m, right_m), "ticks" (counters) or "velocity" (v_mps, omega_radps).
+
+        Raises CoreError if refused: the estimate is then unchanged.
+        """
+        source, name_a, name_b = self._sources[kind]
+        reading = self._reading
+        reading.source = source
+        reading.time_us = time_us
+        setattr(reading, name_a, a)
+        setattr(reading, name_b, b)
+        reading.has_gyro = gyro_radps is not None
+        reading.gyro_radps = gyro_radps or 0.0
+        status = self._lib.bslam_slam_odometry(self._slam, reading)
+        if status:
+            self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")
+
+    def rebase_odometry(self) -> None:
+        """After an encoder reset: the next tick reading is the new reference."""
+        self._lib.bslam_slam_rebase_odometry(self._slam)
+
+    def sightings(
+        self,
+        time_us: int,
+        bearing_rad: Sequence[float],
+        range_m: Sequence[float],
+        label: Sequence[int],
+        mappable: Sequence[bool],
+    ) -> list[Account]:
+        """One image: equal lengths; range NaN: direction only; label -1: no identity. Raises CoreError if refused."""
+        rows = list(zip(bearing_rad, range_m, label, mappable, strict=True))
+        array = self._raw.sightings(rows)
+        status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
+        if status:
+            bad = self._lib.bslam_slam_bad_sighting(self._slam)
+            which = f", sighting {bad} {rows[bad]}" if bad >= 0 else f", {len(rows)} sightings"
+            self._raw.ensure(status, f"frame at {time_us} us{which}")
+        accounts = self._slam.accounts
+        return [self._account(accounts[i]) for i in range(len(rows))]
+
+    def _account(self, account) -> Account:  # type: ignore[no-untyped-def]
+        return Account(
+            self._outcomes[account.outcome],
+            self._reasons[account.reason],
+            account.beacon_uid if account.has_beacon else None,
+            account.test_ratio if account.test_ratio >= 0 else None,
+            account.weight,
+        )
+
+    def pose(self) -> tuple[float, float, float]:
+        """(x_m, y_m, theta_rad) in the start pose's frame."""
+        pose = self._lib.bslam_slam_pose(self._slam)
+        return pose.x_m, pose.y_m, pose.theta_rad
+
+    def pose_at(self, time_us: int) -> tuple[float, float, float]:
+        """The pose at a time within the history. Raises CoreError outside it."""
+        status = self._lib.bslam_slam_pose_at(self._slam, time_us, self._pose)
+        if status:
+            self._raw.ensure(status, f"pose at {time_us} us")
+        return self._pose.x_m, self._pose.y_m, self._pose.theta_rad
+
+    def pose_covariance_lower(self) -> tuple[float, ...]:
+        """xx, yx, yy, tx, ty, tt of the covariance of (x, y, theta) in m², m rad, rad²."""
+        self._lib.bslam_slam_pose_covariance(self._slam, self._lower)
+        return tuple(self._lower)
+
+    def pose_covariance(self) -> NDArray[np.float64]:
+        """(3, 3) covariance of (x, y, theta) in m², m rad, rad²."""
+        xx, yx, yy, tx, ty, tt = self.pose_covariance_lower()
+        return np.array([[xx, yx, tx], [yx, yy, ty], [tx, ty, tt]])
+
+    def beacons(self) -> list[Beacon]:
+        """The map, provisional beacons included, in the order in which they were added."""
+        view = self._ffi.new("bslam_beacon_view_t *")
+        found = []
+        for index in range(self._lib.bslam_slam_beacon_count(self._slam)):
+            self._raw.ensure(self._lib.bslam_slam_beacon(self._slam, index, view), f"beacon {index}")
+            p = view.covariance_m2
+            covariance = np.array([[p.xx, p.xy], [p.xy, p.yy]])
+            found.append(
+                Beacon(
+                    uid=view.uid,
+                    label=view.label,
+                    kind=self._kinds[view.kind],
+                    confirmed=view.confirmed,
+                    sightings=view.sightings,
+                    x_m=view.x_m,
+                    y_m=view.y_m,
+                    covariance=covariance,
+                    range_m=view.range_m,
+                    phi_rad=view.phi_rad,
+                )
+            )
+        return found
+
+    def add_known_beacon(self, label: int, x_m: float, y_m: float) -> None:
+        """A beacon whose position is given and never changes. Raises CoreError."""
+        status = self._lib.bslam_slam_add_known_beacon(self._slam, label, x_m, y_m)
+        self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})")
+
+    def remove_beacon(self, uid: int) -> None:
+        """Takes a beacon out of the map. Raises CoreError if there is none."""
+        self._raw.ensure(self._lib.bslam_slam_remove_beacon(self._slam, uid), f"beacon {uid}")
+
+    def counters(self) -> dict[str, int]:
+        """Never-decreasing counts by the names of bslam_counters_t."""
+        return self._raw.fields(self._slam.counters, "bslam_counters_t")
