@@ -32,10 +32,10 @@ setup-run:
 	@$(MAKE) --silent extension
 
 EXTENSION_STAMP := build/extension.stamp
-EXTENSION_BUILD := $(wildcard host_sim/bslam/core/build.py)
+EXTENSION_BUILD := host_sim/bslam/core/build.py host_sim/bslam/core/builds.py
 
 .PHONY: extension
-extension: $(if $(EXTENSION_BUILD),$(EXTENSION_STAMP))
+extension: $(EXTENSION_STAMP)
 
 $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/run.stamp
 	@echo "setup: building the cffi extensions"
