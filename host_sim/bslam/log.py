@@ -176,6 +176,12 @@ def write_folder(log: Log, path: str | Path) -> None:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
 
 
+def wrap_rad(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same angles in (-pi, pi]; those already there are kept to the last bit."""
+    outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
+    return np.where(outside, math.pi - np.mod(math.pi - angle_rad, 2.0 * math.pi), angle_rad)
+
+
 # --- writing ------------------------------------------------------------------------------------------------
 
 
@@ -255,12 +261,6 @@ def _columns(*names: str) -> dict[str, Column]:
     return {name: _COLUMNS[name] for name in names}
 
 
-def _wrap(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same angles in (-pi, pi]; those already there are kept to the last bit."""
-    outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
-    return np.where(outside, math.pi - np.mod(math.pi - angle_rad, 2.0 * math.pi), angle_rad)
-
-
 def _read_odometry(folder: Path, robot: Robot) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
     table = read_table(_require_csv(folder, "odometry"), layouts)
@@ -293,7 +293,7 @@ def _read_sightings(folder: Path) -> Sightings:
     return Sightings(
         time_us=table.integers("time_us"),
         beacon_id=table.integers("beacon_id"),
-        bearing_rad=_wrap(table.values["bearing_rad"]),
+        bearing_rad=wrap_rad(table.values["bearing_rad"]),
         range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
     )
@@ -306,7 +306,7 @@ def _read_truth(folder: Path) -> Truth | None:
     table = read_table(path, [_columns("time_us", "x_m", "y_m", "theta_rad")])
     table.require_order("time_us", strict=True)
     values = table.values
-    return Truth(table.integers("time_us"), values["x_m"], values["y_m"], _wrap(values["theta_rad"]))
+    return Truth(table.integers("time_us"), values["x_m"], values["y_m"], wrap_rad(values["theta_rad"]))
 
 
 def _read_beacons(folder: Path) -> Beacons | None:

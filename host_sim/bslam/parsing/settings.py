@@ -20,20 +20,24 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Rule:
-    """What a key may hold: its TOML type (`float` takes integers too), a test, and the words for both."""
+    """What a key may hold: its TOML type (`float` takes integers too), a test, and the words for both.
+
+    `make` turns a good value into what the program works with.
+    """
 
     allowed: str
     kind: type
     holds: Callable[[Any], bool] = lambda value: True
+    make: Callable[[Any], Any] = lambda value: value
 
     def convert(self, value: object, where: str) -> Any:
-        """The value as `kind`, or a BslamError that starts with `where` (file and key)."""
+        """The value to work with, or a BslamError that starts with `where` (file and key)."""
         right_type = isinstance(value, (int, float) if self.kind is float else self.kind)
         if isinstance(value, bool) and self.kind is not bool:
             right_type = False
         try:
-            if right_type and self.holds(self.kind(value)):
-                return self.kind(value)
+            if right_type and self.holds(typed := self.kind(value)):
+                return self.make(typed)
         except OverflowError:  # an integer that no double can hold
             pass
         raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}")

@@ -1,0 +1,77 @@
+"""The robot's body: how wheel travel moves it, and how a wall stops it. Metres and radians."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bslam.world.arena import Arena
+
+Pose = tuple[float, float, float]  # x_m, y_m, theta_rad
+
+
+def move_on_arc(pose: Pose, left_m: float, right_m: float, wheelbase_m: float) -> Pose:
+    """The pose after the wheels have rolled so far at constant speeds: exact, a circular arc.
+
+    The chord of an arc of length s that turns by a is s sin(a/2) / (a/2), at half the turn.
+    """
+    x_m, y_m, theta_rad = pose
+    forward_m = 0.5 * (left_m + right_m)
+    half_turn_rad = 0.5 * (right_m - left_m) / wheelbase_m
+    shrink = math.sin(half_turn_rad) / half_turn_rad if half_turn_rad != 0.0 else 1.0
+    chord_m = forward_m * shrink
+    heading_rad = theta_rad + half_turn_rad
+    turned_rad = math.remainder(theta_rad + 2.0 * half_turn_rad, math.tau)
+    return x_m + chord_m * math.cos(heading_rad), y_m + chord_m * math.sin(heading_rad), turned_rad
+
+
+class Feeler:
+    """Asks how near the walls are, without measuring all of them in every step.
+
+    The distance to the nearest wall changes by no more than the way gone, so one measurement is good until
+    that way has eaten it up.
+    """
+
+    def __init__(self, arena: Arena) -> None:
+        self._arena = arena
+        self._measured = (math.inf, 0.0, 0.0)
+        self._x_m = self._y_m = math.nan
+
+    def nearest_within(self, x_m: float, y_m: float, reach_m: float) -> tuple[float, float, float] | None:
+        """Like `Arena.nearest_wall`, or None if every wall is at least `reach_m` away."""
+        at_least_m = self._measured[0] - math.hypot(x_m - self._x_m, y_m - self._y_m)
+        if at_least_m >= reach_m:
+            return None
+        self._measured = self._arena.nearest_wall(x_m, y_m)
+        self._x_m, self._y_m = x_m, y_m
+        return self._measured if self._measured[0] < reach_m else None
+
+
+class Body:
+    """A round body on two wheels in an arena: it goes where the wheels roll, unless a wall is there."""
+
+    def __init__(self, arena: Arena, pose: Pose, radius_m: float, wheelbase_m: float) -> None:
+        self.pose = pose
+        self.feeler = Feeler(arena)
+        self._arena = arena
+        self._radius_m = radius_m
+        self._wheelbase_m = wheelbase_m
+
+    def roll(self, left_m: float, right_m: float) -> bool:
+        """Roll the wheels. False: a wall is in the way, both wheels stall and nothing has moved."""
+        pose = move_on_arc(self.pose, left_m, right_m, self._wheelbase_m)
+        if self._is_blocked(pose):
+            return False
+        self.pose = pose
+        return True
+
+    def _is_blocked(self, pose: Pose) -> bool:
+        x_m, y_m, _ = pose
+        if self.feeler.nearest_within(x_m, y_m, self._radius_m) is not None:
+            return True
+        old_x_m, old_y_m, _ = self.pose
+        if math.hypot(x_m - old_x_m, y_m - old_y_m) < self._radius_m:
+            return False  # too short a step to have jumped a wall, with the body clear of it before and after
+        start, end = np.array([[old_x_m, old_y_m]]), np.array([[x_m, y_m]])
+        return bool(self._arena.path_clearance(start, end)[0] < self._radius_m)

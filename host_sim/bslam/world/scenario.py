@@ -1,0 +1,305 @@
+"""What is simulated: the arena, the robot, how it drives, and how well it senses; read from a TOML file.
+
+Lengths in metres, angles in radians, positions in the arena's own frame. Every error names the file, table and
+key, the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bslam.errors import BslamError
+from bslam.parsing.settings import (
+    ANY,
+    FIELD_OF_VIEW,
+    NOT_NEGATIVE,
+    POSITIVE,
+    POSITIVE_OR_INF,
+    SHARE,
+    Rule,
+    check_keys,
+    integer,
+    load_toml,
+    one_of,
+    parse_table,
+    setting,
+)
+from bslam.world.arena import Arena, Beacon, Point, Wall
+
+NOISES = ("speedometer", "actuation")
+_FOLDER = Path(__file__).resolve().parent.parent / "scenarios"
+
+T = TypeVar("T")
+
+
+def _is_point(value: object) -> bool:
+    if not isinstance(value, list) or len(value) != 2:
+        return False
+    numbers = [one for one in value if isinstance(one, (int, float)) and not isinstance(one, bool)]
+    return len(numbers) == 2 and all(math.isfinite(one) for one in numbers)
+
+
+def _to_point(value: list[Any]) -> Point:
+    return float(value[0]), float(value[1])
+
+
+_POINT = Rule("[x, y], two finite numbers", list, _is_point, _to_point)
+_INTERVAL = Rule(
+    "[low, high], two numbers, low < high", list, lambda v: _is_point(v) and v[0] < v[1], _to_point
+)
+_GAPS = Rule(
+    "[[from, to], ...], stretches along the wall in m, in order, from < to",
+    list,
+    lambda v: all(_is_point(gap) and gap[0] < gap[1] for gap in v),
+    lambda v: tuple(_to_point(gap) for gap in v),
+)
+
+
+@dataclass(frozen=True)
+class Start:
+    x_m: float = setting(ANY)
+    y_m: float = setting(ANY)
+    heading_rad: float = setting(ANY)
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """A round body, its two wheels on one line through the middle."""
+
+    diameter_m: float = setting(POSITIVE)
+    wheelbase_m: float = setting(POSITIVE)
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle that goals are drawn from, a room for instance."""
+
+    x_m: tuple[float, float] = setting(_INTERVAL)
+    y_m: tuple[float, float] = setting(_INTERVAL)
+
+
+@dataclass(frozen=True)
+class Driving:
+    """How the robot goes from goal to goal. Clearances are distances from the robot's middle to a wall.
+
+    Its turning rate is heading_gain_per_s times the heading error plus noise: a Gauss-Markov process of
+    standard deviation turn_noise_radps and correlation time turn_noise_time_s.
+    """
+
+    speed_mps: float = setting(POSITIVE)
+    acceleration_mps2: float = setting(POSITIVE)
+    turn_rate_radps: float = setting(POSITIVE)
+    turn_acceleration_radps2: float = setting(POSITIVE)
+    heading_gain_per_s: float = setting(POSITIVE)
+    turn_noise_radps: float = setting(NOT_NEGATIVE)
+    turn_noise_time_s: float = setting(POSITIVE)
+    goal_clearance_m: float = setting(POSITIVE)
+    path_clearance_m: float = setting(POSITIVE)
+    avoid_clearance_m: float = setting(POSITIVE)  # nearer to a wall than this, the robot steers away from it
+    reach_m: float = setting(POSITIVE)  # so near to a point of the route, the next one is headed for
+    stall_time_s: float = setting(NOT_NEGATIVE)  # how long the robot pushes against a wall before it gives up
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`."""
+
+    sigma_mps: float = setting(NOT_NEGATIVE)
+    noise: str = setting(one_of(*NOISES), "speedometer")
+
+
+@dataclass(frozen=True)
+class Encoders:
+    """Counters of ticks on the two wheels; they roll over at 2^counter_bits."""
+
+    left_radius_m: float = setting(POSITIVE)
+    right_radius_m: float = setting(POSITIVE)
+    ticks_per_revolution: float = setting(POSITIVE)
+    counter_bits: int = setting(integer(8, 32))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What sees beacons. The sd of a range r is sqrt(floor^2 + (fraction r)^2 + (r^2 / scale)^2)."""
+
+    field_of_view_rad: float = setting(FIELD_OF_VIEW)
+    bearing_sigma_rad: float = setting(NOT_NEGATIVE)
+    range_sigma_fraction: float = setting(NOT_NEGATIVE)
+    range_sigma_scale_m: float = setting(POSITIVE_OR_INF)
+    range_sigma_floor_m: float = setting(NOT_NEGATIVE, 0.0)
+    range_max_m: float = setting(POSITIVE_OR_INF, math.inf)
+    x_m: float = setting(ANY, 0.0)  # where it sits on the robot
+    y_m: float = setting(ANY, 0.0)
+    yaw_rad: float = setting(ANY, 0.0)
+    delay_us: int = setting(integer(0), 0)  # the stamp of a sighting is so much later than the sight
+    outlier_share: float = setting(SHARE, 0.0)  # share of sightings with any direction and range
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything but the seed.
+
+    `areas` are visited in turn; without any, goals are drawn from the whole arena. Without `encoders` the
+    odometry is the wheels' travel itself.
+    """
+
+    name: str
+    description: str
+    steps: int
+    step_us: int
+    arena: Arena
+    areas: tuple[Area, ...]
+    start: Start
+    body: BodySettings
+    driving: Driving
+    wheels: Wheels
+    encoders: Encoders | None
+    sensor: Sensor
+
+
+@dataclass(frozen=True)
+class _WallTable:
+    start: tuple[float, float] = setting(_POINT)
+    end: tuple[float, float] = setting(_POINT)
+    doors: tuple[Point, ...] = setting(_GAPS, ())
+
+
+@dataclass(frozen=True)
+class _BeaconTable:
+    id: int = setting(integer(0))
+    at: tuple[float, float] = setting(_POINT)
+
+
+_TOP_RULES = {
+    "description": Rule("text", str),
+    "steps": integer(1, 10_000_000),
+    "step_us": integer(1, 10_000_000),
+}
+_TABLES: dict[str, type] = {
+    "start": Start,
+    "body": BodySettings,
+    "driving": Driving,
+    "wheels": Wheels,
+    "encoders": Encoders,
+    "sensor": Sensor,
+}
+_OPTIONAL = ("encoders", "areas", "beacons")
+_LISTS: dict[str, type] = {"walls": _WallTable, "beacons": _BeaconTable, "areas": Area}
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """A scenario by its name or from a path that ends in .toml; BslamError if it is missing or wrong."""
+    text = str(name_or_path)
+    path = Path(text) if text.endswith(".toml") else _FOLDER / f"{text}.toml"
+    if not path.is_file():
+        allowed = f"{', '.join(scenario_names())}, or a path that ends in .toml"
+        raise BslamError(f"scenario {text!r}: there is no such scenario or file; allowed: {allowed}")
+    return _parse_scenario(load_toml(path), path)
+
+
+def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
+    known = {**_TOP_RULES, **_TABLES, **_LISTS}
+    check_keys(document, known, str(path))
+    for key in known:
+        if key not in document and key not in _OPTIONAL:
+            raise BslamError(f"{path}, key {key}: is missing; allowed: {_allowed(key)}")
+    top: dict[str, Any] = {
+        key: rule.convert(document[key], f"{path}, key {key}") for key, rule in _TOP_RULES.items()
+    }
+    tables: dict[str, Any] = {
+        key: _parse_one(cls, document[key], f"{path}, [{key}]") if key in document else None
+        for key, cls in _TABLES.items()
+    }
+    lists: dict[str, Any] = {
+        key: _parse_list(cls, document.get(key, []), path, key) for key, cls in _LISTS.items()
+    }
+    scenario = Scenario(
+        name=path.stem,
+        arena=Arena(
+            walls=_cut_doors(lists["walls"], path),
+            beacons=tuple(Beacon(one.id, one.at) for one in lists["beacons"]),
+        ),
+        areas=tuple(lists["areas"]),
+        **top,
+        **tables,
+    )
+    _check_together(scenario, path)
+    return scenario
+
+
+def _allowed(key: str) -> str:
+    if key in _TOP_RULES:
+        return _TOP_RULES[key].allowed
+    if key in _TABLES:
+        return f"a table [{key}]"
+    return "a list of tables, at least one"
+
+
+def _parse_one(cls: type[T], table: object, where: str) -> T:
+    if not isinstance(table, Mapping):
+        names = ", ".join(one.name for one in fields(cls))  # type: ignore[arg-type]
+        raise BslamError(f"{where}: {table!r} is not allowed; allowed: a table of {names}")
+    return parse_table(cls, table, where)
+
+
+def _parse_list(cls: type[T], tables: object, path: Path, key: str) -> list[T]:
+    if not isinstance(tables, list) or (key == "walls" and not tables):
+        raise BslamError(f"{path}, key {key}: {tables!r} is not allowed; allowed: {_allowed(key)}")
+    return [_parse_one(cls, table, f"{path}, {key}[{index}]") for index, table in enumerate(tables)]
+
+
+def _cut_doors(tables: list[_WallTable], path: Path) -> tuple[Wall, ...]:
+    """The solid pieces of walls that have doors."""
+    walls: list[Wall] = []
+    for index, table in enumerate(tables):
+        (x0, y0), (x1, y1) = table.start, table.end
+        length_m = math.hypot(x1 - x0, y1 - y0)
+        if not 0.0 < length_m < math.inf:
+            raise BslamError(
+                f"{path}, walls[{index}], key end: {table.end!r} is not allowed; allowed: not the start"
+            )
+        cuts_m = [0.0, *(edge for door in table.doors for edge in door), length_m]
+        if cuts_m != sorted(cuts_m):
+            allowed = f"doors in order, without overlap, within 0 to {length_m:g}"
+            raise BslamError(
+                f"{path}, walls[{index}], key doors: {table.doors!r} is not allowed; allowed: {allowed}"
+            )
+        at = [(x0 + (x1 - x0) * cut_m / length_m, y0 + (y1 - y0) * cut_m / length_m) for cut_m in cuts_m]
+        walls += [Wall(a, b) for a, b in zip(at[::2], at[1::2], strict=True) if a != b]
+    return tuple(walls)
+
+
+def _check_together(scenario: Scenario, path: Path) -> None:
+    """What no value shows by itself."""
+    radius_m = scenario.body.diameter_m / 2.0
+    driving, sensor, start = scenario.driving, scenario.sensor, scenario.start
+
+    def require(good: bool, key: str, value: object, allowed: str) -> None:
+        if not good:
+            raise BslamError(f"{path}, {key}: {value!r} is not allowed; allowed: {allowed}")
+
+    seen: set[int] = set()
+    for index, beacon in enumerate(scenario.arena.beacons):
+        require(
+            beacon.beacon_id not in seen, f"beacons[{index}], key id", beacon.beacon_id, "an id of its own"
+        )
+        seen.add(beacon.beacon_id)
+    to_wall_m = scenario.arena.nearest_wall(start.x_m, start.y_m)[0]
+    place = (start.x_m, start.y_m)
+    require(to_wall_m >= radius_m, "[start], keys x_m, y_m", place, f"a place {radius_m:g} m from every wall")
+    mount = (sensor.x_m, sensor.y_m)
+    require(math.hypot(*mount) <= radius_m, "[sensor], keys x_m, y_m", mount, "a place on the robot's body")
+    path_m, goal_m = driving.path_clearance_m, driving.goal_clearance_m
+    require(
+        path_m > radius_m, "[driving], key path_clearance_m", path_m, f"above the body's radius, {radius_m:g}"
+    )
+    require(goal_m >= path_m, "[driving], key goal_clearance_m", goal_m, f"from path_clearance_m, {path_m:g}")

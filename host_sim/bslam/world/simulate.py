@@ -1,0 +1,132 @@
+"""One drive through a scenario: from a scenario and a seed to a log."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
+from bslam.world.driving import Drive, drive
+from bslam.world.scenario import NOISES, Scenario, Start, load_scenario, scenario_names
+from bslam.world.sensor import see
+from bslam.world.wheels import count_ticks, read_travel
+
+__all__ = ["load_scenario", "scenario_names", "simulate", "true_drive"]
+
+
+def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, noise: str | None = None) -> Log:
+    """Drive, and record what the wheels and the sensor say.
+
+    The seed makes the drive, the wheel noise and the sensing noise, each on its own: speedometer noise
+    changes neither the path nor the sightings. `sigma_mps` and `noise` ("speedometer", "actuation") stand in
+    for the scenario's. Raises BslamError if they are not allowed, or if there is nowhere to go in the arena.
+    """
+    scenario = _with_noise(scenario, sigma_mps, noise)
+    time_us = np.arange(scenario.steps + 1, dtype=np.int64) * scenario.step_us
+    path = true_drive(scenario, seed)
+    poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1)
+    sightings = see(scenario.arena, scenario.sensor, time_us, poses, _random_streams(seed)[2])
+    x_m, y_m = _to_map_frame(scenario.start, path.x_m, path.y_m)
+    return Log(
+        name=f"{scenario.name}_seed{seed}",
+        odometry=_read_odometry(scenario, seed, time_us[1:], path),
+        sightings=_until(sightings, int(time_us[-1])),
+        truth=Truth(time_us, x_m, y_m, wrap_rad(path.theta_rad - scenario.start.heading_rad)),
+        beacons=_true_map(scenario),
+        robot=_describe_robot(scenario),
+    )
+
+
+def true_drive(scenario: Scenario, seed: int) -> Drive:
+    """The motion behind the log that `simulate` makes, in the arena's frame."""
+    jitter_m = _wheel_noise_m(scenario, seed) if scenario.wheels.noise == "actuation" else None
+    return drive(scenario, _random_streams(seed)[0], jitter_m)
+
+
+def _with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -> Scenario:
+    wheels = scenario.wheels
+    sigma_mps = wheels.sigma_mps if sigma_mps is None else sigma_mps
+    noise = wheels.noise if noise is None else noise
+    if not 0.0 <= sigma_mps < math.inf:
+        raise BslamError(
+            f"wheel-speed sigma: {sigma_mps!r} is not allowed; allowed: a finite number from 0, m/s"
+        )
+    if noise not in NOISES:
+        raise BslamError(f"wheel noise: {noise!r} is not allowed; allowed: {' or '.join(NOISES)}")
+    return replace(scenario, wheels=replace(wheels, sigma_mps=sigma_mps, noise=noise))
+
+
+def _random_streams(seed: int) -> list[np.random.Generator]:
+    """Driving, wheels, sensing."""
+    if seed < 0:
+        raise BslamError(f"seed: {seed!r} is not allowed; allowed: an integer from 0")
+    return np.random.default_rng(seed).spawn(3)
+
+
+def _wheel_noise_m(scenario: Scenario, seed: int) -> NDArray[np.float64]:
+    """Noise of the left and right wheel's travel in each step, (steps, 2)."""
+    sigma_m = scenario.wheels.sigma_mps * scenario.step_us * 1e-6
+    return sigma_m * _random_streams(seed)[1].standard_normal((scenario.steps, 2))
+
+
+def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], path: Drive) -> Odometry:
+    travel_m = np.stack([path.left_m, path.right_m], axis=1)
+    if scenario.wheels.noise == "speedometer":
+        travel_m = travel_m + _wheel_noise_m(scenario, seed)
+    if scenario.encoders is None:
+        return read_travel(time_us, travel_m)
+    return count_ticks(scenario.encoders, time_us, travel_m)
+
+
+def _until(sightings: Sightings, end_us: int) -> Sightings:
+    """Without those that, being delayed, arrive after the end."""
+    kept = sightings.time_us <= end_us
+    return Sightings(
+        time_us=sightings.time_us[kept],
+        beacon_id=sightings.beacon_id[kept],
+        bearing_rad=sightings.bearing_rad[kept],
+        range_m=sightings.range_m[kept],
+        mappable=sightings.mappable[kept],
+    )
+
+
+def _to_map_frame(
+    start: Start, x_m: NDArray[np.float64], y_m: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """From the arena's frame to that of the start pose, in which the estimator works."""
+    cos, sin = math.cos(start.heading_rad), math.sin(start.heading_rad)
+    east_m, north_m = x_m - start.x_m, y_m - start.y_m
+    return cos * east_m + sin * north_m, cos * north_m - sin * east_m
+
+
+def _true_map(scenario: Scenario) -> Beacons:
+    beacons = scenario.arena.beacons
+    beacon_id = np.array([one.beacon_id for one in beacons], dtype=np.int64)
+    x_m, y_m = scenario.arena.beacon_xy_m.T
+    return Beacons(beacon_id, *_to_map_frame(scenario.start, x_m, y_m))
+
+
+def _describe_robot(scenario: Scenario) -> Robot:
+    sensor, encoders = scenario.sensor, scenario.encoders
+    return Robot(
+        wheelbase_m=scenario.body.wheelbase_m,
+        wheel_speed_sigma_mps=scenario.wheels.sigma_mps,
+        step_us=scenario.step_us,
+        field_of_view_rad=sensor.field_of_view_rad,
+        bearing_sigma_rad=sensor.bearing_sigma_rad,
+        range_sigma_fraction=sensor.range_sigma_fraction,
+        range_sigma_scale_m=sensor.range_sigma_scale_m,
+        range_sigma_floor_m=sensor.range_sigma_floor_m,
+        sensor_x_m=sensor.x_m,
+        sensor_y_m=sensor.y_m,
+        sensor_yaw_rad=sensor.yaw_rad,
+        sighting_delay_us=sensor.delay_us,
+        left_radius_m=None if encoders is None else encoders.left_radius_m,
+        right_radius_m=None if encoders is None else encoders.right_radius_m,
+        ticks_per_revolution=None if encoders is None else encoders.ticks_per_revolution,
+        counter_bits=None if encoders is None else encoders.counter_bits,
+    )
