@@ -44,9 +44,23 @@ $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/r
 
 # --- The main job -------------------------------------------------------------------------------------------
 
+# A real log of the MRCLAM collection, where it is at hand: `bslam replay` looks into the same directories.
+RUN_LOG := MRCLAM_Dataset6
+RUN_DATA := $(or $(BSLAM_DATA),$(wildcard ../shared/data))
+
 .PHONY: run
 run: setup-run ## the main job: the paper's room, then a real log where the data is at hand
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
+ifneq ($(wildcard $(RUN_DATA)/mrclam/$(RUN_LOG)),)
+	$(BSLAM) replay mrclam $(RUN_LOG) --robot 3 --out out/replay
+else
+	@echo "make run: no real log replayed: get the UTIAS Multi-Robot Cooperative Localization and Mapping data" \
+	    "set from its authors and let BSLAM_DATA name the directory that holds mrclam/$(RUN_LOG)"
+endif
+
+.PHONY: tables
+tables: setup-run ## the tables of the paper, in our figures
+	$(BSLAM) tables --out out/tables
 
 # --- Testing ------------------------------------------------------------------------------------------------
 
@@ -58,6 +72,10 @@ test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation
 
 pytest: ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
+
+.PHONY: proof
+proof: setup ## what takes longer: everything `make test` does, and the firmware for every target
+	@$(MAKE) --no-print-directory test firmware-all
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

@@ -1,5 +1,5 @@
-# What a filter step costs, in instructions as callgrind counts them on the host: unlike time, the same from run
-# to run. Instructions are not cycles. tests/bench/bench_<name>.c is a program that drives the core.
+# What a filter step costs, in instructions as callgrind counts them on the host: unlike time, the same from
+# run to run. Instructions are not cycles. tests/bench/bench_<name>.c is a program that drives the core.
 
 BENCH_SOURCES := $(sort $(wildcard tests/bench/bench_*.c))
 BENCH_PROGRAMS := $(BENCH_SOURCES:tests/bench/%.c=build/bench/%)

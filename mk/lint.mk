@@ -28,7 +28,7 @@ $(TIDY_STAMPS): build/tidy/%.ok: %.c $(CORE_HEADERS) .clang-tidy mk/config.mk mk
 	@touch $@
 
 lint-python:
-	@$(PYTHON) -m ruff check --quiet $(PYTHON_DIRS)
+	@$(PYTHON) -m ruff check --quiet --output-format=concise $(PYTHON_DIRS)
 	@$(PYTHON) -m ruff format --check --quiet $(PYTHON_DIRS)
 
 lint-types:

@@ -19,6 +19,7 @@ UNIT_CORE_WARNINGS_double := $(C_WARNINGS)
 
 .PHONY: unit
 unit: $(UNIT_REALS:%=unit-%) ## the C unit tests, in float and in double, under ASan and UBSan
+	@test -n "$(UNIT_SOURCES)" || { echo "unit: no test found, tests/unit/*/test_*.c" >&2; exit 1; }
 
 # The rules for one scalar type: $(1) is float or double.
 define unit_rules
