@@ -1,0 +1,38 @@
+"""`make help` lists what scripts and people rely on."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[3]
+PROMISED = ["setup", "run", "test", "lint", "format", "firmware", "sizes", "unit", "pytest", "proof", "bench",
+            "tables", "clean"]  # fmt: skip
+
+
+def make(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """A make of its own, although `make test` may be running this."""
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL")
+    }
+    command = ["make", *arguments]
+    return subprocess.run(
+        command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def listed() -> set[str]:
+    return {line.split()[1] for line in make("help").stdout.splitlines()}
+
+
+@pytest.mark.parametrize("target", PROMISED)
+def test_help_promised_target_is_listed(listed: set[str], target: str) -> None:
+    assert target in listed
+
+
+def test_firmware_unknown_target_names_the_allowed_ones() -> None:
+    result = make("firmware", "TARGET=avr")
+    assert result.returncode == 2
+    assert "TARGET is avr; allowed: m0plus m33 m4f m7" in result.stderr
