@@ -18,6 +18,8 @@ from bslam.world.scenario import Area, Scenario
 
 _GOAL_DRAWS = 1000  # so many draws without a place that is free and can be reached: there is none
 
+_FORGET_STALL = 0.25  # seconds of pushing forgotten in a second of rolling: jittering wheels roll on and off
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -71,7 +73,7 @@ class Driver:
         self._planner = RoutePlanner(scenario.arena, scenario.driving.path_clearance_m)
         self._route: list[Point] = []  # the points ahead
         self._v_mps = self._omega_radps = 0.0
-        self._stalled_steps = 0
+        self._pushing_s = 0.0
 
     def command(self) -> tuple[float, float]:
         """Forward speed m/s and turning rate rad/s of the next step."""
@@ -88,10 +90,10 @@ class Driver:
 
     def feel(self, stalled: bool) -> None:
         """What the bumper says of the step just made: after pushing long enough, stop and plan anew."""
-        self._stalled_steps = self._stalled_steps + 1 if stalled else 0
-        if stalled and self._stalled_steps * self._step_s >= self._settings.stall_time_s:
-            self._v_mps = self._omega_radps = 0.0
-            self._stalled_steps = 0
+        change_s = self._step_s if stalled else -_FORGET_STALL * self._step_s
+        self._pushing_s = max(0.0, self._pushing_s + change_s)
+        if stalled and self._pushing_s >= self._settings.stall_time_s:
+            self._v_mps = self._omega_radps = self._pushing_s = 0.0
             self._route = self._plan(self._route[-1])
 
     def _heading_error(self) -> float:
@@ -128,7 +130,8 @@ class Driver:
     def _plan(self, goal: Point) -> list[Point]:
         """The points to pass on the way to the goal; empty if there is no way.
 
-        At a wall, the way begins with one straight away from it, so far that within reach of there it is left.
+        At a wall, the way begins with one straight away from it: so far that within reach of there, the wall is
+        left.
         """
         x_m, y_m, _ = self._body.pose
         settings = self._settings

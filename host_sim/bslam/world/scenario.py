@@ -1,6 +1,6 @@
 """What is simulated: the arena, the robot, how it drives, and how well it senses; read from a TOML file.
 
-Lengths in metres, angles in radians, positions in the arena's own frame. Every error names the file, table and
+Lengths in metres, angles in radians, positions in the arena's own frame. Every error names the file, the
 key, the value and what is allowed.
 """
 
