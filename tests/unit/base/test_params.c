@@ -1,0 +1,263 @@
+#include "support.h"
+
+#include <math.h>
+
+/// The table line of a name; fails if there is none.
+static int id_of(const char *name)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        if (strcmp(bslam_params_info(id)->name, name) == 0) {
+            return id;
+        }
+    }
+    fail_msg("no parameter %s", name);
+    return -1;
+}
+
+/// The next number of the scalar type above (up) or below x.
+static bslam_real_t neighbour(bslam_real_t x, bool up)
+{
+#if BSLAM_REAL_DOUBLE
+    return nextafter(x, up ? INFINITY : -INFINITY);
+#else
+    return nextafterf(x, up ? INFINITY : -INFINITY);
+#endif
+}
+
+static void assert_check_blames(const bslam_params_t *params, const char *name)
+{
+    int bad_id = -1;
+    assert_int_equal(bslam_params_check(params, &bad_id), BSLAM_E_PARAMETER);
+    assert_int_equal(bad_id, id_of(name));
+}
+
+// ---- the table
+// -----------------------------------------------------------------------------------------------------
+
+static void test_info_every_line_has_name_meaning_and_default_in_range(void **state)
+{
+    assert_true(bslam_params_count() > 0);
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const bslam_param_info_t *info = bslam_params_info(id);
+        assert_non_null(info);
+        assert_true(strlen(info->name) > 0);
+        assert_true(strlen(info->meaning) > 0);
+        assert_true(info->low < info->high);
+        assert_true(info->initial >= info->low && info->initial <= info->high);
+    }
+}
+
+static void test_info_names_are_unique(void **state)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        assert_int_equal(id_of(bslam_params_info(id)->name), id);
+    }
+}
+
+static void test_info_outside_the_table_is_null(void **state)
+{
+    assert_null(bslam_params_info(-1));
+    assert_null(bslam_params_info(bslam_params_count()));
+    assert_null(bslam_params_info(INT32_MAX));
+    assert_null(bslam_params_info(INT32_MIN));
+}
+
+static void test_default_every_field_is_the_tables_and_passes_the_check(void **state)
+{
+    bslam_params_t params;
+    memset(&params, 0xa5, sizeof params);
+    bslam_params_default(&params);
+#define ASSERT_DEFAULT(field, value, low, high, meaning) \
+    assert_near(params.field, value, UNIT_ROUNDING *(value));
+    BSLAM_PARAMS(ASSERT_DEFAULT, ASSERT_DEFAULT)
+    int bad_id = 7;
+    assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+    assert_int_equal(bad_id, 7);
+}
+
+// ---- get and set
+// ---------------------------------------------------------------------------------------------------
+
+static void test_get_every_field_is_the_structs(void **state)
+{
+    bslam_params_t params;
+    bslam_params_default(&params);
+    int id = 0;
+#define ASSERT_GET(field, value, low, high, meaning) \
+    params.field = (high); \
+    assert_true(bslam_params_get(&params, id) == params.field); \
+    id++;
+#define ASSERT_GET_REAL(field, value, low, high, meaning) \
+    ASSERT_GET(field, value, low, BSLAM_R(high), meaning)
+    BSLAM_PARAMS(ASSERT_GET_REAL, ASSERT_GET)
+    assert_int_equal(id, bslam_params_count());
+}
+
+static void test_get_no_such_field_is_zero(void **state)
+{
+    bslam_params_t params;
+    bslam_params_default(&params);
+    assert_true(bslam_params_get(&params, -1) == 0);
+    assert_true(bslam_params_get(&params, bslam_params_count()) == 0);
+}
+
+static void test_set_both_limits_are_taken_and_read_back(void **state)
+{
+    bslam_params_t params;
+    bslam_params_default(&params);
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const bslam_param_info_t *info = bslam_params_info(id);
+        assert_int_equal(bslam_params_set(&params, id, info->low), BSLAM_OK);
+        assert_true(bslam_params_get(&params, id) == info->low);
+        assert_int_equal(bslam_params_set(&params, id, info->high), BSLAM_OK);
+        assert_true(bslam_params_get(&params, id) == info->high);
+    }
+}
+
+static void test_set_touches_no_other_field(void **state)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        bslam_params_t params;
+        bslam_params_default(&params);
+        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->high), BSLAM_OK);
+        for (int other = 0; other < bslam_params_count(); other++) {
+            if (other != id) {
+                assert_true(bslam_params_get(&params, other) == bslam_params_info(other)->initial);
+            }
+        }
+    }
+}
+
+static void test_set_outside_the_range_is_refused_and_changes_nothing(void **state)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const bslam_param_info_t *info = bslam_params_info(id);
+        const bslam_real_t wrong[] = {neighbour(info->low, false), neighbour(info->high, true), NAN, INFINITY,
+                                      -INFINITY};
+        for (int i = 0; i < COUNT_OF(wrong); i++) {
+            bslam_params_t params;
+            bslam_params_t before;
+            memset(&params, 0, sizeof params);
+            bslam_params_default(&params);
+            memcpy(&before, &params, sizeof params);
+            assert_int_equal(bslam_params_set(&params, id, wrong[i]), BSLAM_E_PARAMETER);
+            assert_memory_equal(&params, &before, sizeof params);
+        }
+    }
+}
+
+static void test_set_fraction_for_an_integer_is_refused(void **state)
+{
+    bslam_params_t params;
+    bslam_params_default(&params);
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const bslam_param_info_t *info = bslam_params_info(id);
+        if (info->is_integer) {
+            assert_int_equal(bslam_params_set(&params, id, info->low + BSLAM_R(0.5)), BSLAM_E_PARAMETER);
+            assert_true(bslam_params_get(&params, id) == info->initial);
+        }
+    }
+}
+
+static void test_set_no_such_field_is_refused(void **state)
+{
+    bslam_params_t params;
+    bslam_params_default(&params);
+    assert_int_equal(bslam_params_set(&params, -1, 0), BSLAM_E_PARAMETER);
+    assert_int_equal(bslam_params_set(&params, bslam_params_count(), 0), BSLAM_E_PARAMETER);
+}
+
+// ---- check
+// ---------------------------------------------------------------------------------------------------------
+
+/// One field of otherwise good parameters is set to `value`: the check must blame it.
+#define ASSERT_BLAMED(field, value) \
+    do { \
+        bslam_params_t params = unit_params(); \
+        params.field = (value); \
+        assert_check_blames(&params, #field); \
+    } while (0)
+
+static void test_check_every_real_field_outside_its_range_is_blamed(void **state)
+{
+#define ASSERT_BLAMED_REAL(field, value, low, high, meaning) \
+    ASSERT_BLAMED(field, neighbour(BSLAM_R(low), false)); \
+    ASSERT_BLAMED(field, neighbour(BSLAM_R(high), true)); \
+    ASSERT_BLAMED(field, (bslam_real_t)NAN); \
+    ASSERT_BLAMED(field, (bslam_real_t)INFINITY);
+#define IGNORE(field, value, low, high, meaning)
+    BSLAM_PARAMS(ASSERT_BLAMED_REAL, IGNORE)
+}
+
+static void test_check_every_integer_field_outside_its_range_is_blamed(void **state)
+{
+#define ASSERT_BLAMED_INTEGER(field, value, low, high, meaning) \
+    ASSERT_BLAMED(field, (low) - 1); \
+    ASSERT_BLAMED(field, (high) + 1); \
+    ASSERT_BLAMED(field, INT32_MAX); \
+    ASSERT_BLAMED(field, INT32_MIN);
+    BSLAM_PARAMS(IGNORE, ASSERT_BLAMED_INTEGER)
+}
+
+static void test_check_both_limits_of_every_field_are_taken(void **state)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        bslam_params_t params = unit_params();
+        // A field that the contradictions below are about keeps its value.
+        if (strstr(bslam_params_info(id)->name, "_states") != NULL) {
+            continue;
+        }
+        int bad_id = -1;
+        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->low), BSLAM_OK);
+        assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->high), BSLAM_OK);
+        assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+    }
+}
+
+static void test_check_velocity_and_scale_states_together_are_refused(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.velocity_states = 1;
+    params.scale_states = 1;
+    assert_check_blames(&params, "scale_states");
+}
+
+static void test_check_velocity_states_need_noise_of_both_wheels(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.velocity_states = 1;
+    params.left_speed_sd_mps = 0;
+    assert_check_blames(&params, "left_speed_sd_mps");
+    params.left_speed_sd_mps = 1;
+    params.right_speed_sd_mps = 0;
+    assert_check_blames(&params, "right_speed_sd_mps");
+    params.right_speed_sd_mps = 1;
+    int bad_id = -1;
+    assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_info_every_line_has_name_meaning_and_default_in_range),
+        cmocka_unit_test(test_info_names_are_unique),
+        cmocka_unit_test(test_info_outside_the_table_is_null),
+        cmocka_unit_test(test_default_every_field_is_the_tables_and_passes_the_check),
+
+        cmocka_unit_test(test_get_every_field_is_the_structs),
+        cmocka_unit_test(test_get_no_such_field_is_zero),
+        cmocka_unit_test(test_set_both_limits_are_taken_and_read_back),
+        cmocka_unit_test(test_set_touches_no_other_field),
+        cmocka_unit_test(test_set_outside_the_range_is_refused_and_changes_nothing),
+        cmocka_unit_test(test_set_fraction_for_an_integer_is_refused),
+        cmocka_unit_test(test_set_no_such_field_is_refused),
+
+        cmocka_unit_test(test_check_every_real_field_outside_its_range_is_blamed),
+        cmocka_unit_test(test_check_every_integer_field_outside_its_range_is_blamed),
+        cmocka_unit_test(test_check_both_limits_of_every_field_are_taken),
+        cmocka_unit_test(test_check_velocity_and_scale_states_together_are_refused),
+        cmocka_unit_test(test_check_velocity_states_need_noise_of_both_wheels),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,331 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/math/symmat.h"
+
+#define SIZE_MAX_TESTED 27
+
+/// A matrix in an array of exactly its length, so that AddressSanitizer sees a step beyond it, and its plain
+/// square twin.
+typedef struct pair {
+    int n;
+    bslam_real_t *m;
+    double naive[SIZE_MAX_TESTED][SIZE_MAX_TESTED];
+} pair_t;
+
+static bslam_real_t *new_array(int count)
+{
+    bslam_real_t *array = calloc((size_t)count, sizeof *array);
+    assert_non_null(array);
+    return array;
+}
+
+static bslam_real_t *new_random_vector(unit_random_t *random, int count)
+{
+    bslam_real_t *vector = new_array(count);
+    for (int i = 0; i < count; i++) {
+        vector[i] = real(unit_random(random, -1, 1));
+    }
+    return vector;
+}
+
+static void set_both(pair_t *pair, int i, int j, double value)
+{
+    bslam_symmat_set(pair->m, i, j, real(value));
+    pair->naive[i][j] = pair->naive[j][i] = (double)real(value);
+}
+
+static pair_t new_random_pair(unit_random_t *random, int n)
+{
+    pair_t pair = {.n = n, .m = new_array(BSLAM_SYMMAT_LENGTH(n))};
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j <= i; j++) {
+            set_both(&pair, i, j, unit_random(random, -1, 1));
+        }
+    }
+    return pair;
+}
+
+/// B Bᵀ for a random n x rank matrix B: of rank `rank`, positive definite if rank >= n.
+static pair_t new_gram_pair(unit_random_t *random, int n, int rank)
+{
+    double b[SIZE_MAX_TESTED][SIZE_MAX_TESTED];
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < rank; k++) {
+            b[i][k] = unit_random(random, -1, 1);
+        }
+    }
+    pair_t pair = {.n = n, .m = new_array(BSLAM_SYMMAT_LENGTH(n))};
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = 0;
+            for (int k = 0; k < rank; k++) {
+                sum += b[i][k] * b[j][k];
+            }
+            set_both(&pair, i, j, sum);
+        }
+    }
+    return pair;
+}
+
+static void assert_pair_agrees(const pair_t *pair, double tolerance)
+{
+    for (int i = 0; i < pair->n; i++) {
+        for (int j = 0; j < pair->n; j++) {
+            assert_near(bslam_symmat_get(pair->m, i, j), pair->naive[i][j], tolerance);
+        }
+    }
+}
+
+static bool is_positive(const bslam_real_t *m, int n)
+{
+    bslam_real_t *scratch = new_array(BSLAM_SYMMAT_LENGTH(n));
+    const bool positive = bslam_symmat_is_positive(m, n, scratch);
+    free(scratch);
+    return positive;
+}
+
+// ---- layout
+// --------------------------------------------------------------------------------------------------------
+
+static void test_at_every_element_has_its_own_place_within_the_length(void **state)
+{
+    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+        bool *taken = calloc((size_t)BSLAM_SYMMAT_LENGTH(n), sizeof *taken);
+        assert_non_null(taken);
+        for (int i = 0; i < n; i++) {
+            for (int j = 0; j <= i; j++) {
+                const size_t at = bslam_symmat_at(i, j);
+                assert_true(at < (size_t)BSLAM_SYMMAT_LENGTH(n));
+                assert_false(taken[at]);
+                taken[at] = true;
+                assert_true(bslam_symmat_at(j, i) == at);
+            }
+        }
+        free(taken);
+    }
+}
+
+static void test_row_is_filled_up_to_a_multiple_of_four_and_the_next_follows(void **state)
+{
+    size_t expected = 0;
+    for (int i = 0; i < 300; i++) {
+        assert_true(bslam_symmat_row(i) == expected);
+        expected += (size_t)BSLAM_SYMMAT_PADDED(i + 1);
+        // The array of a matrix of i + 1 rows ends with its own block of four rows.
+        assert_true(expected <= (size_t)BSLAM_SYMMAT_LENGTH(i + 1));
+        if ((i + 1) % 4 == 0) {
+            assert_true(expected == (size_t)BSLAM_SYMMAT_LENGTH(i + 1));
+        }
+    }
+}
+
+static void test_set_is_read_back_from_both_sides(void **state)
+{
+    unit_random_t random = {1};
+    pair_t pair = new_random_pair(&random, SIZE_MAX_TESTED);
+    assert_pair_agrees(&pair, 0);
+    free(pair.m);
+}
+
+// ---- arithmetic
+// ----------------------------------------------------------------------------------------------------
+
+static void test_add_column_is_the_naive_product(void **state)
+{
+    unit_random_t random = {2};
+    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+        pair_t pair = new_random_pair(&random, n);
+        for (int k = 0; k < n; k++) {
+            bslam_real_t *out = new_random_vector(&random, n);
+            double expected[SIZE_MAX_TESTED];
+            const bslam_real_t factor = real(unit_random(&random, -2, 2));
+            for (int i = 0; i < n; i++) {
+                expected[i] = (double)out[i] + (double)factor * pair.naive[i][k];
+            }
+            bslam_symmat_add_column(pair.m, n, k, factor, out);
+            for (int i = 0; i < n; i++) {
+                // Two roundings of values below 3.
+                assert_near(out[i], expected[i], 6 * UNIT_ROUNDING);
+            }
+            free(out);
+        }
+        free(pair.m);
+    }
+}
+
+/// Two vectors u, v: u uᵀ and v vᵀ with scales of either sign, and u vᵀ + v uᵀ as two mirrored terms.
+static void test_add_rank4_is_the_naive_sum(void **state)
+{
+    unit_random_t random = {3};
+    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+        pair_t pair = new_random_pair(&random, n);
+        bslam_real_t *u = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+        bslam_real_t *v = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+        const double scale_u = unit_random(&random, -1, 1);
+        const double scale_v = unit_random(&random, -1, 1);
+        const bslam_symmat_term_t terms[4] = {
+            {u, real(scale_u), u}, {v, real(scale_v), v}, {u, 1, v}, {v, 1, u}};
+        for (int i = 0; i < n; i++) {
+            for (int j = 0; j < n; j++) {
+                const double ui = (double)u[i], uj = (double)u[j], vi = (double)v[i], vj = (double)v[j];
+                pair.naive[i][j] +=
+                    (double)terms[0].scale * ui * uj + (double)terms[1].scale * vi * vj + ui * vj + vi * uj;
+            }
+        }
+        bslam_symmat_add_rank4(pair.m, n, terms);
+        // Nine roundings of partial sums below 5.
+        assert_pair_agrees(&pair, 45 * UNIT_ROUNDING);
+        free(u);
+        free(v);
+        free(pair.m);
+    }
+}
+
+static void test_add_rank4_with_zero_scales_changes_no_bit(void **state)
+{
+    unit_random_t random = {4};
+    const int n = 13;
+    pair_t pair = new_random_pair(&random, n);
+    bslam_real_t *u = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+    const bslam_symmat_term_t nothing = {u, 0, u};
+    const bslam_symmat_term_t terms[4] = {nothing, nothing, nothing, nothing};
+    bslam_symmat_add_rank4(pair.m, n, terms);
+    assert_pair_agrees(&pair, 0);
+    free(u);
+    free(pair.m);
+}
+
+// ---- removal
+// -------------------------------------------------------------------------------------------------------
+
+static void assert_remove_is_naive(unit_random_t *random, int n, int first, int count)
+{
+    pair_t pair = new_random_pair(random, n);
+    bslam_symmat_remove(pair.m, n, first, count);
+    for (int i = 0; i < n - count; i++) {
+        for (int j = 0; j <= i; j++) {
+            const int from_i = i < first ? i : i + count;
+            const int from_j = j < first ? j : j + count;
+            assert_near(bslam_symmat_get(pair.m, i, j), pair.naive[from_i][from_j], 0);
+        }
+    }
+    free(pair.m);
+}
+
+static void test_remove_every_stretch_of_every_size_is_the_naive_removal(void **state)
+{
+    unit_random_t random = {5};
+    for (int n = 1; n <= 14; n++) {
+        for (int count = 1; count <= n; count++) {
+            for (int first = 0; first + count <= n; first++) {
+                assert_remove_is_naive(&random, n, first, count);
+            }
+        }
+    }
+}
+
+// ---- definiteness
+// --------------------------------------------------------------------------------------------------
+
+static void test_is_positive_definite_matrix_is(void **state)
+{
+    unit_random_t random = {6};
+    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+        pair_t pair = new_gram_pair(&random, n, n);
+        for (int i = 0; i < n; i++) {
+            // Clear of rounding, whatever the random matrix.
+            set_both(&pair, i, i, pair.naive[i][i] + 0.01);
+        }
+        assert_true(is_positive(pair.m, n));
+        free(pair.m);
+    }
+}
+
+static void test_is_positive_matrix_with_a_repeated_row_is(void **state)
+{
+    // A new ray's anchor repeats the robot's position: exactly singular, and no fault.
+    unit_random_t random = {7};
+    pair_t pair = new_gram_pair(&random, 5, 5);
+    pair_t grown = {.n = 7, .m = new_array(BSLAM_SYMMAT_LENGTH(7))};
+    static const int source[7] = {0, 1, 2, 3, 4, 0, 1};
+    for (int i = 0; i < 7; i++) {
+        for (int j = 0; j <= i; j++) {
+            set_both(&grown, i, j, pair.naive[source[i]][source[j]]);
+        }
+    }
+    assert_true(is_positive(grown.m, 7));
+    free(pair.m);
+    free(grown.m);
+}
+
+static void test_is_positive_zero_matrix_is(void **state)
+{
+    // The pose before the first motion.
+    bslam_real_t *m = new_array(BSLAM_SYMMAT_LENGTH(3));
+    assert_true(is_positive(m, 3));
+    free(m);
+}
+
+static void test_is_positive_matrix_with_a_negative_eigenvalue_is_not(void **state)
+{
+    unit_random_t random = {8};
+    for (int n = 2; n <= SIZE_MAX_TESTED; n++) {
+        pair_t pair = new_gram_pair(&random, n, n);
+        // A correlation of 1.001 between the first and the last.
+        set_both(&pair, n - 1, 0, 1.001 * sqrt(pair.naive[0][0] * pair.naive[n - 1][n - 1]));
+        assert_false(is_positive(pair.m, n));
+        free(pair.m);
+    }
+}
+
+static void test_is_positive_matrix_with_a_bad_element_is_not(void **state)
+{
+    static const double bad[] = {NAN, INFINITY, -INFINITY, -1};
+    unit_random_t random = {9};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        for (int k = 0; k < 5; k++) {
+            pair_t pair = new_gram_pair(&random, 5, 5);
+            bslam_symmat_set(pair.m, k, k, real(bad[i]));
+            assert_false(is_positive(pair.m, 5));
+            free(pair.m);
+        }
+    }
+}
+
+static void test_is_positive_nan_off_the_diagonal_is_not(void **state)
+{
+    unit_random_t random = {10};
+    for (int i = 1; i < 5; i++) {
+        for (int j = 0; j < i; j++) {
+            pair_t pair = new_gram_pair(&random, 5, 5);
+            bslam_symmat_set(pair.m, i, j, (bslam_real_t)NAN);
+            assert_false(is_positive(pair.m, 5));
+            free(pair.m);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_at_every_element_has_its_own_place_within_the_length),
+        cmocka_unit_test(test_row_is_filled_up_to_a_multiple_of_four_and_the_next_follows),
+        cmocka_unit_test(test_set_is_read_back_from_both_sides),
+
+        cmocka_unit_test(test_add_column_is_the_naive_product),
+        cmocka_unit_test(test_add_rank4_is_the_naive_sum),
+        cmocka_unit_test(test_add_rank4_with_zero_scales_changes_no_bit),
+
+        cmocka_unit_test(test_remove_every_stretch_of_every_size_is_the_naive_removal),
+
+        cmocka_unit_test(test_is_positive_definite_matrix_is),
+        cmocka_unit_test(test_is_positive_matrix_with_a_repeated_row_is),
+        cmocka_unit_test(test_is_positive_zero_matrix_is),
+        cmocka_unit_test(test_is_positive_matrix_with_a_negative_eigenvalue_is_not),
+        cmocka_unit_test(test_is_positive_matrix_with_a_bad_element_is_not),
+        cmocka_unit_test(test_is_positive_nan_off_the_diagonal_is_not),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,66 @@
+/// What the unit tests share: comparison with a tolerance, repeatable random numbers, and parameters that do
+/// not change when a default is tuned.
+#ifndef UNIT_SUPPORT_H
+#define UNIT_SUPPORT_H
+
+// CMocka needs these before its own header.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "bslam/base/params.h"
+#include "bslam/base/types.h"
+
+/// Half the distance from 1 to the next number of bslam_real_t: the relative error of one rounding.
+#define UNIT_ROUNDING (BSLAM_REAL_DOUBLE ? 1.12e-16 : 5.97e-8)
+
+/// Fails unless |actual - expected| <= tolerance; a NaN fails.
+#define assert_near(actual, expected, tolerance) \
+    unit_check_near((double)(actual), (double)(expected), (double)(tolerance), #actual, __FILE__, __LINE__)
+
+void unit_check_near(double actual, double expected, double tolerance, const char *what, const char *file,
+                     int line);
+
+/// Elements of an array.
+#define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
+
+/// A number of the scalar type that comes from outside it: a loop variable in double, an expected value.
+static inline bslam_real_t real(double value)
+{
+    return (bslam_real_t)value;
+}
+
+/// A repeatable stream of random numbers. Any seed but 0.
+typedef struct unit_random {
+    uint64_t state;
+} unit_random_t;
+
+/// The next number, uniform in [low, high).
+double unit_random(unit_random_t *random, double low, double high);
+
+/// A function of n numbers with m results, for finite differences. context is the caller's.
+typedef void (*unit_function_t)(const double *in, double *out, const void *context);
+
+/// Derivative of result `row` of a function with at most UNIT_RESULTS_MAX results by its argument `column`,
+/// from two evaluations: the error is of order 1e-10 where the third derivative is of order 1.
+double unit_derivative(unit_function_t function, const double *in, int in_count, int row, int column,
+                       const void *context);
+
+#define UNIT_ARGUMENTS_MAX 16
+#define UNIT_RESULTS_MAX 8
+
+/// Parameters for tests that compare with numbers: every value a test may rely on is set, whatever its
+/// default. Standard EKF, Euler step, no velocity or scale states, known identity, no gate, no Huber, no
+/// delay, sensor on the axle.
+bslam_params_t unit_params(void);
+
+/// A sighting with a distance, or in direction only.
+bslam_sighting_t unit_polar(double bearing_rad, double range_m, int32_t label);
+bslam_sighting_t unit_direction(double bearing_rad, int32_t label);
+
+#endif
