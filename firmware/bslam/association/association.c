@@ -31,6 +31,7 @@ static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
                 bslam_match_t *loser = matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
                 loser->verdict = BSLAM_VERDICT_REJECT;
                 loser->reason = BSLAM_REASON_DUPLICATE;
+                loser->beacon = -1;
             }
         }
     }

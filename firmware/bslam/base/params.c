@@ -74,10 +74,21 @@ static int id_at(size_t offset)
     return id;
 }
 
+static bool is_allowed(const bslam_params_t *params, int id)
+{
+    const bslam_param_info_t *info = &infos[id];
+    if (info->is_integer) {
+        // As integers: a float does not hold every int32_t.
+        const int32_t value = *(const int32_t *)field(params, id);
+        return value >= (int32_t)info->low && value <= (int32_t)info->high;
+    }
+    return bslam_in_range(*(const bslam_real_t *)field(params, id), info->low, info->high);
+}
+
 bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)
 {
     for (int id = 0; id < PARAMS_COUNT; id++) {
-        if (!bslam_in_range(bslam_params_get(params, id), infos[id].low, infos[id].high)) {
+        if (!is_allowed(params, id)) {
             *bad_id = id;
             return BSLAM_E_PARAMETER;
         }

@@ -17,11 +17,11 @@
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     INTEGER(velocity_states, 1, 0, 1, "1: v and omega are states and the wheels measure them (speedometer noise)") \
     INTEGER(scale_states, 0, 0, 1, "1: the scale factors of odometry are states; not together with velocity_states") \
-    REAL(velocity_sd_mps, 0.4, 1e-6, 100.0, "standard deviation of v before the first reading") \
+    REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, "standard deviation of v at the start (the robot stands still)") \
     REAL(velocity_walk_mps_sqrt_s, 0.15, 0.0, 100.0, "v changes by this much in a second (random walk)") \
     REAL(velocity_decay_s, 1e6, 1e-3, 1e6, "v decays to 0 with this time constant (1e6: not)") \
-    REAL(turn_rate_sd_radps, 0.5, 1e-6, 100.0, "standard deviation of omega before the first reading") \
-    REAL(turn_rate_walk_radps_sqrt_s, 0.5, 0.0, 100.0, "omega changes by this much in a second (random walk)") \
+    REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, "standard deviation of omega at the start (the robot stands still)") \
+    REAL(turn_rate_walk_radps_sqrt_s, 0.8, 0.0, 100.0, "omega changes by this much in a second (random walk)") \
     REAL(turn_rate_decay_s, 1e6, 1e-3, 1e6, "omega decays to 0 with this time constant (1e6: not)") \
     REAL(forward_scale, 1.0, 0.1, 10.0, "true over measured forward motion; with scale_states its start value") \
     REAL(turn_scale, 1.0, 0.1, 10.0, "true over measured turn; with scale_states its start value") \
@@ -103,7 +103,7 @@ void bslam_params_default(bslam_params_t *params);
 /// another (velocity_states needs a positive speed noise of both wheels, and excludes scale_states).
 BSLAM_MUST_CHECK bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id);
 
-/// Field id as a number. 0 for an id that does not exist.
+/// Field id as a number, an integer rounded to the scalar type. 0 for an id that does not exist.
 bslam_real_t bslam_params_get(const bslam_params_t *params, int id);
 
 /// Sets field id. BSLAM_E_PARAMETER, and no change, if there is no such field, the value is outside its range, or an

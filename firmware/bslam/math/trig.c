@@ -13,9 +13,23 @@
 #define HALF_PI_LOW 7.5497899548918821e-8f
 #endif
 
-/// The angle less the nearest multiple of pi/2, and which multiple that was.
-static bslam_real_t reduce_to_quadrant(bslam_real_t angle, int32_t *quadrant)
+/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same everywhere too.
+static bslam_real_t bring_near(bslam_real_t angle)
 {
+    if (bslam_abs(angle) <= BSLAM_ANGLE_MAX) {
+        return angle;
+    }
+#if BSLAM_REAL_DOUBLE
+    return fmod(angle, 2 * BSLAM_PI);
+#else
+    return fmodf(angle, 2 * BSLAM_PI);
+#endif
+}
+
+/// The angle less the nearest multiple of pi/2, and which multiple that was.
+static bslam_real_t reduce_to_quadrant(bslam_real_t any_angle, int32_t *quadrant)
+{
+    const bslam_real_t angle = bring_near(any_angle);
     const bslam_real_t turns = angle * BSLAM_R(0.63661977236758134308);
     const int32_t nearest = (int32_t)(turns + (turns < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
     const bslam_real_t q = (bslam_real_t)nearest;
@@ -116,7 +130,8 @@ bslam_real_t bslam_atan2(bslam_real_t y, bslam_real_t x)
     if (x < 0) {
         angle = BSLAM_PI - angle;
     }
-    return y < 0 ? -angle : angle;
+    // Below -pi's own rounding the answer is +pi: -pi is not in (-pi, pi].
+    return y < 0 && angle < BSLAM_PI ? -angle : angle;
 }
 
 bslam_real_t bslam_angle_wrap(bslam_real_t angle_rad)
@@ -124,12 +139,12 @@ bslam_real_t bslam_angle_wrap(bslam_real_t angle_rad)
     if (angle_rad > -BSLAM_PI && angle_rad <= BSLAM_PI) {
         return angle_rad;
     }
-    // Two quadrants are half a turn: the even quadrant nearest below leaves a remainder within a half turn.
-    const bslam_real_t turns = angle_rad / (2 * BSLAM_PI);
+    const bslam_real_t near_rad = bring_near(angle_rad);
+    const bslam_real_t turns = near_rad / (2 * BSLAM_PI);
     const int32_t nearest = (int32_t)(turns + (turns < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
     const bslam_real_t quadrants = (bslam_real_t)(4 * nearest);
     bslam_real_t wrapped =
-        ((angle_rad - quadrants * HALF_PI_HIGH) - quadrants * HALF_PI_MIDDLE) - quadrants * HALF_PI_LOW;
+        ((near_rad - quadrants * HALF_PI_HIGH) - quadrants * HALF_PI_MIDDLE) - quadrants * HALF_PI_LOW;
     if (wrapped <= -BSLAM_PI) {
         wrapped += 2 * BSLAM_PI;
     } else if (wrapped > BSLAM_PI) {

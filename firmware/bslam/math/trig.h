@@ -9,17 +9,17 @@
 
 #define BSLAM_PI BSLAM_R(3.14159265358979323846)
 
-/// Angles that bslam_angle_wrap takes: |angle| <= this.
+/// Up to this |angle| the functions keep full accuracy; beyond, any finite angle is first divided by 2 pi.
 #define BSLAM_ANGLE_MAX BSLAM_R(1e4)
 
-/// Sine and cosine of an angle in [-BSLAM_ANGLE_MAX, BSLAM_ANGLE_MAX] rad.
+/// Sine and cosine of a finite angle.
 /// Error <= 1.5e-7 in float and 1e-15 in double for |angle| <= pi; beyond, the reduction adds 1 ulp of the angle.
 void bslam_sin_cos(bslam_real_t angle_rad, bslam_real_t *sine, bslam_real_t *cosine);
 
 /// Arc tangent of y/x in (-pi, pi], 0 for (0, 0). Error <= 4e-7 in float, 1e-15 in double. Finite arguments.
 bslam_real_t bslam_atan2(bslam_real_t y, bslam_real_t x);
 
-/// The same direction in (-pi, pi]. |angle| <= BSLAM_ANGLE_MAX.
+/// The same direction in (-pi, pi]. A finite angle.
 bslam_real_t bslam_angle_wrap(bslam_real_t angle_rad);
 
 #endif

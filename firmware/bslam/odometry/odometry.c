@@ -5,6 +5,8 @@
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const int64_t TIME_MAX_US = INT64_MAX / 2;
 static const int64_t INTERVAL_MAX_US = INT64_C(3600000000);
+/// More than this in one interval is no motion of a robot: 16 turns.
+static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
 
 /// Travel of both wheels in one interval.
 typedef struct wheel_travel {
@@ -138,6 +140,14 @@ static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
     return !odometry->has_time || (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
 }
 
+/// True if the wheels cannot have moved like this.
+static bool is_jump(const bslam_params_t *params, const wheel_travel_t *travel, bslam_real_t dt_s)
+{
+    const bslam_real_t travel_max_m = params->speed_max_mps * dt_s;
+    return bslam_abs(travel->left_m) > travel_max_m || bslam_abs(travel->right_m) > travel_max_m ||
+           bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * params->wheelbase_m;
+}
+
 /// Kalman update of (forward, turn) with the turn that the gyro measured.
 static void fuse_gyro(bslam_motion_t *motion, bslam_real_t gyro_turn_rad, bslam_real_t gyro_var_rad2)
 {
@@ -158,18 +168,22 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     if (!time_is_valid(odometry, reading->time_us)) {
         return BSLAM_E_TIME;
     }
-    if (reading->has_gyro && !bslam_is_number(reading->gyro_radps)) {
-        return BSLAM_E_NOT_FINITE;
-    }
     const bslam_real_t dt_s =
         odometry->has_time ? (bslam_real_t)(reading->time_us - odometry->time_us) * SECONDS_PER_US : 0;
+    if (reading->has_gyro) {
+        if (!bslam_is_number(reading->gyro_radps)) {
+            return BSLAM_E_NOT_FINITE;
+        }
+        if (bslam_abs(reading->gyro_radps) * dt_s > TURN_MAX_RAD) {
+            return BSLAM_E_RANGE;
+        }
+    }
     wheel_travel_t travel;
     const bslam_status_t status = reading_to_travel(odometry, params, reading, dt_s, &travel);
     if (status != BSLAM_OK) {
         return status;
     }
-    const bslam_real_t travel_max_m = params->speed_max_mps * dt_s;
-    if (odometry->has_time && (bslam_abs(travel.left_m) > travel_max_m || bslam_abs(travel.right_m) > travel_max_m)) {
+    if (odometry->has_time && is_jump(params, &travel, dt_s)) {
         return BSLAM_E_JUMP;
     }
     if (odometry->has_time) {
@@ -182,10 +196,11 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     }
     odometry->time_us = reading->time_us;
     odometry->has_time = true;
-    if (reading->source == BSLAM_ODOMETRY_TICKS) {
+    // A reading of another source covers motion that the counters saw too: the next tick reading starts afresh.
+    odometry->has_ticks = reading->source == BSLAM_ODOMETRY_TICKS;
+    if (odometry->has_ticks) {
         odometry->left_ticks = reading->left_ticks;
         odometry->right_ticks = reading->right_ticks;
-        odometry->has_ticks = true;
     }
     return BSLAM_OK;
 }

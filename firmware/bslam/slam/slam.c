@@ -6,6 +6,7 @@
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
+static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
 
 bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id)
 {
@@ -123,7 +124,7 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
         return BSLAM_E_NOT_FINITE;
     }
     const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI);
-    const bool range_ok = !sighting->has_range || sighting->range_m > RANGE_MIN_M;
+    const bool range_ok = !sighting->has_range || bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M);
     return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
 }
 

@@ -90,7 +90,7 @@ void bslam_slam_rebase_odometry(bslam_slam_t *slam);
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²).
 /// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than the history reaches,
-/// or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance not above 1 mm, a
+/// or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance outside 1 mm to 10 km, a
 /// direction beyond ±2 pi, a label below -1): bslam_slam_bad_sighting says which.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);

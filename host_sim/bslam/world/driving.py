@@ -18,6 +18,9 @@ from bslam.world.scenario import Area, Scenario
 
 _GOAL_DRAWS = 1000  # so many draws without a place that is free and can be reached: there is none
 
+_FACING_RAD = 0.3
+_STEP_OFF_M = 0.1  # after a stall: so much farther from the wall than a path must be
+_STEP_OFF_REACH_M = 0.03
 _FORGET_STALL = 0.25  # seconds of pushing forgotten in a second of rolling: jittering wheels roll on and off
 
 
@@ -71,15 +74,17 @@ class Driver:
         self._turn_noise_radps = iter(_turn_noise(scenario, noise_random))
         self._goals = _draw_goals(scenario, goal_random)
         self._planner = RoutePlanner(scenario.arena, scenario.driving.path_clearance_m)
-        self._route: list[Point] = []  # the points ahead
+        self._route: list[tuple[Point, float]] = []  # the points ahead, and how near is near enough
         self._v_mps = self._omega_radps = 0.0
         self._pushing_s = 0.0
+        self._facing = False  # only turning, to face the next point
 
     def command(self) -> tuple[float, float]:
         """Forward speed m/s and turning rate rad/s of the next step."""
         settings = self._settings
         error_rad = self._heading_error()
-        v_mps = settings.speed_mps * max(0.0, math.cos(error_rad))
+        self._facing = self._facing and abs(error_rad) > _FACING_RAD
+        v_mps = 0.0 if self._facing else settings.speed_mps * max(0.0, math.cos(error_rad))
         omega_radps = settings.heading_gain_per_s * error_rad + next(self._turn_noise_radps)
         omega_radps = _clip(omega_radps, settings.turn_rate_radps)
         v_step_mps = settings.acceleration_mps2 * self._step_s
@@ -89,12 +94,13 @@ class Driver:
         return self._v_mps, self._omega_radps
 
     def feel(self, stalled: bool) -> None:
-        """What the bumper says of the step just made: after pushing long enough, stop and plan anew."""
+        """What the bumper says of the step just made: after pushing long enough, stop, plan anew and turn there."""
         change_s = self._step_s if stalled else -_FORGET_STALL * self._step_s
         self._pushing_s = max(0.0, self._pushing_s + change_s)
         if stalled and self._pushing_s >= self._settings.stall_time_s:
             self._v_mps = self._omega_radps = self._pushing_s = 0.0
-            self._route = self._plan(self._route[-1])
+            self._facing = True
+            self._route = self._plan(self._route[-1][0])
 
     def _heading_error(self) -> float:
         """Angle from where the robot heads to where it should: to the next point, but away from walls."""
@@ -110,15 +116,18 @@ class Driver:
 
     def _next_point(self, x_m: float, y_m: float) -> Point:
         while True:
-            for passed, point in enumerate(self._route):
-                if math.hypot(point[0] - x_m, point[1] - y_m) > self._settings.reach_m:
+            for passed, (point, reach_m) in enumerate(self._route):
+                if math.hypot(point[0] - x_m, point[1] - y_m) > reach_m:
                     del self._route[:passed]
                     return point
             self._route = self._plan_new()
 
-    def _plan_new(self) -> list[Point]:
+    def _plan_new(self) -> list[tuple[Point, float]]:
         """The route to the next goal that can be reached."""
         for goal in islice(self._goals, _GOAL_DRAWS):
+            x_m, y_m, _ = self._body.pose
+            if math.hypot(goal[0] - x_m, goal[1] - y_m) <= self._settings.reach_m:
+                continue
             route = self._plan(goal)
             if route:
                 return route
@@ -127,19 +136,15 @@ class Driver:
             f"allowed: an arena with ways that keep path_clearance_m, {self._settings.path_clearance_m:g}"
         )
 
-    def _plan(self, goal: Point) -> list[Point]:
-        """The points to pass on the way to the goal; empty if there is no way.
-
-        At a wall, the way begins with one straight away from it: so far that within reach of there, the wall is
-        left.
-        """
+    def _plan(self, goal: Point) -> list[tuple[Point, float]]:
+        """The points to pass on the way to the goal; empty if there is no way. At a wall, step off it first."""
         x_m, y_m, _ = self._body.pose
         settings = self._settings
         if self._body.feeler.nearest_within(x_m, y_m, settings.path_clearance_m) is None:
-            return self._planner.route((x_m, y_m), goal)
-        free = self._planner.step_off((x_m, y_m), settings.reach_m)
-        way = self._planner.route(free, goal)
-        return [free, *way] if way else []
+            return [(point, settings.reach_m) for point in self._planner.route((x_m, y_m), goal)]
+        free = self._planner.step_off((x_m, y_m), _STEP_OFF_M)
+        way = [(point, settings.reach_m) for point in self._planner.route(free, goal)]
+        return [(free, _STEP_OFF_REACH_M), *way] if way else []
 
 
 def _clip(value: float, limit: float) -> float:

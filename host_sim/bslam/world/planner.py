@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bslam.world.arena import Arena, Point
 
 _DIRECTIONS = 8  # corners of the polygon around each wall end
+_STEP_OFF_M = 0.02
 
 
 class RoutePlanner:
@@ -30,15 +31,21 @@ class RoutePlanner:
         self._lengths_m[first, second] = self._lengths_m[second, first] = lengths_m
 
     def step_off(self, point: Point, more_m: float) -> Point:
-        """A point straight away from the wall, farther from it by `more_m` than a path must be."""
+        """A point away from the walls, farther from them by `more_m` than a path must be.
+
+        Where that is too far, between two walls for instance, the farthest that was found.
+        """
         x_m, y_m = point
         enough_m = self._clearance_m + more_m
-        for _ in range(4):  # leaving one wall may lead to another, in a corner
+        best, best_m = point, 0.0
+        for _ in range(math.ceil(2.0 * enough_m / _STEP_OFF_M)):
             distance_m, away_x, away_y = self._arena.nearest_wall(x_m, y_m)
+            if distance_m > best_m:
+                best, best_m = (x_m, y_m), distance_m
             if distance_m >= enough_m:
                 break
-            x_m, y_m = x_m + (enough_m - distance_m) * away_x, y_m + (enough_m - distance_m) * away_y
-        return x_m, y_m
+            x_m, y_m = x_m + _STEP_OFF_M * away_x, y_m + _STEP_OFF_M * away_y
+        return best
 
     def route(self, start: Point, goal: Point) -> list[Point]:
         """The points to drive to in turn, the goal last; empty if there is no way that keeps the distance."""
