@@ -18,8 +18,9 @@ from bslam.world.scenario import Area, Scenario
 
 _GOAL_DRAWS = 1000  # so many draws without a place that is free and can be reached: there is none
 
-_FACING_RAD = 0.3
-_STEP_OFF_M = 0.1  # after a stall: so much farther from the wall than a path must be
+_STALLS_PER_GOAL = 6  # then the goal is given up
+_FACING_RAD = 0.5
+_STEP_OFF_M = 0.05  # after a stall: so much farther from the wall than a path must be
 _STEP_OFF_REACH_M = 0.03
 _FORGET_STALL = 0.25  # seconds of pushing forgotten in a second of rolling: jittering wheels roll on and off
 
@@ -77,6 +78,7 @@ class Driver:
         self._route: list[tuple[Point, float]] = []  # the points ahead, and how near is near enough
         self._v_mps = self._omega_radps = 0.0
         self._pushing_s = 0.0
+        self._stalls = 0  # on the way to this goal
         self._facing = False  # only turning, to face the next point
 
     def command(self) -> tuple[float, float]:
@@ -94,13 +96,14 @@ class Driver:
         return self._v_mps, self._omega_radps
 
     def feel(self, stalled: bool) -> None:
-        """What the bumper says of the step just made: after pushing long enough, stop, plan anew and turn there."""
+        """What the bumper says of the step just made: after enough pushing, stop and look for a way."""
         change_s = self._step_s if stalled else -_FORGET_STALL * self._step_s
         self._pushing_s = max(0.0, self._pushing_s + change_s)
         if stalled and self._pushing_s >= self._settings.stall_time_s:
             self._v_mps = self._omega_radps = self._pushing_s = 0.0
             self._facing = True
-            self._route = self._plan(self._route[-1][0])
+            self._stalls += 1
+            self._route = self._plan(self._route[-1][0]) if self._stalls < _STALLS_PER_GOAL else []
 
     def _heading_error(self) -> float:
         """Angle from where the robot heads to where it should: to the next point, but away from walls."""
@@ -130,6 +133,7 @@ class Driver:
                 continue
             route = self._plan(goal)
             if route:
+                self._stalls = 0
                 return route
         raise BslamError(
             f"scenario {self._name}: no goal can be reached from {self._body.pose[:2]!r}; "
@@ -137,7 +141,7 @@ class Driver:
         )
 
     def _plan(self, goal: Point) -> list[tuple[Point, float]]:
-        """The points to pass on the way to the goal; empty if there is no way. At a wall, step off it first."""
+        """The points to pass on the way to the goal, at a wall first one away from it; empty: no way."""
         x_m, y_m, _ = self._body.pose
         settings = self._settings
         if self._body.feeler.nearest_within(x_m, y_m, settings.path_clearance_m) is None:
