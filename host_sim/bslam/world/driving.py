@@ -17,11 +17,14 @@ from bslam.world.robot import Body
 from bslam.world.scenario import Area, Scenario
 
 _GOAL_DRAWS = 1000  # so many draws without a place that is free and can be reached: there is none
+_STALLS_PER_GOAL = 6  # so many on the way, and the goal is given up
 
-_STALLS_PER_GOAL = 6  # then the goal is given up
+# After a stall the robot turns on the spot until it faces its way so well, and first drives to a point a bit
+# farther from the wall than a path must be.
 _FACING_RAD = 0.5
-_STEP_OFF_M = 0.05  # after a stall: so much farther from the wall than a path must be
+_STEP_OFF_M = 0.05
 _STEP_OFF_REACH_M = 0.03
+
 _FORGET_STALL = 0.25  # seconds of pushing forgotten in a second of rolling: jittering wheels roll on and off
 
 
