@@ -25,17 +25,49 @@ double unit_random(unit_random_t *random, double low, double high)
 double unit_derivative(unit_function_t function, const double *in, int in_count, int row, int column,
                        const void *context)
 {
-    // Error of the central difference: step^2 from the third derivative, 1e-16 / step from rounding.
-    const double step = 1e-5;
-    double shifted[UNIT_ARGUMENTS_MAX];
-    double before[UNIT_RESULTS_MAX];
-    double after[UNIT_RESULTS_MAX];
-    memcpy(shifted, in, (size_t)in_count * sizeof *in);
-    shifted[column] = in[column] - step;
-    function(shifted, before, context);
-    shifted[column] = in[column] + step;
-    function(shifted, after, context);
-    return (after[row] - before[row]) / (2 * step);
+    // Five points: the error is step^4 / 30 times the fifth derivative, and 1e-16 / step from rounding.
+    const double step = 2e-4 * fmax(0.1, fmin(1, fabs(in[column])));
+    static const struct {
+        double at;
+        double weight;
+    } stencil[] = {{-2, 1.0 / 12}, {-1, -2.0 / 3}, {1, 2.0 / 3}, {2, -1.0 / 12}};
+    double sum = 0;
+    for (int i = 0; i < COUNT_OF(stencil); i++) {
+        double shifted[UNIT_ARGUMENTS_MAX];
+        double out[UNIT_RESULTS_MAX];
+        memcpy(shifted, in, (size_t)in_count * sizeof *in);
+        shifted[column] = in[column] + stencil[i].at * step;
+        function(shifted, out, context);
+        sum += stencil[i].weight * out[row];
+    }
+    return sum / step;
+}
+
+void unit_mean_direction(double start, double turn, double *cosine, double *sine)
+{
+    static const struct {
+        double at;
+        double weight;
+    } gauss[] = {{-0.906179845938663993, 0.236926885056189088},
+                 {-0.538469310105683091, 0.478628670499366468},
+                 {0, 0.568888888888888889},
+                 {0.538469310105683091, 0.478628670499366468},
+                 {0.906179845938663993, 0.236926885056189088}};
+    const int panels = 8;
+    *cosine = 0;
+    *sine = 0;
+    for (int i = 0; i < panels; i++) {
+        for (int k = 0; k < COUNT_OF(gauss); k++) {
+            const double angle = start + turn * (i + 0.5 + gauss[k].at / 2) / panels;
+            *cosine += gauss[k].weight * cos(angle) / (2 * panels);
+            *sine += gauss[k].weight * sin(angle) / (2 * panels);
+        }
+    }
+}
+
+double unit_angle_between(double a, double b)
+{
+    return remainder(a - b, 6.283185307179586476925);
 }
 
 bslam_params_t unit_params(void)

@@ -54,6 +54,13 @@ double unit_derivative(unit_function_t function, const double *in, int in_count,
 #define UNIT_ARGUMENTS_MAX 16
 #define UNIT_RESULTS_MAX 8
 
+/// Mean of (cos, sin) over the angles from start to start + turn, by Gauss quadrature, two points in each of
+/// 512 panels: the error is (turn / 512)^4 / 4320, below 1e-12 for turns up to 4 rad.
+void unit_mean_direction(double start, double turn, double *cosine, double *sine);
+
+/// The angle from b to a, in [-pi, pi]: how far two directions differ.
+double unit_angle_between(double a, double b);
+
 /// Parameters for tests that compare with numbers: every value a test may rely on is set, whatever its
 /// default. Standard EKF, Euler step, no velocity or scale states, known identity, no gate, no Huber, no
 /// delay, sensor on the axle.
