@@ -1,0 +1,76 @@
+"""The command line: `bslam COMMAND [options]`.
+
+Exit status 0: all ran; 1: a run failed or was stopped; 2: bad input, the last line on stderr says what,
+where, and what is allowed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from bslam.commands import calibrate, params, replay, run, sweep, tables
+from bslam.errors import BslamError
+
+COMMANDS: dict[str, ModuleType] = {
+    "run": run,
+    "replay": replay,
+    "tables": tables,
+    "sweep": sweep,
+    "calibrate": calibrate,
+    "params": params,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(_overview())
+        return 0 if words else 2
+    name, *rest = words
+    try:
+        if name not in COMMANDS:
+            raise BslamError(f"command '{name}' does not exist; allowed: {', '.join(COMMANDS)}")
+        command = COMMANDS[name]
+        # Not argparse's own sub-parsers: with them options could not stand between two directories.
+        return int(command.execute(_parser(name, command).parse_intermixed_args(rest)))
+    except BslamError as error:
+        print(f"bslam {name}: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"bslam {name}: stopped", file=sys.stderr)
+        return 1
+
+
+def _parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=f"bslam {name}",
+        description=command.SUMMARY,
+        epilog=command.EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    command.add_arguments(parser)
+    return parser
+
+
+def _overview() -> str:
+    lines = [
+        "usage: bslam COMMAND [options]",
+        "",
+        "SLAM with beacons that fits in a microcontroller.",
+        "",
+        "commands:",
+    ]
+    lines += [f"  {name:10} {command.SUMMARY.splitlines()[0]}" for name, command in COMMANDS.items()]
+    lines += [
+        "",
+        "examples:",
+        "  bslam run paper_room",
+        "  bslam tables --seeds 0:10",
+        "  bslam COMMAND --help",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,228 @@
+"""Options that several commands share, and what they become."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tomllib
+from collections.abc import Callable, Container, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import joblib
+
+from bslam.core.slam import Slam
+from bslam.errors import BslamError
+from bslam.experiment.options import (
+    ASSOCIATIONS,
+    FILTERS,
+    MOTIONS,
+    NOISES,
+    OBSERVATIONS,
+    TARGETS,
+    Number,
+    RunOptions,
+    parse_association,
+)
+
+T = TypeVar("T")
+
+
+def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = ()) -> None:
+    """How the filter runs. `lists` names the options that take several values, with commas between."""
+    group = parser.add_argument_group("filter")
+
+    def add(name: str, parse: Callable[[str], Any], default: Any, shape: str, meaning: str) -> None:
+        if name in lists:
+            parse, default, shape = _list_of(parse), default and [default], f"{shape},..."
+        group.add_argument(f"--{name}", type=parse, default=default, metavar=shape, help=meaning)
+
+    add(
+        "observation",
+        _word(OBSERVATIONS),
+        "distance",
+        _names(OBSERVATIONS),
+        "what a sighting tells (default: distance)",
+    )
+    associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
+    meaning = "whose a sighting is; known:RATE: identity wrong at that rate (default: known)"
+    add("association", _association, ("known", 0.0), associations, meaning)
+    add("filter", _word(FILTERS), "invariant", _names(FILTERS), "kind of Kalman filter (default: invariant)")
+    meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
+    add("sigma", _not_negative, None, "M/S", meaning)
+    group.add_argument("--motion", choices=MOTIONS, default="arc", help="odometry step (default: arc)")
+    group.add_argument(
+        "--velocity-states",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="v and omega in the state (default: on for speedometer noise)",
+    )
+    group.add_argument(
+        "--noise",
+        choices=NOISES,
+        help="what errs: the reading or the wheel (default: as the scenario says, else speedometer)",
+    )
+    group.add_argument(
+        "--target", choices=TARGETS, default="host", help="where the core runs (default: host)"
+    )
+    group.add_argument(
+        "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
+    )
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any core parameter (see `bslam params`); wins over all else; may be repeated",
+    )
+
+
+def add_batch_options(
+    parser: argparse.ArgumentParser, command: str, seeds: str = "0:1", pictures: int = 5
+) -> None:
+    """How many runs, on how many processes, and where the files go."""
+    group = parser.add_argument_group("runs")
+    group.add_argument(
+        "--seeds",
+        type=_seeds,
+        default=_seeds(seeds),
+        metavar="A:B",
+        help=f"seeds from A up to and without B (default: {seeds})",
+    )
+    group.add_argument(
+        "--jobs", type=_count, default=joblib.cpu_count(), metavar="N", help="processes (default: cores)"
+    )
+    group.add_argument(
+        "--out",
+        type=Path,
+        default=Path("out") / command,
+        metavar="DIR",
+        help=f"where files go; what is there is replaced (default: out/{command})",
+    )
+    group.add_argument(
+        "--pictures",
+        type=_whole,
+        default=pictures,
+        metavar="N",
+        help=f"draw the first N runs (default: {pictures})",
+    )
+
+
+def run_options(arguments: argparse.Namespace, **changes: Any) -> RunOptions:
+    """Options of one run; `changes` win, and are needed where the command takes lists."""
+    association = changes.pop("association", arguments.association)
+    name, rate = association
+    values = {
+        "observation": arguments.observation,
+        "filter": arguments.filter,
+        "sigma_mps": arguments.sigma,
+        "motion": arguments.motion,
+        "velocity_states": arguments.velocity_states,
+        "noise": arguments.noise or "speedometer",
+        "target": arguments.target,
+        "parameters": tuple(core_parameters(arguments).items()),
+    }
+    return RunOptions(association=name, wrong_identity_rate=rate, **(values | changes))
+
+
+def core_parameters(arguments: argparse.Namespace) -> dict[str, Number]:
+    """What --params and --set ask for; --set wins. Raises BslamError for a name or value that cannot be."""
+    chosen: dict[str, Number] = {}
+    if arguments.params is not None:
+        chosen |= _read_params(arguments.params)
+    for text in arguments.set:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise BslamError(f"--set {text}: no value; allowed: --set KEY=VALUE")
+        chosen |= _checked({key.strip(): _number(value, f"--set {key}")}, "--set")
+    return chosen
+
+
+def _read_params(path: Path) -> dict[str, Number]:
+    try:
+        content = tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError) as error:
+        raise BslamError(f"--params {path}: cannot be read: {error}; allowed: a TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BslamError(f"--params {path}: {error}; allowed: lines of KEY = VALUE") from error
+    values = {key: _number(str(value), f"--params {path}: {key}") for key, value in content.items()}
+    return _checked(values, f"--params {path}")
+
+
+def _checked(values: dict[str, Number], where: str) -> dict[str, Number]:
+    defaults = Slam.defaults()
+    for key in values:
+        if key not in defaults:
+            raise BslamError(f"{where}: parameter '{key}' does not exist; allowed: {', '.join(defaults)}")
+    return values
+
+
+def _number(text: str, where: str) -> Number:
+    for kind in (int, float):
+        try:
+            value = kind(text)
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            return value
+    raise BslamError(f"{where}: '{text}' is not allowed; allowed: a finite number")
+
+
+def _list_of(parse: Callable[[str], T]) -> Callable[[str], list[T]]:
+    def parse_list(text: str) -> list[T]:
+        return [parse(word.strip()) for word in text.split(",")]
+
+    return parse_list
+
+
+def _word(allowed: Iterable[str]) -> Callable[[str], str]:
+    names = tuple(allowed)
+
+    def parse(text: str) -> str:
+        if text not in names:
+            raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {', '.join(names)}")
+        return text
+
+    return parse
+
+
+def _association(text: str) -> tuple[str, float]:
+    try:
+        return parse_association(text)
+    except BslamError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _not_negative(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a finite number from 0")
+    return value
+
+
+def _seeds(text: str) -> range:
+    first, colon, end = text.partition(":")
+    if not (colon and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not allowed; allowed: A:B with whole numbers 0 <= A < B"
+        )
+    return range(int(first), int(end))
+
+
+def _whole(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number from 0")
+    return int(text)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number from 1")
+    return int(text)
+
+
+def _names(words: Iterable[str]) -> str:
+    return "{" + ",".join(words) + "}"

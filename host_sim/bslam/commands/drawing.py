@@ -1,0 +1,53 @@
+"""Pictures of a run, drawn by the process that ran it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from bslam.experiment.consistency import nees_band_95
+from bslam.experiment.metrics import WINDOW_S, Evaluation
+from bslam.experiment.output import write_atomically
+from bslam.experiment.sources import Source
+from bslam.experiment.trace import MapBeacon, Trace
+from bslam.log import Log
+from bslam.view.room import Mapped, Room, draw_room
+from bslam.view.series import Series, draw_run
+from bslam.view.style import png
+
+
+def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> None:
+    """Write NAME.map.png and, if there is a truth, NAME.error.png."""
+    write_atomically(out / f"{name}.map.png", png(draw_room(room(name, source, log, trace, evaluation))))
+    if evaluation is not None:
+        series = Series(
+            name,
+            evaluation.time_s,
+            evaluation.error_m[None],
+            evaluation.nees[None],
+            nees_band_95(1),
+            WINDOW_S,
+        )
+        write_atomically(out / f"{name}.error.png", png(draw_run(series)))
+
+
+def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> Room:
+    """What the picture of the map shows, in the frame of the truth; without one, in that of the map."""
+    if evaluation is None:
+        mapped = [Mapped(one.x_m, one.y_m, one.covariance_m2, one.confirmed) for one in trace.beacons]
+        return Room(name, trace.pose[:, :2], mapped=mapped)
+    return Room(
+        title=f"{name} (path and map each rigidly aligned with the truth)" if source.align else name,
+        estimate_m=evaluation.estimate[:, :2],
+        truth_m=evaluation.truth[:, :2],
+        beacons=log.beacons,
+        mapped=[_in_truth(beacon, source, evaluation) for beacon in trace.beacons],
+        walls_m=source.walls_m(),
+    )
+
+
+def _in_truth(beacon: MapBeacon, source: Source, evaluation: Evaluation) -> Mapped:
+    """A beacon in the frame of the truth; if aligned without ellipse, which is relative to the start."""
+    x_m, y_m = evaluation.map_to_truth.points(np.array([[beacon.x_m, beacon.y_m]]))[0]
+    return Mapped(float(x_m), float(y_m), None if source.align else beacon.covariance_m2, beacon.confirmed)

@@ -1,0 +1,48 @@
+"""Jobs for every combination of the values that options with lists name."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+from bslam.commands.arguments import run_options
+from bslam.commands.drawing import draw
+from bslam.experiment.batch import Job, make_jobs
+from bslam.experiment.sources import ScenarioSource
+from bslam.world.simulate import load_scenario
+
+
+def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None) -> list[Job]:
+    """Simulated runs of arguments.scenario: sigma x observation x filter x association x seed.
+
+    `sigmas_mps` None: what the scenario says. The first arguments.pictures runs are drawn.
+    """
+    wheels = load_scenario(arguments.scenario).wheels
+    noise = arguments.noise or wheels.noise
+    options = [
+        run_options(
+            arguments,
+            sigma_mps=sigma_mps,
+            observation=observation,
+            filter=filter_name,
+            association=association,
+            seed=seed,
+            noise=noise,
+        )
+        for sigma_mps, observation, filter_name, association, seed in itertools.product(
+            sigmas_mps or (wheels.sigma_mps,),
+            _values(arguments.observation),
+            _values(arguments.filter),
+            _values(arguments.association),
+            arguments.seeds,
+        )
+    ]
+    sources = [ScenarioSource(arguments.scenario, one.seed, one.sigma_mps, noise) for one in options]
+    return make_jobs(sources, options, draw, arguments.pictures)
+
+
+def _values(one_or_several: Any) -> list[Any]:
+    """Options without lists in this command have a single value."""
+    return one_or_several if isinstance(one_or_several, list) else [one_or_several]

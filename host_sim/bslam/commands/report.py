@@ -1,0 +1,108 @@
+"""What a command that ran filters prints at its end, and its exit status."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bslam.errors import BslamError
+from bslam.experiment.batch import BatchResult
+
+# Heading, and how to get the text of an entry.
+_COLUMNS = (
+    ("mean cm", lambda e: _cm(e, "mean")),
+    ("max cm", lambda e: _cm(e, "max")),
+    ("rmse cm", lambda e: _cm(e, "rmse")),
+    ("last 50 s", lambda e: _scaled(e, "position_error_last_50s_m")),
+    ("odometry", lambda e: _scaled(e, "dead_reckoning_error_m")),
+    ("NEES", lambda e: _number(e, "nees_mean", ".2f")),
+    ("map cm", lambda e: _scaled(e, "map_rmse_m")),
+    ("mapped", lambda e: _number(e, "beacons_mapped", ".4g")),
+    ("of", lambda e: _number(e, "beacons_true", ".4g")),
+    ("wrong", lambda e: _number(e, "wrong_associations", ".4g")),
+    ("us/step", lambda e: _number(e, "step_us_median", ".0f")),
+    ("", lambda e: "FAILED" if "error" in e else "DIVERGED" if e["diverged"] else ""),
+)
+HEADINGS = [heading for heading, _ in _COLUMNS]
+_MOST_ROWS = 40
+
+
+def finish(
+    result: BatchResult, out: Path, text: str | None = None, more: str = "", means: bool = True
+) -> int:
+    """Print the runs (or `text` in their place) and where the files are; the exit status.
+
+    Raises BslamError if an input was bad, after all that could run did.
+    """
+    print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
+    files = [
+        "summary.json",
+        "NAME.estimate.tum",
+        "NAME.truth.tum",
+        "NAME.map.csv",
+        "*.png",
+        *([more] if more else []),
+    ]
+    print(f"files in {out}: {', '.join(files)}")
+    for outcome in result.outcomes:
+        if outcome.crash is not None:
+            print(f"{outcome.name} failed:\n{outcome.crash}", file=sys.stderr)
+    if result.interrupted:
+        print("stopped: what was finished is kept", file=sys.stderr)
+    if result.bad_input is not None:
+        raise BslamError(result.bad_input)
+    return 0 if result.ok else 1
+
+
+def table(entries: Sequence[dict[str, Any]], means: bool = True) -> str:
+    """One line a run, and if wanted a last line with the means of several."""
+    rows = [[entry["name"], *(text(entry) for _, text in _COLUMNS)] for entry in entries[:_MOST_ROWS]]
+    if len(entries) > _MOST_ROWS:
+        rows.append([f"... {len(entries) - _MOST_ROWS} more in summary.json", *("" for _ in _COLUMNS)])
+    if means and len(entries) > 1:
+        rows.append(mean_row(f"mean of {len(entries)}", entries))
+    return table_of([["run", *HEADINGS], *rows])
+
+
+def table_of(rows: Sequence[Sequence[str]]) -> str:
+    """Text in columns: the first to the left, the others to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        numbers = [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join([row[0].ljust(widths[0]), *numbers]).rstrip())
+    return "\n".join(lines)
+
+
+def mean_row(name: str, entries: Sequence[dict[str, Any]]) -> list[str]:
+    """Means over the runs that have a figure, lost ones included; the last column counts these."""
+    lost = sum(bool(entry["diverged"]) for entry in entries)
+    mean = _mean_entry(entries)
+    return [name, *(text(mean) for _, text in _COLUMNS[:-1]), f"{lost} lost" if lost else ""]
+
+
+def _mean_entry(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Mean of every number that all or some entries have."""
+    mean: dict[str, Any] = {}
+    for key in {key for entry in entries for key in entry}:
+        values = [entry[key] for entry in entries if key in entry]
+        if all(isinstance(value, (int, float)) for value in values):
+            mean[key] = round(statistics.fmean(values), 6)
+        elif all(isinstance(value, dict) for value in values):
+            mean[key] = _mean_entry(values)
+    return mean
+
+
+def _cm(entry: dict[str, Any], figure: str) -> str:
+    return _scaled(entry.get("position_error_m", {}), figure)
+
+
+def _scaled(entry: dict[str, Any], figure: str) -> str:
+    return f"{100.0 * entry[figure]:.2f}" if figure in entry else "-"
+
+
+def _number(entry: dict[str, Any], figure: str, form: str) -> str:
+    return format(entry[figure], form) if figure in entry else "-"

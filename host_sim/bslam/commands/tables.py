@@ -1,0 +1,100 @@
+"""`bslam tables`: the paper's Tables I to III and Fig. 6 to 9, over several seeds."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bslam.commands.arguments import add_batch_options, add_filter_options
+from bslam.commands.grid import grid_jobs
+from bslam.commands.report import finish, table_of
+from bslam.experiment.batch import Job, Outcome, run_batch
+from bslam.experiment.consistency import nees_band_95
+from bslam.experiment.metrics import WINDOW_S
+from bslam.experiment.options import OBSERVATIONS
+from bslam.experiment.output import write_atomically, write_json
+from bslam.experiment.tables import (
+    OBSERVATION_TITLES,
+    SIGMAS_MPS,
+    STATISTICS,
+    Cell,
+    make_cell,
+    markdown,
+)
+from bslam.view.series import Series, draw_pair
+from bslam.view.style import png
+
+SUMMARY = "the paper's Tables I to III and Fig. 6 to 9, with this estimator's figures beside"
+EXAMPLES = """examples:
+  bslam tables
+  bslam tables --seeds 100:120 --jobs 2 --out out/fresh
+  bslam tables --filter standard --no-velocity-states --motion euler --out out/as_printed
+  bslam tables --sigma 0.3 --observation distance --seeds 0:3
+
+Writes tables.md, tables.json, sigmaX.png (errors and NEES over time) and the files of every run."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "--scenario", default="paper_room", help="name, or path of a TOML file (default: paper_room)"
+    )
+    add_filter_options(parser, lists=("observation", "sigma"))
+    parser.set_defaults(sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
+    add_batch_options(parser, "tables", seeds="0:10", pictures=1)
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    jobs = grid_jobs(arguments, arguments.sigma)
+    result = run_batch(jobs, arguments.out, arguments.jobs)
+    by_cell = group(jobs, result.outcomes)
+    cells = [cell for key, outcomes in by_cell.items() if (cell := make_cell(*key, outcomes)) is not None]
+    pictures = {
+        sigma_mps: _draw_sigma(arguments.out, sigma_mps, by_cell)
+        for sigma_mps in {c.sigma_mps for c in cells}
+    }
+    room = f"{jobs[0].name}.map.png" if arguments.pictures > 0 else None
+    runs = len(arguments.seeds)
+    heading = f"Tables I to III: {arguments.scenario}, {arguments.filter} filter, {runs} runs a cell"
+    write_atomically(arguments.out / "tables.md", markdown(cells, heading, pictures, room))
+    write_json(arguments.out / "tables.json", {"schema": 1, "cells": [cell.as_json() for cell in cells]})
+    return finish(result, arguments.out, table_of(_rows(cells)), more="tables.md, tables.json")
+
+
+def group(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> dict[tuple[float, str], list[Outcome]]:
+    """Outcomes by sigma and observation, in the order of the jobs."""
+    cell_of = {job.name: (float(job.options.sigma_mps or 0.0), job.options.observation) for job in jobs}
+    by_cell: dict[tuple[float, str], list[Outcome]] = {}
+    for outcome in outcomes:
+        by_cell.setdefault(cell_of[outcome.name], []).append(outcome)
+    return by_cell
+
+
+def _draw_sigma(out: Path, sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -> str:
+    """Draw both observations of one sigma; the name of the file."""
+    pair = []
+    for observation in OBSERVATIONS:
+        runs = [one for one in by_cell.get((sigma_mps, observation), []) if len(one.time_s)]
+        if runs:
+            error_m, nees = np.array([one.error_m for one in runs]), np.array([one.nees for one in runs])
+            title = OBSERVATION_TITLES[observation]
+            pair.append(Series(title, runs[0].time_s, error_m, nees, nees_band_95(len(runs)), WINDOW_S))
+    name = f"sigma{sigma_mps:g}.png"
+    write_atomically(out / name, png(draw_pair(f"Position error and NEES, sigma = {sigma_mps:g} m/s", pair)))
+    return name
+
+
+def _rows(cells: Sequence[Cell]) -> list[list[str]]:
+    """What is printed: paper / here."""
+    rows = [["cm: paper / here", *STATISTICS, "first 50 s", "last 50 s", "NEES", "inside 95 %", "lost"]]
+    for cell in cells:
+        paper = cell.paper_cm or {}
+        pairs = [f"{paper.get(name, float('nan')):g} / {cell.error_cm[name]:.2f}" for name in STATISTICS]
+        rest = [f"{cell.first_50s_cm:.2f}", f"{cell.last_50s_cm:.2f}", f"{cell.nees_mean:.2f}"]
+        rest += [f"{100 * cell.nees_inside_95:.1f} %", f"{cell.lost}/{cell.runs}"]
+        rows.append([f"sigma {cell.sigma_mps:g} {cell.observation}", *pairs, *rest])
+    return rows

@@ -1,0 +1,207 @@
+"""Many runs in parallel: one that fails does not stop the others, and Ctrl-C keeps what is finished."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from bslam.errors import BslamError
+from bslam.experiment.metrics import Evaluation, describe, evaluate, summarise
+from bslam.experiment.options import RunOptions
+from bslam.experiment.output import write_run, write_summary
+from bslam.experiment.runner import run_log
+from bslam.experiment.sources import ScenarioSource, Source
+from bslam.experiment.trace import Trace
+from bslam.log import Log, write_folder
+
+# Draws the pictures of a run: out directory, name, source, log, trace, evaluation.
+Draw = Callable[[Path, str, Source, Log, Trace, Evaluation | None], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: which log, how, and under which name its files stand."""
+
+    name: str
+    source: Source
+    options: RunOptions
+    draw: Draw | None = None
+    record: bool = False  # write the log as a folder NAME, too
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What comes back from a run, small enough to send between processes."""
+
+    name: str
+    entry: dict[str, Any]  # for summary.json
+    time_s: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))  # (n + 1,)
+    error_m: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))  # (n + 1,)
+    nees: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))  # (n + 1,)
+    bad_input: str | None = None  # the log, or an option, is not what it should be
+    crash: str | None = None  # traceback of anything else that went wrong
+
+    @property
+    def failed(self) -> bool:
+        return self.bad_input is not None or self.crash is not None
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """Outcomes in the order of the jobs; `interrupted`: some are missing because the user stopped."""
+
+    outcomes: tuple[Outcome, ...]
+    interrupted: bool
+
+    @property
+    def bad_input(self) -> str | None:
+        """The first complaint about the input."""
+        return next((one.bad_input for one in self.outcomes if one.bad_input is not None), None)
+
+    @property
+    def ok(self) -> bool:
+        return not self.interrupted and not any(one.failed for one in self.outcomes)
+
+
+def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
+    """Run all jobs, write their files and summary.json into `out`."""
+    finished: dict[int, Outcome] = {}
+    interrupted = False
+    try:
+        for index, outcome in tqdm(
+            _outcomes(jobs, out, processes), total=len(jobs), desc="runs", unit="run", disable=_bar_off(jobs)
+        ):
+            finished[index] = outcome
+    except KeyboardInterrupt:
+        interrupted = True
+    outcomes = tuple(finished[index] for index in sorted(finished))
+    more = {"interrupted": True} if interrupted else {}
+    write_summary(out, [outcome.entry for outcome in outcomes], **more)
+    return BatchResult(outcomes, interrupted)
+
+
+def execute(job: Job, out: Path) -> Outcome:
+    """One run from log to files. Never raises: a failure is an outcome, too."""
+    try:
+        return _execute(job, out)
+    except BslamError as error:
+        return Outcome(job.name, _failed_entry(job, str(error)), bad_input=str(error))
+    except Exception as error:  # a run that crashes is an outcome; the others go on
+        entry = _failed_entry(job, f"{type(error).__name__}: {error}")
+        return Outcome(job.name, entry, crash=traceback.format_exc())
+
+
+def _execute(job: Job, out: Path) -> Outcome:
+    log = job.source.load()
+    if job.record:
+        write_folder(log, out / job.name)
+    trace = run_log(log, job.options)
+    evaluation = evaluate(log, trace, job.options, job.source.align)
+    write_run(out, job.name, trace, evaluation)
+    if job.draw is not None:
+        job.draw(out, job.name, job.source, log, trace, evaluation)
+    entry = summarise(log, trace, job.options, evaluation) | {
+        "name": job.name,
+        "scenario": job.source.name,
+        "truth": job.source.truth_kind if log.truth is not None else "none",
+    }
+    if evaluation is None:
+        return Outcome(job.name, entry)
+    return Outcome(
+        name=job.name,
+        entry=entry,
+        time_s=evaluation.time_s.astype(np.float32),
+        error_m=evaluation.error_m.astype(np.float32),
+        nees=evaluation.nees.astype(np.float32),
+    )
+
+
+def _failed_entry(job: Job, error: str) -> dict[str, Any]:
+    words = describe(job.options) | {"name": job.name, "scenario": job.source.name}
+    return words | {"diverged": True, "error": error}
+
+
+def _outcomes(jobs: Sequence[Job], out: Path, processes: int) -> Iterator[tuple[int, Outcome]]:
+    """Pairs of job index and outcome as they finish; in this process where a second one would not help."""
+    processes = min(processes, len(jobs))
+    if processes <= 1:
+        yield from ((index, execute(job, out)) for index, job in enumerate(jobs))
+        return
+    parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
+    yield from parallel(joblib.delayed(_execute_in_worker)(index, job, out) for index, job in enumerate(jobs))
+
+
+def _execute_in_worker(index: int, job: Job, out: Path) -> tuple[int, Outcome]:
+    if threading.current_thread() is threading.main_thread():
+        # Ctrl-C reaches every process of the terminal; the parent alone decides what it means.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return index, execute(job, out)
+
+
+def _bar_off(jobs: Sequence[Job]) -> bool | None:
+    """No bar for a single run; else tqdm's own choice: a bar on a terminal only."""
+    return True if len(jobs) < 2 else None
+
+
+def make_jobs(
+    sources: Sequence[Source],
+    options: Sequence[RunOptions],
+    draw: Draw | None,
+    pictures: int,
+    record: bool = False,
+) -> list[Job]:
+    """One job for each pair of source and options, named apart; the first `pictures` of them are drawn."""
+    names = run_names(sources, options)
+    return [
+        Job(name, source, one, draw if index < pictures else None, record)
+        for index, (name, source, one) in enumerate(zip(names, sources, options, strict=True))
+    ]
+
+
+def run_names(sources: Sequence[Source], options: Sequence[RunOptions]) -> list[str]:
+    """A name for each run: the log's, a simulation's seed, and whatever else differs between the runs."""
+    varying = {
+        word: len({getattr(one, word) for one in options}) > 1
+        for word in (
+            "sigma_mps",
+            "observation",
+            "association_name",
+            "filter",
+            "motion",
+            "noise",
+            "velocity_states",
+        )
+    }
+    seeds_vary = len({one.seed for one in options}) > 1
+    names: list[str] = []
+    for source, one in zip(sources, options, strict=True):
+        name = source.name
+        if seeds_vary or isinstance(source, ScenarioSource):
+            name += f"_seed{one.seed}"
+        name += "".join(_name_part(word, getattr(one, word)) for word, varies in varying.items() if varies)
+        names.append(_unique(name, names))
+    return names
+
+
+def _name_part(word: str, value: Any) -> str:
+    if word == "sigma_mps":
+        return f"_sigma{value:g}" if value is not None else ""
+    if word == "velocity_states":
+        return "_velocity" if value else "_novelocity"
+    return f"_{str(value).replace(':', '')}"
+
+
+def _unique(name: str, taken: Sequence[str]) -> str:
+    """`name`, or where two logs share it, with a number behind."""
+    count = sum(other == name or other.startswith(f"{name}-") for other in taken)
+    return f"{name}-{count + 1}" if count else name

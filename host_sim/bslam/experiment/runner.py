@@ -1,0 +1,197 @@
+"""Feed a log to the core in the order of time, and keep what it says."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.errors import CoreError
+from bslam.core.slam import Slam
+from bslam.experiment.ledger import Ledger, corrupt_identities
+from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
+from bslam.experiment.trace import MapBeacon, Trace
+from bslam.experiment.truth import step_times_us
+from bslam.log import Log, Odometry, Sightings
+
+SlamFactory = Callable[[Mapping[str, Number], int], Any]
+_FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
+START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
+
+
+def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = None) -> Trace:
+    """Run the filter over the log. Raises BslamError if the core does not accept the parameters.
+
+    What the core refuses on the way (an impossible time stamp, say) is counted in `Trace.refusals` and the
+    run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
+    beacons to hold.
+    """
+    factory = slam_factory or _make_slam
+    return _Run(factory(core_params(options, log), _beacons_in(log)), log, options).finish()
+
+
+def _make_slam(params: Mapping[str, Number], beacons_max: int) -> Slam:
+    return Slam(params, beacons_max=beacons_max)
+
+
+def _beacons_in(log: Log) -> int:
+    """Beacons that there are, as far as the log tells."""
+    sighted = log.sightings.beacon_id[log.sightings.mappable]
+    return max(1, len(np.unique(sighted[sighted >= 0])))
+
+
+class _Run:
+    """One pass over a log; lists rather than small arrays inside, since the loop runs some thousand times."""
+
+    def __init__(self, slam: Any, log: Log, options: RunOptions) -> None:
+        self.slam = slam
+        self.frames = _Frames(log.sightings, options)
+        self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
+        self.lead_us = odometry_lead_us(options, log)
+        self.refusals: Counter[str] = Counter()
+        self.poses: list[tuple[float, float, float]] = []
+        self.covariances: list[tuple[float, ...]] = []  # lower triangles
+        self.seen: list[bool] = []
+        self.step_ns: list[int] = []
+        self.times_us = self._run(log.odometry)
+
+    def _run(self, odometry: Odometry) -> list[int]:
+        """Feed everything; the times of the rows kept."""
+        slam, kind, clock = self.slam, odometry.kind, time.thread_time_ns
+        times_us = step_times_us(odometry).tolist()
+        number = np.int64 if kind == "ticks" else np.float64
+        a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
+        rows = list(zip(odometry.time_us.tolist(), a, b, strict=True))
+        if len(times_us) > len(rows):  # the start stands before the first row, which already moves
+            self._start_clock(times_us[0])
+        else:
+            self._try(slam.odometry, kind, *rows.pop(0))
+        self._frames_until(times_us[1] if len(times_us) > 1 else None)
+        self._keep(times_us[0])
+        for row, until_us in zip(rows, [*times_us[2:], None], strict=False):
+            began = clock()
+            self._try(slam.odometry, kind, *row)
+            core_ns = clock() - began + self._frames_until(until_us)
+            self.step_ns.append(core_ns)
+            self._keep(row[0])
+        return times_us
+
+    def _start_clock(self, time_us: int) -> None:
+        """An empty frame if none is at the start, or the core would not know how long the first row took."""
+        if not self.frames.waiting_before(time_us + 1):
+            self._try(self.slam.sightings, time_us, [], [], [], [])
+
+    def _frames_until(self, until_us: int | None) -> int:
+        """Feed the frames stamped before `until_us` (None: all that are left); CPU time of the core, ns."""
+        clock, core_ns, frames = time.thread_time_ns, 0, self.frames
+        seen = False
+        while frames.waiting_before(until_us):
+            seen = True
+            time_us, true_id, columns = frames.take()
+            began = clock()
+            accounts = self._try(self.slam.sightings, time_us, *columns)
+            core_ns += clock() - began
+            if accounts is None:
+                self.ledger.book_refused(true_id, columns[-1])
+            else:
+                self.ledger.book(true_id, columns[-1], accounts)
+        self.seen.append(seen)
+        return core_ns
+
+    def _try(self, call: Callable[..., Any], *inputs: Any) -> Any:
+        """The answer of the core; None, and a count, where it refuses the input and stays as it was."""
+        try:
+            return call(*inputs)
+        except CoreError as refusal:
+            self.refusals[refusal.status] += 1
+            return None
+
+    def _keep(self, time_us: int) -> None:
+        slam = self.slam
+        pose = None
+        if self.lead_us:
+            pose = self._pose_in_past(time_us - self.lead_us)
+        self.poses.append(pose or slam.pose())
+        self.covariances.append(slam.pose_covariance_lower())
+
+    def _pose_in_past(self, time_us: int) -> tuple[float, float, float] | None:
+        """None before the history reaches back that far."""
+        try:
+            return self.slam.pose_at(time_us)
+        except CoreError:
+            return START_POSE if len(self.poses) < 2 else None
+
+    def finish(self) -> Trace:
+        """The trace of the run."""
+        return Trace(
+            time_us=np.array(self.times_us, dtype=np.int64),
+            pose=np.array(self.poses, dtype=np.float64),
+            covariance=np.array(self.covariances, dtype=np.float64)[:, _FROM_LOWER],
+            seen=np.array(self.seen, dtype=np.bool_),
+            counts=self.ledger.counts(),
+            beacons=tuple(self._map_beacon(beacon) for beacon in self.slam.beacons()),
+            parameters=self._changed_parameters(),
+            counters=dict(self.slam.counters()),
+            refusals=dict(self.refusals),
+            step_us_median=float(np.median(self.step_ns)) * 1e-3 if self.step_ns else 0.0,
+        )
+
+    def _changed_parameters(self) -> dict[str, Number]:
+        defaults = self.slam.defaults()
+        # Seven digits: float32's nearest to 0.3 is not Python's.
+        params = {name: float(f"{value:.7g}") for name, value in self.slam.params.items()}
+        return {name: value for name, value in params.items() if value != defaults[name]}
+
+    def _map_beacon(self, beacon: Any) -> MapBeacon:
+        return MapBeacon(
+            uid=beacon.uid,
+            label=beacon.label,
+            true_id=self.ledger.identity(beacon.uid),
+            x_m=beacon.x_m,
+            y_m=beacon.y_m,
+            covariance_m2=np.array(beacon.covariance, dtype=np.float64),
+            sightings=beacon.sightings,
+            confirmed=beacon.confirmed,
+            range_m=beacon.range_m,
+            phi_rad=beacon.phi_rad,
+        )
+
+
+class _Frames:
+    """Sightings in frames of equal time, as the filter is to see them: without what it must not know."""
+
+    def __init__(self, sightings: Sightings, options: RunOptions) -> None:
+        times = sightings.time_us
+        first = np.flatnonzero(np.diff(times, prepend=-1))
+        self._bounds = [*first.tolist(), len(times)]
+        self._time_us: list[int] = times[first].tolist()
+        self._true_id: list[int] = sightings.beacon_id.tolist()
+        self._columns = _columns_for_filter(sightings, options)
+        self._next = 0
+
+    def waiting_before(self, until_us: int | None) -> bool:
+        if self._next == len(self._time_us):
+            return False
+        return until_us is None or self._time_us[self._next] < until_us
+
+    def take(self) -> tuple[int, Sequence[int], list[list[Any]]]:
+        """Time, true identities, and the columns bearing_rad, range_m, label, mappable of the next frame."""
+        frame = self._next
+        rows = slice(self._bounds[frame], self._bounds[frame + 1])
+        self._next = frame + 1
+        return self._time_us[frame], self._true_id[rows], [column[rows] for column in self._columns]
+
+
+def _columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:
+    """bearing_rad, range_m, label, mappable of all sightings, with what the options hide hidden."""
+    nothing: NDArray[np.float64] = np.full(len(sightings.time_us), np.nan)
+    range_m = sightings.range_m if options.observation == "distance" else nothing
+    label = np.full(len(sightings.time_us), -1, dtype=np.int64)
+    if options.association == "known":
+        mappable_id = np.where(sightings.mappable, sightings.beacon_id, -1)
+        label = corrupt_identities(mappable_id, options.wrong_identity_rate, options.seed)
+    return [column.tolist() for column in (sightings.bearing_rad, range_m, label, sightings.mappable)]

@@ -1,0 +1,108 @@
+"""Where a log comes from: each kind can be sent to another process and loaded there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.experiment.align import Rigid
+from bslam.experiment.mrclam import best_truth, load_mrclam
+from bslam.log import Log, read_folder
+from bslam.world.simulate import load_scenario, simulate
+
+
+class Source(Protocol):
+    """A log that can be made on demand."""
+
+    @property
+    def name(self) -> str:
+        """Scenario, or the log's own name."""
+
+    @property
+    def align(self) -> bool:
+        """The truth has a frame of its own, so that an estimate is aligned before it is compared."""
+
+    @property
+    def truth_kind(self) -> str:
+        """ "simulated", "recorded" or how complete a data set's truth is."""
+
+    def load(self) -> Log:
+        """The log. Raises BslamError."""
+
+    def walls_m(self) -> NDArray[np.float64]:
+        """Walls (w, 4) x1, y1, x2, y2 in the frame of the truth; none where nobody knows them."""
+
+
+@dataclass(frozen=True)
+class ScenarioSource:
+    """A drive to simulate."""
+
+    scenario: str  # name or path of a TOML file
+    seed: int
+    sigma_mps: float | None  # wheel-speed sigma; None: the scenario's
+    noise: str | None  # what errs; None: as the scenario says
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "simulated"
+
+    @property
+    def name(self) -> str:
+        return Path(self.scenario).stem
+
+    def load(self) -> Log:
+        return simulate(load_scenario(self.scenario), self.seed, self.sigma_mps, self.noise)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        scenario = load_scenario(self.scenario)
+        start = scenario.start
+        ends_m = np.array([(*wall.start, *wall.end) for wall in scenario.arena.walls], dtype=np.float64)
+        to_start = Rigid(start.heading_rad, start.x_m, start.y_m).inverse()
+        return to_start.points(ends_m.reshape(-1, 2)).reshape(-1, 4)
+
+
+@dataclass(frozen=True)
+class FolderSource:
+    """A recorded log folder; its truth is in the frame of the start pose."""
+
+    path: Path
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "recorded"
+
+    @property
+    def name(self) -> str:
+        return self.path.resolve().name
+
+    def load(self) -> Log:
+        return read_folder(self.path)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class MrclamSource:
+    """One robot of an MRCLAM data set."""
+
+    directory: Path
+    robot: int
+
+    align: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:
+        return f"{self.directory.resolve().name}_robot{self.robot}"
+
+    @property
+    def truth_kind(self) -> str:
+        return best_truth(self.directory, self.robot)[0]
+
+    def load(self) -> Log:
+        return load_mrclam(self.directory, self.robot)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))

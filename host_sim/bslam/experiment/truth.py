@@ -1,0 +1,105 @@
+"""True poses at the times of the steps, and dead reckoning to compare with."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.experiment.align import wrap_angle
+from bslam.log import Log, Odometry, Truth
+
+# Between two true poses no farther apart in time than this, the truth is interpolated (Vicon gaps, short
+# rests);
+INTERPOLATE_US: Final = 500_000
+# elsewhere it is only known this near to a true pose. Sparse truth stands still there.
+NEAR_US: Final = 50_000
+
+
+def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """True poses (n, 3) at `time_us` (n,), and where they are known, (n,); NaN elsewhere."""
+    stamps = truth.time_us
+    after = np.clip(np.searchsorted(stamps, time_us), 1, max(len(stamps) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(stamps) - 1)
+    inside = (time_us >= stamps[before]) & (time_us <= stamps[after])
+    close = inside & (stamps[after] - stamps[before] <= INTERPOLATE_US)
+    distance_us = np.minimum(np.abs(time_us - stamps[before]), np.abs(time_us - stamps[after]))
+    known = close | (distance_us <= NEAR_US)
+    poses = _interpolate(truth, np.where(close, time_us, _nearest(stamps, time_us, before, after)))
+    poses[~known] = np.nan
+    return poses, known
+
+
+def is_dense(truth: Truth) -> bool:
+    """True if the truth covers the drive without long gaps, so that a way can be measured on it."""
+    return len(truth.time_us) > 1 and float(np.mean(np.diff(truth.time_us) <= INTERPOLATE_US)) > 0.99
+
+
+def dead_reckoning(log: Log, forward_scale: float = 1.0, turn_scale: float = 1.0) -> NDArray[np.float64]:
+    """Poses (n + 1, 3) of odometry alone, by exact arcs from the origin; rows as in a Trace.
+
+    The scales are true over measured.
+    """
+    forward_m, turn_rad = odometry_increments(log)
+    forward_m, turn_rad = forward_scale * forward_m, turn_scale * turn_rad
+    theta = np.concatenate([[0.0], np.cumsum(turn_rad)])
+    chord_m = forward_m * np.sinc(turn_rad / (2.0 * np.pi))  # numpy's sinc(x) is sin(pi x) / (pi x)
+    course = theta[:-1] + 0.5 * turn_rad
+    x = np.concatenate([[0.0], np.cumsum(chord_m * np.cos(course))])
+    y = np.concatenate([[0.0], np.cumsum(chord_m * np.sin(course))])
+    return np.column_stack([x, y, wrap_angle(theta)])
+
+
+def step_times_us(odometry: Odometry) -> NDArray[np.int64]:
+    """Times of the start and of the end of each step, (n + 1,).
+
+    Wheel travel counts from time 0 on; the first row of other odometry only gives the reading at the start.
+    """
+    if odometry.kind == "wheels":
+        return np.concatenate([[0], odometry.time_us]).astype(np.int64)
+    return odometry.time_us
+
+
+def odometry_increments(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Way along the path, m, and turn, rad, of each step, (n,) each, as odometry gives them."""
+    odometry, robot = log.odometry, log.robot
+    if odometry.kind == "velocity":
+        dt_s = np.diff(odometry.time_us) * 1e-6
+        return odometry.a[1:] * dt_s, odometry.b[1:] * dt_s
+    left_m, right_m = odometry.a, odometry.b
+    if odometry.kind == "ticks":
+        left_m, right_m = _travel_of_ticks(log)
+    return 0.5 * (left_m + right_m), (right_m - left_m) / robot.wheelbase_m
+
+
+def _travel_of_ticks(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    robot = log.robot
+    assert robot.left_radius_m and robot.right_radius_m and robot.ticks_per_revolution and robot.counter_bits
+    modulus, per_turn = 2.0**robot.counter_bits, robot.ticks_per_revolution
+
+    def travel_m(ticks: NDArray[np.float64], radius_m: float) -> NDArray[np.float64]:
+        rolled_over = np.mod(np.diff(ticks) + 0.5 * modulus, modulus) - 0.5 * modulus
+        return rolled_over * (2.0 * np.pi * radius_m / per_turn)
+
+    return travel_m(log.odometry.a, robot.left_radius_m), travel_m(log.odometry.b, robot.right_radius_m)
+
+
+def _nearest(
+    stamps: NDArray[np.int64],
+    time_us: NDArray[np.int64],
+    before: NDArray[np.intp],
+    after: NDArray[np.intp],
+) -> NDArray[np.int64]:
+    nearer_before = np.abs(time_us - stamps[before]) <= np.abs(time_us - stamps[after])
+    return np.where(nearer_before, stamps[before], stamps[after])
+
+
+def _interpolate(truth: Truth, time_us: NDArray[np.int64]) -> NDArray[np.float64]:
+    start_us = truth.time_us[0]  # differences are exact in a double, times since 1970 squared are not
+    at, stamps = time_us - start_us, truth.time_us - start_us
+    theta = np.interp(at, stamps, np.unwrap(truth.theta_rad))
+    return np.column_stack(
+        [np.interp(at, stamps, truth.x_m), np.interp(at, stamps, truth.y_m), wrap_angle(theta)]
+    )

@@ -1,0 +1,141 @@
+"""The map: walls, true and estimated path, true and estimated beacons (as the paper's Fig. 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from bslam.log import Beacons
+from bslam.view.style import BEACON, ESTIMATE, SECOND, TRUTH, WALL, new_figure, thinned, tidy
+
+_SIGMAS: Final = 2.0  # size of the ellipses
+# An estimate that got lost is cut off this far (times the extent of the truth) outside, or the room would
+# shrink.
+_LOST_MARGIN: Final = 0.6
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A beacon of the estimated map."""
+
+    x_m: float
+    y_m: float
+    covariance_m2: NDArray[np.float64] | None  # (2, 2); None: no ellipse
+    confirmed: bool
+
+
+@dataclass(frozen=True)
+class Room:
+    """What is in the picture; everything in one frame."""
+
+    title: str
+    estimate_m: NDArray[np.float64]  # (n, 2), its first row the start
+    truth_m: NDArray[np.float64] | None = None  # (n, 2), NaN where it is not known
+    beacons: Beacons | None = None
+    mapped: Sequence[Mapped] = ()
+    walls_m: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))  # (w, 4) x1, y1, x2, y2
+
+
+def draw_room(room: Room) -> Figure:
+    """The picture."""
+    low_m, high_m = _extent(room)
+    width_m, height_m = high_m - low_m
+    width_in = float(np.clip(9.0 * np.sqrt(width_m / height_m), 6.5, 11.0))
+    figure = new_figure(width_in, float(np.clip(width_in * height_m / width_m, 4.0, 11.0)) + 0.8)
+    axes = figure.add_subplot()
+    for x1, y1, x2, y2 in room.walls_m:
+        axes.plot([x1, x2], [y1, y2], color=WALL, linewidth=3, solid_capstyle="round", zorder=2)
+    if room.truth_m is not None:
+        _draw_truth(axes, room.truth_m)
+    shown = thinned(room.estimate_m)
+    axes.plot(*shown.T, color=ESTIMATE, linewidth=1.1, alpha=0.9, label="estimated path", zorder=4)
+    start: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
+    axes.plot(*room.estimate_m[0], color=ESTIMATE, label="start", zorder=7, **start)
+    if room.beacons is not None:
+        _draw_beacons(axes, room.beacons)
+    for confirmed in (True, False):
+        _draw_mapped(axes, [one for one in room.mapped if one.confirmed == confirmed], confirmed)
+    axes.set_aspect("equal")
+    axes.set_xlim(low_m[0], high_m[0])
+    axes.set_ylim(low_m[1], high_m[1])
+    tidy(axes, "x, m", "y, m")
+    axes.set_title(room.title, fontsize=11)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8, frameon=False)
+    return figure
+
+
+def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:
+    """A line where the truth is known step by step, dots where it is known now and then."""
+    known = np.isfinite(truth_m[:, 0])
+    style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 5}
+    if known.mean() > 0.5:
+        style = {"linewidth": 2.2, "alpha": 0.55}
+    shown = thinned(truth_m if known.mean() > 0.5 else truth_m[known])
+    axes.plot(*shown.T, color=TRUTH, label="true path", zorder=3, **style)
+
+
+def _draw_beacons(axes: Any, beacons: Beacons) -> None:
+    style = {
+        "marker": "*",
+        "markersize": 14,
+        "markeredgecolor": "#6b4b00",
+        "markeredgewidth": 0.8,
+        "linestyle": "",
+    }
+    axes.plot(beacons.x_m, beacons.y_m, color=BEACON, label="true beacon", zorder=5, **style)
+    for identity, x_m, y_m in zip(beacons.beacon_id, beacons.x_m, beacons.y_m, strict=True):
+        offset = {"xytext": (7, 6), "textcoords": "offset points"}
+        axes.annotate(str(identity), (x_m, y_m), fontsize=8, color="#6b4b00", **offset)
+
+
+def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:
+    """Crosses with their ellipse; provisional beacons pale."""
+    if not beacons:
+        return
+    label = "mapped beacon" if confirmed else "provisional beacon"
+    if any(one.covariance_m2 is not None for one in beacons):
+        label += f", {_SIGMAS:g} sigma"
+    alpha = 0.95 if confirmed else 0.3
+    xs, ys = [one.x_m for one in beacons], [one.y_m for one in beacons]
+    style = {"marker": "+", "markersize": 11, "markeredgewidth": 1.5, "linestyle": "", "zorder": 6}
+    axes.plot(xs, ys, color=SECOND, alpha=alpha, label=label, **style)
+    for one in beacons:
+        if one.covariance_m2 is not None:
+            outline = {
+                "facecolor": "none",
+                "edgecolor": SECOND,
+                "alpha": alpha,
+                "linewidth": 1.2,
+                "zorder": 6,
+            }
+            axes.add_patch(_ellipse((one.x_m, one.y_m), one.covariance_m2, **outline))
+
+
+def _ellipse(centre_m: tuple[float, float], covariance_m2: NDArray[np.float64], **style: Any) -> Ellipse:
+    variances, directions = np.linalg.eigh(covariance_m2)
+    minor_m, major_m = 2.0 * _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
+    angle_deg = float(np.degrees(np.arctan2(directions[1, 1], directions[0, 1])))
+    return Ellipse(centre_m, major_m, minor_m, angle=angle_deg, **style)
+
+
+def _extent(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest x, y shown: all that is true, and of the estimate what leaves that readable."""
+    true = [room.walls_m.reshape(-1, 2)]
+    if room.truth_m is not None:
+        true.append(room.truth_m[np.isfinite(room.truth_m[:, 0])])
+    if room.beacons is not None:
+        true.append(np.column_stack([room.beacons.x_m, room.beacons.y_m]))
+    points = np.concatenate(true)
+    if len(points) == 0:
+        points = room.estimate_m
+    low_m, high_m = points.min(axis=0), points.max(axis=0)
+    margin_m = _LOST_MARGIN * max(float(np.max(high_m - low_m)), 1.0)
+    low_m = np.maximum(np.minimum(low_m, room.estimate_m.min(axis=0)), low_m - margin_m)
+    high_m = np.minimum(np.maximum(high_m, room.estimate_m.max(axis=0)), high_m + margin_m)
+    return low_m - 0.4, high_m + 0.4
