@@ -3,7 +3,8 @@
 #include "bslam/math/trig.h"
 
 /// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
-typedef bslam_real_t (*distance2_fn)(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon);
+typedef bslam_real_t (*distance2_fn)(const bslam_frame_t *frame, const bslam_sighting_t *sighting,
+                                     int beacon);
 
 static bool is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
 {
@@ -28,7 +29,8 @@ static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
     for (int i = 1; i < frame->count; i++) {
         for (int j = 0; j < i && matches[i].verdict == BSLAM_VERDICT_MATCH; j++) {
             if (matches[j].verdict == BSLAM_VERDICT_MATCH && matches[j].beacon == matches[i].beacon) {
-                bslam_match_t *loser = matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
+                bslam_match_t *loser =
+                    matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
                 loser->verdict = BSLAM_VERDICT_REJECT;
                 loser->reason = BSLAM_REASON_DUPLICATE;
                 loser->beacon = -1;
@@ -37,7 +39,8 @@ static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
     }
 }
 
-// ---- known identity ------------------------------------------------------------------------------------------------
+// ---- known identity
+// ------------------------------------------------------------------------------------------------
 
 static int find_label(const bslam_ekf_t *ekf, int32_t label)
 {
@@ -53,7 +56,8 @@ static bool label_is_repeated(const bslam_frame_t *frame, int i)
 {
     for (int j = 0; j < i; j++) {
         const bslam_sighting_t *earlier = &frame->sightings[j];
-        if (earlier->label == frame->sightings[i].label && earlier->beacon_class != BSLAM_CLASS_NOT_MAPPABLE) {
+        if (earlier->label == frame->sightings[i].label &&
+            earlier->beacon_class != BSLAM_CLASS_NOT_MAPPABLE) {
             return true;
         }
     }
@@ -79,7 +83,8 @@ void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches)
     }
 }
 
-// ---- by distance ---------------------------------------------------------------------------------------------------
+// ---- by distance
+// ---------------------------------------------------------------------------------------------------
 
 /// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
 static void associate_by_distance(const bslam_frame_t *frame, distance2_fn distance2, bslam_real_t match2,
@@ -141,7 +146,8 @@ static bslam_real_t mahalanobis2(const bslam_frame_t *frame, const bslam_sightin
 {
     bslam_innovation_t innovation;
     bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) != BSLAM_OK ||
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+            BSLAM_OK ||
         bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
         return -1;
     }

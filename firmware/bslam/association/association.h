@@ -1,5 +1,5 @@
-/// Data association: which beacon does each sighting of a frame show? One signature for every method, so that they plug
-/// into the same place. MATH "Association".
+/// Data association: which beacon does each sighting of a frame show? One signature for every method, so that
+/// they plug into the same place. MATH "Association".
 #ifndef BSLAM_ASSOCIATION_ASSOCIATION_H
 #define BSLAM_ASSOCIATION_ASSOCIATION_H
 
@@ -48,8 +48,8 @@ typedef void (*bslam_associate_fn)(const bslam_frame_t *frame, bslam_match_t *ma
 /// By label: the detector knows which beacon it is. O(count * beacons).
 void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches);
 
-/// The paper's baseline (Bailey's flowchart): far from any found feature is new, else it is the nearest one. Measured in
-/// the map, or as an angle where there is no distance. O(count * beacons).
+/// The paper's baseline (Bailey's flowchart): far from any found feature is new, else it is the nearest one.
+/// Measured in the map, or as an angle where there is no distance. O(count * beacons).
 void bslam_associate_nearest(const bslam_frame_t *frame, bslam_match_t *matches);
 
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).

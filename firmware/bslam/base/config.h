@@ -1,7 +1,7 @@
 /// Every compile-time size of the library, in one place.
 ///
-/// Override with -D or by naming a header in BSLAM_CONFIG_HEADER. Tuning that may change at run time is not here: it
-/// stands in the bslam_*_params_t structs. `make sizes` prints what each choice costs.
+/// Override with -D or by naming a header in BSLAM_CONFIG_HEADER. Tuning that may change at run time is not
+/// here: it stands in the bslam_*_params_t structs. `make sizes` prints what each choice costs.
 #ifndef BSLAM_BASE_CONFIG_H
 #define BSLAM_BASE_CONFIG_H
 
@@ -17,7 +17,8 @@
 #error "BSLAM_REAL_DOUBLE is 0 or 1"
 #endif
 
-/// Beacons that the map holds, provisional ones included. RAM grows with the square: see docs/SIZES in `make sizes`.
+/// Beacons that the map holds, provisional ones included. RAM grows with the square: see docs/SIZES in `make
+/// sizes`.
 #ifndef BSLAM_BEACONS_MAX
 #define BSLAM_BEACONS_MAX 20
 #endif
@@ -25,8 +26,8 @@
 #error "BSLAM_BEACONS_MAX is 1 to 250"
 #endif
 
-/// Beacons that may stand in inverse-distance form at once (4 state values in place of 2): those seen in direction only
-/// whose distance is not yet known. 0 saves RAM where every sighting has a distance.
+/// Beacons that may stand in inverse-distance form at once (4 state values in place of 2): those seen in
+/// direction only whose distance is not yet known. 0 saves RAM where every sighting has a distance.
 #ifndef BSLAM_RAYS_MAX
 #define BSLAM_RAYS_MAX (BSLAM_BEACONS_MAX < 6 ? BSLAM_BEACONS_MAX : 6)
 #endif
@@ -42,8 +43,8 @@
 #error "BSLAM_SIGHTINGS_MAX is 1 to 250"
 #endif
 
-/// Odometry steps remembered, so that a sighting may be older than the pose (24 bytes each in float). At 25 steps/s the
-/// default reaches 0.6 s back.
+/// Odometry steps remembered, so that a sighting may be older than the pose (24 bytes each in float). At 25
+/// steps/s the default reaches 0.6 s back.
 #ifndef BSLAM_HISTORY_MAX
 #define BSLAM_HISTORY_MAX 16
 #endif

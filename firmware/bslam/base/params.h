@@ -1,5 +1,5 @@
-/// Every run-time parameter: name, default, range and meaning stand once, in the table below. C, the Python package and
-/// `bslam params` read the same line.
+/// Every run-time parameter: name, default, range and meaning stand once, in the table below. C, the Python
+/// package and `bslam params` read the same line.
 #ifndef BSLAM_BASE_PARAMS_H
 #define BSLAM_BASE_PARAMS_H
 
@@ -15,18 +15,25 @@
     /* estimator */ \
     INTEGER(filter, 1, 0, 1, "0 standard EKF (paper equations (4)-(11)), 1 right-invariant EKF") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
-    INTEGER(velocity_states, 1, 0, 1, "1: v and omega are states and the wheels measure them (speedometer noise)") \
-    INTEGER(scale_states, 0, 0, 1, "1: the scale factors of odometry are states; not together with velocity_states") \
-    REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, "standard deviation of v at the start (the robot stands still)") \
+    INTEGER(velocity_states, 1, 0, 1, \
+            "1: v and omega are states and the wheels measure them (speedometer noise)") \
+    INTEGER(scale_states, 0, 0, 1, \
+            "1: the scale factors of odometry are states; not together with velocity_states") \
+    REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, \
+         "standard deviation of v at the start (the robot stands still)") \
     REAL(velocity_walk_mps_sqrt_s, 0.15, 0.0, 100.0, "v changes by this much in a second (random walk)") \
     REAL(velocity_decay_s, 1e6, 1e-3, 1e6, "v decays to 0 with this time constant (1e6: not)") \
-    REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, "standard deviation of omega at the start (the robot stands still)") \
-    REAL(turn_rate_walk_radps_sqrt_s, 0.8, 0.0, 100.0, "omega changes by this much in a second (random walk)") \
+    REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, \
+         "standard deviation of omega at the start (the robot stands still)") \
+    REAL(turn_rate_walk_radps_sqrt_s, 0.8, 0.0, 100.0, \
+         "omega changes by this much in a second (random walk)") \
     REAL(turn_rate_decay_s, 1e6, 1e-3, 1e6, "omega decays to 0 with this time constant (1e6: not)") \
-    REAL(forward_scale, 1.0, 0.1, 10.0, "true over measured forward motion; with scale_states its start value") \
+    REAL(forward_scale, 1.0, 0.1, 10.0, \
+         "true over measured forward motion; with scale_states its start value") \
     REAL(turn_scale, 1.0, 0.1, 10.0, "true over measured turn; with scale_states its start value") \
     REAL(scale_sd, 0.2, 1e-6, 1.0, "standard deviation of both scale factors at the start") \
-    REAL(scale_walk_sqrt_s, 0.002, 0.0, 1.0, "a scale factor changes by this much in a second (random walk)") \
+    REAL(scale_walk_sqrt_s, 0.002, 0.0, 1.0, \
+         "a scale factor changes by this much in a second (random walk)") \
     /* odometry */ \
     REAL(wheelbase_m, 0.4, 1e-3, 10.0, "distance between the wheels") \
     REAL(left_radius_m, 0.05, 1e-4, 10.0, "radius of the left wheel") \
@@ -34,12 +41,16 @@
     INTEGER(ticks_per_revolution, 1024, 1, 10000000, "encoder ticks in a turn of the wheel") \
     INTEGER(counter_bits, 16, 2, 32, "width of the tick counters, which roll over") \
     REAL(speed_max_mps, 20.0, 1e-3, 1000.0, "a wheel reading faster than this is refused as a jump") \
-    REAL(left_speed_sd_mps, 0.3, 0.0, 100.0, "noise of the left wheel's speed reading, independent at each step") \
-    REAL(right_speed_sd_mps, 0.3, 0.0, 100.0, "noise of the right wheel's speed reading, independent at each step") \
+    REAL(left_speed_sd_mps, 0.3, 0.0, 100.0, \
+         "noise of the left wheel's speed reading, independent at each step") \
+    REAL(right_speed_sd_mps, 0.3, 0.0, 100.0, \
+         "noise of the right wheel's speed reading, independent at each step") \
     REAL(travel_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of a wheel's travel that grows with the travel") \
-    REAL(forward_sd_per_sqrt_s, 0.0, 0.0, 10.0, "noise of forward motion that grows with time while the robot moves") \
+    REAL(forward_sd_per_sqrt_s, 0.0, 0.0, 10.0, \
+         "noise of forward motion that grows with time while the robot moves") \
     REAL(forward_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of forward motion that grows with the way") \
-    REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, "noise of the heading that grows with time while the robot moves") \
+    REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, \
+         "noise of the heading that grows with time while the robot moves") \
     REAL(turn_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of the heading that grows with the way") \
     REAL(turn_sd_per_sqrt_rad, 0.0, 0.0, 10.0, "noise of the heading that grows with the turn") \
     REAL(gyro_sd_radps, 0.02, 1e-6, 100.0, "noise of the gyro rate, independent at each step") \
@@ -50,24 +61,34 @@
     REAL(mount_x_m, 0.0, -100.0, 100.0, "sensor on the robot, forward of the wheel axle") \
     REAL(mount_y_m, 0.0, -100.0, 100.0, "sensor on the robot, to the left") \
     REAL(mount_yaw_rad, 0.0, -3.2, 3.2, "sensor on the robot, turned to the left") \
-    INTEGER(sighting_delay_us, 0, -1000000, 10000000, "a sighting stamped t shows what odometry has at t - delay") \
+    INTEGER(sighting_delay_us, 0, -1000000, 10000000, \
+            "a sighting stamped t shows what odometry has at t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
     REAL(bearing_sd_rad, 0.0136, 1e-6, 3.2, "noise of the direction") \
-    REAL(range_sd_floor_m, 0.0, 0.0, 100.0, "noise of the distance: sd^2 = floor^2 + (fraction r)^2 + (per_m r^2)^2") \
+    REAL(range_sd_floor_m, 0.0, 0.0, 100.0, \
+         "noise of the distance: sd^2 = floor^2 + (fraction r)^2 + (per_m r^2)^2") \
     REAL(range_sd_fraction, 0.02, 0.0, 10.0, "noise of the distance in proportion to it") \
     REAL(range_sd_per_m, 0.009, 0.0, 10.0, "noise of the distance from apparent size: proportional to r^2") \
-    REAL(bearing_only_variance_factor, 4.0, 1.0, 1000.0, "direction variance times this where there is no distance") \
-    REAL(gate_d2, 25.0, 0.0, 1e6, "a sighting with a larger squared Mahalanobis distance is rejected (0: no gate)") \
+    REAL(bearing_only_variance_factor, 3.0, 1.0, 1000.0, \
+         "direction variance times this where no distance comes") \
+    REAL(bearing_only_curvature_factor, 100.0, 0.0, 1e6, \
+         "and plus this times the bend of the model, MATH 24") \
+    REAL(gate_d2, 25.0, 0.0, 1e6, \
+         "a sighting with a larger squared Mahalanobis distance is rejected (0: no gate)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \
-    REAL(ray_inverse_distance_per_m, 0.2, 1e-4, 100.0, "start value of a direction-only beacon's inverse distance") \
+    REAL(ray_inverse_distance_per_m, 0.2, 1e-4, 100.0, \
+         "start value of a direction-only beacon's inverse distance") \
     REAL(ray_inverse_distance_sd_per_m, 0.1, 1e-4, 100.0, "its standard deviation") \
-    REAL(ray_linear_limit, 0.1, 1e-4, 10.0, "a ray becomes a point when its linearity index falls below this") \
+    REAL(ray_linear_limit, 0.1, 1e-4, 10.0, \
+         "a ray becomes a point when its linearity index falls below this") \
     /* association and map */ \
-    INTEGER(association, 0, 0, 2, "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis nearest neighbour") \
+    INTEGER(association, 0, 0, 2, \
+            "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis nearest neighbour") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
     REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, direction only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \
-    REAL(new_d2, 40.0, 1e-3, 1e6, "mahalanobis: farther than this from any beacon is a new one, between: rejected") \
+    REAL(new_d2, 40.0, 1e-3, 1e6, \
+         "mahalanobis: farther than this from any beacon is a new one, between: rejected") \
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
     INTEGER(confirm_window_us, 0, 0, 1000000000, "one not confirmed after this long is removed (0: never)")
 // clang-format on
@@ -99,15 +120,16 @@ const bslam_param_info_t *bslam_params_info(int id);
 /// Every field to its default.
 void bslam_params_default(bslam_params_t *params);
 
-/// BSLAM_OK, or BSLAM_E_PARAMETER with *bad_id the first field that is outside its range (NaN is), or that contradicts
-/// another (velocity_states needs a positive speed noise of both wheels, and excludes scale_states).
+/// BSLAM_OK, or BSLAM_E_PARAMETER with *bad_id the first field that is outside its range (NaN is), or that
+/// contradicts another (velocity_states needs a positive speed noise of both wheels, and excludes
+/// scale_states).
 BSLAM_MUST_CHECK bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id);
 
 /// Field id as a number, an integer rounded to the scalar type. 0 for an id that does not exist.
 bslam_real_t bslam_params_get(const bslam_params_t *params, int id);
 
-/// Sets field id. BSLAM_E_PARAMETER, and no change, if there is no such field, the value is outside its range, or an
-/// integer is asked for and the value has a fraction.
+/// Sets field id. BSLAM_E_PARAMETER, and no change, if there is no such field, the value is outside its
+/// range, or an integer is asked for and the value has a fraction.
 BSLAM_MUST_CHECK bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value);
 
 #endif

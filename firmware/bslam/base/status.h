@@ -1,4 +1,5 @@
-/// What a call answers. On every status but BSLAM_OK the instance is unchanged to the bit, but for its counters.
+/// What a call answers. On every status but BSLAM_OK the instance is unchanged to the bit, but for its
+/// counters.
 #ifndef BSLAM_BASE_STATUS_H
 #define BSLAM_BASE_STATUS_H
 

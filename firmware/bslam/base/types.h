@@ -13,7 +13,8 @@ typedef struct bslam_pose {
     bslam_real_t theta_rad;
 } bslam_pose_t;
 
-/// What odometry says of one interval: how far the robot went along its path and how far it turned, with covariance.
+/// What odometry says of one interval: how far the robot went along its path and how far it turned, with
+/// covariance.
 typedef struct bslam_motion {
     bslam_real_t dt_s;
     bslam_real_t forward_m;

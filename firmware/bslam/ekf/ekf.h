@@ -1,11 +1,12 @@
-/// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its right-invariant
-/// form. MATH "The filter".
+/// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its
+/// right-invariant form. MATH "The filter".
 ///
-/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 or 4 values each. The covariance is
-/// held in these ordinary coordinates in both forms; the invariant form transports it after each correction.
+/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 or 4 values each. The
+/// covariance is held in these ordinary coordinates in both forms; the invariant form transports it after
+/// each correction.
 ///
-/// Cost for a state of n values, in multiply-adds: prediction O(n); each scalar of a sighting 7 n, and n²/2 for its
-/// share of the down-date, which waits until four scalars share one pass over the triangle.
+/// Cost for a state of n values, in multiply-adds: prediction O(n); each scalar of a sighting 7 n, and n²/2
+/// for its share of the down-date, which waits until four scalars share one pass over the triangle.
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
@@ -75,15 +76,18 @@ typedef struct bslam_ekf {
 /// Robot at the origin, which it knows exactly; no beacons.
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
 
-// ---- time ----------------------------------------------------------------------------------------------------------
+// ---- time
+// ----------------------------------------------------------------------------------------------------------
 
-/// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states the increment
-/// is a measurement of v and omega instead, fused here. *moved is the motion that the filter took for the interval.
-/// BSLAM_E_SINGULAR: the motion noise is not positive definite, which velocity states need; nothing changes.
+/// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states
+/// the increment is a measurement of v and omega instead, fused here. *moved is the motion that the filter
+/// took for the interval. BSLAM_E_SINGULAR: the motion noise is not positive definite, which velocity states
+/// need; nothing changes.
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
                                                   const bslam_motion_t *motion, bslam_motion_t *moved);
 
-// ---- sightings -----------------------------------------------------------------------------------------------------
+// ---- sightings
+// -----------------------------------------------------------------------------------------------------
 
 /// A row of H with at most 3 + BSLAM_RAY_DIM values that are not zero.
 typedef struct bslam_row {
@@ -103,15 +107,17 @@ typedef struct bslam_innovation {
     bslam_row_t bearing_row;
 } bslam_innovation_t;
 
-/// Innovation of a sighting if it shows beacon `index`. BSLAM_E_SINGULAR: the beacon stands at the sensor, or is a ray
-/// without a positive inverse distance and the sighting has a distance. O(1).
+/// Innovation of a sighting if it shows beacon `index`. BSLAM_E_SINGULAR: the beacon stands at the sensor, or
+/// is a ray without a positive inverse distance and the sighting has a distance. O(1).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
-                                                     const bslam_pose_t *mount, const bslam_sighting_t *sighting,
-                                                     int index, bslam_innovation_t *innovation);
+                                                     const bslam_pose_t *mount,
+                                                     const bslam_sighting_t *sighting, int index,
+                                                     bslam_innovation_t *innovation);
 
-/// Squared Mahalanobis distance of an innovation, equation (8)'s S, from the covariance as it stands: for association.
-/// BSLAM_E_SINGULAR: S is not positive definite. O(1).
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
+/// Squared Mahalanobis distance of an innovation, equation (8)'s S, from the covariance as it stands: for
+/// association. BSLAM_E_SINGULAR: S is not positive definite. O(1).
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
+                                                    const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
 
 /// What became of a sighting.
@@ -120,43 +126,51 @@ typedef struct bslam_fusion {
     bslam_real_t weight;     ///< 1, or less by Huber's rule; 0: gated out
 } bslam_fusion_t;
 
-/// Equations (9)-(11) for one sighting, given those fused since the last bslam_ekf_correct. The mean moves only with
-/// bslam_ekf_correct. BSLAM_E_RANGE: outside the gate, not used. BSLAM_E_SINGULAR: S is not positive definite, not used.
+/// Equations (9)-(11) for one sighting, given those fused since the last bslam_ekf_correct. The mean moves
+/// only with bslam_ekf_correct. BSLAM_E_RANGE: outside the gate, not used. BSLAM_E_SINGULAR: S is not
+/// positive definite, not used.
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
                                                const bslam_innovation_t *innovation, bslam_fusion_t *fusion);
 
-/// Ends a frame: moves the mean, by the exponential map in the invariant form, and brings the covariance up to date.
+/// Ends a frame: moves the mean, by the exponential map in the invariant form, and brings the covariance up
+/// to date.
 void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
 
-// ---- map -----------------------------------------------------------------------------------------------------------
+// ---- map
+// -----------------------------------------------------------------------------------------------------------
 
-/// Adds the beacon that a sighting shows: as a point if it has a distance, else as a ray. *index is its place.
-/// BSLAM_E_MAP_FULL: no room for it. O(n).
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
-                                              const bslam_sighting_t *sighting, int *index);
+/// Adds the beacon that a sighting shows: as a point if it has a distance, else as a ray. *index is its
+/// place. BSLAM_E_MAP_FULL: no room for it. O(n).
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params,
+                                              const bslam_pose_t *mount, const bslam_sighting_t *sighting,
+                                              int *index);
 
 /// Adds a beacon at a position that is given and exact. BSLAM_E_MAP_FULL.
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m, int *index);
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
+                                                    int *index);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
 
-/// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH "Direction only").
-/// True if it did. O(n²) then.
-bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount, int index);
+/// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH
+/// "Direction only"). True if it did. O(n²) then.
+bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                          int index);
 
-// ---- queries -------------------------------------------------------------------------------------------------------
+// ---- queries
+// -------------------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf);
 
-/// Where a beacon is, in the map. A ray without a positive inverse distance answers with a point 1 km along it.
+/// Where a beacon is, in the map. A ray without a positive inverse distance answers with a point 1 km along
+/// it.
 void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *x_m, bslam_real_t *y_m);
 
 /// Covariance of a beacon's position in the map; zero for a known one.
 bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index);
 
-/// False if the robot's pose or a variance in the state is not finite, or a variance is not positive (a pose that has
-/// never moved has variance 0, which passes). O(n).
+/// False if the robot's pose or a variance in the state is not finite, or a variance is not positive (a pose
+/// that has never moved has variance 0, which passes). O(n).
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf);
 
 #endif

@@ -11,6 +11,7 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);
 
 /// Fuses one scalar measurement whose innovation, at the mean before the frame, and variance are given.
-void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation, bslam_real_t variance);
+void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
+                            bslam_real_t variance);
 
 #endif

@@ -1,4 +1,5 @@
-// The map: beacons come into the state, leave it, and turn from rays into points. MATH "Augment", "Direction only".
+// The map: beacons come into the state, leave it, and turn from rays into points. MATH "Augment", "Direction
+// only".
 #include <string.h>
 
 #include "bslam/ekf/ekf.h"
@@ -28,10 +29,13 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
     ekf->base_dim = ekf->dim;
 }
 
-// ---- growing -------------------------------------------------------------------------------------------------------
+// ---- growing
+// -------------------------------------------------------------------------------------------------------
 
-/// A new state value that depends on the robot's pose, and through `own_var` on the sighting: writes its row of P.
-static void append_value(bslam_ekf_t *ekf, bslam_real_t value, const bslam_real_t by_pose[3], bslam_real_t own_var)
+/// A new state value that depends on the robot's pose, and through `own_var` on the sighting: writes its row
+/// of P.
+static void append_value(bslam_ekf_t *ekf, bslam_real_t value, const bslam_real_t by_pose[3],
+                         bslam_real_t own_var)
 {
     const int at = ekf->dim;
     bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
@@ -50,18 +54,21 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
                          const bslam_sighting_t *sighting)
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
-    const bslam_sighted_point_t point = bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
+    const bslam_sighted_point_t point =
+        bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
     const bslam_real_t range_var = bslam_range_variance_m2(params, sighting->range_m);
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, true);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
     const int at = ekf->dim;
     append_value(ekf, point.x_m, x_by_pose,
-                 point.x_by_range * point.x_by_range * range_var + point.x_by_bearing * point.x_by_bearing * bearing_var);
+                 point.x_by_range * point.x_by_range * range_var +
+                     point.x_by_bearing * point.x_by_bearing * bearing_var);
     append_value(ekf, point.y_m, y_by_pose,
-                 point.y_by_range * point.y_by_range * range_var + point.y_by_bearing * point.y_by_bearing * bearing_var);
-    ekf->covariance[bslam_symmat_at(at + 1, at)] +=
-        point.x_by_range * point.y_by_range * range_var + point.x_by_bearing * point.y_by_bearing * bearing_var;
+                 point.y_by_range * point.y_by_range * range_var +
+                     point.y_by_bearing * point.y_by_bearing * bearing_var);
+    ekf->covariance[bslam_symmat_at(at + 1, at)] += point.x_by_range * point.y_by_range * range_var +
+                                                    point.x_by_bearing * point.y_by_bearing * bearing_var;
 }
 
 static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
@@ -85,8 +92,10 @@ static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
 static int append_beacon(bslam_ekf_t *ekf, bslam_beacon_kind_t kind)
 {
     const int index = ekf->beacon_count;
-    ekf->beacons[index] = (bslam_beacon_t){
-        .uid = ekf->next_uid, .label = BSLAM_LABEL_NONE, .kind = kind, .at = kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim};
+    ekf->beacons[index] = (bslam_beacon_t){.uid = ekf->next_uid,
+                                           .label = BSLAM_LABEL_NONE,
+                                           .kind = kind,
+                                           .at = kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim};
     ekf->next_uid++;
     ekf->beacon_count++;
     return index;
@@ -121,13 +130,15 @@ bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_rea
     return BSLAM_OK;
 }
 
-// ---- shrinking -----------------------------------------------------------------------------------------------------
+// ---- shrinking
+// -----------------------------------------------------------------------------------------------------
 
 /// Takes `count` state values out; beacons behind them move up.
 static void remove_values(bslam_ekf_t *ekf, int first, int count)
 {
     bslam_symmat_remove(ekf->covariance, ekf->dim, first, count);
-    memmove(&ekf->mean[first], &ekf->mean[first + count], (size_t)(ekf->dim - first - count) * sizeof ekf->mean[0]);
+    memmove(&ekf->mean[first], &ekf->mean[first + count],
+            (size_t)(ekf->dim - first - count) * sizeof ekf->mean[0]);
     ekf->dim -= count;
     memset(&ekf->mean[ekf->dim], 0, (size_t)count * sizeof ekf->mean[0]);
     for (int b = 0; b < ekf->beacon_count; b++) {
@@ -151,10 +162,13 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
             (size_t)(ekf->beacon_count - index) * sizeof ekf->beacons[0]);
 }
 
-// ---- rays ----------------------------------------------------------------------------------------------------------
+// ---- rays
+// ----------------------------------------------------------------------------------------------------------
 
-/// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the sensor.
-static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount, int at)
+/// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the
+/// sensor.
+static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                          int at)
 {
     const bslam_real_t *ray = &ekf->mean[at];
     const bslam_real_t inverse = ray[3];
@@ -173,7 +187,8 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, 
     return 4 * distance_sd * along < params->ray_linear_limit * square;
 }
 
-bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount, int index)
+bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                          int index)
 {
     bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
@@ -210,11 +225,13 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
     return true;
 }
 
-// ---- queries -------------------------------------------------------------------------------------------------------
+// ---- queries
+// -------------------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
 {
-    const bslam_pose_t pose = {ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y], ekf->mean[BSLAM_STATE_THETA]};
+    const bslam_pose_t pose = {ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y],
+                               ekf->mean[BSLAM_STATE_THETA]};
     return pose;
 }
 

@@ -14,10 +14,10 @@ typedef struct transition {
     bslam_real_t by[POSE_DIM][BASE_DIM_MAX];
 } transition_t;
 
-/// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and turn_rate
-/// times their own change.
-static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_t forward_rate, bslam_real_t turn_rate,
-                            transition_t *transition)
+/// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
+/// turn_rate times their own change.
+static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_t forward_rate,
+                            bslam_real_t turn_rate, transition_t *transition)
 {
     *transition = (transition_t){0};
     for (int i = 0; i < POSE_DIM; i++) {
@@ -79,7 +79,8 @@ static void move_covariance(bslam_ekf_t *ekf, const transition_t *transition)
 }
 
 /// Adds the noise of the increment, mapped into the pose: Q of equation (5).
-static void add_motion_noise(bslam_ekf_t *ekf, const bslam_motion_jacobian_t *jacobian, const bslam_motion_t *motion)
+static void add_motion_noise(bslam_ekf_t *ekf, const bslam_motion_jacobian_t *jacobian,
+                             const bslam_motion_t *motion)
 {
     const bslam_real_t by_forward[POSE_DIM] = {jacobian->x_forward, jacobian->y_forward, 0};
     const bslam_real_t by_turn[POSE_DIM] = {jacobian->x_turn, jacobian->y_turn, 1};
@@ -106,8 +107,8 @@ static void walk_state(bslam_ekf_t *ekf, int at, bslam_real_t keep, bslam_real_t
     ekf->covariance[bslam_symmat_at(at, at)] += walk_var;
 }
 
-static void step_pose(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t forward_m, bslam_real_t turn_rad,
-                      bslam_motion_jacobian_t *jacobian)
+static void step_pose(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t forward_m,
+                      bslam_real_t turn_rad, bslam_motion_jacobian_t *jacobian)
 {
     const bslam_pose_t before = bslam_ekf_pose(ekf);
     const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
@@ -142,7 +143,8 @@ static bslam_status_t predict_with_velocity(bslam_ekf_t *ekf, const bslam_params
     bslam_motion_t scaled = *motion;
     scaled.forward_m *= params->forward_scale;
     scaled.turn_rad *= params->turn_scale;
-    const bslam_sym2_t covariance = {motion->forward_var_m2, motion->forward_turn_cov_mrad, motion->turn_var_rad2};
+    const bslam_sym2_t covariance = {motion->forward_var_m2, motion->forward_turn_cov_mrad,
+                                     motion->turn_var_rad2};
     bslam_lower2_t noise;
     const bslam_status_t status = bslam_sym2_cholesky(&covariance, &noise);
     if (status != BSLAM_OK) {

@@ -7,7 +7,8 @@
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 
-// ---- rows of H -----------------------------------------------------------------------------------------------------
+// ---- rows of H
+// -----------------------------------------------------------------------------------------------------
 
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
@@ -33,8 +34,8 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
     }
 }
 
-static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3], const bslam_real_t *by_beacon,
-                     bslam_row_t *row)
+static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
+                     const bslam_real_t *by_beacon, bslam_row_t *row)
 {
     const int beacon_dim = beacon->kind == BSLAM_BEACON_RAY     ? BSLAM_RAY_DIM
                            : beacon->kind == BSLAM_BEACON_POINT ? BSLAM_POINT_DIM
@@ -50,47 +51,8 @@ static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3]
     row->count = 3 + beacon_dim;
 }
 
-// ---- innovation ----------------------------------------------------------------------------------------------------
-
-static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
-                              bslam_observation_t *seen)
-{
-    const bslam_pose_t pose = bslam_ekf_pose(ekf);
-    const bslam_real_t *state = &ekf->mean[beacon->at];
-    switch (beacon->kind) {
-    case BSLAM_BEACON_RAY:
-        return bslam_observe_ray(&pose, mount, state, seen);
-    case BSLAM_BEACON_KNOWN:
-        return bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
-    case BSLAM_BEACON_POINT:
-    default:
-        return bslam_observe_point(&pose, mount, state[0], state[1], seen);
-    }
-}
-
-bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
-                                    const bslam_sighting_t *sighting, int index, bslam_innovation_t *innovation)
-{
-    const bslam_beacon_t *beacon = &ekf->beacons[index];
-    bslam_observation_t seen;
-    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
-    if (status != BSLAM_OK) {
-        return status;
-    }
-    if (sighting->has_range && !(seen.range_m > 0)) {
-        return BSLAM_E_SINGULAR;
-    }
-    innovation->has_range = sighting->has_range;
-    innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
-    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
-    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
-    if (sighting->has_range) {
-        innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = bslam_range_variance_m2(params, seen.range_m);
-        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
-    }
-    return BSLAM_OK;
-}
+// ---- innovation
+// ----------------------------------------------------------------------------------------------------
 
 /// a P bᵀ for two rows of one sighting, which have the same places.
 static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
@@ -106,6 +68,54 @@ static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, cons
     return sum;
 }
 
+/// What the bend of the direction's model adds to its variance, to second order: with e = d ln(distance) and
+/// b the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Direction only".
+static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon,
+                                       const bslam_observation_t *seen, const bslam_row_t *bearing)
+{
+    bslam_row_t log_distance;
+    fill_row(beacon, seen->range_by_pose, seen->range_by_beacon, &log_distance);
+    for (int k = 0; k < log_distance.count; k++) {
+        log_distance.value[k] /= seen->range_m;
+    }
+    if (beacon->kind == BSLAM_BEACON_RAY) {
+        // A ray's distance is length/inverse, and it is the length whose uncertainty bends the direction:
+        // taking d ln(inverse) out is why rays are so much straighter than points.
+        log_distance.value[log_distance.count - 1] += 1 / ekf->mean[beacon->at + 3];
+    }
+    const bslam_real_t cross = quadratic(ekf, &log_distance, bearing);
+    return quadratic(ekf, &log_distance, &log_distance) * quadratic(ekf, bearing, bearing) + cross * cross;
+}
+
+bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
+                                    const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
+                                    bslam_innovation_t *innovation)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    bslam_observation_t seen;
+    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    if (sighting->has_range && !(seen.range_m > 0)) {
+        return BSLAM_E_SINGULAR;
+    }
+    innovation->has_range = sighting->has_range;
+    innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
+    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
+    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    if (!sighting->has_range && seen.range_m > 0) {
+        innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
+                                        curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
+    }
+    if (sighting->has_range) {
+        innovation->range_m = sighting->range_m - seen.range_m;
+        innovation->range_var_m2 = bslam_range_variance_m2(params, seen.range_m);
+        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+    }
+    return BSLAM_OK;
+}
+
 bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
                                    bslam_real_t *distance2)
 {
@@ -119,7 +129,8 @@ bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovatio
     return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
 }
 
-// ---- gain and down-date --------------------------------------------------------------------------------------------
+// ---- gain and down-date
+// --------------------------------------------------------------------------------------------
 
 /// The waiting down-dates as terms of one pass; places without one add nothing.
 static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t terms[BSLAM_PENDING_MAX])
@@ -143,7 +154,8 @@ static void flush(bslam_ekf_t *ekf)
     }
 }
 
-/// Takes the column P hᵀ, which stands in the next free pending slot, into the correction and the pending down-dates.
+/// Takes the column P hᵀ, which stands in the next free pending slot, into the correction and the pending
+/// down-dates.
 static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s)
 {
     const bslam_real_t *column = ekf->pending[ekf->pending_count];
@@ -156,7 +168,8 @@ static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_
     ekf->has_correction = true;
 }
 
-void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation, bslam_real_t variance)
+void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
+                            bslam_real_t variance)
 {
     if (ekf->pending_count == BSLAM_PENDING_MAX) {
         flush(ekf);
@@ -175,12 +188,13 @@ static bslam_status_t judge(const bslam_params_t *params, bslam_fusion_t *fusion
         return BSLAM_E_RANGE;
     }
     const bslam_real_t limit = params->huber_d;
-    fusion->weight = limit > 0 && fusion->distance2 > limit * limit ? limit / bslam_sqrt(fusion->distance2) : 1;
+    fusion->weight =
+        limit > 0 && fusion->distance2 > limit * limit ? limit / bslam_sqrt(fusion->distance2) : 1;
     return BSLAM_OK;
 }
 
-bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_innovation_t *innovation,
-                              bslam_fusion_t *fusion)
+bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
+                              const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
     if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
         flush(ekf);
@@ -224,9 +238,11 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params, co
     return BSLAM_OK;
 }
 
-// ---- end of a frame ------------------------------------------------------------------------------------------------
+// ---- end of a frame
+// ------------------------------------------------------------------------------------------------
 
-/// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the transport.
+/// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the
+/// transport.
 static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
 {
     bslam_real_t dx = ekf->correction[at];
@@ -261,7 +277,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need anyway:
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need:
 /// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
 static void transport_covariance(bslam_ekf_t *ekf)
 {

@@ -16,7 +16,8 @@ bslam_status_t bslam_sym2_cholesky(const bslam_sym2_t *m, bslam_lower2_t *l)
     return BSLAM_OK;
 }
 
-bslam_status_t bslam_sym2_mahalanobis(const bslam_sym2_t *m, bslam_real_t x, bslam_real_t y, bslam_real_t *distance2)
+bslam_status_t bslam_sym2_mahalanobis(const bslam_sym2_t *m, bslam_real_t x, bslam_real_t y,
+                                      bslam_real_t *distance2)
 {
     if (!(m->xx > 0)) {
         return BSLAM_E_SINGULAR;

@@ -1,4 +1,5 @@
-/// 2 x 2 symmetric matrices: the innovation covariance of a sighting, the noise of a motion, a beacon's ellipse.
+/// 2 x 2 symmetric matrices: the innovation covariance of a sighting, the noise of a motion, a beacon's
+/// ellipse.
 #ifndef BSLAM_MATH_SMALLMAT_H
 #define BSLAM_MATH_SMALLMAT_H
 
@@ -21,8 +22,8 @@ typedef struct bslam_lower2 {
 
 BSLAM_MUST_CHECK bslam_status_t bslam_sym2_cholesky(const bslam_sym2_t *m, bslam_lower2_t *l);
 
-/// vᵀ m⁻¹ v for v = (x, y): the squared Mahalanobis distance. BSLAM_E_SINGULAR if m is not positive definite; then
-/// *distance2 is unchanged.
+/// vᵀ m⁻¹ v for v = (x, y): the squared Mahalanobis distance. BSLAM_E_SINGULAR if m is not positive definite;
+/// then *distance2 is unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_sym2_mahalanobis(const bslam_sym2_t *m, bslam_real_t x, bslam_real_t y,
                                                        bslam_real_t *distance2);
 

@@ -41,7 +41,8 @@ void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_
 
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count)
 {
-    // Every element moves to a place at or before its own, so ascending order never overwrites what is still to be read.
+    // Every element moves to a place at or before its own, so ascending order never overwrites what is still
+    // to be read.
     for (int i = first + count; i < n; i++) {
         const bslam_real_t *from = m + bslam_symmat_row(i);
         bslam_real_t *to = m + bslam_symmat_row(i - count);
@@ -67,9 +68,10 @@ bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratc
             }
             if (i == j) {
                 const bslam_real_t diagonal = bslam_symmat_get(m, i, i);
-                // Rounding leaves a pivot within the tolerance of zero where the matrix is singular, as it is while a
-                // new beacon's anchor still equals the robot's position.
-                if (!(diagonal >= 0) || !(sum >= -tolerance * (bslam_real_t)n * diagonal)) {
+                // Rounding leaves a pivot within the tolerance of zero where the matrix is singular, as it is
+                // while a new beacon's anchor still equals the robot's position.
+                if (!bslam_in_range(diagonal, 0, BSLAM_R(1e30)) ||
+                    !(sum >= -tolerance * (bslam_real_t)n * diagonal)) {
                     return false;
                 }
                 li[i] = sum > tolerance * diagonal ? bslam_sqrt(sum) : 0;

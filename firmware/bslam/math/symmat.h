@@ -1,8 +1,9 @@
 /// A symmetric matrix of changing size, held as one triangle in the caller's array.
 ///
-/// Row i holds columns 0 to i and is filled up to a multiple of four, so that the one inner loop that costs anything
-/// (bslam_symmat_add_rank4) runs in blocks of four without a remainder. What stands in the fill is no part of the
-/// matrix. The same array serves every size up to BSLAM_SYMMAT_LENGTH's argument: growing is writing the new rows.
+/// Row i holds columns 0 to i and is filled up to a multiple of four, so that the one inner loop that costs
+/// anything (bslam_symmat_add_rank4) runs in blocks of four without a remainder. What stands in the fill is
+/// no part of the matrix. The same array serves every size up to BSLAM_SYMMAT_LENGTH's argument: growing is
+/// writing the new rows.
 #ifndef BSLAM_MATH_SYMMAT_H
 #define BSLAM_MATH_SYMMAT_H
 
@@ -11,7 +12,8 @@
 
 #include "bslam/base/real.h"
 
-/// n filled up to a multiple of four: the length of a vector that goes with a matrix of size n. Its tail must be finite.
+/// n filled up to a multiple of four: the length of a vector that goes with a matrix of size n. Its tail must
+/// be finite.
 #define BSLAM_SYMMAT_PADDED(n) (((n) + 3) / 4 * 4)
 /// Elements of the array that holds a matrix of size n.
 #define BSLAM_SYMMAT_LENGTH(n) (BSLAM_SYMMAT_PADDED(n) * (BSLAM_SYMMAT_PADDED(n) + 4) / 2)
@@ -51,15 +53,17 @@ typedef struct bslam_symmat_term {
     const bslam_real_t *columns;      ///< [BSLAM_SYMMAT_PADDED(n)]
 } bslam_symmat_term_t;
 
-/// m += the sum of four terms, in one pass over the triangle. The sum must be symmetric (pairs of terms may be each
-/// other's mirror image). This is where a filter step spends its time: 4 multiply-adds an element. O(4 n^2 / 2).
+/// m += the sum of four terms, in one pass over the triangle. The sum must be symmetric (pairs of terms may
+/// be each other's mirror image). This is where a filter step spends its time: 4 multiply-adds an element.
+/// O(4 n^2 / 2).
 void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t terms[4]);
 
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count);
 
-/// True if the n x n matrix is positive definite to working precision: Cholesky with a relative pivot tolerance.
-/// scratch has BSLAM_SYMMAT_LENGTH(n) elements. O(n^3 / 6): for tests and health checks, not for the control loop.
+/// True if the n x n matrix is positive definite to working precision: Cholesky with a relative pivot
+/// tolerance. scratch has BSLAM_SYMMAT_LENGTH(n) elements. O(n^3 / 6): for tests and health checks, not for
+/// the control loop.
 bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratch);
 
 #endif

@@ -13,7 +13,8 @@
 #define HALF_PI_LOW 7.5497899548918821e-8f
 #endif
 
-/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same everywhere too.
+/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same
+/// everywhere too.
 static bslam_real_t bring_near(bslam_real_t angle)
 {
     if (bslam_abs(angle) <= BSLAM_ANGLE_MAX) {
@@ -42,10 +43,10 @@ static bslam_real_t sin_polynomial(bslam_real_t x)
 {
     const bslam_real_t z = x * x;
 #if BSLAM_REAL_DOUBLE
-    const double tail =
-        8.33333333332248946124e-03 +
-        z * (-1.98412698298579493134e-04 +
-             z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
+    const double tail = 8.33333333332248946124e-03 +
+                        z * (-1.98412698298579493134e-04 +
+                             z * (2.75573137070700676789e-06 +
+                                  z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
     return x + x * z * (-1.66666666666666324348e-01 + z * tail);
 #else
     return x + x * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
@@ -56,13 +57,15 @@ static bslam_real_t cos_polynomial(bslam_real_t x)
 {
     const bslam_real_t z = x * x;
 #if BSLAM_REAL_DOUBLE
-    const double tail =
-        -1.38888888888741095749e-03 +
-        z * (2.48015872894767294178e-05 +
-             z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
+    const double tail = -1.38888888888741095749e-03 +
+                        z * (2.48015872894767294178e-05 +
+                             z * (-2.75573143513906633035e-07 +
+                                  z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
     return 1.0 - (0.5 * z - z * z * (4.16666666666666019037e-02 + z * tail));
 #else
-    return 1.0f - (0.5f * z - z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f)));
+    return 1.0f -
+           (0.5f * z -
+            z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f)));
 #endif
 }
 
@@ -95,26 +98,30 @@ void bslam_sin_cos(bslam_real_t angle_rad, bslam_real_t *sine, bslam_real_t *cos
 /// Arc tangent of a ratio in [0, 1].
 static bslam_real_t atan_unit(bslam_real_t ratio)
 {
-    // Above tan(pi/8) use atan(t) = pi/4 + atan((t - 1)/(t + 1)), which brings the argument into [-0.4143, 0.4143].
+    // Above tan(pi/8) use atan(t) = pi/4 + atan((t - 1)/(t + 1)), which brings the argument into [-0.4143,
+    // 0.4143].
     const bool upper = ratio > BSLAM_R(0.41421356237309504880);
     const bslam_real_t t = upper ? (ratio - 1) / (ratio + 1) : ratio;
     const bslam_real_t z = t * t;
 #if BSLAM_REAL_DOUBLE
     // Cephes atan: rational on |t| <= 0.66.
     const double numerator =
-        ((((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z -
+        ((((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) *
+              z -
           1.228866684490136173410e2) *
              z -
          6.485021904942025371773e1);
-    const double denominator =
-        (((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z +
-          4.853903996359136964868e2) *
-             z +
-         1.945506571482613964425e2);
+    const double denominator = (((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z +
+                                  4.328810604912902668951e2) *
+                                     z +
+                                 4.853903996359136964868e2) *
+                                    z +
+                                1.945506571482613964425e2);
     const double small = t + t * (z * numerator / denominator);
 #else
-    const float small =
-        t + t * z * (-3.33329491539e-1f + z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
+    const float small = t + t * z *
+                                (-3.33329491539e-1f +
+                                 z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
 #endif
     return upper ? BSLAM_PI / 4 + small : small;
 }

@@ -1,7 +1,8 @@
 /// Sine, cosine and arc tangent of our own, and angle wrapping.
 ///
-/// libm's functions differ between C libraries in the last bit, and newlib's carry a large-angle reduction. These use
-/// only + - * / and comparisons, so every machine that follows IEEE 754 gets the same bits (MATH "Trigonometry").
+/// libm's functions differ between C libraries in the last bit, and newlib's carry a large-angle reduction.
+/// These use only + - * / and comparisons, so every machine that follows IEEE 754 gets the same bits (MATH
+/// "Trigonometry").
 #ifndef BSLAM_MATH_TRIG_H
 #define BSLAM_MATH_TRIG_H
 
@@ -13,7 +14,8 @@
 #define BSLAM_ANGLE_MAX BSLAM_R(1e4)
 
 /// Sine and cosine of a finite angle.
-/// Error <= 1.5e-7 in float and 1e-15 in double for |angle| <= pi; beyond, the reduction adds 1 ulp of the angle.
+/// Error <= 1.5e-7 in float and 1e-15 in double for |angle| <= pi; beyond, the reduction adds 1 ulp of the
+/// angle.
 void bslam_sin_cos(bslam_real_t angle_rad, bslam_real_t *sine, bslam_real_t *cosine);
 
 /// Arc tangent of y/x in (-pi, pi], 0 for (0, 0). Error <= 4e-7 in float, 1e-15 in double. Finite arguments.

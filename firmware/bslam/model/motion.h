@@ -1,4 +1,5 @@
-/// The motion model: where an increment of odometry takes the robot, with Jacobians. Paper equation (2); MATH "Motion".
+/// The motion model: where an increment of odometry takes the robot, with Jacobians. Paper equation (2); MATH
+/// "Motion".
 #ifndef BSLAM_MODEL_MOTION_H
 #define BSLAM_MODEL_MOTION_H
 
@@ -9,7 +10,8 @@ typedef enum bslam_motion_kind {
     BSLAM_MOTION_ARC = 1     ///< the circular arc that constant wheel speeds drive
 } bslam_motion_kind_t;
 
-/// Derivatives of the new pose (x, y, theta). Those not listed are 0 or, d theta/d theta and d theta/d turn, 1.
+/// Derivatives of the new pose (x, y, theta). Those not listed are 0 or, d theta/d theta and d theta/d
+/// turn, 1.
 typedef struct bslam_motion_jacobian {
     bslam_real_t x_theta;
     bslam_real_t y_theta;

@@ -22,8 +22,8 @@ bslam_sensor_t bslam_sensor_at(const bslam_pose_t *pose, const bslam_pose_t *mou
 }
 
 /// Completes the derivative of a scalar by the robot's pose from that by the sensor's position.
-static void by_pose(const bslam_sensor_t *sensor, bslam_real_t by_x, bslam_real_t by_y, bslam_real_t by_heading,
-                    bslam_real_t out[3])
+static void by_pose(const bslam_sensor_t *sensor, bslam_real_t by_x, bslam_real_t by_y,
+                    bslam_real_t by_heading, bslam_real_t out[3])
 {
     out[0] = by_x;
     out[1] = by_y;
@@ -92,8 +92,8 @@ bslam_status_t bslam_observe_ray(const bslam_pose_t *pose, const bslam_pose_t *m
     return BSLAM_OK;
 }
 
-bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_pose_t *mount, bslam_real_t range_m,
-                                         bslam_real_t bearing_rad)
+bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_pose_t *mount,
+                                         bslam_real_t range_m, bslam_real_t bearing_rad)
 {
     const bslam_sensor_t sensor = bslam_sensor_at(pose, mount);
     bslam_real_t s;

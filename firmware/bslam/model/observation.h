@@ -1,5 +1,5 @@
-/// What a sensor on the robot sees of a beacon: distance and direction, paper equation (14), or direction alone,
-/// equation (15). Pure functions with Jacobians. MATH "Observation".
+/// What a sensor on the robot sees of a beacon: distance and direction, paper equation (14), or direction
+/// alone, equation (15). Pure functions with Jacobians. MATH "Observation".
 #ifndef BSLAM_MODEL_OBSERVATION_H
 #define BSLAM_MODEL_OBSERVATION_H
 
@@ -20,15 +20,18 @@ typedef struct bslam_observation {
     bslam_real_t bearing_by_beacon[BSLAM_RAY_DIM];
 } bslam_observation_t;
 
-/// Sighting of the point (x_m, y_m) by a sensor at mount on a robot at pose. BSLAM_E_SINGULAR, and *seen unchanged, if the
-/// point is within 1 mm of the sensor: it has no direction.
+/// Sighting of the point (x_m, y_m) by a sensor at mount on a robot at pose. BSLAM_E_SINGULAR, and *seen
+/// unchanged, if the point is within 1 mm of the sensor: it has no direction.
 BSLAM_MUST_CHECK bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t *mount,
-                                                    bslam_real_t x_m, bslam_real_t y_m, bslam_observation_t *seen);
+                                                    bslam_real_t x_m, bslam_real_t y_m,
+                                                    bslam_observation_t *seen);
 
-/// Sighting of a ray: the point anchor + (cos, sin)(direction) / inverse distance. An inverse distance of 0 is a beacon
-/// at infinity; range_m and its derivatives are 0 where the inverse distance is not positive. BSLAM_E_SINGULAR as above.
+/// Sighting of a ray: the point anchor + (cos, sin)(direction) / inverse distance. An inverse distance of 0
+/// is a beacon at infinity; range_m and its derivatives are 0 where the inverse distance is not positive.
+/// BSLAM_E_SINGULAR as above.
 BSLAM_MUST_CHECK bslam_status_t bslam_observe_ray(const bslam_pose_t *pose, const bslam_pose_t *mount,
-                                                  const bslam_real_t ray[BSLAM_RAY_DIM], bslam_observation_t *seen);
+                                                  const bslam_real_t ray[BSLAM_RAY_DIM],
+                                                  bslam_observation_t *seen);
 
 /// The sensor in the map, and how it moves with the robot's heading.
 typedef struct bslam_sensor {
@@ -51,8 +54,8 @@ typedef struct bslam_sighted_point {
     bslam_real_t y_by_bearing;
 } bslam_sighted_point_t;
 
-bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_pose_t *mount, bslam_real_t range_m,
-                                         bslam_real_t bearing_rad);
+bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_pose_t *mount,
+                                         bslam_real_t range_m, bslam_real_t bearing_rad);
 
 /// A ray's point, and its derivatives by the ray's four values. The inverse distance is positive.
 typedef struct bslam_ray_point {

@@ -100,8 +100,10 @@ static void travel_to_motion(const bslam_params_t *params, const wheel_travel_t 
 {
     const bslam_real_t base = params->wheelbase_m;
     const bslam_real_t growth = square(params->travel_sd_per_sqrt_m);
-    const bslam_real_t left_var = square(params->left_speed_sd_mps * dt_s) + growth * bslam_abs(travel->left_m);
-    const bslam_real_t right_var = square(params->right_speed_sd_mps * dt_s) + growth * bslam_abs(travel->right_m);
+    const bslam_real_t left_var =
+        square(params->left_speed_sd_mps * dt_s) + growth * bslam_abs(travel->left_m);
+    const bslam_real_t right_var =
+        square(params->right_speed_sd_mps * dt_s) + growth * bslam_abs(travel->right_m);
     motion->dt_s = dt_s;
     motion->forward_m = (travel->left_m + travel->right_m) / 2;
     motion->turn_rad = (travel->right_m - travel->left_m) / base;
@@ -114,13 +116,15 @@ static void travel_to_motion(const bslam_params_t *params, const wheel_travel_t 
     const bslam_real_t moving_s = way > 0 || turn > 0 ? dt_s : 0;
     motion->forward_var_m2 +=
         square(params->forward_sd_per_sqrt_s) * moving_s + square(params->forward_sd_per_sqrt_m) * way;
-    motion->turn_var_rad2 += square(params->turn_sd_per_sqrt_s) * moving_s + square(params->turn_sd_per_sqrt_m) * way +
+    motion->turn_var_rad2 += square(params->turn_sd_per_sqrt_s) * moving_s +
+                             square(params->turn_sd_per_sqrt_m) * way +
                              square(params->turn_sd_per_sqrt_rad) * turn;
     motion->forward_var_m2 += square(params->gap_speed_sd_mps * gap_s);
     motion->turn_var_rad2 += square(params->gap_turn_sd_radps * gap_s);
 }
 
-/// The part of an interval in which the robot may have moved unseen: all of it while the tick reference is missing.
+/// The part of an interval in which the robot may have moved unseen: all of it while the tick reference is
+/// missing.
 static bslam_real_t unseen_s(const bslam_odometry_t *odometry, const bslam_params_t *params,
                              const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
 {
@@ -137,7 +141,8 @@ static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
     if (time_us < 0 || time_us > TIME_MAX_US) {
         return false;
     }
-    return !odometry->has_time || (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
+    return !odometry->has_time ||
+           (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
 }
 
 /// True if the wheels cannot have moved like this.
@@ -196,7 +201,8 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     }
     odometry->time_us = reading->time_us;
     odometry->has_time = true;
-    // A reading of another source covers motion that the counters saw too: the next tick reading starts afresh.
+    // A reading of another source covers motion that the counters saw too: the next tick reading starts
+    // afresh.
     odometry->has_ticks = reading->source == BSLAM_ODOMETRY_TICKS;
     if (odometry->has_ticks) {
         odometry->left_ticks = reading->left_ticks;

@@ -1,7 +1,7 @@
 /// Odometry of a two-wheel robot: readings in, motion increments with covariance out.
 ///
-/// Three sources: tick counts of two wheel encoders, the travel of each wheel, or velocities (v, omega); a gyro rate may
-/// come beside each. All noise is described at the wheels and at the body (MATH "Odometry").
+/// Three sources: tick counts of two wheel encoders, the travel of each wheel, or velocities (v, omega); a
+/// gyro rate may come beside each. All noise is described at the wheels and at the body (MATH "Odometry").
 #ifndef BSLAM_ODOMETRY_ODOMETRY_H
 #define BSLAM_ODOMETRY_ODOMETRY_H
 
@@ -43,16 +43,18 @@ void bslam_odometry_init(bslam_odometry_t *odometry);
 /// Starts the clock, if nothing has: intervals count from here.
 void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);
 
-/// Forgets the tick reference: after an encoder reset, the next tick reading is the new one, and its interval counts as
-/// a gap.
+/// Forgets the tick reference: after an encoder reset, the next tick reading is the new one, and its interval
+/// counts as a gap.
 void bslam_odometry_rebase(bslam_odometry_t *odometry);
 
 /// The motion since the reading before, into *motion. O(1).
-/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than an hour. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn
-/// beyond 100 rad, an unknown source), BSLAM_E_JUMP: see status.h. On any of these nothing changes.
-/// A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.
+/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than an hour. BSLAM_E_NOT_FINITE,
+/// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, an unknown source),
+/// BSLAM_E_JUMP: see status.h. On any of these nothing changes. A first reading without a started clock has
+/// no interval: BSLAM_OK with motion->dt_s = 0.
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_params_t *params,
-                                                    const bslam_odometry_reading_t *reading, bslam_motion_t *motion);
+                                                    const bslam_odometry_reading_t *reading,
+                                                    bslam_motion_t *motion);
 
 /// Ticks from one counter value to a later one, across at most half a roll-over either way. 2 <= bits <= 32.
 int32_t bslam_odometry_tick_difference(uint32_t before, uint32_t after, int bits);

@@ -22,7 +22,8 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-// ---- odometry and the past -----------------------------------------------------------------------------------------
+// ---- odometry and the past
+// -----------------------------------------------------------------------------------------
 
 static void remember(bslam_slam_t *slam, int64_t end_us, const bslam_motion_t *moved)
 {
@@ -72,7 +73,8 @@ void bslam_slam_rebase_odometry(bslam_slam_t *slam)
 }
 
 /// A part of a remembered step, as a pose in the frame at its beginning.
-static bslam_pose_t step_pose(const bslam_params_t *params, const bslam_history_step_t *step, bslam_real_t share)
+static bslam_pose_t step_pose(const bslam_params_t *params, const bslam_history_step_t *step,
+                              bslam_real_t share)
 {
     const bslam_pose_t start = {0, 0, 0};
     const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
@@ -116,11 +118,13 @@ static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, b
     return BSLAM_E_TIME;
 }
 
-// ---- sightings -----------------------------------------------------------------------------------------------------
+// ---- sightings
+// -----------------------------------------------------------------------------------------------------
 
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
-    if (!bslam_is_number(sighting->bearing_rad) || (sighting->has_range && !bslam_is_number(sighting->range_m))) {
+    if (!bslam_is_number(sighting->bearing_rad) ||
+        (sighting->has_range && !bslam_is_number(sighting->range_m))) {
         return BSLAM_E_NOT_FINITE;
     }
     const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI);
@@ -129,8 +133,8 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 }
 
 /// Checks a frame, and says where the sensor was relative to the robot's present pose.
-static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
-                                  bslam_pose_t *mount)
+static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                  int count, bslam_pose_t *mount)
 {
     slam->bad_sighting = -1;
     if (count < 0 || count > BSLAM_SIGHTINGS_MAX) {
@@ -173,19 +177,21 @@ static bslam_real_t test_ratio(const bslam_params_t *params, bslam_real_t distan
 }
 
 /// Fuses a sighting with the beacon that association chose.
-static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, const bslam_sighting_t *sighting,
-                       int index, bslam_account_t *account)
+static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                       const bslam_sighting_t *sighting, int index, bslam_account_t *account)
 {
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
     bslam_innovation_t innovation;
     bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
-    bslam_status_t status = bslam_ekf_innovation(&slam->ekf, &slam->params, mount, sighting, index, &innovation);
+    bslam_status_t status =
+        bslam_ekf_innovation(&slam->ekf, &slam->params, mount, sighting, index, &innovation);
     if (status == BSLAM_OK) {
         status = bslam_ekf_fuse(&slam->ekf, &slam->params, &innovation, &fusion);
     }
     if (status != BSLAM_OK) {
         const bool gated = status == BSLAM_E_RANGE;
-        fill_account(account, BSLAM_OUTCOME_REJECTED, gated ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon);
+        fill_account(account, BSLAM_OUTCOME_REJECTED, gated ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR,
+                     beacon);
         account->test_ratio = gated ? test_ratio(&slam->params, fusion.distance2) : -1;
         slam->counters.gated += gated ? 1u : 0u;
         return;
@@ -199,8 +205,8 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *
     beacon->confirmed = beacon->confirmed || beacon->sightings >= (uint32_t)slam->params.confirm_sightings;
 }
 
-static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, const bslam_sighting_t *sighting,
-                    bslam_account_t *account)
+static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                    const bslam_sighting_t *sighting, bslam_account_t *account)
 {
     int index;
     if (bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index) != BSLAM_OK) {
@@ -281,7 +287,8 @@ static void count_accounts(bslam_slam_t *slam, int count)
     counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
 }
 
-bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                    int count)
 {
     bslam_pose_t mount;
     const bslam_status_t status = check_frame(slam, time_us, sightings, count, &mount);
@@ -291,7 +298,7 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
     }
     const bslam_frame_t frame = {
         .ekf = &slam->ekf, .params = &slam->params, .mount = &mount, .sightings = sightings, .count = count};
-    bslam_associate_method(&slam->params)(&frame, slam->matches);
+    bslam_associate_method (&slam->params)(&frame, slam->matches);
     use_matches(slam, time_us, &mount, sightings, count);
     tidy_map(slam, time_us, &mount);
     slam->last_frame_us = time_us;
@@ -302,9 +309,11 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
     return BSLAM_OK;
 }
 
-// ---- the map -------------------------------------------------------------------------------------------------------
+// ---- the map
+// -------------------------------------------------------------------------------------------------------
 
-bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bslam_real_t x_m, bslam_real_t y_m)
+bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bslam_real_t x_m,
+                                           bslam_real_t y_m)
 {
     if (!bslam_is_number(x_m) || !bslam_is_number(y_m)) {
         return BSLAM_E_NOT_FINITE;
@@ -336,7 +345,8 @@ bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
     return BSLAM_E_NO_BEACON;
 }
 
-// ---- results -------------------------------------------------------------------------------------------------------
+// ---- results
+// -------------------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam)
 {

@@ -1,13 +1,15 @@
 /// The pipeline: odometry and sightings in; pose, map and an account of each sighting out.
 ///
-/// One struct an instance, owned by the caller; no heap, no global state, no output. Feed it in order of time:
+/// One struct an instance, owned by the caller; no heap, no global state, no output. Feed it in order of
+/// time:
 ///
 ///     bslam_slam_init(&slam, &params, &bad);
 ///     bslam_slam_odometry(&slam, &reading);              // each control step
 ///     bslam_slam_sightings(&slam, time_us, seen, count); // each image
 ///     bslam_slam_pose(&slam);
 ///
-/// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing but a counter has changed.
+/// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing but a counter has
+/// changed.
 #ifndef BSLAM_SLAM_SLAM_H
 #define BSLAM_SLAM_SLAM_H
 
@@ -16,22 +18,22 @@
 
 /// Never-decreasing counts of what happened.
 typedef struct bslam_counters {
-    uint32_t odometry;           ///< readings taken
-    uint32_t odometry_refused;   ///< readings refused, any status
-    uint32_t jumps;              ///< of these, BSLAM_E_JUMP
-    uint32_t frames;             ///< frames taken
-    uint32_t frames_refused;     ///< frames refused, any status
-    uint32_t sightings;          ///< in the frames taken
-    uint32_t matched;            ///< fused with a beacon of the map
-    uint32_t down_weighted;      ///< of these, with less than full weight (Huber)
-    uint32_t added;              ///< started a beacon
-    uint32_t rejected;           ///< not used, any reason
-    uint32_t gated;              ///< of these, outside the hard gate
-    uint32_t map_full;           ///< of these, new without room
-    uint32_t deferred;           ///< left undecided
-    uint32_t removed;            ///< provisional beacons taken out
-    uint32_t settled;            ///< rays that became points
-    uint32_t insane;             ///< times the state was found not finite or with a negative variance: must stay 0
+    uint32_t odometry;          ///< readings taken
+    uint32_t odometry_refused;  ///< readings refused, any status
+    uint32_t jumps;             ///< of these, BSLAM_E_JUMP
+    uint32_t frames;            ///< frames taken
+    uint32_t frames_refused;    ///< frames refused, any status
+    uint32_t sightings;         ///< in the frames taken
+    uint32_t matched;           ///< fused with a beacon of the map
+    uint32_t down_weighted;     ///< of these, with less than full weight (Huber)
+    uint32_t added;             ///< started a beacon
+    uint32_t rejected;          ///< not used, any reason
+    uint32_t gated;             ///< of these, outside the hard gate
+    uint32_t map_full;          ///< of these, new without room
+    uint32_t deferred;          ///< left undecided
+    uint32_t removed;           ///< provisional beacons taken out
+    uint32_t settled;           ///< rays that became points
+    uint32_t insane;  ///< times the state was found not finite or with a negative variance: must stay 0
 } bslam_counters_t;
 
 typedef enum bslam_outcome {
@@ -44,8 +46,8 @@ typedef enum bslam_outcome {
 /// What became of a sighting, and why.
 typedef struct bslam_account {
     bslam_outcome_t outcome;
-    bslam_reason_t reason;    ///< BSLAM_REASON_NONE if it was used
-    bool has_beacon;          ///< beacon_uid is set: it was matched, started a beacon, or was gated against one
+    bslam_reason_t reason;  ///< BSLAM_REASON_NONE if it was used
+    bool has_beacon;        ///< beacon_uid is set: it was matched, started a beacon, or was gated against one
     uint32_t beacon_uid;
     bslam_real_t test_ratio;  ///< squared Mahalanobis distance over the gate's; negative: not computed
     bslam_real_t weight;      ///< 1 for full weight, 0 for not used
@@ -76,40 +78,47 @@ typedef struct bslam_slam {
     bslam_match_t matches[BSLAM_SIGHTINGS_MAX];
 } bslam_slam_t;
 
-/// Robot at the origin, empty map. params is copied. BSLAM_E_PARAMETER with *bad_id, see bslam_params_check: then *slam is
-/// unchanged.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id);
+/// Robot at the origin, empty map. params is copied. BSLAM_E_PARAMETER with *bad_id, see bslam_params_check:
+/// then *slam is unchanged.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
+                                                int *bad_id);
 
-/// One odometry reading: predicts. BSLAM_E_TIME, BSLAM_E_NOT_FINITE, BSLAM_E_RANGE, BSLAM_E_JUMP as bslam_odometry_read
-/// has them; BSLAM_E_SINGULAR as bslam_ekf_predict has it. O(n), or O(n²) with velocity states.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading);
+/// One odometry reading: predicts. BSLAM_E_TIME, BSLAM_E_NOT_FINITE, BSLAM_E_RANGE, BSLAM_E_JUMP as
+/// bslam_odometry_read has them; BSLAM_E_SINGULAR as bslam_ekf_predict has it. O(n), or O(n²) with velocity
+/// states.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
+                                                    const bslam_odometry_reading_t *reading);
 
-/// After an encoder reset (BSLAM_E_JUMP that does not go away): take the next tick reading as the new reference.
+/// After an encoder reset (BSLAM_E_JUMP that does not go away): take the next tick reading as the new
+/// reference.
 void bslam_slam_rebase_odometry(bslam_slam_t *slam);
 
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²).
-/// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than the history reaches,
-/// or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance outside 1 mm to 10 km, a
-/// direction beyond ±2 pi, a label below -1): bslam_slam_bad_sighting says which.
+/// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than the
+/// history reaches, or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE
+/// (a distance outside 1 mm to 10 km, a direction beyond ±2 pi, a label below -1): bslam_slam_bad_sighting
+/// says which.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);
 
 /// Gives a beacon with a known place: localisation in a known map, paper equation (12). It never changes.
 /// BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a label below 0), BSLAM_E_DUPLICATE, BSLAM_E_MAP_FULL.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bslam_real_t x_m,
-                                                            bslam_real_t y_m);
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label,
+                                                            bslam_real_t x_m, bslam_real_t y_m);
 
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid);
 
-// ---- results -------------------------------------------------------------------------------------------------------
+// ---- results
+// -------------------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam);
 
-/// The robot's pose at a time within the history, or up to ahead_max_us after the last odometry, from the present
-/// estimate. BSLAM_E_TIME: outside that; *pose is unchanged.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *pose);
+/// The robot's pose at a time within the history, or up to ahead_max_us after the last odometry, from the
+/// present estimate. BSLAM_E_TIME: outside that; *pose is unchanged.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us,
+                                                   bslam_pose_t *pose);
 
 /// Covariance of (x, y, theta): the lower triangle xx, yx, yy, tx, ty, tt in m², m rad, rad².
 void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6]);
@@ -141,6 +150,7 @@ typedef struct bslam_beacon_view {
 int bslam_slam_beacon_count(const bslam_slam_t *slam);
 
 /// Beacon 0 <= index < bslam_slam_beacon_count(). BSLAM_E_NO_BEACON otherwise.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_beacon(const bslam_slam_t *slam, int index, bslam_beacon_view_t *view);
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_beacon(const bslam_slam_t *slam, int index,
+                                                  bslam_beacon_view_t *view);
 
 #endif

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bslam.world.arena import Arena
 
 Pose = tuple[float, float, float]  # x_m, y_m, theta_rad
+
+# The body is held against the walls every so often: by far less than its radius, so that no wall is jumped.
+_PIECE_M = 0.02
 
 
 def move_on_arc(pose: Pose, left_m: float, right_m: float, wheelbase_m: float) -> Pose:
@@ -54,24 +55,17 @@ class Body:
     def __init__(self, arena: Arena, pose: Pose, radius_m: float, wheelbase_m: float) -> None:
         self.pose = pose
         self.feeler = Feeler(arena)
-        self._arena = arena
         self._radius_m = radius_m
         self._wheelbase_m = wheelbase_m
 
     def roll(self, left_m: float, right_m: float) -> bool:
         """Roll the wheels. False: a wall is in the way, both wheels stall and nothing has moved."""
-        pose = move_on_arc(self.pose, left_m, right_m, self._wheelbase_m)
-        if self._is_blocked(pose):
-            return False
+        pieces = max(1, math.ceil(abs(left_m + right_m) / 2.0 / _PIECE_M))
+        pose = self.pose
+        for piece in range(1, pieces + 1):
+            share = piece / pieces
+            pose = move_on_arc(self.pose, left_m * share, right_m * share, self._wheelbase_m)
+            if self.feeler.nearest_within(pose[0], pose[1], self._radius_m) is not None:
+                return False
         self.pose = pose
         return True
-
-    def _is_blocked(self, pose: Pose) -> bool:
-        x_m, y_m, _ = pose
-        if self.feeler.nearest_within(x_m, y_m, self._radius_m) is not None:
-            return True
-        old_x_m, old_y_m, _ = self.pose
-        if math.hypot(x_m - old_x_m, y_m - old_y_m) < self._radius_m:
-            return False  # too short a step to have jumped a wall, with the body clear of it before and after
-        start, end = np.array([[old_x_m, old_y_m]]), np.array([[x_m, y_m]])
-        return bool(self._arena.path_clearance(start, end)[0] < self._radius_m)

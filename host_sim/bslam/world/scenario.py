@@ -287,6 +287,7 @@ def _check_together(scenario: Scenario, path: Path) -> None:
         if not good:
             raise BslamError(f"{path}, {key}: {value!r} is not allowed; allowed: {allowed}")
 
+    require(bool(scenario.arena.walls), "key walls", scenario.arena.walls, "some wall left between the doors")
     seen: set[int] = set()
     for index, beacon in enumerate(scenario.arena.beacons):
         require(
