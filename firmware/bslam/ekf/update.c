@@ -87,6 +87,22 @@ static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beaco
     return quadratic(ekf, &log_distance, &log_distance) * quadratic(ekf, bearing, bearing) + cross * cross;
 }
 
+static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
+                              bslam_observation_t *seen)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_real_t *state = &ekf->mean[beacon->at];
+    switch (beacon->kind) {
+    case BSLAM_BEACON_RAY:
+        return bslam_observe_ray(&pose, mount, state, seen);
+    case BSLAM_BEACON_KNOWN:
+        return bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+    case BSLAM_BEACON_POINT:
+    default:
+        return bslam_observe_point(&pose, mount, state[0], state[1], seen);
+    }
+}
+
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
                                     const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)

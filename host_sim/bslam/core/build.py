@@ -75,7 +75,7 @@ def build(real: str, beacons_max: int) -> Path:
             sources=sorted(str(path) for path in LIBRARY_DIR.rglob("*.c")),
             include_dirs=[str(FIRMWARE_DIR)],
             define_macros=_macros(real, beacons_max),
-            extra_compile_args=["-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-w"],
+            extra_compile_args=["-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-w", "-Werror=implicit-function-declaration"],
             libraries=["m"],
         )
         built = Path(ffi.compile(tmpdir=work, verbose=False))

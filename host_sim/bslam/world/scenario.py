@@ -31,6 +31,7 @@ from bslam.parsing.settings import (
 from bslam.world.arena import Arena, Beacon, Point, Wall
 
 NOISES = ("speedometer", "actuation")
+_SHORTEST_WALL_M = 0.001
 _FOLDER = Path(__file__).resolve().parent.parent / "scenarios"
 
 T = TypeVar("T")
@@ -263,9 +264,10 @@ def _cut_doors(tables: list[_WallTable], path: Path) -> tuple[Wall, ...]:
     for index, table in enumerate(tables):
         (x0, y0), (x1, y1) = table.start, table.end
         length_m = math.hypot(x1 - x0, y1 - y0)
-        if not 0.0 < length_m < math.inf:
+        if not _SHORTEST_WALL_M <= length_m < math.inf:
+            allowed = f"{_SHORTEST_WALL_M:g} m or more from the start"
             raise BslamError(
-                f"{path}, walls[{index}], key end: {table.end!r} is not allowed; allowed: not the start"
+                f"{path}, walls[{index}], key end: {table.end!r} is not allowed; allowed: {allowed}"
             )
         cuts_m = [0.0, *(edge for door in table.doors for edge in door), length_m]
         if cuts_m != sorted(cuts_m):
@@ -274,7 +276,8 @@ def _cut_doors(tables: list[_WallTable], path: Path) -> tuple[Wall, ...]:
                 f"{path}, walls[{index}], key doors: {table.doors!r} is not allowed; allowed: {allowed}"
             )
         at = [(x0 + (x1 - x0) * cut_m / length_m, y0 + (y1 - y0) * cut_m / length_m) for cut_m in cuts_m]
-        walls += [Wall(a, b) for a, b in zip(at[::2], at[1::2], strict=True) if a != b]
+        pieces = [Wall(a, b) for a, b in zip(at[::2], at[1::2], strict=True)]
+        walls += [piece for piece in pieces if math.dist(piece.start, piece.end) >= _SHORTEST_WALL_M]
     return tuple(walls)
 
 
