@@ -107,8 +107,8 @@ class Robot:
     sighting_delay_us: int = setting(integer(0), 0)
     left_radius_m: float | None = setting(POSITIVE, None)
     right_radius_m: float | None = setting(POSITIVE, None)
-    ticks_per_revolution: float | None = setting(POSITIVE, None)
-    counter_bits: int | None = setting(integer(8, 32), None)
+    ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)
+    counter_bits: int | None = setting(integer(2, 32), None)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ ROBOT = Robot(
     range_sigma_fraction=0.02,
     range_sigma_scale_m=110.9,
 )
-ENCODERS = {"left_radius_m": 0.05, "right_radius_m": 0.051, "ticks_per_revolution": 1024.0, "counter_bits": 8}
+ENCODERS = {"left_radius_m": 0.05, "right_radius_m": 0.051, "ticks_per_revolution": 1024, "counter_bits": 8}
 ROBOT_TOML = (
     "wheelbase_m = 0.4\nwheel_speed_sigma_mps = 0.3\nstep_us = 40000\nfield_of_view_rad = 3.14\n"
     "bearing_sigma_rad = 0.0136\nrange_sigma_fraction = 0.02\nrange_sigma_scale_m = 110.9\n"
@@ -321,6 +321,12 @@ def test_read_of_a_broken_gzip_file_names_it(tmp_path: Path, content: bytes) -> 
     write_files(tmp_path, odometry_csv=None)
     (tmp_path / "odometry.csv.gz").write_bytes(content)
     with pytest.raises(BslamError, match=r"odometry\.csv\.gz(: cannot be read|, line 1)"):
+        read_folder(tmp_path)
+
+
+def test_read_of_a_robot_toml_that_is_not_utf8_names_it(tmp_path: Path) -> None:
+    (write_files(tmp_path) / "robot.toml").write_bytes(b"# m\xe8tres\n")
+    with pytest.raises(BslamError, match=r"robot\.toml: cannot be read: .*allowed: a UTF-8 text file"):
         read_folder(tmp_path)
 
 

@@ -119,8 +119,8 @@ class Encoders:
 
     left_radius_m: float = setting(POSITIVE)
     right_radius_m: float = setting(POSITIVE)
-    ticks_per_revolution: float = setting(POSITIVE)
-    counter_bits: int = setting(integer(8, 32))
+    ticks_per_revolution: int = setting(integer(1, 10_000_000))
+    counter_bits: int = setting(integer(2, 32))
 
 
 @dataclass(frozen=True)

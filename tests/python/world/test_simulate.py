@@ -136,7 +136,7 @@ def test_simulate_starts_at_the_origin_with_sightings_and_odometry_from_step_one
 
 def test_simulate_twice_gives_the_same_log_to_the_bit(short_room: Scenario) -> None:
     assert_same_log(simulate(short_room, 4), simulate(short_room, 4))
-    assert (simulate(short_room, 5).truth.x_m != simulate(short_room, 4).truth.x_m).any()  # type: ignore[union-attr]
+    assert (simulate(short_room, 5).truth.x_m != simulate(short_room, 4).truth.x_m).any()
 
 
 def test_simulate_with_another_sigma_changes_only_the_odometry(short_room: Scenario) -> None:
@@ -175,7 +175,7 @@ def test_simulate_without_noise_reads_the_true_travel(short_room: Scenario) -> N
 
 
 def test_simulate_ticks_roll_over_and_give_the_way_back(paper_room: Scenario, tmp_path: Path) -> None:
-    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=2000.0, counter_bits=12)
+    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=2000, counter_bits=12)
     scenario = replace(paper_room, encoders=encoders)
     log, drive = simulate(scenario, 1, sigma_mps=0.0), true_drive(scenario, 1)
     assert log.odometry.kind == "ticks"

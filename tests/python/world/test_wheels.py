@@ -21,7 +21,7 @@ def test_read_travel_is_the_travel_of_every_step() -> None:
 
 
 def test_count_ticks_starts_at_zero_and_counts_whole_ticks() -> None:
-    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.1, ticks_per_revolution=1000.0, counter_bits=16)
+    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.1, ticks_per_revolution=1000, counter_bits=16)
     turn_m = 2.0 * math.pi * 0.05
     odometry = count_ticks(encoders, np.array([40_000]), np.array([[1.0005 * turn_m, 1.0011 * turn_m]]))
     assert odometry.kind == "ticks"
@@ -30,7 +30,7 @@ def test_count_ticks_starts_at_zero_and_counts_whole_ticks() -> None:
 
 
 def test_count_ticks_rolls_under_zero_when_driving_back() -> None:
-    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=1000.0, counter_bits=8)
+    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=1000, counter_bits=8)
     back_m = np.full((1, 2), -2.5 * 2.0 * math.pi * 0.05 / 1000.0)
     assert count_ticks(encoders, np.array([1]), back_m).a.tolist() == [0.0, 253.0]
 
@@ -38,7 +38,7 @@ def test_count_ticks_rolls_under_zero_when_driving_back() -> None:
 @given(travels)
 def test_count_ticks_differences_modulo_give_the_travel_back(travel: list[tuple[float, float]]) -> None:
     """An 8 bit counter rolls over after 8 cm here: more than a step, less than the way."""
-    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=1000.0, counter_bits=8)
+    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=1000, counter_bits=8)
     tick_m = 2.0 * math.pi * 0.05 / 1000.0
     travel_m = np.clip(np.array(travel), -126 * tick_m, 126 * tick_m)  # a counter tells half its range
     odometry = count_ticks(encoders, np.arange(1, len(travel) + 1), travel_m)
