@@ -108,7 +108,7 @@ FIRST_BEACON = "{ id = 0, at = [1.5, 0.0] }"
             r"path_clearance_m: 0\.3 .*body's radius, 0\.3",
         ),
         (
-            "goal_clearance_m = 0.9",
+            "goal_clearance_m = 0.7",
             "goal_clearance_m = 0.31",
             r"goal_clearance_m: 0\.31 .*path_clearance_m, 0\.32",
         ),

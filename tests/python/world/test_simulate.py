@@ -220,7 +220,7 @@ def test_simulate_refuses_what_is_not_allowed(short_room: Scenario, arguments: d
 
 
 def test_simulate_where_no_goal_can_be_says_so(edited_room: Callable[..., Path]) -> None:
-    full = load_scenario(edited_room("goal_clearance_m = 0.9", "goal_clearance_m = 6.0"))
+    full = load_scenario(edited_room("goal_clearance_m = 0.7", "goal_clearance_m = 6.0"))
     with pytest.raises(BslamError, match=r"scenario edited: no free place .*goal_clearance_m, 6"):
         simulate(full, 0)
 
