@@ -84,7 +84,7 @@ def nees_band_95(runs: int, dof: int = 3) -> tuple[float, float]:
     """Band that holds 95 % of a consistent filter's NEES when it is averaged over `runs` runs.
 
     Chi-square quantiles of dof x runs degrees of freedom over `runs`, by Wilson and Hilferty's cube root:
-    within 1 % but for the lower bound of one run, 0.18 for 0.22.
+    within 3 % from two runs on; the lower bound of one run comes out as 0.18 for 0.22.
     """
     k, z = float(dof * runs), 1.959964
     spread = float(np.sqrt(2.0 / (9.0 * k)))

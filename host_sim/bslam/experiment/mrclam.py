@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import gzip
 import math
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,7 +182,8 @@ def _require(folder: Path, stem: str) -> Path:
 def _read_table(path: Path, columns: int) -> _Table:
     """At least `columns` finite numbers a line; `#` begins a comment."""
     try:
-        with gzip.open(path, "rt") if path.suffix == ".gz" else path.open() as file:
+        with _open(path) as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is an error here
             rows = np.loadtxt(file, ndmin=2, usecols=range(columns))
         if len(rows) and np.isfinite(rows).all():
             return _Table(path, rows)
@@ -192,13 +194,16 @@ def _read_table(path: Path, columns: int) -> _Table:
     raise _first_bad_line(path, columns)
 
 
+def _open(path: Path) -> IO[str]:
+    """For reading; what is no UTF-8 becomes something that is no number either."""
+    if path.suffix == ".gz":
+        return gzip.open(path, "rt", encoding="utf-8", errors="replace")
+    return path.open(encoding="utf-8", errors="replace")
+
+
 def _first_bad_line(path: Path, columns: int) -> BslamError:
     """The error for the first line that is not `columns` finite numbers."""
-    with (
-        gzip.open(path, "rt", errors="replace")
-        if path.suffix == ".gz"
-        else path.open(errors="replace") as file
-    ):
+    with _open(path) as file:
         for number, line in enumerate(file, start=1):
             fields = line.split("#")[0].split()
             if fields and not (len(fields) >= columns and all(map(_is_finite, fields[:columns]))):

@@ -1,0 +1,101 @@
+"""From what the user chose to parameters of the core."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bslam.core.slam import Slam
+from bslam.errors import BslamError
+from bslam.experiment import defaults
+from bslam.experiment.options import RunOptions, core_params, odometry_lead_us, parse_association
+from bslam.log import Odometry
+
+
+def velocity(log):
+    return replace(log, odometry=Odometry("velocity", np.array([0, 40_000]), np.zeros(2), np.zeros(2)))
+
+
+def test_every_parameter_exists_in_the_core(made):
+    log = made.circle_log(steps=1)
+    ticks = replace(
+        log,
+        odometry=replace(log.odometry, kind="ticks"),
+        robot=replace(
+            log.robot, left_radius_m=0.1, right_radius_m=0.1, ticks_per_revolution=10, counter_bits=16
+        ),
+    )
+    known = Slam.defaults()
+    for one in (log, ticks, velocity(log)):
+        for observation in ("distance", "direction"):
+            assert set(core_params(RunOptions(observation=observation), one)) <= set(known)
+    assert set(defaults.REAL_LOG) | set(defaults.DIRECTION_ONLY) <= set(known)
+
+
+def test_the_robot_s_noise_and_geometry_reach_the_filter(made):
+    log = made.circle_log(steps=1)
+    robot = replace(
+        log.robot, range_sigma_scale_m=100.0, sensor_x_m=0.1, sensor_yaw_rad=0.2, sighting_delay_us=5000
+    )
+    params = core_params(RunOptions(), replace(log, robot=robot))
+    assert params["left_speed_sd_mps"] == params["right_speed_sd_mps"] == 0.05
+    assert params["range_sd_per_m"] == pytest.approx(0.01)
+    assert (params["mount_x_m"], params["mount_yaw_rad"], params["sighting_delay_us"]) == (0.1, 0.2, 5000)
+    assert core_params(RunOptions(), log)["range_sd_per_m"] == 0.0  # a scale of infinity
+    assert math.isinf(log.robot.range_sigma_scale_m)
+
+
+def test_sigma_of_the_command_line_wins_over_the_log_s_and_set_over_all(made):
+    log = made.circle_log(steps=1)
+    assert core_params(RunOptions(sigma_mps=0.7), log)["left_speed_sd_mps"] == 0.7
+    chosen = RunOptions(sigma_mps=0.7, parameters=(("left_speed_sd_mps", 0.1), ("filter", 0)))
+    assert core_params(chosen, log)["left_speed_sd_mps"] == 0.1
+    assert core_params(chosen, log)["filter"] == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (RunOptions(), 1),
+        (RunOptions(noise="actuation"), 0),
+        (RunOptions(noise="actuation", velocity_states=True), 1),
+        (RunOptions(velocity_states=False), 0),
+        (RunOptions(sigma_mps=0.0), 0),  # nothing errs: the filter refuses a speedometer without noise
+    ],
+)
+def test_velocity_states_belong_to_speedometer_noise(made, options, expected):
+    assert core_params(options, made.circle_log(steps=1))["velocity_states"] == expected
+
+
+def test_real_logs_have_their_own_set(made):
+    params = core_params(RunOptions(), velocity(made.circle_log(steps=1)))
+    assert defaults.REAL_LOG.items() <= params.items()
+    assert params["velocity_states"] == 0
+    assert (
+        odometry_lead_us(RunOptions(), velocity(made.circle_log(steps=1))) == defaults.REAL_ODOMETRY_LEAD_US
+    )
+    assert odometry_lead_us(RunOptions(), made.circle_log(steps=1)) == 0
+    asked = core_params(RunOptions(velocity_states=True), velocity(made.circle_log(steps=1)))
+    assert (asked["velocity_states"], asked["scale_states"]) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("known", ("known", 0.0)), ("known:0.05", ("known", 0.05)), ("nearest", ("nearest", 0.0))],
+)
+def test_parse_association_reads(text, expected):
+    assert parse_association(text) == expected
+
+
+@pytest.mark.parametrize("text", ["joint", "known:", "known:2", "known:nan", "known:x", "nearest:0.1", ""])
+def test_parse_association_says_what_is_allowed(text):
+    with pytest.raises(
+        BslamError, match=r"allowed: known, known:RATE with RATE from 0 to 1, nearest, mahalanobis"
+    ):
+        parse_association(text)
+
+
+def test_association_name_is_what_the_command_line_takes():
+    assert RunOptions(association="known", wrong_identity_rate=0.05).association_name == "known:0.05"
+    assert RunOptions(association="nearest").association_name == "nearest"

@@ -1,0 +1,106 @@
+"""Pictures: they are drawn from whatever a run leaves, and are PNG."""
+
+import io
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from bslam.view.room import Mapped, Room, draw_room
+from bslam.view.series import Series, draw_pair, draw_run
+from bslam.view.style import moving_mean, png, thinned
+
+PATH = np.column_stack([np.linspace(0, 5, 200), np.sin(np.linspace(0, 5, 200))])
+
+
+def pixels(figure):
+    content = png(figure)
+    assert content.startswith(b"\x89PNG")
+    image = matplotlib.image.imread(io.BytesIO(content))
+    assert image.shape[0] > 300
+    assert image.shape[1] > 400
+    return image
+
+
+def texts(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def series(runs=1, steps=2000, lost=False):
+    rng = np.random.default_rng(0)
+    error_m = np.abs(rng.normal(0.1, 0.02, (runs, steps)))
+    if lost:
+        error_m[-1] = 1e6
+    error_m[:, 0] = np.nan
+    nees = rng.chisquare(3, (runs, steps))
+    nees[:, :51] = np.nan
+    return Series("a run", 0.04 * np.arange(steps), error_m, nees, (0.2, 9.3), 50.0)
+
+
+def test_room_with_everything_shows_it(made):
+    mapped = [Mapped(2.0, 0.6, np.diag([0.01, 0.04]), True), Mapped(1.0, 1.0, np.diag([1.0, 0.1]), False)]
+    walls_m = np.array([[-1.0, -3.0, 6.0, -3.0]])
+    figure = draw_room(Room("a room", PATH, PATH + 0.1, made.beacons, mapped, walls_m))
+    pixels(figure)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    lines = ["true path", "estimated path", "start"]
+    assert names == [*lines, "true beacon", "mapped beacon, 2 sigma", "provisional beacon, 2 sigma"]
+    low, high = figure.axes[0].get_ylim()
+    assert low < -3.0 < 2.0 < high
+
+
+def test_room_of_the_estimate_alone():
+    pixels(draw_room(Room("nothing known", PATH)))
+
+
+def test_room_with_a_truth_now_and_then_shows_dots():
+    truth_m = np.full_like(PATH, np.nan)
+    truth_m[[3, 50]] = PATH[[3, 50]]
+    figure = draw_room(Room("sparse", PATH, truth_m))
+    pixels(figure)
+    (line,) = (one for one in figure.axes[0].lines if one.get_label() == "true path")
+    assert (line.get_marker(), len(line.get_xdata())) == (".", 2)
+
+
+def test_room_is_not_shrunk_by_an_estimate_that_got_lost(made):
+    lost = PATH.copy()
+    lost[-1] = (1e6, -1e6)
+    figure = draw_room(Room("lost", lost, PATH, made.beacons))
+    pixels(figure)
+    assert figure.axes[0].get_xlim()[1] < 15.0
+
+
+def test_run_shows_the_means_at_both_ends():
+    figure = draw_run(series())
+    pixels(figure)
+    names = texts(figure.axes[0])
+    assert names[0] == "position error"
+    assert [name.split(":")[0] for name in names[1:]] == ["first 50 s", "last 50 s"]
+    assert any("95 % band, 0.2 to 9.3" in name for name in texts(figure.axes[1]))
+
+
+def test_pair_shares_one_scale_that_a_lost_run_does_not_stretch():
+    figure = draw_pair("both", [series(runs=5), series(runs=5, lost=False)])
+    pixels(figure)
+    top = figure.axes[0].get_ylim()[1]
+    assert 10.0 < top < 100.0
+    assert "mean of 5 runs" in texts(figure.axes[0])
+
+
+def test_a_run_without_a_single_figure_is_drawn_all_the_same():
+    empty = Series(
+        "none", 0.04 * np.arange(100), np.full((1, 100), np.nan), np.full((1, 100), np.nan), (0.2, 9.3), 50.0
+    )
+    pixels(draw_run(empty))
+
+
+def test_moving_mean_leaves_out_what_is_not_known():
+    values = np.array([np.nan, 1.0, 3.0, np.nan, np.nan, np.nan, 5.0])
+    np.testing.assert_allclose(moving_mean(values, 3), [1.0, 2.0, 2.0, 3.0, np.nan, 5.0, 5.0])
+
+
+@pytest.mark.parametrize("rows", [10, 4000, 100_000])
+def test_thinned_keeps_the_first_and_few(rows):
+    kept = thinned(np.arange(rows))
+    assert kept[0] == 0
+    assert len(kept) <= min(rows, 8000)
