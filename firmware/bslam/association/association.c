@@ -39,8 +39,7 @@ static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
     }
 }
 
-// ---- known identity
-// ------------------------------------------------------------------------------------------------
+// ---- known identity ---------------------------------------------------------------------------------------
 
 static int find_label(const bslam_ekf_t *ekf, int32_t label)
 {
@@ -83,8 +82,7 @@ void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches)
     }
 }
 
-// ---- by distance
-// ---------------------------------------------------------------------------------------------------
+// ---- by distance ------------------------------------------------------------------------------------------
 
 /// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
 static void associate_by_distance(const bslam_frame_t *frame, distance2_fn distance2, bslam_real_t match2,

@@ -76,8 +76,7 @@ typedef struct bslam_ekf {
 /// Robot at the origin, which it knows exactly; no beacons.
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
 
-// ---- time
-// ----------------------------------------------------------------------------------------------------------
+// ---- time -------------------------------------------------------------------------------------------------
 
 /// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states
 /// the increment is a measurement of v and omega instead, fused here. *moved is the motion that the filter
@@ -86,13 +85,12 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
                                                   const bslam_motion_t *motion, bslam_motion_t *moved);
 
-// ---- sightings
-// -----------------------------------------------------------------------------------------------------
+// ---- sightings --------------------------------------------------------------------------------------------
 
 /// A row of H with at most 3 + BSLAM_RAY_DIM values that are not zero.
 typedef struct bslam_row {
-    int count;
-    int index[3 + BSLAM_RAY_DIM];
+    uint16_t count;
+    uint16_t index[3 + BSLAM_RAY_DIM];
     bslam_real_t value[3 + BSLAM_RAY_DIM];
 } bslam_row_t;
 
@@ -107,8 +105,9 @@ typedef struct bslam_innovation {
     bslam_row_t bearing_row;
 } bslam_innovation_t;
 
-/// Innovation of a sighting if it shows beacon `index`. BSLAM_E_SINGULAR: the beacon stands at the sensor, or
-/// is a ray without a positive inverse distance and the sighting has a distance. O(1).
+/// Innovation of a sighting if it shows beacon `index`, at the mean and covariance before the frame: take all
+/// of a frame before the first bslam_ekf_fuse. BSLAM_E_SINGULAR: the beacon stands at the sensor, or is a ray
+/// without a positive inverse distance and the sighting has a distance. O(1).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
                                                      const bslam_pose_t *mount,
                                                      const bslam_sighting_t *sighting, int index,
@@ -136,8 +135,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_par
 /// to date.
 void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
 
-// ---- map
-// -----------------------------------------------------------------------------------------------------------
+// ---- map --------------------------------------------------------------------------------------------------
 
 /// Adds the beacon that a sighting shows: as a point if it has a distance, else as a ray. *index is its
 /// place. BSLAM_E_MAP_FULL: no room for it. O(n).
@@ -157,8 +155,7 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
 bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                           int index);
 
-// ---- queries
-// -------------------------------------------------------------------------------------------------------
+// ---- queries ----------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf);
 

@@ -29,8 +29,7 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
     ekf->base_dim = ekf->dim;
 }
 
-// ---- growing
-// -------------------------------------------------------------------------------------------------------
+// ---- growing ----------------------------------------------------------------------------------------------
 
 /// A new state value that depends on the robot's pose, and through `own_var` on the sighting: writes its row
 /// of P.
@@ -130,8 +129,7 @@ bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_rea
     return BSLAM_OK;
 }
 
-// ---- shrinking
-// -----------------------------------------------------------------------------------------------------
+// ---- shrinking --------------------------------------------------------------------------------------------
 
 /// Takes `count` state values out; beacons behind them move up.
 static void remove_values(bslam_ekf_t *ekf, int first, int count)
@@ -162,8 +160,7 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
             (size_t)(ekf->beacon_count - index) * sizeof ekf->beacons[0]);
 }
 
-// ---- rays
-// ----------------------------------------------------------------------------------------------------------
+// ---- rays -------------------------------------------------------------------------------------------------
 
 /// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the
 /// sensor.
@@ -225,8 +222,7 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
     return true;
 }
 
-// ---- queries
-// -------------------------------------------------------------------------------------------------------
+// ---- queries ----------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
 {

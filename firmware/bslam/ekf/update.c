@@ -7,8 +7,7 @@
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 
-// ---- rows of H
-// -----------------------------------------------------------------------------------------------------
+// ---- rows of H --------------------------------------------------------------------------------------------
 
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
@@ -41,18 +40,17 @@ static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3]
                            : beacon->kind == BSLAM_BEACON_POINT ? BSLAM_POINT_DIM
                                                                 : 0;
     for (int k = 0; k < 3; k++) {
-        row->index[k] = k;
+        row->index[k] = (uint16_t)k;
         row->value[k] = by_pose[k];
     }
     for (int k = 0; k < beacon_dim; k++) {
-        row->index[3 + k] = beacon->at + k;
+        row->index[3 + k] = (uint16_t)(beacon->at + k);
         row->value[3 + k] = by_beacon[k];
     }
-    row->count = 3 + beacon_dim;
+    row->count = (uint16_t)(3 + beacon_dim);
 }
 
-// ---- innovation
-// ----------------------------------------------------------------------------------------------------
+// ---- innovation -------------------------------------------------------------------------------------------
 
 /// a P bᵀ for two rows of one sighting, which have the same places.
 static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
@@ -68,23 +66,15 @@ static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, cons
     return sum;
 }
 
-/// What the bend of the direction's model adds to its variance, to second order: with e = d ln(distance) and
-/// b the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Direction only".
+/// What the bend of the direction's model adds to its variance, to second order: with e = d ln(length) and b
+/// the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Direction only".
 static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon,
                                        const bslam_observation_t *seen, const bslam_row_t *bearing)
 {
-    bslam_row_t log_distance;
-    fill_row(beacon, seen->range_by_pose, seen->range_by_beacon, &log_distance);
-    for (int k = 0; k < log_distance.count; k++) {
-        log_distance.value[k] /= seen->range_m;
-    }
-    if (beacon->kind == BSLAM_BEACON_RAY) {
-        // A ray's distance is length/inverse, and it is the length whose uncertainty bends the direction:
-        // taking d ln(inverse) out is why rays are so much straighter than points.
-        log_distance.value[log_distance.count - 1] += 1 / ekf->mean[beacon->at + 3];
-    }
-    const bslam_real_t cross = quadratic(ekf, &log_distance, bearing);
-    return quadratic(ekf, &log_distance, &log_distance) * quadratic(ekf, bearing, bearing) + cross * cross;
+    bslam_row_t stretch;
+    fill_row(beacon, seen->stretch_by_pose, seen->stretch_by_beacon, &stretch);
+    const bslam_real_t cross = quadratic(ekf, &stretch, bearing);
+    return quadratic(ekf, &stretch, &stretch) * quadratic(ekf, bearing, bearing) + cross * cross;
 }
 
 static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
@@ -120,7 +110,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
-    if (!sighting->has_range && seen.range_m > 0) {
+    if (!sighting->has_range) {
         innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
@@ -145,8 +135,7 @@ bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovatio
     return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
 }
 
-// ---- gain and down-date
-// --------------------------------------------------------------------------------------------
+// ---- gain and down-date -----------------------------------------------------------------------------------
 
 /// The waiting down-dates as terms of one pass; places without one add nothing.
 static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t terms[BSLAM_PENDING_MAX])
@@ -254,8 +243,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-// ---- end of a frame
-// ------------------------------------------------------------------------------------------------
+// ---- end of a frame ---------------------------------------------------------------------------------------
 
 /// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the
 /// transport.

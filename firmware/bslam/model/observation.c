@@ -45,10 +45,13 @@ bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t 
     seen->bearing_rad = bslam_angle_wrap(bslam_atan2(dy, dx) - sensor.pose.theta_rad);
     by_pose(&sensor, -dx / range, -dy / range, 0, seen->range_by_pose);
     by_pose(&sensor, dy / square, -dx / square, -1, seen->bearing_by_pose);
+    by_pose(&sensor, -dx / square, -dy / square, 0, seen->stretch_by_pose);
     seen->range_by_beacon[0] = dx / range;
     seen->range_by_beacon[1] = dy / range;
     seen->bearing_by_beacon[0] = -dy / square;
     seen->bearing_by_beacon[1] = dx / square;
+    seen->stretch_by_beacon[0] = dx / square;
+    seen->stretch_by_beacon[1] = dy / square;
     return BSLAM_OK;
 }
 
@@ -78,17 +81,25 @@ bslam_status_t bslam_observe_ray(const bslam_pose_t *pose, const bslam_pose_t *m
     seen->bearing_by_beacon[2] = bearing_by_gy * c - bearing_by_gx * s;
     seen->bearing_by_beacon[3] = bearing_by_gx * from_sensor_x + bearing_by_gy * from_sensor_y;
 
+    const bslam_real_t stretch_by_gx = gx / square;
+    const bslam_real_t stretch_by_gy = gy / square;
+    by_pose(&sensor, -inverse * stretch_by_gx, -inverse * stretch_by_gy, 0, seen->stretch_by_pose);
+    seen->stretch_by_beacon[0] = inverse * stretch_by_gx;
+    seen->stretch_by_beacon[1] = inverse * stretch_by_gy;
+    seen->stretch_by_beacon[2] = stretch_by_gy * c - stretch_by_gx * s;
+    seen->stretch_by_beacon[3] = stretch_by_gx * from_sensor_x + stretch_by_gy * from_sensor_y;
+
+    // range = |g| / inverse, so d range = range (d ln|g| - d inverse / inverse).
     const bool ahead = inverse > 0;
-    const bslam_real_t length = bslam_sqrt(square);
-    const bslam_real_t by_gx = ahead ? gx / (length * inverse) : 0;
-    const bslam_real_t by_gy = ahead ? gy / (length * inverse) : 0;
-    seen->range_m = ahead ? length / inverse : 0;
-    by_pose(&sensor, -inverse * by_gx, -inverse * by_gy, 0, seen->range_by_pose);
-    seen->range_by_beacon[0] = inverse * by_gx;
-    seen->range_by_beacon[1] = inverse * by_gy;
-    seen->range_by_beacon[2] = by_gy * c - by_gx * s;
-    seen->range_by_beacon[3] =
-        by_gx * from_sensor_x + by_gy * from_sensor_y - (ahead ? length / (inverse * inverse) : 0);
+    const bslam_real_t range = ahead ? bslam_sqrt(square) / inverse : 0;
+    seen->range_m = range;
+    for (int k = 0; k < 3; k++) {
+        seen->range_by_pose[k] = range * seen->stretch_by_pose[k];
+    }
+    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
+        seen->range_by_beacon[k] = range * seen->stretch_by_beacon[k];
+    }
+    seen->range_by_beacon[3] -= ahead ? range / inverse : 0;
     return BSLAM_OK;
 }
 

@@ -18,6 +18,9 @@ typedef struct bslam_observation {
     bslam_real_t bearing_by_pose[3];              ///< d bearing / d (x, y, theta)
     bslam_real_t range_by_beacon[BSLAM_RAY_DIM];  ///< d range / d beacon, in the order of its state values
     bslam_real_t bearing_by_beacon[BSLAM_RAY_DIM];
+    bslam_real_t stretch_by_pose[3];  ///< d ln(length) / d (x, y, theta); length is the distance, or a ray's
+                                      ///< distance times its inverse distance
+    bslam_real_t stretch_by_beacon[BSLAM_RAY_DIM];
 } bslam_observation_t;
 
 /// Sighting of the point (x_m, y_m) by a sensor at mount on a robot at pose. BSLAM_E_SINGULAR, and *seen

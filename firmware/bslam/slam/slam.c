@@ -22,8 +22,7 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-// ---- odometry and the past
-// -----------------------------------------------------------------------------------------
+// ---- odometry and the past --------------------------------------------------------------------------------
 
 static void remember(bslam_slam_t *slam, int64_t end_us, const bslam_motion_t *moved)
 {
@@ -118,8 +117,7 @@ static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, b
     return BSLAM_E_TIME;
 }
 
-// ---- sightings
-// -----------------------------------------------------------------------------------------------------
+// ---- sightings --------------------------------------------------------------------------------------------
 
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
@@ -173,27 +171,26 @@ static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bsla
 
 static bslam_real_t test_ratio(const bslam_params_t *params, bslam_real_t distance2)
 {
-    return params->gate_d2 > 0 ? distance2 / params->gate_d2 : -1;
+    return params->gate_d2 > 0 && distance2 >= 0 ? distance2 / params->gate_d2 : -1;
+}
+
+static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon_t *beacon,
+                   bslam_account_t *account)
+{
+    fill_account(account, BSLAM_OUTCOME_REJECTED, reason, beacon);
+    slam->counters.gated += reason == BSLAM_REASON_GATE ? 1u : 0u;
+    slam->counters.map_full += reason == BSLAM_REASON_MAP_FULL ? 1u : 0u;
 }
 
 /// Fuses a sighting with the beacon that association chose.
-static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                       const bslam_sighting_t *sighting, int index, bslam_account_t *account)
+static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beacon,
+                       const bslam_innovation_t *innovation, bslam_account_t *account)
 {
-    bslam_beacon_t *beacon = &slam->ekf.beacons[index];
-    bslam_innovation_t innovation;
     bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
-    bslam_status_t status =
-        bslam_ekf_innovation(&slam->ekf, &slam->params, mount, sighting, index, &innovation);
-    if (status == BSLAM_OK) {
-        status = bslam_ekf_fuse(&slam->ekf, &slam->params, &innovation, &fusion);
-    }
+    const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->params, innovation, &fusion);
     if (status != BSLAM_OK) {
-        const bool gated = status == BSLAM_E_RANGE;
-        fill_account(account, BSLAM_OUTCOME_REJECTED, gated ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR,
-                     beacon);
-        account->test_ratio = gated ? test_ratio(&slam->params, fusion.distance2) : -1;
-        slam->counters.gated += gated ? 1u : 0u;
+        reject(slam, status == BSLAM_E_RANGE ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon, account);
+        account->test_ratio = test_ratio(&slam->params, fusion.distance2);
         return;
     }
     fill_account(account, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE, beacon);
@@ -210,8 +207,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
 {
     int index;
     if (bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index) != BSLAM_OK) {
-        fill_account(account, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_MAP_FULL, NULL);
-        slam->counters.map_full++;
+        reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;
     }
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
@@ -225,18 +221,35 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     account->weight = 1;
 }
 
-/// Fuses all matches, then adds what is new; everything else is accounted for as it stands.
+/// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
+/// them before the first is fused, so that the order within a frame does not matter.
+static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sightings,
+                             int count)
+{
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->matches[i];
+        if (match->verdict == BSLAM_VERDICT_REJECT) {
+            reject(slam, match->reason, NULL, &slam->accounts[i]);
+        } else if (match->verdict == BSLAM_VERDICT_DEFER) {
+            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
+        } else if (match->verdict == BSLAM_VERDICT_MATCH &&
+                   bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &sightings[i], match->beacon,
+                                        &slam->innovations[i]) != BSLAM_OK) {
+            reject(slam, BSLAM_REASON_SINGULAR, &slam->ekf.beacons[match->beacon], &slam->accounts[i]);
+            match->verdict = BSLAM_VERDICT_REJECT;
+        }
+    }
+}
+
+/// Fuses all matches, then adds what is new.
 static void use_matches(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
                         const bslam_sighting_t *sightings, int count)
 {
+    take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
-        const bslam_match_t *match = &slam->matches[i];
-        if (match->verdict == BSLAM_VERDICT_MATCH) {
-            fuse_match(slam, time_us, mount, &sightings[i], match->beacon, &slam->accounts[i]);
-        } else {
-            const bool deferred = match->verdict == BSLAM_VERDICT_DEFER;
-            fill_account(&slam->accounts[i], deferred ? BSLAM_OUTCOME_DEFERRED : BSLAM_OUTCOME_REJECTED,
-                         match->reason, NULL);
+        if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH) {
+            fuse_match(slam, time_us, &slam->ekf.beacons[slam->matches[i].beacon], &slam->innovations[i],
+                       &slam->accounts[i]);
         }
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
@@ -309,8 +322,7 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
     return BSLAM_OK;
 }
 
-// ---- the map
-// -------------------------------------------------------------------------------------------------------
+// ---- the map ----------------------------------------------------------------------------------------------
 
 bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bslam_real_t x_m,
                                            bslam_real_t y_m)
@@ -345,8 +357,7 @@ bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
     return BSLAM_E_NO_BEACON;
 }
 
-// ---- results
-// -------------------------------------------------------------------------------------------------------
+// ---- results ----------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam)
 {

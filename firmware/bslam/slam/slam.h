@@ -75,7 +75,9 @@ typedef struct bslam_slam {
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;
     int32_t bad_sighting;  ///< place of the sighting for which the last frame was refused, else -1
+    // Scratch: holds nothing between calls.
     bslam_match_t matches[BSLAM_SIGHTINGS_MAX];
+    bslam_innovation_t innovations[BSLAM_SIGHTINGS_MAX];
 } bslam_slam_t;
 
 /// Robot at the origin, empty map. params is copied. BSLAM_E_PARAMETER with *bad_id, see bslam_params_check:
@@ -110,8 +112,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, 
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid);
 
-// ---- results
-// -------------------------------------------------------------------------------------------------------
+// ---- results ----------------------------------------------------------------------------------------------
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam);
 
