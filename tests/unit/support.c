@@ -116,6 +116,7 @@ bslam_params_t unit_params(void)
     p.range_sd_fraction = BSLAM_R(0.02);
     p.range_sd_per_m = BSLAM_R(0.01);
     p.bearing_only_variance_factor = 2;
+    p.bearing_only_curvature_factor = 0;
     p.gate_d2 = 0;
     p.huber_d = 0;
     p.ray_inverse_distance_per_m = BSLAM_R(0.2);

@@ -51,7 +51,7 @@ typedef void (*unit_function_t)(const double *in, double *out, const void *conte
 double unit_derivative(unit_function_t function, const double *in, int in_count, int row, int column,
                        const void *context);
 
-#define UNIT_ARGUMENTS_MAX 16
+#define UNIT_ARGUMENTS_MAX 32
 #define UNIT_RESULTS_MAX 8
 
 /// Mean of (cos, sin) over the angles from start to start + turn, by Gauss quadrature, two points in each of

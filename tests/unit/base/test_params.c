@@ -31,8 +31,7 @@ static void assert_check_blames(const bslam_params_t *params, const char *name)
     assert_int_equal(bad_id, id_of(name));
 }
 
-// ---- the table
-// -----------------------------------------------------------------------------------------------------
+// ---- the table --------------------------------------------------------------------------------------------
 
 static void test_info_every_line_has_name_meaning_and_default_in_range(void **state)
 {
@@ -75,8 +74,7 @@ static void test_default_every_field_is_the_tables_and_passes_the_check(void **s
     assert_int_equal(bad_id, 7);
 }
 
-// ---- get and set
-// ---------------------------------------------------------------------------------------------------
+// ---- get and set ------------------------------------------------------------------------------------------
 
 static void test_get_every_field_is_the_structs(void **state)
 {
@@ -167,8 +165,7 @@ static void test_set_no_such_field_is_refused(void **state)
     assert_int_equal(bslam_params_set(&params, bslam_params_count(), 0), BSLAM_E_PARAMETER);
 }
 
-// ---- check
-// ---------------------------------------------------------------------------------------------------------
+// ---- check ------------------------------------------------------------------------------------------------
 
 /// One field of otherwise good parameters is set to `value`: the check must blame it.
 #define ASSERT_BLAMED(field, value) \

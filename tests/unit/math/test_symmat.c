@@ -86,8 +86,7 @@ static bool is_positive(const bslam_real_t *m, int n)
     return positive;
 }
 
-// ---- layout
-// --------------------------------------------------------------------------------------------------------
+// ---- layout -----------------------------------------------------------------------------------------------
 
 static void test_at_every_element_has_its_own_place_within_the_length(void **state)
 {
@@ -129,8 +128,7 @@ static void test_set_is_read_back_from_both_sides(void **state)
     free(pair.m);
 }
 
-// ---- arithmetic
-// ----------------------------------------------------------------------------------------------------
+// ---- arithmetic -------------------------------------------------------------------------------------------
 
 static void test_add_column_is_the_naive_product(void **state)
 {
@@ -197,8 +195,7 @@ static void test_add_rank4_with_zero_scales_changes_no_bit(void **state)
     free(pair.m);
 }
 
-// ---- removal
-// -------------------------------------------------------------------------------------------------------
+// ---- removal ----------------------------------------------------------------------------------------------
 
 static void assert_remove_is_naive(unit_random_t *random, int n, int first, int count)
 {
@@ -226,8 +223,7 @@ static void test_remove_every_stretch_of_every_size_is_the_naive_removal(void **
     }
 }
 
-// ---- definiteness
-// --------------------------------------------------------------------------------------------------
+// ---- definiteness -----------------------------------------------------------------------------------------
 
 static void test_is_positive_definite_matrix_is(void **state)
 {

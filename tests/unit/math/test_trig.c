@@ -31,8 +31,7 @@ static double direction_difference(long double a, long double b)
     return (double)remainderl(a - b, 2 * PI_L);
 }
 
-// ---- sine and cosine
-// -----------------------------------------------------------------------------------------------
+// ---- sine and cosine --------------------------------------------------------------------------------------
 
 static void assert_sin_cos(bslam_real_t angle, double tolerance)
 {
@@ -107,8 +106,7 @@ static void test_sin_cos_of_the_opposite_angle_is_the_mirror_image_to_the_bit(vo
     }
 }
 
-// ---- arc tangent
-// ---------------------------------------------------------------------------------------------------
+// ---- arc tangent ------------------------------------------------------------------------------------------
 
 static void assert_atan2(bslam_real_t y, bslam_real_t x)
 {
@@ -171,8 +169,7 @@ static void test_atan2_undoes_sin_cos(void **state)
     }
 }
 
-// ---- wrapping
-// ------------------------------------------------------------------------------------------------------
+// ---- wrapping ---------------------------------------------------------------------------------------------
 
 static void assert_wraps(bslam_real_t angle)
 {

@@ -7,8 +7,7 @@
 /// Arguments of the model in a test: x, y, theta, forward, turn.
 enum { X, Y, THETA, FORWARD, TURN, ARGUMENTS };
 
-// ---- the model again, in double, from its definition
-// ---------------------------------------------------------------
+// ---- the model again, in double, from its definition ------------------------------------------------------
 
 /// Equation (2) of the paper.
 static void euler(const double *in, double *out, const void *context)
@@ -33,8 +32,7 @@ static void arc(const double *in, double *out, const void *context)
 
 static const unit_function_t models[] = {[BSLAM_MOTION_EULER] = euler, [BSLAM_MOTION_ARC] = arc};
 
-// ---- comparison
-// ----------------------------------------------------------------------------------------------------
+// ---- comparison -------------------------------------------------------------------------------------------
 
 static bslam_pose_t step(bslam_motion_kind_t kind, const double *in, bslam_motion_jacobian_t *jacobian)
 {
@@ -125,8 +123,7 @@ static void test_step_arc_jacobian_is_that_of_finite_differences(void **state)
     for_many_motions(BSLAM_MOTION_ARC, assert_jacobian_is_the_models);
 }
 
-// ---- properties
-// ----------------------------------------------------------------------------------------------------
+// ---- properties -------------------------------------------------------------------------------------------
 
 static void test_step_arc_is_the_limit_of_many_euler_steps(void **state)
 {

@@ -8,14 +8,14 @@
 /// Arguments of the models in a test: the robot's pose, the sensor on it, then the beacon's values or a
 /// sighting's.
 enum { X, Y, THETA, MOUNT_X, MOUNT_Y, MOUNT_YAW, REST };
-enum { RANGE, BEARING };
+/// Results: STRETCH is the log of a point's distance, and of a ray's distance times its inverse distance.
+enum { RANGE, BEARING, STRETCH, RESULTS };
 
 #define POINT_ARGUMENTS (REST + 2)
 #define RAY_ARGUMENTS (REST + 4)
 #define TESTED 500
 
-// ---- the models again, in double, from their definitions
-// -----------------------------------------------------------
+// ---- the models again, in double, from their definitions --------------------------------------------------
 
 /// Sighting of the point (px, py). context: a bearing near which to keep the result, so that it has no jump
 /// at pi.
@@ -29,6 +29,7 @@ static void see(const double *in, double px, double py, double *out, const void 
     const double base = context != NULL ? *(const double *)context : 0;
     out[RANGE] = hypot(dx, dy);
     out[BEARING] = base + unit_angle_between(bearing, base);
+    out[STRETCH] = log(out[RANGE]);
 }
 
 static void see_point(const double *in, double *out, const void *context)
@@ -62,8 +63,7 @@ static void to_point(const double *in, double *out, const void *context)
     out[Y] = in[1] + sin(in[2]) / in[3];
 }
 
-// ---- inputs
-// --------------------------------------------------------------------------------------------------------
+// ---- inputs -----------------------------------------------------------------------------------------------
 
 static void random_pose_and_mount(unit_random_t *random, double *in)
 {
@@ -131,35 +131,38 @@ static bslam_status_t observe(const double *in, int count, bslam_observation_t *
 /// Finite differences: 1e-15 of rounding at 30 m over a step of 2e-5; and roundings as above.
 #define SLOPE_ERROR (1e-9 + 300 * UNIT_ROUNDING)
 
+/// The derivatives of one result: by the pose, and by the beacon's values.
+static void assert_slopes(const double *in, int count, unit_function_t model, int row,
+                          const double *bearing_rad, const bslam_real_t by_pose[3],
+                          const bslam_real_t *by_beacon)
+{
+    for (int k = 0; k < 3; k++) {
+        assert_near(by_pose[k], unit_derivative(model, in, count, row, k, bearing_rad), SLOPE_ERROR);
+    }
+    for (int k = 0; k < count - REST; k++) {
+        // By the inverse distance the slope is distance^2, up to 100.
+        const double scale = k == 3 ? 100 : k == 2 ? 10 : 1;
+        assert_near(by_beacon[k], unit_derivative(model, in, count, row, REST + k, bearing_rad),
+                    SLOPE_ERROR * scale);
+    }
+}
+
 static void assert_is_the_model(const double *in, int count, unit_function_t model)
 {
     bslam_observation_t seen;
-    double expected[2];
+    double expected[RESULTS];
     assert_int_equal(observe(in, count, &seen), BSLAM_OK);
     model(in, expected, NULL);
     assert_near(seen.range_m, expected[RANGE], VALUE_ERROR);
     assert_near(unit_angle_between((double)seen.bearing_rad, expected[BEARING]), 0, VALUE_ERROR);
     assert_true(fabs((double)seen.bearing_rad) < 3.14160);
-    for (int k = 0; k < 3; k++) {
-        assert_near(seen.range_by_pose[k], unit_derivative(model, in, count, RANGE, k, &expected[BEARING]),
-                    SLOPE_ERROR);
-        assert_near(seen.bearing_by_pose[k],
-                    unit_derivative(model, in, count, BEARING, k, &expected[BEARING]), SLOPE_ERROR);
-    }
-    for (int k = 0; k < count - REST; k++) {
-        // By the inverse distance the slope is distance^2, up to 100.
-        const double scale = k == 3 ? 100 : k == 2 ? 10 : 1;
-        assert_near(seen.range_by_beacon[k],
-                    unit_derivative(model, in, count, RANGE, REST + k, &expected[BEARING]),
-                    SLOPE_ERROR * scale);
-        assert_near(seen.bearing_by_beacon[k],
-                    unit_derivative(model, in, count, BEARING, REST + k, &expected[BEARING]),
-                    SLOPE_ERROR * scale);
-    }
+    const double *bearing = &expected[BEARING];
+    assert_slopes(in, count, model, RANGE, bearing, seen.range_by_pose, seen.range_by_beacon);
+    assert_slopes(in, count, model, BEARING, bearing, seen.bearing_by_pose, seen.bearing_by_beacon);
+    assert_slopes(in, count, model, STRETCH, bearing, seen.stretch_by_pose, seen.stretch_by_beacon);
 }
 
-// ---- points
-// --------------------------------------------------------------------------------------------------------
+// ---- points -----------------------------------------------------------------------------------------------
 
 static void test_observe_point_value_and_jacobians_are_the_models(void **state)
 {
@@ -203,8 +206,7 @@ static void test_observe_point_at_the_sensor_is_singular_and_changes_nothing(voi
     assert_near(seen.range_m, 0.0011, UNIT_ROUNDING);
 }
 
-// ---- rays
-// ----------------------------------------------------------------------------------------------------------
+// ---- rays -------------------------------------------------------------------------------------------------
 
 static void test_observe_ray_value_and_jacobians_are_the_models(void **state)
 {
@@ -262,6 +264,9 @@ static void test_observe_ray_at_infinity_has_its_direction_and_no_range(void **s
     const double sensor_y = -2 + sin(0.5) * 0.1 + cos(0.5) * 0.2;
     const double across = (8 - sensor_y) * cos(1.3) - (7 - sensor_x) * sin(1.3);
     assert_near(seen.bearing_by_beacon[3], across, VALUE_ERROR);
+    // And how the baseline, along the direction, stretches g: (a - p) . u.
+    const double along = (7 - sensor_x) * cos(1.3) + (8 - sensor_y) * sin(1.3);
+    assert_near(seen.stretch_by_beacon[3], along, VALUE_ERROR);
 }
 
 static void test_observe_ray_beyond_infinity_is_finite_and_has_no_range(void **state)
@@ -320,8 +325,7 @@ static void test_ray_to_point_value_and_jacobian_are_the_models(void **state)
     }
 }
 
-// ---- the inverse
-// ---------------------------------------------------------------------------------------------------
+// ---- the inverse ------------------------------------------------------------------------------------------
 
 static void test_locate_point_value_and_jacobian_are_the_models(void **state)
 {
@@ -374,8 +378,7 @@ static void test_locate_point_undoes_observe_point(void **state)
     }
 }
 
-// ---- noise
-// ---------------------------------------------------------------------------------------------------------
+// ---- noise ------------------------------------------------------------------------------------------------
 
 static void test_range_variance_is_the_sum_of_its_three_parts(void **state)
 {

@@ -15,8 +15,7 @@ static double rounding_of(double magnitude)
     return 16 * UNIT_ROUNDING * magnitude;
 }
 
-// ---- readings
-// ------------------------------------------------------------------------------------------------------
+// ---- readings ---------------------------------------------------------------------------------------------
 
 static bslam_odometry_reading_t wheels(int64_t time_us, double left_m, double right_m)
 {
@@ -47,8 +46,7 @@ static bslam_odometry_reading_t with_gyro(bslam_odometry_reading_t reading, doub
     return reading;
 }
 
-// ---- the unit under test, with its clock started
-// -------------------------------------------------------------------
+// ---- the unit under test, with its clock started ----------------------------------------------------------
 
 /// An odometry whose clock stands at START_US.
 static bslam_odometry_t started(void)
@@ -91,8 +89,7 @@ static void assert_refused(const bslam_odometry_t *odometry, const bslam_params_
     assert_memory_equal(&motion, &before, sizeof motion);
 }
 
-// ---- tick differences
-// ----------------------------------------------------------------------------------------------
+// ---- tick differences -------------------------------------------------------------------------------------
 
 static void test_tick_difference_every_step_of_a_narrow_counter_is_found(void **state)
 {
@@ -131,8 +128,7 @@ static void test_tick_difference_of_32_bits_at_its_extremes_is_exact(void **stat
     assert_int_equal(bslam_odometry_tick_difference(0, 0xffffffffu, 32), -1);
 }
 
-// ---- clock
-// ---------------------------------------------------------------------------------------------------------
+// ---- clock ------------------------------------------------------------------------------------------------
 
 static void test_read_first_reading_without_a_clock_has_no_interval(void **state)
 {
@@ -205,8 +201,7 @@ static void test_read_first_time_out_of_range_is_refused(void **state)
     }
 }
 
-// ---- sources
-// -------------------------------------------------------------------------------------------------------
+// ---- sources ----------------------------------------------------------------------------------------------
 
 static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
 {
@@ -364,8 +359,7 @@ static void test_read_denormal_travel_is_a_motion_like_any_other(void **state)
     assert_near(motion.turn_rad, 0, 0);
 }
 
-// ---- jumps
-// ---------------------------------------------------------------------------------------------------------
+// ---- jumps ------------------------------------------------------------------------------------------------
 
 static void test_read_wheel_faster_than_possible_is_a_jump(void **state)
 {
@@ -434,8 +428,7 @@ static void test_read_ticks_after_another_source_start_afresh(void **state)
     assert_near(motion.forward_m, 0, 0);
 }
 
-// ---- gaps
-// ----------------------------------------------------------------------------------------------------------
+// ---- gaps -------------------------------------------------------------------------------------------------
 
 static void test_read_gap_inflates_by_the_part_beyond_its_limit(void **state)
 {
@@ -455,8 +448,7 @@ static void test_read_gap_inflates_by_the_part_beyond_its_limit(void **state)
     }
 }
 
-// ---- gyro
-// ----------------------------------------------------------------------------------------------------------
+// ---- gyro -------------------------------------------------------------------------------------------------
 
 /// Fusion of (forward, turn) with a measurement of turn in information form, for comparison: P' = (P⁻¹ + e eᵀ
 /// / r)⁻¹.

@@ -1,0 +1,490 @@
+#include "support.h"
+#include "twin.h"
+
+#include <math.h>
+
+/// In double the finite differences of the expected Jacobians limit the comparison; in float some hundred
+/// roundings of numbers of order 1 (positions up to 10 m).
+#define TOLERANCE (BSLAM_REAL_DOUBLE ? 1e-8 : 5e-5)
+
+static const bslam_pose_t mount = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.4)};
+
+/// A filter with two points and one ray, with velocity states so that more than the pose stands before the
+/// map.
+static bslam_ekf_t random_filter(bslam_params_t *params, unit_random_t *random)
+{
+    *params = unit_params();
+    params->velocity_states = 1;
+    bslam_ekf_t ekf;
+    twin_randomise(&ekf, params, random, 2, 1);
+    return ekf;
+}
+
+/// The state with `count` values appended that are functions of the state and of noise n (with covariance q)
+/// after it: the augment step, with Jacobians by finite differences. The function's argument is (state,
+/// noise).
+static twin_t augmented(const bslam_ekf_t *ekf, unit_function_t function, int count, const double *noise_var,
+                        int noise_count, const void *context)
+{
+    const twin_t before = twin_of(ekf);
+    const int n = ekf->dim;
+    double in[UNIT_ARGUMENTS_MAX] = {0};
+    twin_values(ekf, in);
+    double added[UNIT_RESULTS_MAX];
+    function(in, added, context);
+    // (state, noise) -> (state, added), and the covariance of (state, noise).
+    dense_t jacobian = dense_zero(n + count, n + noise_count);
+    dense_t joint = dense_zero(n + noise_count, n + noise_count);
+    twin_t after = {.mean = dense_zero(n + count, 1)};
+    for (int i = 0; i < n; i++) {
+        jacobian.at[i][i] = 1;
+        after.mean.at[i][0] = before.mean.at[i][0];
+        memcpy(joint.at[i], before.covariance.at[i], (size_t)n * sizeof joint.at[i][0]);
+    }
+    for (int k = 0; k < noise_count; k++) {
+        joint.at[n + k][n + k] = noise_var[k];
+    }
+    for (int k = 0; k < count; k++) {
+        after.mean.at[n + k][0] = added[k];
+        for (int j = 0; j < n + noise_count; j++) {
+            jacobian.at[n + k][j] = unit_derivative(function, in, n + noise_count, k, j, context);
+        }
+    }
+    after.covariance = dense_sandwich(&jacobian, &joint);
+    return after;
+}
+
+// ---- adding -----------------------------------------------------------------------------------------------
+
+typedef struct adding {
+    int dim;  // where the noise stands among the arguments
+    double range_m;
+    double bearing_rad;
+} adding_t;
+
+static void sensor_of(const double *in, double *x, double *y, double *theta)
+{
+    const double s = sin(in[BSLAM_STATE_THETA]);
+    const double c = cos(in[BSLAM_STATE_THETA]);
+    *x = in[BSLAM_STATE_X] + c * (double)mount.x_m - s * (double)mount.y_m;
+    *y = in[BSLAM_STATE_Y] + s * (double)mount.x_m + c * (double)mount.y_m;
+    *theta = in[BSLAM_STATE_THETA] + (double)mount.theta_rad;
+}
+
+/// Noise: of the distance, of the direction.
+static void new_point(const double *in, double *out, const void *context)
+{
+    const adding_t *a = context;
+    double x, y, theta;
+    sensor_of(in, &x, &y, &theta);
+    const double range_m = a->range_m + in[a->dim];
+    const double direction = theta + a->bearing_rad + in[a->dim + 1];
+    out[0] = x + range_m * cos(direction);
+    out[1] = y + range_m * sin(direction);
+}
+
+/// Noise: of the direction, of the inverse distance.
+static void new_ray(const double *in, double *out, const void *context)
+{
+    const adding_t *a = context;
+    double theta;
+    sensor_of(in, &out[0], &out[1], &theta);
+    out[2] = theta + a->bearing_rad + in[a->dim];
+    out[3] = 0.2 + in[a->dim + 1];
+}
+
+static void test_add_point_is_the_augment_step(void **state)
+{
+    unit_random_t random = {1};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const double range_m = unit_random(&random, 0.5, 8);
+        const double bearing = unit_random(&random, -3.14, 3.14);
+        const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
+        const double noise_var[] = {range_sd2, 0.02 * 0.02};
+        const adding_t adding = {ekf.dim, range_m, bearing};
+        const twin_t expected = augmented(&ekf, new_point, 2, noise_var, 2, &adding);
+        const bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(index, 3);
+        assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_POINT);
+        twin_assert(&ekf, &expected, TOLERANCE);
+    }
+}
+
+static void test_add_ray_is_the_augment_step(void **state)
+{
+    unit_random_t random = {2};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const double bearing = unit_random(&random, -3.14, 3.14);
+        // Direction variance times 2 where no distance comes with it; inverse distance 0.2 with sd 0.1.
+        const double noise_var[] = {2 * 0.02 * 0.02, 0.1 * 0.1};
+        const adding_t adding = {ekf.dim, 0, bearing};
+        const twin_t expected = augmented(&ekf, new_ray, 4, noise_var, 2, &adding);
+        const bslam_sighting_t sighting = unit_direction(bearing, 7);
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_RAY);
+        assert_int_equal(ekf.ray_count, 2);
+        twin_assert(&ekf, &expected, TOLERANCE);
+    }
+}
+
+/// Adds with add_one until the map is full; then another changes no byte and is refused.
+static void assert_fills_up(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_sighting_t sighting,
+                            int room)
+{
+    int index;
+    for (int i = 0; i < room; i++) {
+        assert_int_equal(bslam_ekf_add(ekf, params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(ekf->beacons[index].uid, i);
+    }
+    bslam_ekf_t before;
+    memcpy(&before, ekf, sizeof before);
+    assert_int_equal(bslam_ekf_add(ekf, params, &mount, &sighting, &index), BSLAM_E_MAP_FULL);
+    assert_memory_equal(ekf, &before, sizeof before);
+}
+
+static void test_add_points_beyond_the_map_are_refused(void **state)
+{
+    bslam_params_t params = unit_params();
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    assert_fills_up(&ekf, &params, unit_polar(0.3, 2, 1), BSLAM_BEACONS_MAX);
+    int index;
+    assert_int_equal(bslam_ekf_add_known(&ekf, 1, 2, &index), BSLAM_E_MAP_FULL);
+}
+
+static void test_add_rays_beyond_their_number_are_refused_but_points_are_not(void **state)
+{
+    bslam_params_t params = unit_params();
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    assert_fills_up(&ekf, &params, unit_direction(0.3, 1), BSLAM_RAYS_MAX);
+    const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
+    int index;
+    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index),
+                     BSLAM_RAYS_MAX < BSLAM_BEACONS_MAX ? BSLAM_OK : BSLAM_E_MAP_FULL);
+}
+
+static void test_add_known_takes_no_room_in_the_state(void **state)
+{
+    unit_random_t random = {3};
+    bslam_params_t params;
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const twin_t expected = twin_of(&ekf);
+    int index;
+    assert_int_equal(bslam_ekf_add_known(&ekf, 3, -4, &index), BSLAM_OK);
+    twin_assert(&ekf, &expected, 0);
+    bslam_real_t x;
+    bslam_real_t y;
+    bslam_ekf_beacon_position(&ekf, index, &x, &y);
+    assert_true(x == 3 && y == -4);
+    assert_true(ekf.beacons[index].confirmed);
+}
+
+// ---- removing ---------------------------------------------------------------------------------------------
+
+/// Points, rays and known beacons mixed: every second removal hits another kind.
+static bslam_ekf_t mixed_filter(bslam_params_t *params, unit_random_t *random)
+{
+    bslam_ekf_t ekf = random_filter(params, random);
+    int index;
+    assert_int_equal(bslam_ekf_add_known(&ekf, 3, -4, &index), BSLAM_OK);
+    const bslam_sighting_t polar = unit_polar(0.5, 3, 9);
+    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    return ekf;
+}
+
+static int dim_of(const bslam_beacon_t *beacon)
+{
+    return beacon->kind == BSLAM_BEACON_RAY ? 4 : beacon->kind == BSLAM_BEACON_POINT ? 2 : 0;
+}
+
+static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
+{
+    unit_random_t random = {4};
+    bslam_params_t params;
+    const bslam_ekf_t full = mixed_filter(&params, &random);
+    for (int gone = 0; gone < full.beacon_count; gone++) {
+        bslam_ekf_t ekf = full;
+        const bslam_beacon_t *removed = &full.beacons[gone];
+        twin_t expected = twin_of(&full);
+        expected.mean = dense_without(&expected.mean, removed->at, dim_of(removed));
+        expected.covariance = dense_without(&expected.covariance, removed->at, dim_of(removed));
+        bslam_ekf_remove(&ekf, gone);
+        twin_assert(&ekf, &expected, 0);
+        assert_int_equal(ekf.beacon_count, full.beacon_count - 1);
+        assert_int_equal(ekf.ray_count, full.ray_count - (removed->kind == BSLAM_BEACON_RAY ? 1 : 0));
+        for (int b = 0; b < ekf.beacon_count; b++) {
+            const int from = b < gone ? b : b + 1;
+            bslam_real_t x[2];
+            bslam_real_t y[2];
+            bslam_ekf_beacon_position(&ekf, b, &x[0], &y[0]);
+            bslam_ekf_beacon_position(&full, from, &x[1], &y[1]);
+            assert_true(x[0] == x[1] && y[0] == y[1]);
+            assert_int_equal(ekf.beacons[b].uid, full.beacons[from].uid);
+        }
+    }
+}
+
+static void test_remove_then_add_again_is_as_if_it_had_never_been_there(void **state)
+{
+    unit_random_t random = {5};
+    bslam_params_t params;
+    const bslam_ekf_t full = mixed_filter(&params, &random);
+    const bslam_sighting_t direction = unit_direction(-0.4, 3);
+    // The last beacon is a point: in one filter it goes and comes back after the ray, in the other it never
+    // was.
+    bslam_ekf_t a = full;
+    bslam_ekf_t b = full;
+    const int last = full.beacon_count - 1;
+    const bslam_sighting_t polar = unit_polar(0.7, 4, 9);
+    int index;
+    bslam_ekf_remove(&b, last);
+    assert_int_equal(bslam_ekf_add(&a, &params, &mount, &polar, &index), BSLAM_OK);
+    bslam_ekf_remove(&a, index);
+    bslam_ekf_remove(&a, last);
+    assert_int_equal(bslam_ekf_add(&a, &params, &mount, &direction, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&b, &params, &mount, &direction, &index), BSLAM_OK);
+    const twin_t expected = twin_of(&b);
+    twin_assert(&a, &expected, 0);
+    // A number is never given twice.
+    assert_int_equal(a.beacons[index].uid, b.beacons[index].uid + 1);
+}
+
+static void test_remove_down_to_the_last_beacon_and_fill_again(void **state)
+{
+    unit_random_t random = {6};
+    bslam_params_t params;
+    bslam_ekf_t ekf = mixed_filter(&params, &random);
+    const int base = ekf.base_dim;
+    while (ekf.beacon_count > 0) {
+        bslam_ekf_remove(&ekf, ekf.beacon_count / 2);
+    }
+    assert_int_equal(ekf.dim, base);
+    assert_int_equal(ekf.ray_count, 0);
+    const bslam_sighting_t polar = unit_polar(0.3, 3, 1);
+    for (int i = 0; i < BSLAM_BEACONS_MAX; i++) {
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+        assert_int_equal(index, i);
+    }
+    assert_true(bslam_ekf_is_sane(&ekf));
+}
+
+// ---- rays into points -------------------------------------------------------------------------------------
+
+/// The ray's point, as a function of the state; context: where the ray stands.
+static void point_of_ray(const double *in, double *out, const void *context)
+{
+    const double *ray = &in[*(const int *)context];
+    out[0] = ray[0] + cos(ray[2]) / ray[3];
+    out[1] = ray[1] + sin(ray[2]) / ray[3];
+}
+
+/// A filter whose ray, beacon 2 of 4, is so well known that it is a point.
+static bslam_ekf_t filter_with_settled_ray(bslam_params_t *params, unit_random_t *random)
+{
+    bslam_ekf_t ekf = random_filter(params, random);
+    const bslam_sighting_t polar = unit_polar(0.5, 3, 9);
+    int index;
+    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    const int inverse_at = ekf.beacons[2].at + 3;
+    for (int i = 0; i < ekf.dim; i++) {
+        // The same correlations with a deviation 300 times smaller.
+        const bslam_real_t p = bslam_symmat_get(ekf.covariance, i, inverse_at);
+        bslam_symmat_set(ekf.covariance, i, inverse_at, i == inverse_at ? p / 90000 : p / 300);
+    }
+    return ekf;
+}
+
+static void test_settle_ray_becomes_its_point_with_the_covariance_of_the_change(void **state)
+{
+    unit_random_t random = {7};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+        const int at = ekf.beacons[2].at;
+        // Append the point, take the ray out, and move the point to the ray's place.
+        twin_t expected = augmented(&ekf, point_of_ray, 2, NULL, 0, &at);
+        const int n = ekf.dim;
+        dense_t reorder = dense_zero(n - 2, n + 2);
+        for (int k = 0; k < n - 2; k++) {
+            const int from = k < at ? k : k < at + 2 ? n + k - at : k + 2;
+            reorder.at[k][from] = 1;
+        }
+        expected.mean = dense_product(&reorder, &expected.mean);
+        expected.covariance = dense_sandwich(&reorder, &expected.covariance);
+        assert_true(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+        assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_POINT);
+        assert_int_equal(ekf.ray_count, 0);
+        // The slope by the inverse distance is distance², up to 80.
+        twin_assert(&ekf, &expected, TOLERANCE * 10);
+    }
+}
+
+/// Civera's index of beacon 2 as the header's MATH has it: 4 sd(distance) |cos(parallax)| / distance from the
+/// sensor.
+static double linearity_index(const bslam_ekf_t *ekf)
+{
+    double values[DENSE_MAX];
+    twin_values(ekf, values);
+    const int at = ekf->beacons[2].at;
+    double point[2];
+    point_of_ray(values, point, &at);
+    double x, y, theta;
+    sensor_of(values, &x, &y, &theta);
+    const double distance = hypot(point[0] - x, point[1] - y);
+    const double variance = (double)bslam_symmat_get(ekf->covariance, at + 3, at + 3);
+    const double distance_sd = sqrt(variance) / (values[at + 3] * values[at + 3]);
+    const double parallax = unit_angle_between(atan2(point[1] - y, point[0] - x), values[at + 2]);
+    return 4 * distance_sd * fabs(cos(parallax)) / distance;
+}
+
+static void test_settle_ray_happens_where_its_index_falls_below_the_limit(void **state)
+{
+    unit_random_t random = {8};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        const bslam_ekf_t ekf = random_filter(&params, &random);
+        const double index = linearity_index(&ekf);
+        bslam_ekf_t copy = ekf;
+        params.ray_linear_limit = real(index * 0.999);
+        assert_false(bslam_ekf_settle_ray(&copy, &params, &mount, 2));
+        assert_memory_equal(&copy, &ekf, sizeof copy);
+        params.ray_linear_limit = real(index * 1.001);
+        assert_true(bslam_ekf_settle_ray(&copy, &params, &mount, 2));
+    }
+}
+
+static void test_settle_ray_what_is_no_ray_stays(void **state)
+{
+    unit_random_t random = {9};
+    bslam_params_t params;
+    bslam_ekf_t ekf = mixed_filter(&params, &random);
+    const bslam_ekf_t before = ekf;
+    for (int b = 0; b < ekf.beacon_count; b++) {
+        if (ekf.beacons[b].kind != BSLAM_BEACON_RAY) {
+            assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, b));
+        }
+    }
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
+static void test_settle_ray_without_a_positive_inverse_distance_stays(void **state)
+{
+    static const double inverses[] = {0, -0.2, 1e-4, NAN};
+    unit_random_t random = {10};
+    for (int i = 0; i < COUNT_OF(inverses); i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+        ekf.mean[ekf.beacons[2].at + 3] = real(inverses[i]);
+        assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+        assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_RAY);
+    }
+}
+
+// ---- queries ----------------------------------------------------------------------------------------------
+
+static void test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point(void **state)
+{
+    unit_random_t random = {11};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        const bslam_ekf_t ekf = random_filter(&params, &random);
+        const int at = ekf.beacons[2].at;
+        const twin_t expected = augmented(&ekf, point_of_ray, 2, NULL, 0, &at);
+        const int n = ekf.dim;
+        bslam_real_t x;
+        bslam_real_t y;
+        bslam_ekf_beacon_position(&ekf, 2, &x, &y);
+        assert_near(x, expected.mean.at[n][0], TOLERANCE);
+        assert_near(y, expected.mean.at[n + 1][0], TOLERANCE);
+        const bslam_sym2_t covariance = bslam_ekf_beacon_covariance(&ekf, 2);
+        assert_near(covariance.xx, expected.covariance.at[n][n], TOLERANCE * 10);
+        assert_near(covariance.xy, expected.covariance.at[n + 1][n], TOLERANCE * 10);
+        assert_near(covariance.yy, expected.covariance.at[n + 1][n + 1], TOLERANCE * 10);
+    }
+}
+
+static void test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it(void **state)
+{
+    static const double inverses[] = {0, -1, 1e-9};
+    unit_random_t random = {12};
+    bslam_params_t params;
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const int at = ekf.beacons[2].at;
+    for (int i = 0; i < COUNT_OF(inverses); i++) {
+        ekf.mean[at + 3] = real(inverses[i]);
+        bslam_real_t x;
+        bslam_real_t y;
+        bslam_ekf_beacon_position(&ekf, 2, &x, &y);
+        const double distance = hypot((double)x - (double)ekf.mean[at], (double)y - (double)ekf.mean[at + 1]);
+        assert_near(distance, 1000, 1000 * 16 * UNIT_ROUNDING);
+    }
+}
+
+static void test_beacon_covariance_of_a_point_is_its_block(void **state)
+{
+    unit_random_t random = {13};
+    bslam_params_t params;
+    const bslam_ekf_t ekf = random_filter(&params, &random);
+    const int at = ekf.beacons[1].at;
+    const bslam_sym2_t covariance = bslam_ekf_beacon_covariance(&ekf, 1);
+    assert_true(covariance.xx == bslam_symmat_get(ekf.covariance, at, at));
+    assert_true(covariance.xy == bslam_symmat_get(ekf.covariance, at, at + 1));
+    assert_true(covariance.yy == bslam_symmat_get(ekf.covariance, at + 1, at + 1));
+}
+
+static void test_is_sane_finds_every_bad_value(void **state)
+{
+    static const double bad[] = {NAN, INFINITY, -INFINITY};
+    unit_random_t random = {14};
+    bslam_params_t params;
+    const bslam_ekf_t good = random_filter(&params, &random);
+    assert_true(bslam_ekf_is_sane(&good));
+    for (int at = 0; at < good.dim; at++) {
+        for (int i = 0; i < COUNT_OF(bad); i++) {
+            bslam_ekf_t ekf = good;
+            ekf.mean[at] = real(bad[i]);
+            assert_false(bslam_ekf_is_sane(&ekf));
+            ekf = good;
+            bslam_symmat_set(ekf.covariance, at, at, real(bad[i]));
+            assert_false(bslam_ekf_is_sane(&ekf));
+        }
+        bslam_ekf_t ekf = good;
+        bslam_symmat_set(ekf.covariance, at, at, real(-1e-6));
+        assert_false(bslam_ekf_is_sane(&ekf));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_add_point_is_the_augment_step),
+        cmocka_unit_test(test_add_ray_is_the_augment_step),
+        cmocka_unit_test(test_add_points_beyond_the_map_are_refused),
+        cmocka_unit_test(test_add_rays_beyond_their_number_are_refused_but_points_are_not),
+        cmocka_unit_test(test_add_known_takes_no_room_in_the_state),
+
+        cmocka_unit_test(test_remove_any_beacon_leaves_the_others_to_the_bit),
+        cmocka_unit_test(test_remove_then_add_again_is_as_if_it_had_never_been_there),
+        cmocka_unit_test(test_remove_down_to_the_last_beacon_and_fill_again),
+
+        cmocka_unit_test(test_settle_ray_becomes_its_point_with_the_covariance_of_the_change),
+        cmocka_unit_test(test_settle_ray_happens_where_its_index_falls_below_the_limit),
+        cmocka_unit_test(test_settle_ray_what_is_no_ray_stays),
+        cmocka_unit_test(test_settle_ray_without_a_positive_inverse_distance_stays),
+
+        cmocka_unit_test(test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point),
+        cmocka_unit_test(test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it),
+        cmocka_unit_test(test_beacon_covariance_of_a_point_is_its_block),
+        cmocka_unit_test(test_is_sane_finds_every_bad_value),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

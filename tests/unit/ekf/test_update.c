@@ -1,0 +1,617 @@
+#include "support.h"
+#include "twin.h"
+
+#include <math.h>
+
+/// In double the finite differences of the expected rows limit the comparison. In float some hundred
+/// roundings of numbers of order 1, times the condition of S: prior variances of 0.3 against measurement
+/// variances of 4e-4.
+#define TOLERANCE (BSLAM_REAL_DOUBLE ? 1e-8 : 3e-4)
+
+static const bslam_pose_t mount = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.4)};
+
+/// One sighting in a test: of which beacon, with or without a distance, and how far off the prediction.
+typedef struct plan {
+    int beacon;
+    bool has_range;
+    double range_off_m;
+    double bearing_off_rad;
+} plan_t;
+
+#define SIGHTINGS_MAX 8
+
+static plan_t random_plan(unit_random_t *random, int beacon, bool has_range)
+{
+    return (plan_t){beacon, has_range, unit_random(random, -0.3, 0.3), unit_random(random, -0.05, 0.05)};
+}
+
+/// The sighting that a plan makes in the present state.
+static bslam_sighting_t sighting_of(const bslam_ekf_t *ekf, const plan_t *plan)
+{
+    double state[DENSE_MAX];
+    double range_m;
+    double bearing_rad;
+    twin_values(ekf, state);
+    twin_observe(ekf, &mount, plan->beacon, state, &range_m, &bearing_rad);
+    const double bearing = bearing_rad + plan->bearing_off_rad;
+    return plan->has_range ? unit_polar(bearing, range_m + plan->range_off_m, 0) : unit_direction(bearing, 0);
+}
+
+/// The same sighting as a textbook has it: rows of H, innovation, diagonal of R.
+typedef struct measurement {
+    dense_t h;
+    dense_t y;
+    dense_t r;
+} measurement_t;
+
+static void append(measurement_t *m, const dense_t *rows, int row, double y, double variance)
+{
+    const int at = m->h.rows;
+    m->h.rows = m->y.rows = m->r.rows = m->r.columns = at + 1;
+    m->h.columns = rows->columns;
+    m->y.columns = 1;
+    memcpy(m->h.at[at], rows->at[row], sizeof m->h.at[at]);
+    memset(m->r.at[at], 0, sizeof m->r.at[at]);
+    for (int i = 0; i < at; i++) {
+        m->r.at[i][at] = 0;
+    }
+    m->y.at[at][0] = y;
+    m->r.at[at][at] = variance;
+}
+
+/// Adds a sighting's rows. `weight` divides its noise.
+static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const plan_t *plan,
+                    const bslam_sighting_t *sighting, double weight, measurement_t *m)
+{
+    const dense_t rows = twin_rows(ekf, &mount, plan->beacon);
+    double state[DENSE_MAX];
+    double range_m;
+    double bearing_rad;
+    twin_values(ekf, state);
+    twin_observe(ekf, &mount, plan->beacon, state, &range_m, &bearing_rad);
+    const double bearing_sd = (double)params->bearing_sd_rad;
+    const double factor = plan->has_range ? 1 : (double)params->bearing_only_variance_factor;
+    append(m, &rows, 1, unit_angle_between((double)sighting->bearing_rad, bearing_rad),
+           bearing_sd * bearing_sd * factor / weight);
+    if (plan->has_range) {
+        const double floor_m = (double)params->range_sd_floor_m;
+        const double fraction_m = (double)params->range_sd_fraction * range_m;
+        const double quadratic_m = (double)params->range_sd_per_m * range_m * range_m;
+        append(m, &rows, 0, (double)sighting->range_m - range_m,
+               (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m) / weight);
+    }
+}
+
+static bslam_innovation_t innovation_of(const bslam_ekf_t *ekf, const bslam_params_t *params, int beacon,
+                                        const bslam_sighting_t *sighting)
+{
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(ekf, params, &mount, sighting, beacon, &innovation), BSLAM_OK);
+    return innovation;
+}
+
+static bslam_status_t fuse(bslam_ekf_t *ekf, const bslam_params_t *params, int beacon,
+                           const bslam_sighting_t *sighting, bslam_fusion_t *fusion)
+{
+    const bslam_innovation_t innovation = innovation_of(ekf, params, beacon, sighting);
+    return bslam_ekf_fuse(ekf, params, &innovation, fusion);
+}
+
+/// Fuses all plans in one frame, in C and as one batch of the textbook, and compares.
+static void assert_frame_is_the_textbooks(bslam_ekf_t *ekf, const bslam_params_t *params, const plan_t *plans,
+                                          int count)
+{
+    measurement_t m = {0};
+    bslam_sighting_t sightings[SIGHTINGS_MAX];
+    for (int i = 0; i < count; i++) {
+        sightings[i] = sighting_of(ekf, &plans[i]);
+        measure(ekf, params, &plans[i], &sightings[i], 1, &m);
+    }
+    twin_t expected = twin_of(ekf);
+    twin_update(ekf, params->filter, &m.h, &m.y, &m.r, &expected);
+    for (int i = 0; i < count; i++) {
+        bslam_fusion_t fusion;
+        assert_int_equal(fuse(ekf, params, plans[i].beacon, &sightings[i], &fusion), BSLAM_OK);
+        assert_true(fusion.weight == 1);
+    }
+    bslam_ekf_correct(ekf, params);
+    twin_assert(ekf, &expected, TOLERANCE);
+}
+
+/// A random filter with three points and two rays.
+static bslam_ekf_t random_filter(const bslam_params_t *params, unit_random_t *random)
+{
+    bslam_ekf_t ekf;
+    twin_randomise(&ekf, params, random, 3, 2);
+    return ekf;
+}
+
+static bslam_params_t params_of(int filter, bool velocity)
+{
+    bslam_params_t params = unit_params();
+    params.filter = filter;
+    params.velocity_states = velocity ? 1 : 0;
+    return params;
+}
+
+// ---- one frame --------------------------------------------------------------------------------------------
+
+static void assert_every_count_is_the_textbooks(int filter, bool velocity)
+{
+    // From 1 to 7 sightings, 1 to 11 scalars wait: below, at and beyond what one pass over the triangle
+    // takes.
+    const bslam_params_t params = params_of(filter, velocity);
+    unit_random_t random = {1};
+    for (int round = 0; round < 5; round++) {
+        for (int count = 1; count <= 7; count++) {
+            bslam_ekf_t ekf = random_filter(&params, &random);
+            plan_t plans[SIGHTINGS_MAX];
+            for (int i = 0; i < count; i++) {
+                plans[i] = random_plan(&random, i % 5, i % 5 < 3 && (i + round) % 3 != 0);
+            }
+            assert_frame_is_the_textbooks(&ekf, &params, plans, count);
+        }
+    }
+}
+
+static void test_fuse_standard_any_number_of_sightings_is_the_batch_update(void **state)
+{
+    assert_every_count_is_the_textbooks(0, false);
+}
+
+static void test_fuse_standard_with_velocity_states_is_the_batch_update(void **state)
+{
+    assert_every_count_is_the_textbooks(0, true);
+}
+
+static void test_fuse_invariant_any_number_of_sightings_is_the_batch_update(void **state)
+{
+    assert_every_count_is_the_textbooks(1, false);
+}
+
+static void test_fuse_invariant_with_velocity_states_is_the_batch_update(void **state)
+{
+    assert_every_count_is_the_textbooks(1, true);
+}
+
+static void test_fuse_distance_of_a_ray_is_the_batch_update(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        const bslam_params_t params = params_of(filter, false);
+        unit_random_t random = {2};
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const plan_t plans[] = {random_plan(&random, 3, true), random_plan(&random, 4, true)};
+        assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+    }
+}
+
+static void test_fuse_frames_in_a_row_are_the_textbooks(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        const bslam_params_t params = params_of(filter, true);
+        unit_random_t random = {3};
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        for (int frame = 0; frame < 10; frame++) {
+            const plan_t plans[] = {random_plan(&random, frame % 3, true), random_plan(&random, 3, false)};
+            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+        }
+    }
+}
+
+static void test_fuse_order_within_a_frame_does_not_matter(void **state)
+{
+    const bslam_params_t params = params_of(1, true);
+    unit_random_t random = {4};
+    bslam_ekf_t forwards = random_filter(&params, &random);
+    bslam_ekf_t backwards = forwards;
+    bslam_sighting_t sightings[5];
+    for (int i = 0; i < 5; i++) {
+        const plan_t plan = random_plan(&random, i, i < 3);
+        sightings[i] = sighting_of(&forwards, &plan);
+    }
+    for (int i = 0; i < 5; i++) {
+        bslam_fusion_t fusion;
+        assert_int_equal(fuse(&forwards, &params, i, &sightings[i], &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&backwards, &params, 4 - i, &sightings[4 - i], &fusion), BSLAM_OK);
+    }
+    bslam_ekf_correct(&forwards, &params);
+    bslam_ekf_correct(&backwards, &params);
+    const twin_t expected = twin_of(&forwards);
+    twin_assert(&backwards, &expected, BSLAM_REAL_DOUBLE ? 1e-12 : 3e-4);
+}
+
+static void test_fuse_known_beacon_corrects_the_robot_and_stays(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        const bslam_params_t params = params_of(filter, false);
+        unit_random_t random = {5};
+        bslam_ekf_t ekf;
+        twin_randomise(&ekf, &params, &random, 2, 0);
+        int index;
+        const bslam_real_t x = ekf.mean[BSLAM_STATE_X] + 4;
+        const bslam_real_t y = ekf.mean[BSLAM_STATE_Y] - 3;
+        assert_int_equal(bslam_ekf_add_known(&ekf, x, y, &index), BSLAM_OK);
+        for (int frame = 0; frame < 5; frame++) {
+            const plan_t plans[] = {random_plan(&random, index, true), random_plan(&random, 0, true)};
+            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+        }
+        bslam_real_t known_x;
+        bslam_real_t known_y;
+        bslam_ekf_beacon_position(&ekf, index, &known_x, &known_y);
+        assert_true(known_x == x && known_y == y);
+        const bslam_sym2_t none = bslam_ekf_beacon_covariance(&ekf, index);
+        assert_true(none.xx == 0 && none.xy == 0 && none.yy == 0);
+    }
+}
+
+static void test_fuse_leaves_mean_alone_until_correct(void **state)
+{
+    const bslam_params_t params = params_of(1, true);
+    unit_random_t random = {6};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_real_t before[BSLAM_STATE_PADDED];
+    memcpy(before, ekf.mean, sizeof before);
+    const plan_t plan = random_plan(&random, 0, true);
+    const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+    for (int i = 0; i < 6; i++) {
+        bslam_fusion_t fusion;
+        assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+        assert_memory_equal(before, ekf.mean, sizeof before);
+    }
+}
+
+static void test_correct_without_a_sighting_changes_no_bit(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        const bslam_params_t params = params_of(filter, true);
+        unit_random_t random = {7};
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t before;
+        memcpy(&before, &ekf, sizeof ekf);
+        bslam_ekf_correct(&ekf, &params);
+        assert_memory_equal(&ekf, &before, sizeof ekf);
+    }
+}
+
+// ---- distance, gate, Huber --------------------------------------------------------------------------------
+
+/// Squared Mahalanobis distance yᵀ S⁻¹ y of a measurement in a state.
+static double distance2_of(const measurement_t *m, const dense_t *covariance)
+{
+    const dense_t hph = dense_sandwich(&m->h, covariance);
+    const dense_t s = dense_sum(&hph, &m->r);
+    const dense_t inverse = dense_inverse(&s);
+    const dense_t y_t = dense_transposed(&m->y);
+    return dense_sandwich(&y_t, &inverse).at[0][0];
+}
+
+static void test_distance2_is_the_textbooks(void **state)
+{
+    const bslam_params_t params = params_of(0, true);
+    unit_random_t random = {8};
+    for (int i = 0; i < 50; i++) {
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const plan_t plan = random_plan(&random, i % 5, i % 2 == 0);
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        measurement_t m = {0};
+        measure(&ekf, &params, &plan, &sighting, 1, &m);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        bslam_real_t distance2;
+        assert_int_equal(bslam_ekf_distance2(&ekf, &innovation, &distance2), BSLAM_OK);
+        const twin_t twin = twin_of(&ekf);
+        const double expected = distance2_of(&m, &twin.covariance);
+        assert_near(distance2, expected, TOLERANCE * (1 + expected));
+    }
+}
+
+static void test_fuse_distance2_is_given_what_was_fused_before(void **state)
+{
+    const bslam_params_t params = params_of(0, false);
+    unit_random_t random = {9};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, true)};
+    const bslam_sighting_t sightings[] = {sighting_of(&ekf, &plans[0]), sighting_of(&ekf, &plans[1])};
+    measurement_t first = {0};
+    measurement_t both = {0};
+    measure(&ekf, &params, &plans[0], &sightings[0], 1, &first);
+    measure(&ekf, &params, &plans[0], &sightings[0], 1, &both);
+    measure(&ekf, &params, &plans[1], &sightings[1], 1, &both);
+    const twin_t twin = twin_of(&ekf);
+    bslam_fusion_t fusion;
+    assert_int_equal(fuse(&ekf, &params, 0, &sightings[0], &fusion), BSLAM_OK);
+    const double first_d2 = distance2_of(&first, &twin.covariance);
+    assert_near(fusion.distance2, first_d2, TOLERANCE * (1 + first_d2));
+    assert_int_equal(fuse(&ekf, &params, 1, &sightings[1], &fusion), BSLAM_OK);
+    // The chain rule: d2 of both = d2 of the first + d2 of the second given the first.
+    const double both_d2 = distance2_of(&both, &twin.covariance);
+    assert_near(fusion.distance2, both_d2 - first_d2, TOLERANCE * (1 + both_d2));
+}
+
+static void test_fuse_just_inside_and_outside_the_gate(void **state)
+{
+    bslam_params_t params = params_of(1, false);
+    unit_random_t random = {10};
+    const bslam_ekf_t ekf = random_filter(&params, &random);
+    const plan_t plan = random_plan(&random, 0, true);
+    const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+    bslam_ekf_t copy = ekf;
+    bslam_fusion_t fusion;
+    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_OK);
+    const bslam_real_t distance2 = fusion.distance2;
+
+    copy = ekf;
+    params.gate_d2 = distance2;
+    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_OK);
+    assert_true(fusion.weight == 1);
+
+    copy = ekf;
+    params.gate_d2 = distance2 * real(0.999);
+    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_E_RANGE);
+    assert_true(fusion.weight == 0 && fusion.distance2 == distance2);
+    bslam_ekf_correct(&copy, &params);
+    assert_memory_equal(copy.mean, ekf.mean, sizeof ekf.mean);
+    assert_memory_equal(copy.covariance, ekf.covariance, sizeof ekf.covariance);
+}
+
+static void test_fuse_gated_sighting_between_others_has_no_effect(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        // However many columns wait when it comes.
+        for (int before = 1; before <= 4; before++) {
+            bslam_params_t params = params_of(filter, false);
+            unit_random_t random = {11};
+            bslam_ekf_t ekf = random_filter(&params, &random);
+            bslam_ekf_t without = ekf;
+            const plan_t outlier = {0, true, 3, 0.5};
+            const bslam_sighting_t wrong = sighting_of(&ekf, &outlier);
+            bslam_fusion_t fusion;
+            for (int i = 0; i < before; i++) {
+                const plan_t plan = {i, i < 3, 0.01, 0.001};
+                const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+                assert_int_equal(fuse(&ekf, &params, i, &sighting, &fusion), BSLAM_OK);
+                assert_int_equal(fuse(&without, &params, i, &sighting, &fusion), BSLAM_OK);
+            }
+            params.gate_d2 = 9;
+            assert_int_equal(fuse(&ekf, &params, 0, &wrong, &fusion), BSLAM_E_RANGE);
+            bslam_ekf_correct(&ekf, &params);
+            bslam_ekf_correct(&without, &params);
+            const twin_t expected = twin_of(&without);
+            // Whether the down-dates were flushed before or after changes the last bits.
+            twin_assert(&ekf, &expected, 16 * UNIT_ROUNDING * 8);
+        }
+    }
+}
+
+static void test_fuse_beyond_huber_counts_less(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        bslam_params_t params = params_of(filter, false);
+        unit_random_t random = {12};
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const plan_t plan = {0, true, 0.4, 0.1};
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        measurement_t plain = {0};
+        measure(&ekf, &params, &plan, &sighting, 1, &plain);
+        twin_t expected = twin_of(&ekf);
+        const double d = sqrt(distance2_of(&plain, &expected.covariance));
+
+        params.huber_d = real(d / 4);
+        measurement_t weighted = {0};
+        measure(&ekf, &params, &plan, &sighting, 0.25, &weighted);
+        twin_update(&ekf, filter, &weighted.h, &weighted.y, &weighted.r, &expected);
+        bslam_fusion_t fusion;
+        assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+        assert_near(fusion.weight, 0.25, TOLERANCE);
+        assert_near(fusion.distance2, d * d, TOLERANCE * (1 + d * d));
+        bslam_ekf_correct(&ekf, &params);
+        twin_assert(&ekf, &expected, TOLERANCE);
+    }
+}
+
+static void test_fuse_within_huber_has_full_weight(void **state)
+{
+    bslam_params_t params = params_of(0, false);
+    unit_random_t random = {13};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const plan_t plan = {0, true, 0.4, 0.1};
+    const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+    params.huber_d = 1000;
+    bslam_fusion_t fusion;
+    assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+    assert_true(fusion.weight == 1);
+}
+
+// ---- the bend of a direction's model ----------------------------------------------------------------------
+
+/// What beacon 0's direction adds to its variance by the bend of its model, the textbook's way: half the
+/// trace of (Hessian P)², with the Hessian by differences of the gradient.
+static double bend_by_hessian(const bslam_ekf_t *ekf, int beacon)
+{
+    const double step = 1e-3;
+    dense_t hessian = dense_zero(ekf->dim, ekf->dim);
+    for (int i = 0; i < ekf->dim; i++) {
+        dense_t gradients[2];
+        for (int side = 0; side < 2; side++) {
+            bslam_ekf_t moved = *ekf;
+            moved.mean[i] += real(side == 0 ? -step : step);
+            gradients[side] = twin_rows(&moved, &mount, beacon);
+        }
+        for (int j = 0; j < ekf->dim; j++) {
+            hessian.at[i][j] = (gradients[1].at[1][j] - gradients[0].at[1][j]) / (2 * step);
+        }
+    }
+    const twin_t twin = twin_of(ekf);
+    const dense_t hp = dense_product(&hessian, &twin.covariance);
+    const dense_t hphp = dense_product(&hp, &hp);
+    double trace = 0;
+    for (int i = 0; i < ekf->dim; i++) {
+        trace += hphp.at[i][i];
+    }
+    return trace / 2;
+}
+
+static void forget_heading(bslam_ekf_t *ekf)
+{
+    for (int i = 0; i < ekf->dim; i++) {
+        bslam_symmat_set(ekf->covariance, i, BSLAM_STATE_THETA, 0);
+    }
+}
+
+static void test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model(void **state)
+{
+    // With the heading known: where it is not, the bend depends on the coordinates of the error.
+    bslam_params_t params = params_of(0, false);
+    params.bearing_only_curvature_factor = 3;
+    unit_random_t random = {16};
+    for (int i = 0; i < 20; i++) {
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        forget_heading(&ekf);
+        const plan_t plan = random_plan(&random, i % 3, false);
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        const double expected = 0.02 * 0.02 * 2 + 3 * bend_by_hessian(&ekf, plan.beacon);
+        // Differences of gradients: step² in double; in float the mean's own rounding over the step.
+        assert_near(innovation.bearing_var_rad2, expected, expected * (BSLAM_REAL_DOUBLE ? 1e-4 : 1e-2));
+    }
+}
+
+static void test_innovation_in_direction_only_grows_with_doubt_of_length_and_direction(void **state)
+{
+    // MATH "Direction only": e P eᵀ b P bᵀ + (e P bᵀ)², where b is the direction's row of H and e the
+    // gradient of the log of the length: a point's distance, a ray's |g|, g = inverse (anchor - sensor) +
+    // direction.
+    bslam_params_t params = params_of(0, false);
+    params.bearing_only_curvature_factor = 3;
+    unit_random_t random = {17};
+    for (int i = 0; i < 50; i++) {
+        const bslam_ekf_t ekf = random_filter(&params, &random);
+        const int beacon = i % 5;
+        const plan_t plan = random_plan(&random, beacon, false);
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &params, beacon, &sighting);
+        double values[DENSE_MAX];
+        double range_m;
+        double bearing_rad;
+        twin_values(&ekf, values);
+        twin_observe(&ekf, &mount, beacon, values, &range_m, &bearing_rad);
+        dense_t rows = twin_rows(&ekf, &mount, beacon);
+        for (int k = 0; k < ekf.dim; k++) {
+            rows.at[0][k] /= range_m;
+        }
+        if (ekf.beacons[beacon].kind == BSLAM_BEACON_RAY) {
+            const int at = ekf.beacons[beacon].at + 3;
+            rows.at[0][at] += 1 / values[at];
+        }
+        const twin_t twin = twin_of(&ekf);
+        const dense_t p = dense_sandwich(&rows, &twin.covariance);
+        const double bend = p.at[0][0] * p.at[1][1] + p.at[0][1] * p.at[0][1];
+        assert_near(innovation.bearing_var_rad2, 0.02 * 0.02 * 2 + 3 * bend, TOLERANCE);
+    }
+}
+
+static void test_innovation_with_a_distance_has_no_bend(void **state)
+{
+    bslam_params_t params = params_of(0, false);
+    params.bearing_only_curvature_factor = 3;
+    unit_random_t random = {18};
+    const bslam_ekf_t ekf = random_filter(&params, &random);
+    const plan_t plan = random_plan(&random, 0, true);
+    const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+    const bslam_innovation_t innovation = innovation_of(&ekf, &params, 0, &sighting);
+    assert_near(innovation.bearing_var_rad2, 0.02 * 0.02, UNIT_ROUNDING * 1e-3);
+}
+
+// ---- refusals ---------------------------------------------------------------------------------------------
+
+static void test_innovation_of_a_beacon_at_the_sensor_is_singular(void **state)
+{
+    const bslam_params_t params = params_of(0, false);
+    const bslam_pose_t at_origin = {0, 0, 0};
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    int index;
+    assert_int_equal(bslam_ekf_add_known(&ekf, 0, 0, &index), BSLAM_OK);
+    const bslam_sighting_t sighting = unit_polar(0, 1, 0);
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &at_origin, &sighting, index, &innovation),
+                     BSLAM_E_SINGULAR);
+}
+
+static void test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular(void **state)
+{
+    const bslam_params_t params = params_of(0, false);
+    unit_random_t random = {14};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const bslam_sighting_t direction = unit_direction(0.1, 0);
+    const bslam_sighting_t polar = unit_polar(0.1, 3, 0);
+    static const double inverses[] = {0, -0.1};
+    for (int i = 0; i < COUNT_OF(inverses); i++) {
+        ekf.mean[ekf.beacons[3].at + 3] = real(inverses[i]);
+        bslam_innovation_t innovation;
+        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &mount, &direction, 3, &innovation), BSLAM_OK);
+        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &mount, &polar, 3, &innovation),
+                         BSLAM_E_SINGULAR);
+    }
+}
+
+/// A filter whose S is not positive definite for beacon 0.
+static bslam_ekf_t broken_filter(const bslam_params_t *params, unit_random_t *random)
+{
+    bslam_ekf_t ekf = random_filter(params, random);
+    for (int i = 0; i < ekf.dim; i++) {
+        bslam_symmat_set(ekf.covariance, i, i, -1);
+    }
+    return ekf;
+}
+
+static void test_fuse_and_distance2_of_an_indefinite_state_are_singular(void **state)
+{
+    const bslam_params_t params = params_of(1, false);
+    unit_random_t random = {15};
+    const plan_t plans[] = {{0, true, 0, 0}, {0, false, 0, 0}};
+    for (int i = 0; i < COUNT_OF(plans); i++) {
+        bslam_ekf_t ekf = broken_filter(&params, &random);
+        const bslam_ekf_t before = ekf;
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plans[i]);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &params, 0, &sighting);
+        bslam_real_t distance2;
+        bslam_fusion_t fusion;
+        assert_int_equal(bslam_ekf_distance2(&ekf, &innovation, &distance2), BSLAM_E_SINGULAR);
+        assert_int_equal(bslam_ekf_fuse(&ekf, &params, &innovation, &fusion), BSLAM_E_SINGULAR);
+        bslam_ekf_correct(&ekf, &params);
+        assert_memory_equal(ekf.mean, before.mean, sizeof before.mean);
+        assert_memory_equal(ekf.covariance, before.covariance, sizeof before.covariance);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_fuse_standard_any_number_of_sightings_is_the_batch_update),
+        cmocka_unit_test(test_fuse_standard_with_velocity_states_is_the_batch_update),
+        cmocka_unit_test(test_fuse_invariant_any_number_of_sightings_is_the_batch_update),
+        cmocka_unit_test(test_fuse_invariant_with_velocity_states_is_the_batch_update),
+        cmocka_unit_test(test_fuse_distance_of_a_ray_is_the_batch_update),
+        cmocka_unit_test(test_fuse_frames_in_a_row_are_the_textbooks),
+        cmocka_unit_test(test_fuse_order_within_a_frame_does_not_matter),
+        cmocka_unit_test(test_fuse_known_beacon_corrects_the_robot_and_stays),
+        cmocka_unit_test(test_fuse_leaves_mean_alone_until_correct),
+        cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
+
+        cmocka_unit_test(test_distance2_is_the_textbooks),
+        cmocka_unit_test(test_fuse_distance2_is_given_what_was_fused_before),
+        cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),
+        cmocka_unit_test(test_fuse_gated_sighting_between_others_has_no_effect),
+        cmocka_unit_test(test_fuse_beyond_huber_counts_less),
+        cmocka_unit_test(test_fuse_within_huber_has_full_weight),
+
+        cmocka_unit_test(test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model),
+        cmocka_unit_test(test_innovation_in_direction_only_grows_with_doubt_of_length_and_direction),
+        cmocka_unit_test(test_innovation_with_a_distance_has_no_bend),
+
+        cmocka_unit_test(test_innovation_of_a_beacon_at_the_sensor_is_singular),
+        cmocka_unit_test(test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular),
+        cmocka_unit_test(test_fuse_and_distance2_of_an_indefinite_state_are_singular),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
