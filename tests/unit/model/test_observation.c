@@ -42,6 +42,7 @@ static void see_ray(const double *in, double *out, const void *context)
     const double distance = 1 / in[REST + 3];
     see(in, in[REST] + distance * cos(in[REST + 2]), in[REST + 1] + distance * sin(in[REST + 2]), out,
         context);
+    out[STRETCH] -= log(distance);
 }
 
 /// in[REST] = range, in[REST + 1] = bearing.
