@@ -13,23 +13,27 @@ REAL_ODOMETRY_LEAD_US: Final = 175_000
 _IMAGE_DELAY_US: Final = 30_000
 
 REAL_LOG: Final[dict[str, int | float]] = {
-    # A commanded speed is not the driven one, and by how much differs between robots: estimate the scales.
+    # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
+    # scales.
     "scale_states": 1,
-    "scale_sd": 0.1,
-    "scale_walk_sqrt_s": 0.002,
-    # Wheels that follow a command err in proportion to motion: 1.6 x what `bslam calibrate` finds.
-    "forward_sd_per_sqrt_s": 0.02,
-    "turn_sd_per_sqrt_s": 0.04,
-    # Successive sightings err alike (lag-1 correlation of the distance 0.96): the scatter about the truth
-    # (0.01 rad; 0.02 m + 0.035 r) times 4, so that many of them do not count as much evidence.
-    "bearing_sd_rad": 0.04,
-    "range_sd_floor_m": 0.08,
-    "range_sd_fraction": 0.14,
+    "scale_sd": 0.25,
+    "scale_walk_sqrt_s": 0.001,
+    # What a robot that follows commands errs by grows with the way and the turn. The wheels themselves read
+    # nothing.
+    "left_speed_sd_mps": 0.0,
+    "right_speed_sd_mps": 0.0,
+    "forward_sd_per_sqrt_m": 0.05,
+    "turn_sd_per_sqrt_m": 0.05,
+    "turn_sd_per_sqrt_rad": 0.2,
+    # The scatter is 0.02 rad and 0.02 m + 0.035 r, but successive errors are strongly correlated (0.67; 0.96
+    # for the distance), and each robot's distances are biased by 1-2 %: counted as 0.05 rad and 0.18 r.
+    "bearing_sd_rad": 0.05,
+    "range_sd_floor_m": 0.06,
+    "range_sd_fraction": 0.18,
     "range_sd_per_m": 0.0,
-    # After a wheel slips, a gate of the usual size rejects sightings for good. Huber weights from early on
-    # let the estimate come back; the gate only keeps out barcodes read as another one, metres off.
-    "gate_d2": 200,
-    "huber_d": 0.3,
+    # After a wheel slips a hard gate rejects sightings for good; Huber weights let the estimate come back.
+    "gate_d2": 0,
+    "huber_d": 0.5,
     "sighting_delay_us": REAL_ODOMETRY_LEAD_US + _IMAGE_DELAY_US,
 }
 
