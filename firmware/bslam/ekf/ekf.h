@@ -87,11 +87,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_
 
 // ---- sightings --------------------------------------------------------------------------------------------
 
-/// A row of H with at most 3 + BSLAM_RAY_DIM values that are not zero.
+/// A row of H: not zero only at the robot's pose and at `dim` neighbouring state values from `at` on.
 typedef struct bslam_row {
-    uint16_t count;
-    uint16_t index[3 + BSLAM_RAY_DIM];
-    bslam_real_t value[3 + BSLAM_RAY_DIM];
+    bslam_real_t pose[3];
+    bslam_real_t other[BSLAM_RAY_DIM];
+    uint16_t at;
+    uint16_t dim;
 } bslam_row_t;
 
 /// A sighting against a beacon of the map: equations (6)-(8), at the present mean.

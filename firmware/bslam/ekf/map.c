@@ -39,11 +39,7 @@ static void append_value(bslam_ekf_t *ekf, bslam_real_t value, const bslam_real_
     const int at = ekf->dim;
     bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
     memset(row, 0, (size_t)BSLAM_SYMMAT_PADDED(at + 1) * sizeof *row);
-    for (int k = 0; k < 3; k++) {
-        if (by_pose[k] != 0) {
-            bslam_symmat_add_column(ekf->covariance, at, k, by_pose[k], row);
-        }
-    }
+    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, by_pose, row);
     row[at] = by_pose[0] * row[0] + by_pose[1] * row[1] + by_pose[2] * row[2] + own_var;
     ekf->mean[at] = value;
     ekf->dim = at + 1;
@@ -197,10 +193,8 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
     bslam_real_t *y_row = ekf->mirror;
     memset(ekf->shift, 0, sizeof ekf->shift);
     memset(ekf->mirror, 0, sizeof ekf->mirror);
-    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
-        bslam_symmat_add_column(ekf->covariance, ekf->dim, at + k, point.x_by_ray[k], x_row);
-        bslam_symmat_add_column(ekf->covariance, ekf->dim, at + k, point.y_by_ray[k], y_row);
-    }
+    bslam_symmat_add_columns(ekf->covariance, ekf->dim, at, BSLAM_RAY_DIM, point.x_by_ray, x_row);
+    bslam_symmat_add_columns(ekf->covariance, ekf->dim, at, BSLAM_RAY_DIM, point.y_by_ray, y_row);
     bslam_sym2_t own = {0, 0, 0};
     for (int k = 0; k < BSLAM_RAY_DIM; k++) {
         own.xx += point.x_by_ray[k] * x_row[at + k];

@@ -11,18 +11,19 @@
 
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
-    bslam_real_t sum = 0;
-    for (int k = 0; k < row->count; k++) {
-        sum += row->value[k] * vector[row->index[k]];
+    bslam_real_t sum = row->pose[0] * vector[0] + row->pose[1] * vector[1] + row->pose[2] * vector[2];
+    for (int k = 0; k < row->dim; k++) {
+        sum += row->other[k] * vector[row->at + k];
     }
     return sum;
 }
 
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
-    memset(out, 0, BSLAM_STATE_PADDED * sizeof *out);
-    for (int k = 0; k < row->count; k++) {
-        bslam_symmat_add_column(ekf->covariance, ekf->dim, row->index[k], row->value[k], out);
+    memset(out, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof *out);
+    bslam_symmat_add_columns(ekf->covariance, ekf->dim, 0, 3, row->pose, out);
+    if (row->dim > 0) {
+        bslam_symmat_add_columns(ekf->covariance, ekf->dim, row->at, row->dim, row->other, out);
     }
     for (int p = 0; p < ekf->pending_count; p++) {
         const bslam_real_t *column = ekf->pending[p];
@@ -36,35 +37,40 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
-    const int beacon_dim = beacon->kind == BSLAM_BEACON_RAY     ? BSLAM_RAY_DIM
-                           : beacon->kind == BSLAM_BEACON_POINT ? BSLAM_POINT_DIM
-                                                                : 0;
-    for (int k = 0; k < 3; k++) {
-        row->index[k] = (uint16_t)k;
-        row->value[k] = by_pose[k];
-    }
-    for (int k = 0; k < beacon_dim; k++) {
-        row->index[3 + k] = (uint16_t)(beacon->at + k);
-        row->value[3 + k] = by_beacon[k];
-    }
-    row->count = (uint16_t)(3 + beacon_dim);
+    static const uint16_t dims[] = {
+        [BSLAM_BEACON_POINT] = BSLAM_POINT_DIM, [BSLAM_BEACON_RAY] = BSLAM_RAY_DIM};
+    row->at = (uint16_t)beacon->at;
+    row->dim = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : dims[beacon->kind];
+    memcpy(row->pose, by_pose, sizeof row->pose);
+    memcpy(row->other, by_beacon, sizeof row->other);
 }
 
-// ---- innovation -------------------------------------------------------------------------------------------
+/// The state index of a row's k-th value, pose first.
+static int row_index(const bslam_row_t *row, int k)
+{
+    return k < 3 ? k : row->at + k - 3;
+}
 
-/// a P bᵀ for two rows of one sighting, which have the same places.
+static bslam_real_t row_value(const bslam_row_t *row, int k)
+{
+    return k < 3 ? row->pose[k] : row->other[k - 3];
+}
+
+/// a P bᵀ for two rows of one sighting, from the covariance as it is stored.
 static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
     bslam_real_t sum = 0;
-    for (int i = 0; i < a->count; i++) {
+    for (int i = 0; i < 3 + a->dim; i++) {
         bslam_real_t inner = 0;
-        for (int j = 0; j < b->count; j++) {
-            inner += bslam_symmat_get(ekf->covariance, a->index[i], b->index[j]) * b->value[j];
+        for (int j = 0; j < 3 + b->dim; j++) {
+            inner += bslam_symmat_get(ekf->covariance, row_index(a, i), row_index(b, j)) * row_value(b, j);
         }
-        sum += a->value[i] * inner;
+        sum += row_value(a, i) * inner;
     }
     return sum;
 }
+
+// ---- innovation -------------------------------------------------------------------------------------------
 
 /// What the bend of the direction's model adds to its variance, to second order: with e = d ln(length) and b
 /// the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Direction only".
@@ -285,7 +291,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 /// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
 static void transport_covariance(bslam_ekf_t *ekf)
 {
-    const bslam_row_t theta_row = {.count = 1, .index = {BSLAM_STATE_THETA}, .value = {1}};
+    const bslam_row_t theta_row = {.pose = {0, 0, 1}};
     bslam_ekf_project(ekf, &theta_row, ekf->mirror);
     const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
     for (int i = 0; i < ekf->dim; i++) {

@@ -2,17 +2,66 @@
 
 #include <string.h>
 
-void bslam_symmat_add_column(const bslam_real_t *m, int n, int k, bslam_real_t factor, bslam_real_t *out)
+/// factors · (a, b, c, d), of which the first `count` exist. The compiler knows the count: no test is left.
+static inline bslam_real_t weigh(const bslam_real_t *factors, const int count, const bslam_real_t *a,
+                                 const bslam_real_t *b, const bslam_real_t *c, const bslam_real_t *d)
 {
-    const bslam_real_t *row = m + bslam_symmat_row(k);
-    for (int j = 0; j <= k; j++) {
-        out[j] += factor * row[j];
+    bslam_real_t sum = factors[0] * *a;
+    if (count > 1) {
+        sum += factors[1] * *b;
     }
-    const bslam_real_t *element = m + bslam_symmat_row(k) + k;
-    for (int i = k + 1; i < n; i++) {
-        // From row i - 1 to row i: the filled length of row i - 1.
-        element += (size_t)((i - 1) / 4 + 1) * 4;
-        out[i] += factor * *element;
+    if (count > 2) {
+        sum += factors[2] * *c;
+    }
+    if (count > 3) {
+        sum += factors[3] * *d;
+    }
+    return sum;
+}
+
+/// bslam_symmat_add_columns for a count that the compiler knows.
+static inline void add_columns(const bslam_real_t *restrict m, int n, int first, const int count,
+                               const bslam_real_t *restrict factors, bslam_real_t *restrict out)
+{
+    // Above the columns' own rows they are read as rows, by symmetry; below, as `count` neighbours of each
+    // row.
+    const bslam_real_t *rows[BSLAM_SYMMAT_COLUMNS_MAX] = {m, m, m, m};
+    for (int k = 0; k < count; k++) {
+        rows[k] = m + bslam_symmat_row(first + k);
+    }
+    for (int i = 0; i < first; i++) {
+        out[i] += weigh(factors, count, rows[0] + i, rows[1] + i, rows[2] + i, rows[3] + i);
+    }
+    for (int i = first; i < first + count; i++) {
+        for (int k = 0; k < count; k++) {
+            out[i] += factors[k] * bslam_symmat_get(m, i, first + k);
+        }
+    }
+    const bslam_real_t *element = m + bslam_symmat_row(first + count) + first;
+    for (int i = first + count; i < n; i++) {
+        out[i] += weigh(factors, count, element, element + (count > 1 ? 1 : 0), element + (count > 2 ? 2 : 0),
+                        element + (count > 3 ? 3 : 0));
+        // To the next row: the filled length of this one.
+        element += ((size_t)i / 4 + 1) * 4;
+    }
+}
+
+void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count, const bslam_real_t *factors,
+                              bslam_real_t *out)
+{
+    switch (count) {
+    case 1:
+        add_columns(m, n, first, 1, factors, out);
+        break;
+    case 2:
+        add_columns(m, n, first, 2, factors, out);
+        break;
+    case 3:
+        add_columns(m, n, first, 3, factors, out);
+        break;
+    default:
+        add_columns(m, n, first, BSLAM_SYMMAT_COLUMNS_MAX, factors, out);
+        break;
     }
 }
 

@@ -43,8 +43,13 @@ static inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t 
     m[bslam_symmat_at(i, j)] = value;
 }
 
-/// out[0..n) += factor * column k of the n x n matrix. O(n).
-void bslam_symmat_add_column(const bslam_real_t *m, int n, int k, bslam_real_t factor, bslam_real_t *out);
+/// Columns that bslam_symmat_add_columns takes at once.
+#define BSLAM_SYMMAT_COLUMNS_MAX 4
+
+/// out[0..n) += the sum of factors[k] * column first + k of the n x n matrix, 1 <= count <=
+/// BSLAM_SYMMAT_COLUMNS_MAX. O(count n).
+void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count, const bslam_real_t *factors,
+                              bslam_real_t *out);
 
 /// One symmetric term of a sum: row i of the matrix gets row_factors[i] * columns[0..i].
 typedef struct bslam_symmat_term {

@@ -46,6 +46,11 @@ bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t 
     by_pose(&sensor, -dx / range, -dy / range, 0, seen->range_by_pose);
     by_pose(&sensor, dy / square, -dx / square, -1, seen->bearing_by_pose);
     by_pose(&sensor, -dx / square, -dy / square, 0, seen->stretch_by_pose);
+    for (int k = BSLAM_POINT_DIM; k < BSLAM_RAY_DIM; k++) {
+        seen->range_by_beacon[k] = 0;
+        seen->bearing_by_beacon[k] = 0;
+        seen->stretch_by_beacon[k] = 0;
+    }
     seen->range_by_beacon[0] = dx / range;
     seen->range_by_beacon[1] = dy / range;
     seen->bearing_by_beacon[0] = -dy / square;

@@ -10,7 +10,8 @@
 #define BSLAM_POINT_DIM 2
 #define BSLAM_RAY_DIM 4
 
-/// A predicted sighting with its derivatives, the rows of H in paper equation (8).
+/// A predicted sighting with its derivatives, the rows of H in paper equation (8). Those by values that a
+/// point does not have are 0.
 typedef struct bslam_observation {
     bslam_real_t range_m;
     bslam_real_t bearing_rad;

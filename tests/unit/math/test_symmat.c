@@ -130,24 +130,32 @@ static void test_set_is_read_back_from_both_sides(void **state)
 
 // ---- arithmetic -------------------------------------------------------------------------------------------
 
-static void test_add_column_is_the_naive_product(void **state)
+static void test_add_columns_is_the_naive_product(void **state)
 {
     unit_random_t random = {2};
     for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
         pair_t pair = new_random_pair(&random, n);
-        for (int k = 0; k < n; k++) {
-            bslam_real_t *out = new_random_vector(&random, n);
-            double expected[SIZE_MAX_TESTED];
-            const bslam_real_t factor = real(unit_random(&random, -2, 2));
-            for (int i = 0; i < n; i++) {
-                expected[i] = (double)out[i] + (double)factor * pair.naive[i][k];
+        for (int count = 1; count <= BSLAM_SYMMAT_COLUMNS_MAX; count++) {
+            for (int first = 0; first + count <= n; first++) {
+                bslam_real_t *out = new_random_vector(&random, n);
+                bslam_real_t factors[BSLAM_SYMMAT_COLUMNS_MAX];
+                double expected[SIZE_MAX_TESTED];
+                for (int k = 0; k < count; k++) {
+                    factors[k] = real(unit_random(&random, -2, 2));
+                }
+                for (int i = 0; i < n; i++) {
+                    expected[i] = (double)out[i];
+                    for (int k = 0; k < count; k++) {
+                        expected[i] += (double)factors[k] * pair.naive[i][first + k];
+                    }
+                }
+                bslam_symmat_add_columns(pair.m, n, first, count, factors, out);
+                for (int i = 0; i < n; i++) {
+                    // Two roundings a term, of values below 3 * terms.
+                    assert_near(out[i], expected[i], 6 * count * count * UNIT_ROUNDING);
+                }
+                free(out);
             }
-            bslam_symmat_add_column(pair.m, n, k, factor, out);
-            for (int i = 0; i < n; i++) {
-                // Two roundings of values below 3.
-                assert_near(out[i], expected[i], 6 * UNIT_ROUNDING);
-            }
-            free(out);
         }
         free(pair.m);
     }
@@ -310,7 +318,7 @@ int main(void)
         cmocka_unit_test(test_row_is_filled_up_to_a_multiple_of_four_and_the_next_follows),
         cmocka_unit_test(test_set_is_read_back_from_both_sides),
 
-        cmocka_unit_test(test_add_column_is_the_naive_product),
+        cmocka_unit_test(test_add_columns_is_the_naive_product),
         cmocka_unit_test(test_add_rank4_is_the_naive_sum),
         cmocka_unit_test(test_add_rank4_with_zero_scales_changes_no_bit),
 
