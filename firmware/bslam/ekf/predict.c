@@ -189,3 +189,10 @@ bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
     add_motion_noise(ekf, &jacobian, motion);
     return BSLAM_OK;
 }
+
+void bslam_ekf_loosen_pose(bslam_ekf_t *ekf, bslam_real_t position_var_m2, bslam_real_t heading_var_rad2)
+{
+    ekf->covariance[bslam_symmat_at(BSLAM_STATE_X, BSLAM_STATE_X)] += position_var_m2;
+    ekf->covariance[bslam_symmat_at(BSLAM_STATE_Y, BSLAM_STATE_Y)] += position_var_m2;
+    ekf->covariance[bslam_symmat_at(BSLAM_STATE_THETA, BSLAM_STATE_THETA)] += heading_var_rad2;
+}

@@ -43,12 +43,11 @@ void bslam_odometry_init(bslam_odometry_t *odometry);
 /// Starts the clock, if nothing has: intervals count from here.
 void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);
 
-/// Forgets the tick reference: after an encoder reset, the next tick reading is the new one, and its interval
-/// counts as a gap.
-void bslam_odometry_rebase(bslam_odometry_t *odometry);
+/// Forgets the clock and the tick reference: the next reading starts both. Its motion since is not known.
+void bslam_odometry_restart(bslam_odometry_t *odometry);
 
 /// The motion since the reading before, into *motion. O(1).
-/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than an hour. BSLAM_E_NOT_FINITE,
+/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 10 s. BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, an unknown source),
 /// BSLAM_E_JUMP: see status.h. On any of these nothing changes. A first reading without a started clock has
 /// no interval: BSLAM_OK with motion->dt_s = 0.

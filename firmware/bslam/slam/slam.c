@@ -7,6 +7,8 @@
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
+static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
+static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
 
 bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id)
 {
@@ -66,9 +68,17 @@ bslam_status_t bslam_slam_odometry(bslam_slam_t *slam, const bslam_odometry_read
     return status;
 }
 
-void bslam_slam_rebase_odometry(bslam_slam_t *slam)
+bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
+                                          bslam_real_t heading_sd_rad)
 {
-    bslam_odometry_rebase(&slam->odometry);
+    if (!bslam_in_range(position_sd_m, 0, POSITION_SD_MAX_M) ||
+        !bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD)) {
+        return BSLAM_E_RANGE;
+    }
+    bslam_ekf_loosen_pose(&slam->ekf, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
+    bslam_odometry_restart(&slam->odometry);
+    slam->history_count = 0;
+    return BSLAM_OK;
 }
 
 /// A part of a remembered step, as a pose in the frame at its beginning.

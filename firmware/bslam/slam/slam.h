@@ -91,9 +91,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
                                                     const bslam_odometry_reading_t *reading);
 
-/// After an encoder reset (BSLAM_E_JUMP that does not go away): take the next tick reading as the new
-/// reference.
-void bslam_slam_rebase_odometry(bslam_slam_t *slam);
+/// After an interruption of odometry (an encoder reset, a pause of more than 10 s, the robot carried): the
+/// next reading starts the clock and the tick reference anew, and the pose becomes as doubtful as the caller
+/// says the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m outside 0 to 30 or heading_sd_rad
+/// outside 0 to 3.2 (NaN is).
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
+                                                           bslam_real_t heading_sd_rad);
 
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²).

@@ -139,9 +139,13 @@ class Slam:
         if status:
             self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")
 
-    def rebase_odometry(self) -> None:
-        """After an encoder reset: the next tick reading is the new reference."""
-        self._lib.bslam_slam_rebase_odometry(self._slam)
+    def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:
+        """After an interruption: the next reading starts the clock anew, and the pose is this much more doubtful.
+
+        Raises CoreError if a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
+        """
+        status = self._lib.bslam_slam_resume_odometry(self._slam, position_sd_m, heading_sd_rad)
+        self._raw.ensure(status, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad")
 
     def sightings(
         self,

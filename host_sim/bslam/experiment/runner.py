@@ -21,6 +21,11 @@ from bslam.log import Log, Odometry, Sightings
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
+# After an interruption of odometry (the core takes intervals up to 10 s): the robot may have gone this fast.
+INTERRUPTION_US = 10_000_000
+UNSEEN_SPEED_MPS = 0.5
+UNSEEN_POSITION_SD_MAX_M = 30.0
+UNSEEN_HEADING_SD_RAD = 3.0
 
 
 def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = None) -> Trace:
@@ -72,7 +77,11 @@ class _Run:
             self._try(slam.odometry, kind, *rows.pop(0))
         self._frames_until(times_us[1] if len(times_us) > 1 else None)
         self._keep(times_us[0])
+        last_us = times_us[0]
         for row, until_us in zip(rows, [*times_us[2:], None], strict=False):
+            if row[0] - last_us > INTERRUPTION_US:
+                self._resume(row[0] - last_us)
+            last_us = row[0]
             began = clock()
             self._try(slam.odometry, kind, *row)
             core_ns = clock() - began + self._frames_until(until_us)
@@ -84,6 +93,12 @@ class _Run:
         """An empty frame if none is at the start, or the core would not know how long the first row took."""
         if not self.frames.waiting_before(time_us + 1):
             self._try(self.slam.sightings, time_us, [], [], [], [])
+
+    def _resume(self, unseen_us: int) -> None:
+        """Go on after an interruption, with a pose as doubtful as that makes it."""
+        position_sd_m = min(UNSEEN_SPEED_MPS * unseen_us * 1e-6, UNSEEN_POSITION_SD_MAX_M)
+        self.slam.resume_odometry(position_sd_m, UNSEEN_HEADING_SD_RAD)
+        self.refusals["interruption"] += 1
 
     def _frames_until(self, until_us: int | None) -> int:
         """Feed the frames stamped before `until_us` (None: all that are left); CPU time of the core, ns."""

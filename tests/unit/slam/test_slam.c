@@ -828,7 +828,7 @@ static void test_pose_covariance_is_the_lower_triangle_of_the_states(void **stat
     }
 }
 
-static void test_rebase_odometry_forgets_the_ticks_only(void **state)
+static void test_resume_odometry_starts_anew_and_doubts_the_pose(void **state)
 {
     bslam_slam_t slam = started(unit_params());
     const bslam_odometry_reading_t first = {
@@ -838,9 +838,27 @@ static void test_rebase_odometry_forgets_the_ticks_only(void **state)
     reset.left_ticks = reset.right_ticks = 5;
     assert_int_equal(bslam_slam_odometry(&slam, &first), BSLAM_OK);
     assert_odometry_refused(&slam, reset, BSLAM_E_JUMP);
-    bslam_slam_rebase_odometry(&slam);
+    bslam_real_t before[6];
+    bslam_real_t after[6];
+    bslam_slam_pose_covariance(&slam, before);
+    assert_int_equal(bslam_slam_resume_odometry(&slam, BSLAM_R(0.5), BSLAM_R(0.25)), BSLAM_OK);
+    bslam_slam_pose_covariance(&slam, after);
+    assert_true(after[0] == before[0] + BSLAM_R(0.25) && after[2] == before[2] + BSLAM_R(0.25));
+    assert_true(after[5] == before[5] + BSLAM_R(0.0625));
     assert_int_equal(bslam_slam_odometry(&slam, &reset), BSLAM_OK);
     assert_true(bslam_slam_pose(&slam).x_m == 0);
+}
+
+static void test_resume_odometry_out_of_range_is_refused_and_changes_nothing(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    const bslam_slam_t before = slam;
+    const bslam_real_t bad[] = {-1, 31, (bslam_real_t)NAN};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        assert_int_equal(bslam_slam_resume_odometry(&slam, bad[i], 0), BSLAM_E_RANGE);
+        assert_int_equal(bslam_slam_resume_odometry(&slam, 0, bad[i]), BSLAM_E_RANGE);
+    }
+    assert_memory_equal(&slam, &before, sizeof slam);
 }
 
 static void test_counters_a_state_that_is_not_finite_is_counted(void **state)
@@ -897,7 +915,8 @@ int main(void)
         cmocka_unit_test(test_beacon_view_has_the_papers_polar_coordinates),
         cmocka_unit_test(test_init_starts_at_the_origin_with_an_empty_map),
         cmocka_unit_test(test_pose_covariance_is_the_lower_triangle_of_the_states),
-        cmocka_unit_test(test_rebase_odometry_forgets_the_ticks_only),
+        cmocka_unit_test(test_resume_odometry_starts_anew_and_doubts_the_pose),
+        cmocka_unit_test(test_resume_odometry_out_of_range_is_refused_and_changes_nothing),
         cmocka_unit_test(test_counters_a_state_that_is_not_finite_is_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
