@@ -412,6 +412,20 @@ static void test_read_after_an_encoder_reset_restart_takes_a_new_reference(void 
     assert_near(next.forward_var_m2, (0.09 + 0.04) * STEP_S * STEP_S / 4, rounding_of(1e-4));
 }
 
+static void test_read_first_ticks_after_the_clock_started_leave_the_interval_open(void **state)
+{
+    const bslam_params_t params = unit_params();
+    bslam_odometry_t odometry = started();
+    const double dt = 2 * STEP_S;
+    const bslam_motion_t motion = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 70, 80));
+    assert_near(motion.forward_m, 0, 0);
+    assert_near(motion.turn_rad, 0, 0);
+    // The robot may have moved unseen for the whole interval: the wheels' noise, and the gap's.
+    const double wheels_var = (0.09 + 0.04) * dt * dt;
+    assert_near(motion.forward_var_m2, wheels_var / 4 + 0.04 * dt * dt, rounding_of(0.01));
+    assert_near(motion.turn_var_rad2, wheels_var / 0.16 + 0.25 * dt * dt, rounding_of(0.1));
+}
+
 static void test_read_ticks_after_another_source_start_afresh(void **state)
 {
     const bslam_params_t params = unit_params();
@@ -534,6 +548,7 @@ int main(void)
         cmocka_unit_test(test_read_turn_of_many_revolutions_is_a_jump),
         cmocka_unit_test(test_read_gyro_turn_of_many_revolutions_is_refused),
         cmocka_unit_test(test_read_after_an_encoder_reset_restart_takes_a_new_reference),
+        cmocka_unit_test(test_read_first_ticks_after_the_clock_started_leave_the_interval_open),
         cmocka_unit_test(test_read_ticks_after_another_source_start_afresh),
 
         cmocka_unit_test(test_read_gap_inflates_by_the_part_beyond_its_limit),
