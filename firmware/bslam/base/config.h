@@ -17,8 +17,7 @@
 #error "BSLAM_REAL_DOUBLE is 0 or 1"
 #endif
 
-/// Beacons that the map holds, provisional ones included. RAM grows with the square: see docs/SIZES in `make
-/// sizes`.
+/// Beacons that the map holds, provisional ones included. RAM grows with the square: `make sizes` prints it.
 #ifndef BSLAM_BEACONS_MAX
 #define BSLAM_BEACONS_MAX 20
 #endif

@@ -64,7 +64,7 @@
     INTEGER(sighting_delay_us, 0, -1000000, 10000000, \
             "a sighting stamped t shows what odometry has at t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
-    REAL(bearing_sd_rad, 0.0136, 1e-6, 3.2, "noise of the direction") \
+    REAL(bearing_sd_rad, 0.0136, 1e-4, 3.2, "noise of the direction") \
     REAL(range_sd_floor_m, 0.0, 0.0, 100.0, \
          "noise of the distance: sd^2 = floor^2 + (fraction r)^2 + (per_m r^2)^2") \
     REAL(range_sd_fraction, 0.02, 0.0, 10.0, "noise of the distance in proportion to it") \

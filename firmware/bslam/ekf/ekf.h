@@ -85,8 +85,11 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
                                                   const bslam_motion_t *motion, bslam_motion_t *moved);
 
-/// The robot may have moved unseen: adds these variances to its position (each axis) and heading. O(1).
-void bslam_ekf_loosen_pose(bslam_ekf_t *ekf, bslam_real_t position_var_m2, bslam_real_t heading_var_rad2);
+/// The robot may have moved unseen and stands still now: adds variance to its position (each axis) and
+/// heading, up to (30 m)² and (3.2 rad)² in all, beyond which it is lost anyway; velocity states become as at
+/// the start. O(n).
+void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
+                      bslam_real_t heading_var_rad2);
 
 // ---- sightings --------------------------------------------------------------------------------------------
 

@@ -190,9 +190,32 @@ bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-void bslam_ekf_loosen_pose(bslam_ekf_t *ekf, bslam_real_t position_var_m2, bslam_real_t heading_var_rad2)
+/// Adds to a variance, but not beyond `most`.
+static void add_variance(bslam_ekf_t *ekf, int at, bslam_real_t addition, bslam_real_t most)
 {
-    ekf->covariance[bslam_symmat_at(BSLAM_STATE_X, BSLAM_STATE_X)] += position_var_m2;
-    ekf->covariance[bslam_symmat_at(BSLAM_STATE_Y, BSLAM_STATE_Y)] += position_var_m2;
-    ekf->covariance[bslam_symmat_at(BSLAM_STATE_THETA, BSLAM_STATE_THETA)] += heading_var_rad2;
+    bslam_real_t *variance = &ekf->covariance[bslam_symmat_at(at, at)];
+    const bslam_real_t room = most > *variance ? most - *variance : 0;
+    *variance += addition < room ? addition : room;
+}
+
+/// A state value that nothing is known of but its prior.
+static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t sd)
+{
+    ekf->mean[at] = 0;
+    for (int i = 0; i < ekf->dim; i++) {
+        bslam_symmat_set(ekf->covariance, i, at, 0);
+    }
+    bslam_symmat_set(ekf->covariance, at, at, sd * sd);
+}
+
+void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
+                      bslam_real_t heading_var_rad2)
+{
+    add_variance(ekf, BSLAM_STATE_X, position_var_m2, BSLAM_R(900.0));
+    add_variance(ekf, BSLAM_STATE_Y, position_var_m2, BSLAM_R(900.0));
+    add_variance(ekf, BSLAM_STATE_THETA, heading_var_rad2, BSLAM_R(10.24));
+    if (params->velocity_states != 0) {
+        forget_state(ekf, BSLAM_STATE_FORWARD, params->velocity_sd_mps);
+        forget_state(ekf, BSLAM_STATE_TURN, params->turn_rate_sd_radps);
+    }
 }

@@ -75,9 +75,11 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
         !bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD)) {
         return BSLAM_E_RANGE;
     }
-    bslam_ekf_loosen_pose(&slam->ekf, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
+    bslam_ekf_resume(&slam->ekf, &slam->params, position_sd_m * position_sd_m,
+                     heading_sd_rad * heading_sd_rad);
     bslam_odometry_restart(&slam->odometry);
     slam->history_count = 0;
+    slam->has_frame = false;
     return BSLAM_OK;
 }
 
@@ -91,7 +93,8 @@ static bslam_pose_t step_pose(const bslam_params_t *params, const bslam_history_
     return bslam_motion_step(kind, &start, step->forward_m * share, step->turn_rad * share, &unused);
 }
 
-/// The robot at time_us as seen from the robot now. BSLAM_E_TIME: outside the history, or too far ahead.
+/// The robot at time_us as seen from the robot now. BSLAM_E_TIME: outside the history, or too far ahead. MATH
+/// "Late sightings".
 static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
 {
     bslam_pose_t since = {0, 0, 0};

@@ -8,8 +8,8 @@
 ///     bslam_slam_sightings(&slam, time_us, seen, count); // each image
 ///     bslam_slam_pose(&slam);
 ///
-/// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing but a counter has
-/// changed.
+/// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing has changed but the
+/// counters and what bslam_slam_bad_sighting answers.
 #ifndef BSLAM_SLAM_SLAM_H
 #define BSLAM_SLAM_SLAM_H
 
@@ -91,10 +91,10 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
                                                     const bslam_odometry_reading_t *reading);
 
-/// After an interruption of odometry (an encoder reset, a pause of more than 10 s, the robot carried): the
-/// next reading starts the clock and the tick reference anew, and the pose becomes as doubtful as the caller
-/// says the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m outside 0 to 30 or heading_sd_rad
-/// outside 0 to 3.2 (NaN is).
+/// After an interruption of odometry (an encoder reset, a pause of more than 10 s, the robot carried), at a
+/// standstill: the next reading starts the clock and the tick reference anew, at any time stamp, and the pose
+/// becomes as doubtful as the caller says the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m
+/// outside 0 to 30 or heading_sd_rad outside 0 to 3.2 (NaN is).
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
                                                            bslam_real_t heading_sd_rad);
 

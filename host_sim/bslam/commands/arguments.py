@@ -19,6 +19,7 @@ from bslam.experiment.options import (
     MOTIONS,
     NOISES,
     OBSERVATIONS,
+    REALS,
     TARGETS,
     Number,
     RunOptions,
@@ -64,6 +65,14 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     )
     group.add_argument(
         "--target", choices=TARGETS, default="host", help="where the core runs (default: host)"
+    )
+    group.add_argument(
+        "--real", choices=REALS, default="float", help="scalar type: float as on the target, or double"
+    )
+    group.add_argument(
+        "--known-map",
+        action="store_true",
+        help="give the filter the true beacons: it localises and changes none (paper equation (12))",
     )
     group.add_argument(
         "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
@@ -120,6 +129,8 @@ def run_options(arguments: argparse.Namespace, **changes: Any) -> RunOptions:
         "velocity_states": arguments.velocity_states,
         "noise": arguments.noise or "speedometer",
         "target": arguments.target,
+        "real": arguments.real,
+        "known_map": arguments.known_map,
         "parameters": tuple(core_parameters(arguments).items()),
     }
     return RunOptions(association=name, wrong_identity_rate=rate, **(values | changes))

@@ -1,7 +1,7 @@
 """Builds the C library into Python extensions, one a scalar type and size class (cffi, API mode).
 
-The declarations that cffi reads are the real headers, run through the C preprocessor with the C library's own headers
-left empty: there is no second copy to keep. `python -m bslam.core.build` builds all of them beside this file.
+The declarations that cffi reads are the real headers, run through the C preprocessor with the C library's own
+headers left empty: there is no second copy to keep. `python -m bslam.core.build` builds them beside this file.
 """
 
 import os
@@ -75,12 +75,19 @@ def build(real: str, beacons_max: int) -> Path:
             sources=sorted(str(path) for path in LIBRARY_DIR.rglob("*.c")),
             include_dirs=[str(FIRMWARE_DIR)],
             define_macros=_macros(real, beacons_max),
-            extra_compile_args=["-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-w", "-Werror=implicit-function-declaration"],
+            extra_compile_args=[
+                "-std=c11",
+                "-O2",
+                "-ffp-contract=off",
+                "-fvisibility=hidden",
+                "-w",
+                "-Werror=implicit-function-declaration",
+            ],
             libraries=["m"],
         )
         built = Path(ffi.compile(tmpdir=work, verbose=False))
         target = CORE_DIR / (name.rsplit(".", 1)[1] + sysconfig.get_config_var("EXT_SUFFIX"))
-        # Replaced by a rename, so that a running process keeps the old file and an interrupted build leaves none.
+        # Replaced by a rename: a running process keeps the old file, an interrupted build leaves none.
         part = target.with_suffix(".part")
         shutil.copyfile(built, part)
         part.replace(target)
@@ -88,7 +95,7 @@ def build(real: str, beacons_max: int) -> Path:
 
 
 def main() -> int:
-    """Builds every extension, as many at a time as there are cores (processes: cffi changes the directory)."""
+    """Builds every extension, one on a core (in processes, since cffi changes the directory)."""
     sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
     with ProcessPoolExecutor() as pool:
         for path in pool.map(build, reals, sizes):

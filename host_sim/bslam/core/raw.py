@@ -1,4 +1,4 @@
-"""The C library 1:1. One `Library` is one build; a method is one C function. Nothing else in the package touches ffi."""
+"""The C library 1:1: one `Library` is one build. Nothing else in the package touches ffi."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -62,4 +62,6 @@ def library(real: str, beacons_max: int) -> Library:
     for size in SIZE_CLASSES:
         if size >= beacons_max:
             return Library(real, size)
-    raise BslamError(f"{beacons_max} beacons: the largest build holds {SIZE_CLASSES[-1]} (core/builds.py, SIZE_CLASSES)")
+    raise BslamError(
+        f"{beacons_max} beacons: the largest build holds {SIZE_CLASSES[-1]} (core/builds.py, SIZE_CLASSES)"
+    )

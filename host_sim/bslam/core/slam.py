@@ -35,7 +35,10 @@ class Account:
 
 @dataclass(frozen=True)
 class Beacon:
-    """A beacon of the map. Position in m in the start pose's frame; covariance (2, 2) in m²; polar from the start."""
+    """A beacon of the map.
+
+    Position in m in the start pose's frame; covariance (2, 2) float64 in m²; polar from the start.
+    """
 
     uid: int
     label: int
@@ -49,16 +52,17 @@ class Beacon:
     phi_rad: float
 
 
-
-
 class Slam:
     """A robot that localises itself and maps beacons: one instance of the C pipeline.
 
-    params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must hold.
-    real: "float", as on the target, or "double", the twin. Raises BslamError for what is no parameter or out of range.
+    params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must
+    hold. real: "float", as on the target, or "double", the twin. Raises BslamError for what is no parameter
+    or is out of range.
     """
 
-    def __init__(self, params: Mapping[str, float] | None = None, *, beacons_max: int = 20, real: str = "float") -> None:
+    def __init__(
+        self, params: Mapping[str, float] | None = None, *, beacons_max: int = 20, real: str = "float"
+    ) -> None:
         self._raw = library(real, beacons_max)
         self._lib, self._ffi = self._raw.lib, self._raw.ffi
         self._slam = self._ffi.new("bslam_slam_t *")
@@ -85,9 +89,8 @@ class Slam:
             parameter = table[name]
             if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
                 kind = "a whole number" if parameter.is_integer else "a number"
-                raise BslamError(
-                    f"parameter {name} = {value}: allowed is {kind} from {parameter.low:g} to {parameter.high:g}"
-                )
+                allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"
+                raise BslamError(f"parameter {name} = {value}: allowed is {allowed}")
             setattr(c_params, name, int(value) if parameter.is_integer else value)
         bad_id = self._ffi.new("int *", -1)
         status = self._lib.bslam_slam_init(self._slam, c_params, bad_id)
@@ -104,7 +107,9 @@ class Slam:
             info = raw.lib.bslam_params_info(index)
             # Float's 0.1 prints as 0.10000000149; nine digits round-trip float and read as written.
             initial, low, high = (float(f"{value:.7g}") for value in (info.initial, info.low, info.high))
-            found.append(Parameter(raw.text(info.name), raw.text(info.meaning), initial, low, high, info.is_integer))
+            found.append(
+                Parameter(raw.text(info.name), raw.text(info.meaning), initial, low, high, info.is_integer)
+            )
         return found
 
     @staticmethod
@@ -123,7 +128,7 @@ class Slam:
         return bytes(self._ffi.buffer(self._slam))
 
     def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
-        """One reading: kind "wheels" (a, b = left_m, right_m), "ticks" (counters) or "velocity" (v_mps, omega_radps).
+        """One reading of kind "wheels" (a, b = left_m, right_m), "ticks" (counters), "velocity" (m/s, rad/s).
 
         Raises CoreError if refused: the estimate is then unchanged.
         """
@@ -140,7 +145,7 @@ class Slam:
             self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")
 
     def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:
-        """After an interruption: the next reading starts the clock anew, and the pose is this much more doubtful.
+        """After an interruption: the next reading starts the clock, and the pose is this much more doubtful.
 
         Raises CoreError if a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
@@ -155,7 +160,10 @@ class Slam:
         label: Sequence[int],
         mappable: Sequence[bool],
     ) -> list[Account]:
-        """One image: equal lengths; range NaN: direction only; label -1: no identity. Raises CoreError if refused."""
+        """One image: equal lengths; range NaN: direction only; label -1: no identity.
+
+        Raises CoreError if refused: the estimate is then unchanged.
+        """
         rows = list(zip(bearing_rad, range_m, label, mappable, strict=True))
         array = self._raw.sightings(rows)
         status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))

@@ -62,6 +62,10 @@ class Ledger:
             use and one in mapped for one, use in zip(true_id, mappable, strict=True)
         )
 
+    def know(self, uid: int, identity: int) -> None:
+        """A beacon that was in the map from the start."""
+        self._identity[uid] = identity
+
     def identity(self, uid: int) -> int:
         """True identity of a beacon of the map, CLUTTER if there is none."""
         return self._identity.get(uid, CLUTTER)

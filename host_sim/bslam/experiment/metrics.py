@@ -103,6 +103,8 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "velocity_states": velocity_states,
         "noise": options.noise,
         "target": options.target,
+        "real": options.real,
+        "known_map": options.known_map,
     }
     return {word: value for word, value in words.items() if value is not None}
 

@@ -16,6 +16,7 @@ MOTIONS = ("euler", "arc")
 NOISES = ("speedometer", "actuation")
 SENSORS = ("simulated",)
 TARGETS = ("host",)
+REALS = ("float", "double")
 
 Number = int | float
 
@@ -35,6 +36,8 @@ class RunOptions:
     noise: str = "speedometer"
     sensor: str = "simulated"
     target: str = "host"
+    real: str = "float"  # scalar type of the core: as on the target, or the twin
+    known_map: bool = False  # the log's true beacons are given to the filter, which only localises
     sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
     odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: by kind of log

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
+from bslam.errors import BslamError
 from bslam.experiment.ledger import Ledger, corrupt_identities
 from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
 from bslam.experiment.trace import MapBeacon, Trace
@@ -35,18 +37,19 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
     beacons to hold.
     """
-    factory = slam_factory or _make_slam
+    factory = slam_factory or partial(_make_slam, options.real)
     return _Run(factory(core_params(options, log), _beacons_in(log)), log, options).finish()
 
 
-def _make_slam(params: Mapping[str, Number], beacons_max: int) -> Slam:
-    return Slam(params, beacons_max=beacons_max)
+def _make_slam(real: str, params: Mapping[str, Number], beacons_max: int) -> Slam:
+    return Slam(params, beacons_max=beacons_max, real=real)
 
 
 def _beacons_in(log: Log) -> int:
     """Beacons that there are, as far as the log tells."""
     sighted = log.sightings.beacon_id[log.sightings.mappable]
-    return max(1, len(np.unique(sighted[sighted >= 0])))
+    given = 0 if log.beacons is None else len(log.beacons.beacon_id)
+    return max(1, given, len(np.unique(sighted[sighted >= 0])))
 
 
 class _Run:
@@ -56,6 +59,8 @@ class _Run:
         self.slam = slam
         self.frames = _Frames(log.sightings, options)
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
+        if options.known_map:
+            self._give_map(log)
         self.lead_us = odometry_lead_us(options, log)
         self.refusals: Counter[str] = Counter()
         self.poses: list[tuple[float, float, float]] = []
@@ -63,6 +68,19 @@ class _Run:
         self.seen: list[bool] = []
         self.step_ns: list[int] = []
         self.times_us = self._run(log.odometry)
+
+    def _give_map(self, log: Log) -> None:
+        """Give the true beacons to the filter. Raises BslamError if their frame is not the start's."""
+        if log.beacons is None:
+            raise BslamError(f"{log.name}: --known-map: the log has no beacons.csv")
+        truth = log.truth
+        if truth is not None and max(abs(truth.x_m[0]), abs(truth.y_m[0]), abs(truth.theta_rad[0])) > 1e-6:
+            raise BslamError(f"{log.name}: --known-map: its beacons are not in the frame of the start pose")
+        columns = (log.beacons.beacon_id.tolist(), log.beacons.x_m.tolist(), log.beacons.y_m.tolist())
+        for identity, x_m, y_m in zip(*columns, strict=True):
+            self.slam.add_known_beacon(identity, x_m, y_m)
+        for beacon in self.slam.beacons():
+            self.ledger.know(beacon.uid, beacon.label)
 
     def _run(self, odometry: Odometry) -> list[int]:
         """Feed everything; the times of the rows kept."""
