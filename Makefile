@@ -1,6 +1,6 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
 # live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style),
-# bench.mk (instruction counts).
+# bench.mk (instruction counts), docs.mk (generated documents).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -15,6 +15,7 @@ include mk/unit.mk
 include mk/firmware.mk
 include mk/lint.mk
 include mk/bench.mk
+include mk/docs.mk
 
 .PHONY: help
 help: ## list the targets

@@ -40,6 +40,19 @@ def covariance(slam: Slam) -> NDArray[np.float64]:
     return _array(slam, slam._slam.ekf.covariance)[_places(dim(slam))]
 
 
+def angles(slam: Slam) -> list[int]:
+    """Which values of the state are angles: the heading, and rays' directions."""
+    beacons = [slam._slam.ekf.beacons[i] for i in range(slam._slam.ekf.beacon_count)]
+    return [2, *(b.at + 2 for b in beacons if b.kind == slam._lib.BSLAM_BEACON_RAY)]
+
+
+def copy_of(slam: Slam) -> Slam:
+    """Another instance in the same state."""
+    other = Slam(beacons_max=slam._raw.beacons_max, real=slam._raw.real)
+    slam._ffi.memmove(other._slam, slam._slam, slam._ffi.sizeof("bslam_slam_t"))
+    return other
+
+
 def state_without_counters(slam: Slam) -> bytes:
     """Every byte of the instance but those that a refusal may change: the counters, and which sighting was
     bad.

@@ -6,67 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from core.feeding import KINDS, deviations, deviations_between, feed, feed_reference, name
+from reference.dense_ekf import DenseEkf, Sighting, motion_of_wheels
+from reference.runs import PARAMS, STEP_S, mount, places, run
 
 from bslam.core import Slam
-from core import instance
-from reference.dense_ekf import DenseEkf, Sighting, motion_of_wheels
-from reference.runs import PARAMS, STEP_S, Step, mount, places, run
-
-KINDS = [
-    {"filter": invariant, "motion": motion, "velocity_states": velocity, "scale_states": scale}
-    for invariant in (0, 1)
-    for motion in (0, 1)
-    for velocity, scale in ((0, 0), (1, 0), (0, 1))
-]
-
-
-def name(kind: dict[str, float]) -> str:
-    parts = [("standard", "invariant")[kind["filter"]], ("euler", "arc")[kind["motion"]]]
-    parts += [part for part in ("velocity", "scale") if kind[f"{part}_states"]]
-    return "-".join(parts)
-
-
-def feed(slam: Slam, step: Step) -> None:
-    """One step of a run into the C core."""
-    slam.odometry("wheels", step.time_us, step.left_m, step.right_m)
-    seen = step.sightings
-    ranges = [np.nan if s.range_m is None else s.range_m for s in seen]
-    slam.sightings(
-        step.time_us, [s.bearing_rad for s in seen], ranges, [s.label for s in seen], [True] * len(seen)
-    )
-
-
-def feed_reference(reference: DenseEkf, step: Step) -> None:
-    """The same into the reference."""
-    if step.time_us > 0:
-        reference.predict(motion_of_wheels(reference.params, step.left_m, step.right_m, STEP_S))
-    reference.frame(step.sightings, mount(reference.params))
-
-
-def angles_of(slam: Slam) -> list[int]:
-    """Which values of the state are angles: the heading, and rays' directions."""
-    beacons = [slam._slam.ekf.beacons[i] for i in range(slam._slam.ekf.beacon_count)]
-    return [2, *(b.at + 2 for b in beacons if b.kind == slam._lib.BSLAM_BEACON_RAY)]
-
-
-def difference(a: NDArray[np.float64], b: NDArray[np.float64], angles: list[int]) -> NDArray[np.float64]:
-    """a - b, angles as directions."""
-    result = a - b
-    result[angles] = np.remainder(result[angles] + np.pi, 2 * np.pi) - np.pi
-    return result
-
-
-def deviations(actual: Slam, mean: NDArray[np.float64], p: NDArray[np.float64], angles: list[int]) -> float:
-    """The largest difference of any value of the mean or the covariance, in standard deviations.
-
-    What is known better than to 1 mm or 1 mrad (exactly, as an anchor of the first frame is) counts as 1 mm
-    or 1 mrad.
-    """
-    sd = np.sqrt(np.maximum(np.diag(p), 1e-6))
-    off = np.abs(difference(instance.mean(actual), mean, angles)) / sd
-    off_p = np.abs(instance.covariance(actual) - p) / np.outer(sd, sd)
-    return float(max(off.max(), off_p.max()))
 
 
 def pairs(
@@ -211,6 +155,5 @@ def test_float_core_stays_by_its_double_twin(kind: dict[str, float]) -> None:
         # A ray that becomes a point one frame later in float has other coordinates for so long.
         if single.counters()["settled"] == double.counters()["settled"]:
             compared += 1
-            twin = instance.mean(double), instance.covariance(double)
-            assert deviations(single, *twin, angles_of(double)) < FLOAT
+            assert deviations_between(single, double) < FLOAT
     assert compared > 1900
