@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+
+from bslam.core import Slam
 from core.feeding import KINDS, deviations, deviations_between, feed, feed_reference, name
 from reference.dense_ekf import DenseEkf, Sighting, motion_of_wheels
 from reference.runs import PARAMS, STEP_S, mount, places, run
-
-from bslam.core import Slam
 
 
 def pairs(
