@@ -1,8 +1,8 @@
 """Instructions a filter step takes on this host, as callgrind counts them: `make bench`.
 
-Compiles tests/bench/bench_step.c with the core for several map sizes at -O2 and counts the instructions of one step
-(odometry, then 2 to 4 sightings with distance, identity known, invariant filter). Unlike time, the counts are the same
-from run to run. Instructions are not cycles.
+Compiles tests/bench/bench_step.c with the core for several map sizes at -O2 and counts the instructions of
+one step (odometry, then 2 to 4 sightings with distance, identity known, invariant filter). Unlike time, the
+counts are the same from run to run. Instructions are not cycles.
 """
 
 import re
@@ -31,7 +31,8 @@ def build(beacons: int) -> Path:
 
 def instructions_per_step(program: Path, mode: str) -> int:
     """Counts measured_step and divides by the number of steps that the program says it made."""
-    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=measured_step"]
+    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+    command.append("--toggle-collect=measured_step")
     done = subprocess.run([*command, str(program), mode], capture_output=True, text=True)
     collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
     if done.returncode != 0 or collected is None:

@@ -1,7 +1,7 @@
 """Builds the C library into Python extensions, one a scalar type and size class (cffi, API mode).
 
 The declarations that cffi reads are the real headers, run through the C preprocessor with the C library's own
-headers left empty: there is no second copy to keep. `python -m bslam.core.build` builds them beside this file.
+headers left empty: there is no second copy. `python -m bslam.core.build` builds them beside this file.
 """
 
 import os

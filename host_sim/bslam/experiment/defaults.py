@@ -1,4 +1,4 @@
-"""Parameter sets that are not the core's own defaults: one for real logs, one for direction-only.
+"""Parameter sets that are not the core's own defaults: those for real logs.
 
 One set serves every real log; none is tuned to a robot or a recording.
 """
@@ -37,6 +37,14 @@ REAL_LOG: Final[dict[str, int | float]] = {
     "sighting_delay_us": REAL_ODOMETRY_LEAD_US + _IMAGE_DELAY_US,
 }
 
-# Nothing yet: the core's defaults (bearing variance times 4, inverse distance 0.2 +- 0.1 1/m) are the best
-# known.
-DIRECTION_ONLY: Final[dict[str, int | float]] = {}
+# Association wants sharp noise where consistency wants it inflated: with identity unknown, these instead.
+REAL_LOG_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
+    "scale_sd": 0.08,
+    "turn_sd_per_sqrt_rad": 0.1,
+    "bearing_sd_rad": 0.03,
+    "range_sd_fraction": 0.06,
+    "huber_d": 1.0,
+    "match_d2": 12.0,
+    "new_d2": 100.0,
+    "confirm_window_us": 3_000_000,
+}

@@ -100,10 +100,10 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
     if log.odometry.kind == "velocity":
         params |= defaults.REAL_LOG
+        if options.association != "known":
+            params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
         if options.velocity_states:
             params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
-    if options.observation == "direction":
-        params |= defaults.DIRECTION_ONLY
     return params | dict(options.parameters)
 
 

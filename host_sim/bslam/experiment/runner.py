@@ -23,6 +23,7 @@ from bslam.log import Log, Odometry, Sightings
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
+FALSE_BEACONS_ROOM = 80
 # After an interruption of odometry (the core takes intervals up to 10 s): the robot may have gone this fast.
 INTERRUPTION_US = 10_000_000
 UNSEEN_SPEED_MPS = 0.5
@@ -38,18 +39,19 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     beacons to hold.
     """
     factory = slam_factory or partial(_make_slam, options.real)
-    return _Run(factory(core_params(options, log), _beacons_in(log)), log, options).finish()
+    return _Run(factory(core_params(options, log), _beacons_to_hold(log, options)), log, options).finish()
 
 
 def _make_slam(real: str, params: Mapping[str, Number], beacons_max: int) -> Slam:
     return Slam(params, beacons_max=beacons_max, real=real)
 
 
-def _beacons_in(log: Log) -> int:
-    """Beacons that there are, as far as the log tells."""
+def _beacons_to_hold(log: Log, options: RunOptions) -> int:
+    """Beacons that there are, as far as the log tells, and room for false ones where identity is unknown."""
     sighted = log.sightings.beacon_id[log.sightings.mappable]
     given = 0 if log.beacons is None else len(log.beacons.beacon_id)
-    return max(1, given, len(np.unique(sighted[sighted >= 0])))
+    true_beacons = max(1, given, len(np.unique(sighted[sighted >= 0])))
+    return true_beacons if options.association == "known" else max(true_beacons, FALSE_BEACONS_ROOM)
 
 
 class _Run:

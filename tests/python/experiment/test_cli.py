@@ -57,7 +57,7 @@ def runs(out):
         (["run", "paper_room", "--set", "bearing_sd_rad"], ["--set", "bearing_sd_rad", "KEY=VALUE"]),
         (["run", "paper_room", "--set", "bearing_sd_rad=x"], ["--set", "'x'", "finite number"]),
         (["run", "paper_room", "--set", "bearing_sd_rad=nan"], ["--set", "'nan'", "finite number"]),
-        (["run", "paper_room", "--set", "bearing_sd_rad=-2"], ["bearing_sd_rad", "-2", "from 1e-06"]),
+        (["run", "paper_room", "--set", "bearing_sd_rad=-2"], ["bearing_sd_rad", "-2", "from 0.0001"]),
         (["run", "paper_room", "--params", "no.toml"], ["--params", "no.toml", "TOML"]),
         (["run", "paper_room", "--colour"], ["--colour"]),
         (["replay", "rosbag", "x"], ["'rosbag'", "csv", "mrclam"]),

@@ -30,7 +30,7 @@ def test_every_parameter_exists_in_the_core(made):
     for one in (log, ticks, velocity(log)):
         for observation in ("distance", "direction"):
             assert set(core_params(RunOptions(observation=observation), one)) <= set(known)
-    assert set(defaults.REAL_LOG) | set(defaults.DIRECTION_ONLY) <= set(known)
+    assert set(defaults.REAL_LOG) | set(defaults.REAL_LOG_UNKNOWN_IDENTITY) <= set(known)
 
 
 def test_the_robot_s_noise_and_geometry_reach_the_filter(made):
