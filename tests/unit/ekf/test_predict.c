@@ -283,6 +283,69 @@ test_predict_with_velocity_states_and_indefinite_noise_is_singular_and_changes_n
     }
 }
 
+// ---- interruptions ----------------------------------------------------------------------------------------
+
+static void test_resume_adds_the_doubt_to_the_pose_alone(void **state)
+{
+    const bslam_params_t params = unit_params();
+    unit_random_t random = {5};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    twin_t expected = twin_of(&ekf);
+    expected.covariance.at[X][X] += 4;
+    expected.covariance.at[Y][Y] += 4;
+    expected.covariance.at[THETA][THETA] += 0.25;
+    bslam_ekf_resume(&ekf, &params, 4, BSLAM_R(0.25));
+    twin_assert(&ekf, &expected, 8 * UNIT_ROUNDING * 4);
+}
+
+static void test_resume_time_and_again_does_not_add_up_beyond_lost(void **state)
+{
+    const bslam_params_t params = unit_params();
+    unit_random_t random = {6};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    twin_t expected = twin_of(&ekf);
+    for (int i = 0; i < 1000; i++) {
+        bslam_ekf_resume(&ekf, &params, 900, 10);
+    }
+    expected.covariance.at[X][X] = expected.covariance.at[Y][Y] = 30 * 30;
+    expected.covariance.at[THETA][THETA] = 3.2 * 3.2;
+    twin_assert(&ekf, &expected, 8 * UNIT_ROUNDING * 900);
+    // What is more doubtful than that already stays so.
+    bslam_symmat_set(ekf.covariance, X, X, 1000);
+    bslam_ekf_resume(&ekf, &params, 900, 10);
+    assert_true(bslam_symmat_get(ekf.covariance, X, X) == 1000);
+}
+
+static void test_resume_with_velocity_states_stands_still_as_at_the_start(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.velocity_states = 1;
+    unit_random_t random = {7};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    twin_t expected = twin_of(&ekf);
+    for (int k = FORWARD; k <= TURN; k++) {
+        expected.mean.at[k][0] = 0;
+        for (int i = 0; i < ekf.dim; i++) {
+            expected.covariance.at[i][k] = expected.covariance.at[k][i] = 0;
+        }
+    }
+    expected.covariance.at[FORWARD][FORWARD] = 0.4 * 0.4;
+    expected.covariance.at[TURN][TURN] = 0.5 * 0.5;
+    bslam_ekf_resume(&ekf, &params, 0, 0);
+    twin_assert(&ekf, &expected, 4 * UNIT_ROUNDING);
+}
+
+static void test_resume_with_scale_states_keeps_them(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.scale_states = 1;
+    unit_random_t random = {8};
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const twin_t expected = twin_of(&ekf);
+    bslam_ekf_resume(&ekf, &params, 0, 0);
+    twin_assert(&ekf, &expected, 0);
+}
+
 // ---- start ------------------------------------------------------------------------------------------------
 
 static void test_init_knows_its_pose_exactly_and_has_no_beacons(void **state)
@@ -339,6 +402,11 @@ int main(void)
         cmocka_unit_test(test_predict_with_velocity_states_that_never_decay_keeps_them),
         cmocka_unit_test(
             test_predict_with_velocity_states_and_indefinite_noise_is_singular_and_changes_nothing),
+
+        cmocka_unit_test(test_resume_adds_the_doubt_to_the_pose_alone),
+        cmocka_unit_test(test_resume_time_and_again_does_not_add_up_beyond_lost),
+        cmocka_unit_test(test_resume_with_velocity_states_stands_still_as_at_the_start),
+        cmocka_unit_test(test_resume_with_scale_states_keeps_them),
 
         cmocka_unit_test(test_init_knows_its_pose_exactly_and_has_no_beacons),
         cmocka_unit_test(test_init_with_velocity_states_stands_still_within_their_deviations),

@@ -795,6 +795,19 @@ static void test_resume_odometry_forgets_the_past_before_it(void **state)
     assert_int_equal(bslam_slam_pose_at(&slam, 10 * STEP_US, &pose), BSLAM_E_TIME);
 }
 
+static void test_resume_odometry_with_a_clock_that_starts_over_goes_on(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
+    drive_circle(&slam, INT64_C(5000000000), 5);
+    see_one(&slam, INT64_C(5000000000) + 4 * STEP_US, seen);
+    assert_int_equal(bslam_slam_resume_odometry(&slam, 1, 1), BSLAM_OK);
+    see_one(&slam, 0, seen);
+    assert_account(&slam, 0, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE);
+    drive(&slam, STEP_US, 0.01, 0.01);
+    see_one(&slam, STEP_US, seen);
+}
+
 static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map(void **state)
 {
     static const double places[3][2] = {{4, 1}, {-2, 3}, {1, -4}};
@@ -1002,6 +1015,7 @@ int main(void)
         cmocka_unit_test(test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew),
         cmocka_unit_test(test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks),
         cmocka_unit_test(test_resume_odometry_forgets_the_past_before_it),
+        cmocka_unit_test(test_resume_odometry_with_a_clock_that_starts_over_goes_on),
         cmocka_unit_test(test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map),
         cmocka_unit_test(test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing),
         cmocka_unit_test(test_resume_odometry_with_velocity_states_forgets_the_speed),
