@@ -26,6 +26,7 @@ from bslam.parsing.settings import (
     POSITIVE_OR_INF,
     integer,
     load_toml,
+    one_of,
     parse_table,
     setting,
 )
@@ -84,13 +85,18 @@ class Beacons:
     y_m: NDArray[np.float64]  # (b,)
 
 
+WHEEL_NOISES = ("speedometer", "actuation")
+"""What errs: the reading, or the motion against the reading."""
+
+
 @dataclass(frozen=True)
 class Robot:
     """Geometry and noise of the robot that recorded the log; the keys of `robot.toml`.
 
     The sd of a range r is sqrt(floor^2 + (fraction r)^2 + (r^2 / scale)^2). A sighting stamped t was taken at
     t - sighting_delay_us by a sensor at (sensor_x_m, sensor_y_m, sensor_yaw_rad) on the robot.
-    The last four keys describe the encoders; a log with tick odometry must have them.
+    The four keys of the encoders must be there in a log with tick odometry. `wheel_noise` says what the sigma
+    of the wheels' speed is of: the reading of a wheel that moves as told, or the motion of one that jitters.
     """
 
     wheelbase_m: float = setting(POSITIVE)
@@ -109,6 +115,7 @@ class Robot:
     right_radius_m: float | None = setting(POSITIVE, None)
     ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)
     counter_bits: int | None = setting(integer(2, 32), None)
+    wheel_noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
 
 
 @dataclass(frozen=True)

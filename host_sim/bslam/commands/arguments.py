@@ -17,7 +17,6 @@ from bslam.experiment.options import (
     ASSOCIATIONS,
     FILTERS,
     MOTIONS,
-    NOISES,
     OBSERVATIONS,
     REALS,
     TARGETS,
@@ -25,6 +24,7 @@ from bslam.experiment.options import (
     RunOptions,
     parse_association,
 )
+from bslam.log import WHEEL_NOISES
 
 T = TypeVar("T")
 
@@ -60,8 +60,8 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     )
     group.add_argument(
         "--noise",
-        choices=NOISES,
-        help="what errs: the reading or the wheel (default: as the scenario says, else speedometer)",
+        choices=WHEEL_NOISES,
+        help="what errs: the reading or the motion (default: as the scenario or log says)",
     )
     group.add_argument(
         "--target", choices=TARGETS, default="host", help="where the core runs (default: host)"
@@ -127,7 +127,7 @@ def run_options(arguments: argparse.Namespace, **changes: Any) -> RunOptions:
         "sigma_mps": arguments.sigma,
         "motion": arguments.motion,
         "velocity_states": arguments.velocity_states,
-        "noise": arguments.noise or "speedometer",
+        "noise": arguments.noise,
         "target": arguments.target,
         "real": arguments.real,
         "known_map": arguments.known_map,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bslam.experiment.align import Rigid, fit_rigid
 from bslam.experiment.consistency import POSE_95, nees
-from bslam.experiment.options import RunOptions, uses_velocity_states
+from bslam.experiment.options import RunOptions, uses_velocity_states, wheel_noise
 from bslam.experiment.trace import Trace
 from bslam.experiment.truth import dead_reckoning, is_dense, odometry_increments, truth_at
 from bslam.log import Log
@@ -88,10 +88,11 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
 
 def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
     """What was run, in the words of the command line; without the log, as far as the options say."""
-    sigma_mps, velocity_states = options.sigma_mps, options.velocity_states
+    sigma_mps, velocity_states, noise = options.sigma_mps, options.velocity_states, options.noise
     if log is not None:
         sigma_mps = log.robot.wheel_speed_sigma_mps if sigma_mps is None else sigma_mps
         velocity_states = uses_velocity_states(options, log)
+        noise = wheel_noise(options, log)
     words = {
         "seed": options.seed,
         "sigma_mps": sigma_mps,
@@ -101,7 +102,7 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "filter": options.filter,
         "motion": options.motion,
         "velocity_states": velocity_states,
-        "noise": options.noise,
+        "noise": noise,
         "target": options.target,
         "real": options.real,
         "known_map": options.known_map,

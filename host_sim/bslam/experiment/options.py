@@ -13,7 +13,6 @@ OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis")
 FILTERS = ("standard", "invariant")
 MOTIONS = ("euler", "arc")
-NOISES = ("speedometer", "actuation")
 SENSORS = ("simulated",)
 TARGETS = ("host",)
 REALS = ("float", "double")
@@ -33,7 +32,7 @@ class RunOptions:
     velocity_states: bool | None = (
         None  # None: the best known for the kind of odometry, see `uses_velocity_states`
     )
-    noise: str = "speedometer"
+    noise: str | None = None  # what errs, reading or motion; None: as the log's robot says
     sensor: str = "simulated"
     target: str = "host"
     real: str = "float"  # scalar type of the core: as on the target, or the twin
@@ -68,6 +67,11 @@ def parse_association(text: str) -> tuple[str, float]:
     return name, rate
 
 
+def wheel_noise(options: RunOptions, log: Log) -> str:
+    """What errs, "speedometer" or "actuation": asked for, else what the log says."""
+    return options.noise or log.robot.wheel_noise
+
+
 def uses_velocity_states(options: RunOptions, log: Log) -> bool:
     """v and omega as states: asked for, else where the reading of a wheel errs and not the wheel.
 
@@ -77,7 +81,7 @@ def uses_velocity_states(options: RunOptions, log: Log) -> bool:
     if options.velocity_states is not None:
         return options.velocity_states
     sigma_mps = log.robot.wheel_speed_sigma_mps if options.sigma_mps is None else options.sigma_mps
-    return log.odometry.kind == "wheels" and options.noise == "speedometer" and sigma_mps > 0.0
+    return log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
 
 
 def odometry_lead_us(options: RunOptions, log: Log) -> int:

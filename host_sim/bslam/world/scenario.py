@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bslam.errors import BslamError
+from bslam.log import WHEEL_NOISES
 from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
@@ -30,7 +31,6 @@ from bslam.parsing.settings import (
 )
 from bslam.world.arena import Arena, Beacon, Point, Wall
 
-NOISES = ("speedometer", "actuation")
 _SHORTEST_WALL_M = 0.001
 _FOLDER = Path(__file__).resolve().parent.parent / "scenarios"
 
@@ -110,7 +110,7 @@ class Wheels:
     """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`."""
 
     sigma_mps: float = setting(NOT_NEGATIVE)
-    noise: str = setting(one_of(*NOISES), "speedometer")
+    noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
+from bslam.log import WHEEL_NOISES, Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
 from bslam.world.driving import Drive, drive
-from bslam.world.scenario import NOISES, Scenario, Start, load_scenario, scenario_names
+from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
 from bslam.world.wheels import count_ticks, read_travel
 
@@ -55,8 +55,8 @@ def _with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) 
         raise BslamError(
             f"wheel-speed sigma: {sigma_mps!r} is not allowed; allowed: a finite number from 0, m/s"
         )
-    if noise not in NOISES:
-        raise BslamError(f"wheel noise: {noise!r} is not allowed; allowed: {' or '.join(NOISES)}")
+    if noise not in WHEEL_NOISES:
+        raise BslamError(f"wheel noise: {noise!r} is not allowed; allowed: {' or '.join(WHEEL_NOISES)}")
     return replace(scenario, wheels=replace(wheels, sigma_mps=sigma_mps, noise=noise))
 
 
@@ -74,9 +74,13 @@ def _wheel_noise_m(scenario: Scenario, seed: int) -> NDArray[np.float64]:
 
 
 def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], path: Drive) -> Odometry:
+    """What the wheels' sensors say: the travel with noise, or the travel without the jitter that it had."""
     travel_m = np.stack([path.left_m, path.right_m], axis=1)
+    noise_m = _wheel_noise_m(scenario, seed)
     if scenario.wheels.noise == "speedometer":
-        travel_m = travel_m + _wheel_noise_m(scenario, seed)
+        travel_m = travel_m + noise_m
+    else:
+        travel_m = travel_m - np.where(path.stalled[:, np.newaxis], 0.0, noise_m)
     if scenario.encoders is None:
         return read_travel(time_us, travel_m)
     return count_ticks(scenario.encoders, time_us, travel_m)
@@ -115,6 +119,7 @@ def _describe_robot(scenario: Scenario) -> Robot:
     return Robot(
         wheelbase_m=scenario.body.wheelbase_m,
         wheel_speed_sigma_mps=scenario.wheels.sigma_mps,
+        wheel_noise=scenario.wheels.noise,
         step_us=scenario.step_us,
         field_of_view_rad=sensor.field_of_view_rad,
         bearing_sigma_rad=sensor.bearing_sigma_rad,

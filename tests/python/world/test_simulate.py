@@ -158,11 +158,15 @@ def test_simulate_speedometer_noise_is_white_of_the_sigma_asked_for(paper_room: 
     assert abs(np.corrcoef(errors_m)[0, 1]) < 5.0 / math.sqrt(steps)
 
 
-def test_simulate_actuation_noise_moves_the_wheels_and_the_reading_is_true(paper_room: Scenario) -> None:
+def test_simulate_actuation_noise_moves_the_wheels_against_the_reading(paper_room: Scenario) -> None:
     log = simulate(paper_room, 2, sigma_mps=0.6, noise="actuation")
     drive = true_drive(with_noise(paper_room, "actuation", 0.6), 2)
-    np.testing.assert_array_equal(log.odometry.a, drive.left_m)
-    np.testing.assert_array_equal(log.odometry.b, drive.right_m)
+    rolled = ~drive.stalled
+    for read_m, true_m in ((log.odometry.a, drive.left_m), (log.odometry.b, drive.right_m)):
+        jitter_m = true_m[rolled] - read_m[rolled]
+        assert abs(jitter_m.std() / 0.024 - 1.0) < 5.0 / math.sqrt(2.0 * len(jitter_m))
+        np.testing.assert_array_equal(read_m[drive.stalled], 0.0)
+        assert np.abs(np.diff(read_m[rolled])).max() < 0.03  # what is read is smooth: the robot's commands
     rolled_m = drive.left_m[~drive.stalled]
     assert np.diff(rolled_m).std() == pytest.approx(
         0.024 * math.sqrt(2.0), rel=0.05
