@@ -327,6 +327,23 @@ static void test_fuse_distance2_is_given_what_was_fused_before(void **state)
     assert_near(fusion.distance2, both_d2 - first_d2, TOLERANCE * (1 + both_d2));
 }
 
+static void test_fuse_distance2_without_a_distance_is_that_of_the_direction(void **state)
+{
+    const bslam_params_t params = params_of(0, false);
+    unit_random_t random = {19};
+    for (int i = 0; i < 10; i++) {
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        const plan_t plan = random_plan(&random, i % 5, false);
+        const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        measurement_t m = {0};
+        measure(&ekf, &params, &plan, &sighting, 1, &m);
+        const twin_t twin = twin_of(&ekf);
+        bslam_fusion_t fusion;
+        assert_int_equal(fuse(&ekf, &params, plan.beacon, &sighting, &fusion), BSLAM_OK);
+        assert_near(fusion.distance2, distance2_of(&m, &twin.covariance), TOLERANCE);
+    }
+}
+
 static void test_fuse_just_inside_and_outside_the_gate(void **state)
 {
     bslam_params_t params = params_of(1, false);
@@ -600,6 +617,7 @@ int main(void)
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
         cmocka_unit_test(test_fuse_distance2_is_given_what_was_fused_before),
+        cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),
         cmocka_unit_test(test_fuse_gated_sighting_between_others_has_no_effect),
         cmocka_unit_test(test_fuse_beyond_huber_counts_less),

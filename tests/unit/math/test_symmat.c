@@ -249,19 +249,25 @@ static void test_is_positive_definite_matrix_is(void **state)
 
 static void test_is_positive_matrix_with_a_repeated_row_is(void **state)
 {
-    // A new ray's anchor repeats the robot's position: exactly singular, and no fault.
-    unit_random_t random = {7};
-    pair_t pair = new_gram_pair(&random, 5, 5);
-    pair_t grown = {.n = 7, .m = new_array(BSLAM_SYMMAT_LENGTH(7))};
+    // A new ray's anchor repeats the robot's position: exactly singular, and no fault, whatever the units.
+    static const double scales[] = {1e-8, 1, 1e8};
     static const int source[7] = {0, 1, 2, 3, 4, 0, 1};
-    for (int i = 0; i < 7; i++) {
-        for (int j = 0; j <= i; j++) {
-            set_both(&grown, i, j, pair.naive[source[i]][source[j]]);
+    unit_random_t random = {7};
+    for (int s = 0; s < COUNT_OF(scales); s++) {
+        pair_t pair = new_gram_pair(&random, 5, 5);
+        pair_t grown = {.n = 7, .m = new_array(BSLAM_SYMMAT_LENGTH(7))};
+        for (int i = 0; i < 7; i++) {
+            for (int j = 0; j <= i; j++) {
+                set_both(&grown, i, j, scales[s] * pair.naive[source[i]][source[j]]);
+            }
         }
+        assert_true(is_positive(grown.m, 7));
+        // A hair less than its own copy's variance is no longer a covariance.
+        set_both(&grown, 5, 5, scales[s] * pair.naive[0][0] * 0.999);
+        assert_false(is_positive(grown.m, 7));
+        free(pair.m);
+        free(grown.m);
     }
-    assert_true(is_positive(grown.m, 7));
-    free(pair.m);
-    free(grown.m);
 }
 
 static void test_is_positive_zero_matrix_is(void **state)

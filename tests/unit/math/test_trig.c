@@ -222,6 +222,28 @@ static void test_angle_wrap_at_every_odd_multiple_of_pi_comes_into_range(void **
     }
 }
 
+// ---- beyond BSLAM_ANGLE_MAX -------------------------------------------------------------------------------
+
+static void test_angle_wrap_and_sin_cos_beyond_the_largest_angle_take_out_whole_turns(void **state)
+{
+    static const double angles[] = {1.0001e4, 12345.678, 3.7e5, 1e7, 1e12, 1e30, 3e38};
+    for (int i = 0; i < COUNT_OF(angles); i++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            const bslam_real_t angle = real(sign * angles[i]);
+            // Whole turns of the scalar type's own 2 pi: exact, whatever the angle.
+            const long double rest = remainderl((long double)angle, (long double)(2 * BSLAM_PI));
+            const bslam_real_t wrapped = bslam_angle_wrap(angle);
+            assert_true(wrapped > -BSLAM_PI && wrapped <= BSLAM_PI);
+            assert_near(direction_difference((long double)wrapped, rest), 0, 8 * ulp(BSLAM_PI));
+            bslam_real_t s;
+            bslam_real_t c;
+            bslam_sin_cos(angle, &s, &c);
+            assert_near(s, sinl(rest), 8 * ulp(BSLAM_PI));
+            assert_near(c, cosl(rest), 8 * ulp(BSLAM_PI));
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -242,6 +264,8 @@ int main(void)
         cmocka_unit_test(test_angle_wrap_minus_pi_comes_into_range),
         cmocka_unit_test(test_angle_wrap_any_angle_keeps_its_direction_and_comes_into_range),
         cmocka_unit_test(test_angle_wrap_at_every_odd_multiple_of_pi_comes_into_range),
+
+        cmocka_unit_test(test_angle_wrap_and_sin_cos_beyond_the_largest_angle_take_out_whole_turns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
