@@ -341,6 +341,19 @@ static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **
     assert_new(&d.matches[0]);
 }
 
+static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void **state)
+{
+    const bslam_params_t params = unit_params();
+    bslam_ekf_t ekf = three_beacons(&params);
+    for (int k = 0; k < 2; k++) {
+        const int at = ekf.beacons[1].at + k;
+        bslam_symmat_set(ekf.covariance, at, at, -1);
+    }
+    const bslam_sighting_t seen[] = {unit_polar(1.5708, 3, -1)};
+    const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    assert_true(d.matches[0].beacon != 1);
+}
+
 // ---- which method -----------------------------------------------------------------------------------------
 
 static void test_method_is_the_one_that_the_parameter_names(void **state)
@@ -387,6 +400,7 @@ int main(void)
         cmocka_unit_test(test_mahalanobis_match_ambiguous_and_new_by_the_two_thresholds),
         cmocka_unit_test(test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one),
         cmocka_unit_test(test_mahalanobis_beacon_without_an_innovation_is_passed_over),
+        cmocka_unit_test(test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over),
 
         cmocka_unit_test(test_method_is_the_one_that_the_parameter_names),
         cmocka_unit_test(test_every_method_takes_an_empty_frame),

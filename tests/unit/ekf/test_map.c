@@ -376,6 +376,16 @@ static void test_settle_ray_what_is_no_ray_stays(void **state)
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 
+static void test_settle_ray_without_a_positive_variance_stays(void **state)
+{
+    unit_random_t random = {15};
+    bslam_params_t params;
+    bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+    const int at = ekf.beacons[2].at + 3;
+    bslam_symmat_set(ekf.covariance, at, at, -1);
+    assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+}
+
 static void test_settle_ray_without_a_positive_inverse_distance_stays(void **state)
 {
     static const double inverses[] = {0, -0.2, 1e-4, NAN};
@@ -479,6 +489,7 @@ int main(void)
         cmocka_unit_test(test_settle_ray_becomes_its_point_with_the_covariance_of_the_change),
         cmocka_unit_test(test_settle_ray_happens_where_its_index_falls_below_the_limit),
         cmocka_unit_test(test_settle_ray_what_is_no_ray_stays),
+        cmocka_unit_test(test_settle_ray_without_a_positive_variance_stays),
         cmocka_unit_test(test_settle_ray_without_a_positive_inverse_distance_stays),
 
         cmocka_unit_test(test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point),

@@ -285,10 +285,10 @@ static void test_observe_ray_beyond_infinity_is_finite_and_has_no_range(void **s
 static void test_observe_ray_at_the_sensor_is_singular_and_changes_nothing(void **state)
 {
     static const double at_sensor[][4] = {
-        {-2, 0, 0, 0.5},       // the point anchor + 2 m is the origin
-        {-1.9995, 0, 0, 0.5},  // half a millimetre off
-        {-2, 0, 3.0, NAN},     // no number
-        {NAN, 0, 3.0, 0.5},
+        {-2, 0, 0, 0.5},                                // the point anchor + 2 m is the origin
+        {-1.9995, 0, 0, 0.5},                           // half a millimetre off
+        {-2, 0, 3.0, NAN},                              // no number
+        {NAN, 0, 3.0, 0.5},   {-9999.995, 0, 0, 1e-4},  // 5 mm off, in a ray so long that g vanishes in float
     };
     for (int i = 0; i < COUNT_OF(at_sensor); i++) {
         double in[RAY_ARGUMENTS] = {0};

@@ -379,6 +379,20 @@ static void test_sightings_rejected_say_why(void **state)
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
 }
 
+static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    see_one(&slam, 0, unit_polar(0.3, 4, 1));
+    for (int i = 0; i < slam.ekf.dim; i++) {
+        bslam_symmat_set(slam.ekf.covariance, i, i, -1);
+    }
+    see_one(&slam, 1, unit_polar(0.3, 4, 1));
+    assert_account(&slam, 0, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_SINGULAR);
+    assert_true(account(&slam, 0)->has_beacon && account(&slam, 0)->weight == 0);
+    assert_int_equal(bslam_slam_counters(&slam)->gated, 0);
+    assert_int_equal(bslam_slam_counters(&slam)->insane, 1);
+}
+
 static void test_sightings_ambiguous_are_rejected(void **state)
 {
     bslam_params_t params = unit_params();
@@ -604,6 +618,17 @@ static void test_sightings_before_any_odometry_start_the_clock(void **state)
     bslam_real_t lower[6];
     bslam_slam_pose_covariance(&slam, lower);
     assert_true(lower[0] > 0);
+}
+
+static void test_sightings_ahead_of_a_clock_without_odometry_are_seen_from_the_start(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    see_one(&slam, 0, unit_polar(0.3, 4, 1));
+    see_one(&slam, 100000, unit_polar(0, 2, 2));
+    assert_near(beacon(&slam, 1).x_m, 2, POSITION_ERROR);
+    assert_near(beacon(&slam, 1).y_m, 0, POSITION_ERROR);
+    const bslam_sighting_t late = unit_polar(0, 3, 3);
+    assert_frame_refused(&slam, 200001, &late, 1, BSLAM_E_TIME, -1);
 }
 
 static void test_pose_at_a_past_time_is_where_the_robot_was(void **state)
@@ -989,6 +1014,7 @@ int main(void)
 
         cmocka_unit_test(test_sightings_new_and_matched_are_accounted_for),
         cmocka_unit_test(test_sightings_rejected_say_why),
+        cmocka_unit_test(test_sightings_matched_to_an_indefinite_state_are_rejected),
         cmocka_unit_test(test_sightings_ambiguous_are_rejected),
         cmocka_unit_test(test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_ratio),
         cmocka_unit_test(test_sightings_beyond_huber_are_counted_and_weighted),
@@ -1004,6 +1030,7 @@ int main(void)
         cmocka_unit_test(test_sightings_ray_seen_from_aside_settles_into_a_point),
 
         cmocka_unit_test(test_sightings_before_any_odometry_start_the_clock),
+        cmocka_unit_test(test_sightings_ahead_of_a_clock_without_odometry_are_seen_from_the_start),
         cmocka_unit_test(test_pose_at_a_past_time_is_where_the_robot_was),
         cmocka_unit_test(test_pose_at_within_a_step_is_on_the_arc),
         cmocka_unit_test(test_pose_at_ahead_goes_on_as_before_up_to_its_limit),
