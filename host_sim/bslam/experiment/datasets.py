@@ -40,7 +40,8 @@ def find_directory(name: str, collection: str) -> Path:
             return place
     if root is None:
         raise BslamError(
-            f"{name}: no such directory, and no data sets are at hand; allowed: a path; {_how_to_get(collection)}"
+            f"{name}: no such directory, and no data sets are at hand; allowed: a path; "
+            f"{_how_to_get(collection)}"
         )
     there = sorted(entry.name for entry in (root / collection).glob("*") if entry.is_dir())
     raise BslamError(
