@@ -86,7 +86,7 @@ def as_toml(calibration: Calibration, log_name: str) -> str:
 
 
 def _windows(log: Log, truth: Truth, lead_us: int) -> _Windows:
-    times_us = step_times_us(log.odometry)
+    times_us = step_times_us(log)
     poses, known = truth_at(truth, times_us + lead_us)
     true = _true_increments(poses)
     measured = np.column_stack(odometry_increments(log))
@@ -114,7 +114,7 @@ def _true_increments(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _best_lead_us(log: Log, truth: Truth) -> int:
     """The lead at which measured and true turn rates agree best: turning has the sharpest edges."""
-    times_us = step_times_us(log.odometry)
+    times_us = step_times_us(log)
     measured = odometry_increments(log)[1]
 
     def agreement(lead_us: int) -> float:

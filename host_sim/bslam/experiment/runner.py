@@ -69,7 +69,8 @@ class _Run:
         self.covariances: list[tuple[float, ...]] = []  # lower triangles
         self.seen: list[bool] = []
         self.step_ns: list[int] = []
-        self.times_us = self._run(log.odometry)
+        self.times_us = step_times_us(log).tolist()
+        self._run(log.odometry)
 
     def _give_map(self, log: Log) -> None:
         """Give the true beacons to the filter. Raises BslamError if their frame is not the start's."""
@@ -84,10 +85,9 @@ class _Run:
         for beacon in self.slam.beacons():
             self.ledger.know(beacon.uid, beacon.label)
 
-    def _run(self, odometry: Odometry) -> list[int]:
-        """Feed everything; the times of the rows kept."""
-        slam, kind, clock = self.slam, odometry.kind, time.thread_time_ns
-        times_us = step_times_us(odometry).tolist()
+    def _run(self, odometry: Odometry) -> None:
+        """Feed everything, and keep what there is to say at each of the steps' times."""
+        slam, kind, clock, times_us = self.slam, odometry.kind, time.thread_time_ns, self.times_us
         number = np.int64 if kind == "ticks" else np.float64
         a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
         rows = list(zip(odometry.time_us.tolist(), a, b, strict=True))
@@ -107,10 +107,16 @@ class _Run:
             core_ns = clock() - began + self._frames_until(until_us)
             self.step_ns.append(core_ns)
             self._keep(row[0])
-        return times_us
 
     def _start_clock(self, time_us: int) -> None:
-        """An empty frame if none is at the start, or the core would not know how long the first row took."""
+        """An empty frame if none is at the start, or the core would not know how long the first row took.
+
+        Frames from before the start would start the clock too early: they are refused here.
+        """
+        while self.frames.waiting_before(time_us):
+            _, true_id, columns = self.frames.take()
+            self.ledger.book_refused(true_id, columns[-1])
+            self.refusals["before_start"] += 1
         if not self.frames.waiting_before(time_us + 1):
             self._try(self.slam.sightings, time_us, [], [], [], [])
 

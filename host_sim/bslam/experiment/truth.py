@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.experiment.align import wrap_angle
-from bslam.log import Log, Odometry, Truth
+from bslam.log import Log, Truth
 
 # Between two true poses no farther apart in time than this, the truth is interpolated (Vicon gaps, short
 # rests);
 INTERPOLATE_US: Final = 500_000
 # elsewhere it is only known this near to a true pose. Sparse truth stands still there.
 NEAR_US: Final = 50_000
+# A drive whose wheels are logged began no longer than this before the first row (what the core takes for one
+# step).
+START_WINDOW_US: Final = 10_000_000
 
 
 def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -52,14 +55,30 @@ def dead_reckoning(log: Log, forward_scale: float = 1.0, turn_scale: float = 1.0
     return np.column_stack([x, y, wrap_angle(theta)])
 
 
-def step_times_us(odometry: Odometry) -> NDArray[np.int64]:
-    """Times of the start and of the end of each step, (n + 1,).
+def step_times_us(log: Log) -> NDArray[np.int64]:
+    """Times of the start and of the end of each step, (n + 1,), by whatever clock the log has.
 
-    Wheel travel counts from time 0 on; the first row of other odometry only gives the reading at the start.
+    The first row of wheel travel already moves, so the start stands before it; the first row of other
+    odometry only gives the reading at the start.
     """
-    if odometry.kind == "wheels":
-        return np.concatenate([[0], odometry.time_us]).astype(np.int64)
-    return odometry.time_us
+    times_us = log.odometry.time_us
+    if log.odometry.kind == "wheels":
+        return np.concatenate([[_wheels_start_us(log)], times_us]).astype(np.int64)
+    return times_us
+
+
+def _wheels_start_us(log: Log) -> int:
+    """One step before the first row, or the last image or true pose at or before that moment, if any is near.
+
+    A first row may be late, and what was seen at the start then tells when that was; truth that was recorded
+    for a while before the drive must not make its first step longer.
+    """
+    first_us = int(log.odometry.time_us[0])
+    latest_us = max(first_us - log.robot.step_us, 0)
+    tables_us = [log.sightings.time_us] + ([log.truth.time_us] if log.truth is not None else [])
+    seen_us = np.concatenate(tables_us)
+    near = (seen_us <= latest_us) & (seen_us >= first_us - START_WINDOW_US)
+    return int(seen_us[near].max()) if near.any() else latest_us
 
 
 def odometry_increments(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

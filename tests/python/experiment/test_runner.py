@@ -95,6 +95,45 @@ def test_frames_are_fed_after_the_odometry_of_their_time_and_in_order(log):
     assert trace.seen.tolist() == [True, True, True]
 
 
+def test_what_was_seen_before_the_start_is_refused(log, made):
+    later = replace(log.odometry, time_us=log.odometry.time_us + 30_000)
+    seen = made.sightings([(0, 3, 0.1, 1.0, True), (28_000, 3, 0.1, 1.0, True), (50_000, 3, 0.1, 1.0, True)])
+    trace, recorder = run(replace(log, odometry=later, sightings=seen, truth=None))
+    assert [call[1] for call in recorder.calls[:3]] == [28_000, 50_000, 70_000]
+    assert trace.time_us[0] == 28_000
+    assert trace.refusals == {"before_start": 1}
+    assert trace.counts.sightings == 3
+
+
+def shifted(log, by_us):
+    """The same drive by another clock."""
+    parts = {name: getattr(log, name) for name in ("odometry", "sightings", "truth")}
+    return replace(log, **{name: replace(part, time_us=part.time_us + by_us) for name, part in parts.items()})
+
+
+@pytest.mark.parametrize("by_us", [5_000_000, 60_000_000, 1_248_272_272_841_000])
+@pytest.mark.parametrize("with_truth_at_the_start", [True, False])
+def test_wheels_give_the_same_whatever_the_clock_starts_at(made, by_us, with_truth_at_the_start):
+    log = made.circle_log(steps=300, seed=4)
+    if not with_truth_at_the_start:  # nothing but the first row says when the drive began
+        late = log.sightings.time_us > 0
+        columns = {name: column[late] for name, column in vars(log.sightings).items()}
+        log = replace(log, sightings=replace(log.sightings, **columns))
+        truth = {name: column[1:] for name, column in vars(log.truth).items()}
+        log = replace(log, truth=replace(log.truth, **truth))
+    options = RunOptions()
+
+    def figures(one):
+        trace = run_log(one, options)
+        evaluation = evaluate(one, trace, options, align=False)
+        return summarise(one, trace, options, evaluation) | {"step_us_median": 0.0}, trace.pose
+
+    entry, poses = figures(log)
+    shifted_entry, shifted_poses = figures(shifted(log, by_us))
+    assert shifted_entry == entry
+    np.testing.assert_array_equal(shifted_poses, poses)
+
+
 def test_rows_of_one_stamp_are_one_frame(log):
     _, recorder = run(log)
     bearing, range_m, label, mappable = recorder.calls[2][2:]

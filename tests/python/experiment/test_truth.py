@@ -87,8 +87,34 @@ def test_odometry_increments_of_ticks_roll_over(made):
     np.testing.assert_allclose(turn_rad, (right_m - left_m) / robot.wheelbase_m)
 
 
-def test_step_times_of_wheels_begin_at_zero_and_others_at_their_first_row():
-    times_us = np.array([40_000, 80_000])
-    zeros = np.zeros(2)
-    assert step_times_us(Odometry("wheels", times_us, zeros, zeros)).tolist() == [0, 40_000, 80_000]
-    assert step_times_us(Odometry("velocity", times_us, zeros, zeros)).tolist() == [40_000, 80_000]
+def wheels_from(made, first_us, seen_us=(), true_us=None):
+    """A log whose first wheel row stands at first_us, with sightings and truth at these times."""
+    log = made.circle_log(steps=2)
+    odometry = Odometry("wheels", first_us + made.step_us * np.arange(2), np.zeros(2), np.zeros(2))
+    sightings = made.sightings([(time_us, 3, 0.0, 1.0, True) for time_us in seen_us])
+    return replace(
+        log, odometry=odometry, sightings=sightings, truth=None if true_us is None else truth_of(true_us)
+    )
+
+
+def test_step_times_of_what_is_not_wheel_travel_begin_at_the_first_row(made):
+    log = wheels_from(made, 40_000)
+    log = replace(log, odometry=replace(log.odometry, kind="velocity"))
+    assert step_times_us(log).tolist() == [40_000, 80_000]
+
+
+@pytest.mark.parametrize(
+    ("first_us", "seen_us", "true_us", "start_us"),
+    [
+        (40_000, [], None, 0),
+        (START_US, [], None, START_US - 40_000),  # a step before the first row
+        (39_998, [0], [0, 39_998], 0),  # no clock begins before 0
+        (START_US, [START_US - 30_000], None, START_US - 40_000),
+        (START_US, [START_US - 90_000], None, START_US - 90_000),  # the first row is late
+        (START_US, [], [START_US - 5_000_000, START_US - 50_000, START_US], START_US - 50_000),
+        (START_US, [0], [START_US - 10_000_001], START_US - 40_000),  # another drive
+    ],
+)
+def test_step_times_of_wheels_begin_before_the_first_row(made, first_us, seen_us, true_us, start_us):
+    log = wheels_from(made, first_us, seen_us, true_us)
+    assert step_times_us(log).tolist() == [start_us, first_us, first_us + made.step_us]
