@@ -36,6 +36,8 @@ ODOMETRY_COLUMNS = {
     "ticks": ("left_ticks", "right_ticks"),
     "velocity": ("v_mps", "omega_radps"),
 }
+BEACON_ID_MAX = 2**31 - 1
+"""Labels are 32-bit numbers in the core."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
 
 
@@ -43,7 +45,8 @@ TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter
 class Odometry:
     """What the wheels said; `time_us` rises strictly.
 
-    kind "wheels": a, b = left, right wheel travel since the row before (first row: since the start), m.
+    kind "wheels": a, b = left, right wheel travel since the row before (first row: since the start, a step
+    earlier), m.
     kind "ticks": a, b = left, right encoder counter values; the first row is the counters' starting point.
     kind "velocity": a, b = forward speed m/s and turning rate rad/s, held over the interval that ENDS at
     time_us.
@@ -228,8 +231,11 @@ def _robot_text(robot: Robot) -> str:
 
 # --- reading ------------------------------------------------------------------------------------------------
 
+# In m, m/s or rad no robot comes near it; beyond it, figures would overflow.
+_FARTHEST = 1e6
+
 _COUNT = Column("an integer from 0", is_count)
-_NUMBER = Column("a finite number", np.isfinite)
+_NUMBER = Column("a number from -1e6 to 1e6", lambda values: np.abs(values) <= _FARTHEST)
 _COLUMNS = {
     "time_us": _COUNT,
     "left_m": _NUMBER,
@@ -238,10 +244,14 @@ _COLUMNS = {
     "right_ticks": _COUNT,
     "v_mps": _NUMBER,
     "omega_radps": _NUMBER,
-    "beacon_id": Column("an integer from 0, or empty in sightings", is_count, empty=-1.0),
+    "beacon_id": Column(
+        f"an integer from 0 to {BEACON_ID_MAX}, or empty in sightings",
+        lambda values: is_count(values) & (values <= BEACON_ID_MAX),
+        empty=-1.0,
+    ),
     "bearing_rad": Column("radians from -2 pi to 2 pi", lambda values: np.abs(values) <= 2.0 * math.pi),
     "range_m": Column(
-        "a finite number above 0, or empty", lambda v: np.isfinite(v) & (v > 0), empty=math.nan
+        "a number above 0, at most 1e6, or empty", lambda v: (v > 0) & (v <= _FARTHEST), empty=math.nan
     ),
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,
@@ -271,8 +281,7 @@ def _columns(*names: str) -> dict[str, Column]:
 def _read_odometry(folder: Path, robot: Robot) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
     table = read_table(_require_csv(folder, "odometry"), layouts)
-    if table.rows == 0:
-        raise BslamError(f"{table.path}: no rows below the header; allowed: at least one")
+    table.require_rows("allowed: at least one")
     table.require_order("time_us", strict=True)
     kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
     if kind == "ticks":
@@ -311,6 +320,7 @@ def _read_truth(folder: Path) -> Truth | None:
     if path is None:
         return None
     table = read_table(path, [_columns("time_us", "x_m", "y_m", "theta_rad")])
+    table.require_rows("allowed: at least one, or no such file")
     table.require_order("time_us", strict=True)
     values = table.values
     return Truth(table.integers("time_us"), values["x_m"], values["y_m"], wrap_rad(values["theta_rad"]))

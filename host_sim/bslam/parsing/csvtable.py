@@ -43,6 +43,11 @@ class Table:
     def integers(self, column: str) -> NDArray[np.int64]:
         return self.values[column].astype(np.int64)
 
+    def require_rows(self, allowed: str) -> None:
+        """Raise BslamError if there is nothing below the header."""
+        if self.rows == 0:
+            raise BslamError(f"{self.path}: no rows below the header; {allowed}")
+
     def require(self, column: str, good: NDArray[np.bool_], allowed: str) -> None:
         """Raise BslamError for the first row of `column` that is not `good`."""
         if not good.all():

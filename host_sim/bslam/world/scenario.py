@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bslam.errors import BslamError
-from bslam.log import WHEEL_NOISES
+from bslam.log import BEACON_ID_MAX, WHEEL_NOISES
 from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
@@ -171,7 +171,7 @@ class _WallTable:
 
 @dataclass(frozen=True)
 class _BeaconTable:
-    id: int = setting(integer(0))
+    id: int = setting(integer(0, BEACON_ID_MAX))
     at: tuple[float, float] = setting(_POINT)
 
 

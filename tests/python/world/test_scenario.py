@@ -138,6 +138,7 @@ FIRST_BEACON = "{ id = 0, at = [1.5, 0.0] }"
         ("[[3.0, 5.0]]", "[[3.0, 5.0], [4, 6]]", r"walls\[4\], key doors: .*without overlap"),
         (FIRST_BEACON, "{ id = 1, at = [1.5, 0.0] }", r"beacons\[1\], key id: 1 .*an id of its own"),
         (FIRST_BEACON, "{ id = -1, at = [1.5, 0.0] }", r"beacons\[0\], key id: -1 .*integer from 0"),
+        (FIRST_BEACON, "{ id = 5000000000, at = [1.5, 0.0] }", r"key id: 5000000000 .*0 to 2147483647"),
         (
             "steps = 5000",
             "steps = 5\nareas = [{ x_m = [2, 1], y_m = [0, 1] }]",
