@@ -7,6 +7,7 @@ where, and what is allowed.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from types import ModuleType
@@ -36,10 +37,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise BslamError(f"command '{name}' does not exist; allowed: {', '.join(COMMANDS)}")
         command = COMMANDS[name]
         # Not argparse's own sub-parsers: with them options could not stand between two directories.
-        return int(command.execute(_parser(name, command).parse_intermixed_args(rest)))
+        status = int(command.execute(_parser(name, command).parse_intermixed_args(rest)))
+        sys.stdout.flush()
+        return status
     except BslamError as error:
         print(f"bslam {name}: error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:
+        # Whoever read the output has gone, as `head` does: nothing is left to say, at the exit neither.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except KeyboardInterrupt:
         print(f"bslam {name}: stopped", file=sys.stderr)
         return 1

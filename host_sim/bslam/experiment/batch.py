@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,10 @@ from bslam.experiment.runner import run_log
 from bslam.experiment.sources import ScenarioSource, Source
 from bslam.experiment.trace import Trace
 from bslam.log import Log, write_folder
+
+_LOST = (
+    "a process died (killed, or out of memory) before this run was finished; fewer --jobs need less memory"
+)
 
 # Draws the pictures of a run: out directory, name, source, log, trace, evaluation.
 Draw = Callable[[Path, str, Source, Log, Trace, Evaluation | None], None]
@@ -74,7 +80,11 @@ class BatchResult:
 
 
 def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
-    """Run all jobs, write their files and summary.json into `out`."""
+    """Run all jobs, write their files and summary.json into `out`.
+
+    After Ctrl-C what is finished stays. If a process dies (killed, or out of memory), so does the pool: every
+    run that is not finished has failed then.
+    """
     finished: dict[int, Outcome] = {}
     interrupted = False
     try:
@@ -84,6 +94,10 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
             finished[index] = outcome
     except KeyboardInterrupt:
         interrupted = True
+    except BrokenExecutor:
+        for index, job in enumerate(jobs):
+            if index not in finished:
+                finished[index] = Outcome(job.name, _failed_entry(job, _LOST), crash=_LOST)
     outcomes = tuple(finished[index] for index in sorted(finished))
     more = {"interrupted": True} if interrupted else {}
     write_summary(out, [outcome.entry for outcome in outcomes], **more)
@@ -203,5 +217,5 @@ def _name_part(word: str, value: Any) -> str:
 
 def _unique(name: str, taken: Sequence[str]) -> str:
     """`name`, or where two logs share it, with a number behind."""
-    count = sum(other == name or other.startswith(f"{name}-") for other in taken)
-    return f"{name}-{count + 1}" if count else name
+    numbered = (f"{name}-{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([name], numbered) if one not in taken)

@@ -33,9 +33,10 @@ def find_directory(name: str, collection: str) -> Path:
 
     Raises BslamError that says what is missing, from where to get it, and which variable names its place.
     """
+    if Path(name).is_dir():
+        return Path(name)
     root = data_root()
-    places = [Path(name)] + ([root / name, root / collection / name] if root else [])
-    for place in places:
+    for place in [root / name, root / collection / name] if root else []:
         if place.is_dir():
             return place
     if root is None:

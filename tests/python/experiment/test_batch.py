@@ -1,6 +1,7 @@
 """Many runs: names, failures, interruption."""
 
 import json
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -108,6 +109,22 @@ def test_ctrl_c_keeps_what_is_finished(made, tmp_path, monkeypatch):
     assert [entry["seed"] for entry in content["runs"]] == [0]
 
 
+def test_a_process_that_dies_fails_what_is_not_finished_and_keeps_the_rest(made, tmp_path, monkeypatch):
+    jobs = make_jobs([LogSource(made.circle_log(5))] * 3, [RunOptions(seed=k) for k in range(3)], None, 0)
+
+    def one_and_then_none(jobs, out, processes):
+        yield 1, batch.execute(jobs[1], out)
+        raise BrokenExecutor
+
+    monkeypatch.setattr(batch, "_outcomes", one_and_then_none)
+    result = run_batch(jobs, tmp_path, processes=2)
+    assert not result.ok
+    assert result.bad_input is None
+    entries = summary(tmp_path)["runs"]
+    assert [entry["diverged"] for entry in entries] == [True, False, True]
+    assert "a process died" in entries[0]["error"]
+
+
 def test_names_tell_runs_apart_by_what_differs():
     plain = RunOptions(sigma_mps=0.3)
     room = ScenarioSource("some/where/room.toml", 0, 0.3, "speedometer")
@@ -126,6 +143,8 @@ def test_names_of_logs_are_their_folders_and_stay_apart():
     logs = [FolderSource(Path("/a/log")), FolderSource(Path("/b/log")), MrclamSource(Path("/c/Set1"), 2)]
     assert run_names(logs, [RunOptions()] * 3) == ["log", "log-2", "Set1_robot2"]
     assert run_names(logs[:1] * 2, [RunOptions(), RunOptions(seed=1)]) == ["log_seed0", "log_seed1"]
+    numbered = [FolderSource(Path("/a/log-2")), *logs[:2]]
+    assert run_names(numbered, [RunOptions()] * 3) == ["log-2", "log", "log-3"]
 
 
 def test_only_the_first_runs_are_drawn(made):

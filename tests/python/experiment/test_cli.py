@@ -85,6 +85,11 @@ def test_a_data_directory_that_does_not_exist_is_named(capsys, monkeypatch):
     assert "BSLAM_DATA: '/no/such/data' is not a directory" in last_line(capsys)
 
 
+def test_a_path_needs_no_data_directory(log_folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("BSLAM_DATA", "/no/such/data")
+    assert status_of(["replay", "csv", str(log_folder), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
+
+
 def test_a_set_that_the_data_directory_does_not_have_is_named_with_those_it_has(
     capsys, monkeypatch, tmp_path
 ):
@@ -278,6 +283,16 @@ def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, c
     )
     assert "odometry.csv, line 2" in last_line(capsys)
     assert [entry["diverged"] for entry in runs(out)] == [True, False]
+
+
+def test_a_reader_that_goes_away_leaves_no_traceback():
+    words = [sys.executable, "-m", "bslam", "params"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stderr is not None
+        program.stdout.close()
+        assert program.stderr.read() == ""
+    assert program.returncode == 1
 
 
 def test_the_module_runs_as_a_program():
