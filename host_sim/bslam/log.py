@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.parsing.csvtable import Column, Table, is_count, read_table
 from bslam.parsing.settings import (
-    ANY,
     FIELD_OF_VIEW,
-    NOT_NEGATIVE,
-    POSITIVE,
-    POSITIVE_OR_INF,
+    Rule,
     integer,
     load_toml,
+    number,
     one_of,
     parse_table,
     setting,
@@ -91,6 +89,18 @@ class Beacons:
 WHEEL_NOISES = ("speedometer", "actuation")
 """What errs: the reading, or the motion against the reading."""
 
+# What the core takes, so that whoever writes robot.toml or a scenario hears of a bad value in its words.
+WHEELBASE_M = number(1e-3, 10.0)
+WHEEL_RADIUS_M = number(1e-4, 10.0)
+WHEEL_SPEED_SIGMA_MPS = number(0.0, 100.0)
+BEARING_SIGMA_RAD = number(0.0, 3.2)
+RANGE_SIGMA_FLOOR_M = number(0.0, 100.0)
+RANGE_SIGMA_FRACTION = number(0.0, 10.0)
+RANGE_SIGMA_SCALE_M = Rule("a number from 0.1, or inf", float, lambda value: value >= 0.1)
+SENSOR_OFFSET_M = number(-100.0, 100.0)
+SENSOR_YAW_RAD = number(-3.2, 3.2)
+SIGHTING_DELAY_US = integer(0, 10_000_000)
+
 
 @dataclass(frozen=True)
 class Robot:
@@ -100,22 +110,23 @@ class Robot:
     t - sighting_delay_us by a sensor at (sensor_x_m, sensor_y_m, sensor_yaw_rad) on the robot.
     The four keys of the encoders must be there in a log with tick odometry. `wheel_noise` says what the sigma
     of the wheels' speed is of: the reading of a wheel that moves as told, or the motion of one that jitters.
+    A sensor without noise may be described so: the filter is told a little (`options.core_params`).
     """
 
-    wheelbase_m: float = setting(POSITIVE)
-    wheel_speed_sigma_mps: float = setting(NOT_NEGATIVE)  # each wheel, each step, independent
+    wheelbase_m: float = setting(WHEELBASE_M)
+    wheel_speed_sigma_mps: float = setting(WHEEL_SPEED_SIGMA_MPS)  # each wheel, each step, independent
     step_us: int = setting(integer(1))  # nominal time from one odometry row to the next
     field_of_view_rad: float = setting(FIELD_OF_VIEW)
-    bearing_sigma_rad: float = setting(NOT_NEGATIVE)
-    range_sigma_fraction: float = setting(NOT_NEGATIVE)
-    range_sigma_scale_m: float = setting(POSITIVE_OR_INF)
-    range_sigma_floor_m: float = setting(NOT_NEGATIVE, 0.0)
-    sensor_x_m: float = setting(ANY, 0.0)
-    sensor_y_m: float = setting(ANY, 0.0)
-    sensor_yaw_rad: float = setting(ANY, 0.0)
-    sighting_delay_us: int = setting(integer(0), 0)
-    left_radius_m: float | None = setting(POSITIVE, None)
-    right_radius_m: float | None = setting(POSITIVE, None)
+    bearing_sigma_rad: float = setting(BEARING_SIGMA_RAD)
+    range_sigma_fraction: float = setting(RANGE_SIGMA_FRACTION)
+    range_sigma_scale_m: float = setting(RANGE_SIGMA_SCALE_M)
+    range_sigma_floor_m: float = setting(RANGE_SIGMA_FLOOR_M, 0.0)
+    sensor_x_m: float = setting(SENSOR_OFFSET_M, 0.0)
+    sensor_y_m: float = setting(SENSOR_OFFSET_M, 0.0)
+    sensor_yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
+    sighting_delay_us: int = setting(SIGHTING_DELAY_US, 0)
+    left_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
+    right_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
     ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)
     counter_bits: int | None = setting(integer(2, 32), None)
     wheel_noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")

@@ -303,6 +303,10 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
             {"robot_toml": ROBOT_TOML.replace("40000", "0.04")},
             r"key step_us: 0\.04 is not .*an integer from 1",
         ),
+        (
+            {"robot_toml": ROBOT_TOML.replace("= 0.4", "= 40")},
+            r"robot\.toml, key wheelbase_m: 40 is not allowed; allowed: a number from 0\.001 to 10",
+        ),
         ({"robot_toml": ROBOT_TOML.replace("= 0.4", "= true")}, r"key wheelbase_m: True is not allowed"),
         ({"robot_toml": ROBOT_TOML.replace("= 0.4", "= nan")}, r"key wheelbase_m: nan is not allowed"),
         (

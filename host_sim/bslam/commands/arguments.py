@@ -24,7 +24,7 @@ from bslam.experiment.options import (
     RunOptions,
     parse_association,
 )
-from bslam.log import WHEEL_NOISES
+from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 
 T = TypeVar("T")
 
@@ -50,7 +50,7 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     add("association", _association, ("known", 0.0), associations, meaning)
     add("filter", _word(FILTERS), "invariant", _names(FILTERS), "kind of Kalman filter (default: invariant)")
     meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
-    add("sigma", _not_negative, None, "M/S", meaning)
+    add("sigma", _sigma_mps, None, "M/S", meaning)
     group.add_argument("--motion", choices=MOTIONS, default="arc", help="odometry step (default: arc)")
     group.add_argument(
         "--velocity-states",
@@ -204,14 +204,12 @@ def _association(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def _not_negative(text: str) -> float:
+def _sigma_mps(text: str) -> float:
     try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a finite number from 0")
-    return value
+        return float(WHEEL_SPEED_SIGMA_MPS.convert(float(text), "sigma"))
+    except (ValueError, BslamError):
+        allowed = WHEEL_SPEED_SIGMA_MPS.allowed
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: {allowed}") from None
 
 
 def _seeds(text: str) -> range:

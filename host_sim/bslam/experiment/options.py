@@ -17,6 +17,12 @@ SENSORS = ("simulated",)
 TARGETS = ("host",)
 REALS = ("float", "double")
 
+# A measurement without any noise would leave the filter to divide by what rounding leaves of the
+# uncertainty: a noise-free sensor is told to err by this much. The core's own lowest for directions; over the
+# few metres of a sighting, about as much in m.
+LEAST_BEARING_SD_RAD = 1e-4
+LEAST_RANGE_SD_M = 1e-3
+
 Number = int | float
 
 
@@ -112,16 +118,18 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
 
 
 def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
-    """What the log says of the robot and its sensor."""
+    """What the log says of the robot and its sensor; noise where it says that there is none."""
+    range_sd_per_m = 1.0 / robot.range_sigma_scale_m
+    range_errs = robot.range_sigma_floor_m > 0.0 or robot.range_sigma_fraction > 0.0 or range_sd_per_m > 0.0
     params: dict[str, Number] = {
         "mount_x_m": robot.sensor_x_m,
         "mount_y_m": robot.sensor_y_m,
         "mount_yaw_rad": robot.sensor_yaw_rad,
         "sighting_delay_us": robot.sighting_delay_us,
-        "bearing_sd_rad": robot.bearing_sigma_rad,
-        "range_sd_floor_m": robot.range_sigma_floor_m,
+        "bearing_sd_rad": max(robot.bearing_sigma_rad, LEAST_BEARING_SD_RAD),
+        "range_sd_floor_m": robot.range_sigma_floor_m if range_errs else LEAST_RANGE_SD_M,
         "range_sd_fraction": robot.range_sigma_fraction,
-        "range_sd_per_m": 1.0 / robot.range_sigma_scale_m,
+        "range_sd_per_m": range_sd_per_m,
     }
     if kind in ("wheels", "ticks"):
         params |= {

@@ -53,6 +53,10 @@ def integer(lowest: int, highest: int | None = None) -> Rule:
     return Rule(f"an integer from {lowest} to {highest}", int, lambda value: lowest <= value <= highest)
 
 
+def number(lowest: float, highest: float) -> Rule:
+    return Rule(f"a number from {lowest:g} to {highest:g}", float, lambda value: lowest <= value <= highest)
+
+
 ANY = Rule("a finite number", float, math.isfinite)
 POSITIVE = Rule("a finite number above 0", float, lambda value: 0.0 < value < math.inf)
 NOT_NEGATIVE = Rule("a finite number from 0", float, lambda value: 0.0 <= value < math.inf)

@@ -13,7 +13,19 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bslam.errors import BslamError
-from bslam.log import BEACON_ID_MAX, WHEEL_NOISES
+from bslam.log import (
+    BEACON_ID_MAX,
+    BEARING_SIGMA_RAD,
+    RANGE_SIGMA_FLOOR_M,
+    RANGE_SIGMA_FRACTION,
+    RANGE_SIGMA_SCALE_M,
+    SENSOR_YAW_RAD,
+    SIGHTING_DELAY_US,
+    WHEEL_NOISES,
+    WHEEL_RADIUS_M,
+    WHEEL_SPEED_SIGMA_MPS,
+    WHEELBASE_M,
+)
 from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
@@ -72,7 +84,7 @@ class BodySettings:
     """A round body, its two wheels on one line through the middle."""
 
     diameter_m: float = setting(POSITIVE)
-    wheelbase_m: float = setting(POSITIVE)
+    wheelbase_m: float = setting(WHEELBASE_M)
 
 
 @dataclass(frozen=True)
@@ -109,7 +121,7 @@ class Driving:
 class Wheels:
     """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`."""
 
-    sigma_mps: float = setting(NOT_NEGATIVE)
+    sigma_mps: float = setting(WHEEL_SPEED_SIGMA_MPS)
     noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
 
 
@@ -117,8 +129,8 @@ class Wheels:
 class Encoders:
     """Counters of ticks on the two wheels; they roll over at 2^counter_bits."""
 
-    left_radius_m: float = setting(POSITIVE)
-    right_radius_m: float = setting(POSITIVE)
+    left_radius_m: float = setting(WHEEL_RADIUS_M)
+    right_radius_m: float = setting(WHEEL_RADIUS_M)
     ticks_per_revolution: int = setting(integer(1, 10_000_000))
     counter_bits: int = setting(integer(2, 32))
 
@@ -128,15 +140,15 @@ class Sensor:
     """What sees beacons. The sd of a range r is sqrt(floor^2 + (fraction r)^2 + (r^2 / scale)^2)."""
 
     field_of_view_rad: float = setting(FIELD_OF_VIEW)
-    bearing_sigma_rad: float = setting(NOT_NEGATIVE)
-    range_sigma_fraction: float = setting(NOT_NEGATIVE)
-    range_sigma_scale_m: float = setting(POSITIVE_OR_INF)
-    range_sigma_floor_m: float = setting(NOT_NEGATIVE, 0.0)
+    bearing_sigma_rad: float = setting(BEARING_SIGMA_RAD)
+    range_sigma_fraction: float = setting(RANGE_SIGMA_FRACTION)
+    range_sigma_scale_m: float = setting(RANGE_SIGMA_SCALE_M)
+    range_sigma_floor_m: float = setting(RANGE_SIGMA_FLOOR_M, 0.0)
     range_max_m: float = setting(POSITIVE_OR_INF, math.inf)
     x_m: float = setting(ANY, 0.0)  # where it sits on the robot
     y_m: float = setting(ANY, 0.0)
-    yaw_rad: float = setting(ANY, 0.0)
-    delay_us: int = setting(integer(0), 0)  # the stamp of a sighting is so much later than the sight
+    yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
+    delay_us: int = setting(SIGHTING_DELAY_US, 0)  # the stamp of a sighting is so much later than the sight
     outlier_share: float = setting(SHARE, 0.0)  # share of sightings with any direction and range
 
 

@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.log import WHEEL_NOISES, Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
+from bslam.log import (
+    WHEEL_NOISES,
+    WHEEL_SPEED_SIGMA_MPS,
+    Beacons,
+    Log,
+    Odometry,
+    Robot,
+    Sightings,
+    Truth,
+    wrap_rad,
+)
 from bslam.world.driving import Drive, drive
 from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
@@ -51,10 +61,7 @@ def _with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) 
     wheels = scenario.wheels
     sigma_mps = wheels.sigma_mps if sigma_mps is None else sigma_mps
     noise = wheels.noise if noise is None else noise
-    if not 0.0 <= sigma_mps < math.inf:
-        raise BslamError(
-            f"wheel-speed sigma: {sigma_mps!r} is not allowed; allowed: a finite number from 0, m/s"
-        )
+    sigma_mps = WHEEL_SPEED_SIGMA_MPS.convert(sigma_mps, "wheel-speed sigma, m/s")
     if noise not in WHEEL_NOISES:
         raise BslamError(f"wheel noise: {noise!r} is not allowed; allowed: {' or '.join(WHEEL_NOISES)}")
     return replace(scenario, wheels=replace(wheels, sigma_mps=sigma_mps, noise=noise))

@@ -1,7 +1,7 @@
 """From what the user chose to parameters of the core."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,8 +9,16 @@ import pytest
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.experiment import defaults
-from bslam.experiment.options import RunOptions, core_params, odometry_lead_us, parse_association
-from bslam.log import Odometry
+from bslam.experiment.options import (
+    LEAST_BEARING_SD_RAD,
+    LEAST_RANGE_SD_M,
+    RunOptions,
+    core_params,
+    odometry_lead_us,
+    parse_association,
+)
+from bslam.experiment.runner import run_log
+from bslam.log import Odometry, Robot
 
 
 def velocity(log):
@@ -44,6 +52,53 @@ def test_the_robot_s_noise_and_geometry_reach_the_filter(made):
     assert (params["mount_x_m"], params["mount_yaw_rad"], params["sighting_delay_us"]) == (0.1, 0.2, 5000)
     assert core_params(RunOptions(), log)["range_sd_per_m"] == 0.0  # a scale of infinity
     assert math.isinf(log.robot.range_sigma_scale_m)
+
+
+@pytest.mark.parametrize(
+    ("key", "low", "high"),
+    [
+        ("wheelbase_m", 1e-3, 10.0),
+        ("wheel_speed_sigma_mps", 0.0, 100.0),
+        ("bearing_sigma_rad", 0.0, 3.2),
+        ("range_sigma_floor_m", 0.0, 100.0),
+        ("range_sigma_fraction", 0.0, 10.0),
+        ("range_sigma_scale_m", 0.1, math.inf),
+        ("sensor_x_m", -100.0, 100.0),
+        ("sensor_y_m", -100.0, 100.0),
+        ("sensor_yaw_rad", -3.2, 3.2),
+        ("sighting_delay_us", 0, 10_000_000),
+        ("left_radius_m", 1e-4, 10.0),
+        ("right_radius_m", 1e-4, 10.0),
+        ("ticks_per_revolution", 1, 10_000_000),
+        ("counter_bits", 2, 32),
+    ],
+)
+def test_whatever_robot_toml_may_hold_the_core_takes(made, key, low, high):
+    log = made.circle_log(steps=1)
+    log = replace(log, odometry=replace(log.odometry, kind="ticks"))
+    encoders = {"left_radius_m": 0.1, "right_radius_m": 0.1, "ticks_per_revolution": 10, "counter_bits": 16}
+    rule = next(one for one in fields(Robot) if one.name == key).metadata["rule"]
+    for value in (low, high):
+        robot = replace(log.robot, **(encoders | {key: rule.convert(value, key)}))
+        Slam(
+            core_params(RunOptions(), replace(log, robot=robot, odometry=replace(log.odometry, kind="ticks")))
+        )
+    step = 1 if isinstance(low, int) else 1e-5
+    for value in {low - step, high + step} - {math.inf}:
+        with pytest.raises(BslamError, match=f"{key}: .* is not allowed; allowed: "):
+            rule.convert(value, key)
+
+
+def test_a_sensor_without_noise_is_told_to_err_a_little(made):
+    log = made.circle_log(steps=400)
+    perfect = replace(log.robot, bearing_sigma_rad=0.0, range_sigma_fraction=0.0)
+    params = core_params(RunOptions(), replace(log, robot=perfect))
+    assert params["bearing_sd_rad"] == LEAST_BEARING_SD_RAD
+    assert params["range_sd_floor_m"] == LEAST_RANGE_SD_M
+    assert next(one for one in Slam.parameters() if one.name == "bearing_sd_rad").low == LEAST_BEARING_SD_RAD
+    assert core_params(RunOptions(), log)["range_sd_floor_m"] == 0.0  # its distances err in proportion
+    trace = run_log(replace(log, robot=perfect), RunOptions())
+    assert np.hypot(trace.pose[-1, 0] - log.truth.x_m[-1], trace.pose[-1, 1] - log.truth.y_m[-1]) < 1e-3
 
 
 def test_sigma_of_the_command_line_wins_over_the_log_s_and_set_over_all(made):

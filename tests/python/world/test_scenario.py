@@ -94,7 +94,7 @@ FIRST_BEACON = "{ id = 0, at = [1.5, 0.0] }"
             "",
             r"key body: is missing; allowed: a table \[body\]",
         ),
-        ("wheelbase_m = 0.4", "", r"\[body\], key wheelbase_m: is missing; allowed: a finite number above 0"),
+        ("wheelbase_m = 0.4", "", r"\[body\], key wheelbase_m: is missing; allowed: a number from 0"),
         ("wheelbase_m = 0.4", "wheelbase_m = '0.4'", r"\[body\], key wheelbase_m: '0\.4' is not allowed"),
         (
             "wheelbase_m = 0.4",
@@ -114,6 +114,7 @@ FIRST_BEACON = "{ id = 0, at = [1.5, 0.0] }"
         ),
         ('noise = "speedometer"', 'noise = "white"', r"key noise: 'white' .*'speedometer' or 'actuation'"),
         (SENSOR, SENSOR + "x_m = 0.4\n", r"\[sensor\], keys x_m, y_m: \(0\.4, 0\.0\) .*on the robot's body"),
+        ("wheelbase_m = 0.4", "wheelbase_m = 40", r"\[body\], key wheelbase_m: 40 .*from 0\.001 to 10"),
         (SENSOR, SENSOR + "outlier_share = 1.5\n", r"outlier_share: 1\.5 is not allowed; allowed: .* 0 to 1"),
         (SENSOR, "[encoders]\ncounter_bits = 64\n" + SENSOR, r"\[encoders\], key left_radius_m: is missing"),
         (

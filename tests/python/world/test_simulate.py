@@ -213,8 +213,8 @@ def test_simulate_tells_the_log_where_the_sensor_sits(short_room: Scenario) -> N
     ("arguments", "expected"),
     [
         ({"seed": -1}, "seed: -1 .*an integer from 0"),
-        ({"seed": 0, "sigma_mps": -0.1}, r"sigma: -0\.1 .*a finite number from 0"),
-        ({"seed": 0, "sigma_mps": math.nan}, "sigma: nan"),
+        ({"seed": 0, "sigma_mps": -0.1}, r"sigma, m/s: -0\.1 .*a number from 0"),
+        ({"seed": 0, "sigma_mps": math.nan}, "sigma, m/s: nan"),
         ({"seed": 0, "noise": "pink"}, "noise: 'pink' .*speedometer or actuation"),
     ],
 )
