@@ -30,7 +30,7 @@ def _macros(real: str, beacons_max: int) -> list[tuple[str, str]]:
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
         ("BSLAM_RAYS_MAX", str(beacons_max)),
-        ("BSLAM_SIGHTINGS_MAX", "64"),
+        ("BSLAM_SIGHTINGS_MAX", str(max(64, beacons_max + 16))),  # every beacon at once, and some clutter
         ("BSLAM_HISTORY_MAX", "128"),
     ]
 

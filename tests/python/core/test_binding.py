@@ -120,6 +120,14 @@ def test_slam_holds_as_many_beacons_as_asked(size: int) -> None:
     assert len(slam.beacons()) == size
 
 
+@pytest.mark.parametrize("size", SIZE_CLASSES)
+def test_sightings_of_all_beacons_at_once_and_some_clutter_fit(size: int) -> None:
+    slam, count = Slam(beacons_max=size), size + 16
+    bearing_rad = np.linspace(-3.0, 3.0, count).tolist()
+    accounts = slam.sightings(0, bearing_rad, [2.0] * count, list(range(count)), [True] * count)
+    assert [one.result for one in accounts] == ["new"] * size + ["rejected"] * 16
+
+
 # ---- refusals ----------------------------------------------------------------------------------------------
 
 ONE = ([0.1], [2.0], [3], [True])
