@@ -60,8 +60,9 @@ def library(real: str, beacons_max: int) -> Library:
     if real not in REALS:
         raise BslamError(f"scalar type {real!r}: allowed are {', '.join(REALS)}")
     for size in SIZE_CLASSES:
-        if size >= beacons_max:
+        if size >= beacons_max >= 1:
             return Library(real, size)
     raise BslamError(
-        f"{beacons_max} beacons: the largest build holds {SIZE_CLASSES[-1]} (core/builds.py, SIZE_CLASSES)"
+        f"{beacons_max} beacons: allowed are 1 to {SIZE_CLASSES[-1]}, as the largest build holds "
+        "(core/builds.py, SIZE_CLASSES)"
     )

@@ -9,6 +9,13 @@ from numpy.typing import NDArray
 from bslam.core.raw import library
 from bslam.errors import BslamError
 
+# What velocity_states = 1 allows of other parameters: the only contradictions that there are.
+_BESIDE_VELOCITY_STATES = {
+    "scale_states": "0",
+    "left_speed_sd_mps": "a number above 0",
+    "right_speed_sd_mps": "a number above 0",
+}
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -94,9 +101,10 @@ class Slam:
             setattr(c_params, name, int(value) if parameter.is_integer else value)
         bad_id = self._ffi.new("int *", -1)
         status = self._lib.bslam_slam_init(self._slam, c_params, bad_id)
-        bad = self._lib.bslam_params_info(bad_id[0])
-        name = self._raw.text(bad.name) if bad else ""
-        self._raw.ensure(status, f"parameter {name} contradicts another (see `bslam params`)")
+        if status:
+            name = self._raw.text(self._lib.bslam_params_info(bad_id[0]).name)
+            message = f"parameter {name} = {getattr(c_params, name):g} contradicts velocity_states = 1"
+            self._raw.ensure(status, f"{message}: allowed beside it is {_BESIDE_VELOCITY_STATES[name]}")
 
     @staticmethod
     def parameters(real: str = "float") -> list[Parameter]:
@@ -130,14 +138,19 @@ class Slam:
     def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
         """One reading of kind "wheels" (a, b = left_m, right_m), "ticks" (counters), "velocity" (m/s, rad/s).
 
-        Raises CoreError if refused: the estimate is then unchanged.
+        Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
+        if kind not in self._sources:
+            raise BslamError(f"odometry of kind {kind!r}: allowed are {', '.join(self._sources)}")
         source, name_a, name_b = self._sources[kind]
         reading = self._reading
         reading.source = source
-        reading.time_us = time_us
-        setattr(reading, name_a, a)
-        setattr(reading, name_b, b)
+        try:
+            reading.time_us = time_us
+            setattr(reading, name_a, a)
+            setattr(reading, name_b, b)
+        except OverflowError as error:
+            raise BslamError(f"odometry at {time_us} us ({name_a} {a}, {name_b} {b}): {error}") from error
         reading.has_gyro = gyro_radps is not None
         reading.gyro_radps = gyro_radps or 0.0
         status = self._lib.bslam_slam_odometry(self._slam, reading)
@@ -162,11 +175,14 @@ class Slam:
     ) -> list[Account]:
         """One image: equal lengths; range NaN: direction only; label -1: no identity.
 
-        Raises CoreError if refused: the estimate is then unchanged.
+        Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
         rows = list(zip(bearing_rad, range_m, label, mappable, strict=True))
-        array = self._raw.sightings(rows)
-        status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
+        try:
+            array = self._raw.sightings(rows)
+            status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
+        except OverflowError as error:
+            raise BslamError(f"frame at {time_us} us: {error}") from error
         if status:
             bad = self._lib.bslam_slam_bad_sighting(self._slam)
             which = f", sighting {bad} {rows[bad]}" if bad >= 0 else f", {len(rows)} sightings"

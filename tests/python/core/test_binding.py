@@ -89,22 +89,24 @@ def test_params_unknown_name_is_refused_with_the_known_ones() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "blamed"),
+    ("name", "value", "allowed"),
     [
-        ({"velocity_states": 1, "scale_states": 1}, "scale_states"),
-        ({"velocity_states": 1, "left_speed_sd_mps": 0.0}, "left_speed_sd_mps"),
-        ({"velocity_states": 1, "right_speed_sd_mps": 0.0}, "right_speed_sd_mps"),
+        ("scale_states", 1, "0"),
+        ("left_speed_sd_mps", 0.0, "a number above 0"),
+        ("right_speed_sd_mps", 0.0, "a number above 0"),
     ],
 )
-def test_params_that_contradict_each_other_are_refused(values: dict[str, float], blamed: str) -> None:
-    with pytest.raises(CoreError, match=blamed) as refusal:
-        Slam(values)
+def test_params_that_contradict_each_other_are_both_named(name: str, value: float, allowed: str) -> None:
+    message = f"{name} = {value:g} contradicts velocity_states = 1: allowed beside it is {allowed}"
+    with pytest.raises(CoreError, match=message) as refusal:
+        Slam({"velocity_states": 1, name: value})
     assert refusal.value.status == "BSLAM_E_PARAMETER"
 
 
-def test_slam_more_beacons_than_any_build_holds_are_refused() -> None:
-    with pytest.raises(BslamError, match=f"the largest build holds {max(SIZE_CLASSES)}"):
-        Slam(beacons_max=max(SIZE_CLASSES) + 1)
+def test_slam_numbers_of_beacons_that_no_build_holds_are_refused() -> None:
+    for beacons_max in (-1, 0, max(SIZE_CLASSES) + 1):
+        with pytest.raises(BslamError, match=f"{beacons_max} beacons: allowed are 1 to {max(SIZE_CLASSES)}"):
+            Slam(beacons_max=beacons_max)
 
 
 def test_slam_unknown_scalar_type_is_refused() -> None:
@@ -233,9 +235,27 @@ def test_sightings_of_unequal_lengths_are_an_error_of_the_caller() -> None:
         started().sightings(40_000, [0.1, 0.2], [1.0], [1, 2], [True, True])
 
 
-def test_odometry_of_unknown_kind_is_an_error_of_the_caller() -> None:
-    with pytest.raises(KeyError, match="sonar"):
-        started().odometry("sonar", 40_000, 0.0, 0.0)
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda s: s.odometry("sonar", 40_000, 0.0, 0.0), "'sonar': allowed are wheels, ticks, velocity"),
+        (lambda s: s.odometry("ticks", 40_000, -1, 0), r"odometry at 40000 us \(left_ticks -1, .*convert"),
+        (lambda s: s.odometry("wheels", 2**63, 0.0, 0.0), f"odometry at {2**63} us .*convert"),
+        (
+            lambda s: s.sightings(40_000, [0.1], [2.0], [2**40], [True]),
+            f"frame at 40000 us: .*{2**40}.*int32",
+        ),
+        (lambda s: s.sightings(2**63, *ONE), f"frame at {2**63} us: .*convert"),
+    ],
+)
+def test_what_c_cannot_be_told_is_named_and_changes_nothing(
+    call: Callable[[Slam], object], text: str
+) -> None:
+    slam = started()
+    before = slam.state_bytes
+    with pytest.raises(BslamError, match=text):
+        call(slam)
+    assert slam.state_bytes == before
 
 
 # ---- results -----------------------------------------------------------------------------------------------
