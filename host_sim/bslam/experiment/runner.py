@@ -183,8 +183,7 @@ class _Run:
 
     def _changed_parameters(self) -> dict[str, Number]:
         defaults = self.slam.defaults()
-        # Seven digits: float32's nearest to 0.3 is not Python's.
-        params = {name: float(f"{value:.7g}") for name, value in self.slam.params.items()}
+        params = {name: _as_written(value) for name, value in self.slam.params.items()}
         return {name: value for name, value in params.items() if value != defaults[name]}
 
     def _map_beacon(self, beacon: Any) -> MapBeacon:
@@ -200,6 +199,11 @@ class _Run:
             range_m=beacon.range_m,
             phi_rad=beacon.phi_rad,
         )
+
+
+def _as_written(value: Number) -> Number:
+    """Seven digits, since float32's nearest to 0.3 is not Python's; a whole number with all of its digits."""
+    return value if isinstance(value, int) else float(f"{value:.7g}")
 
 
 class _Frames:

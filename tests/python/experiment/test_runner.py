@@ -204,6 +204,13 @@ def test_with_a_lead_the_pose_is_that_of_the_past(log):
     assert trace.pose[:, 0].tolist() == [0.0, 0.0, 0.03]
 
 
+def test_parameters_that_are_whole_numbers_stay_so_to_the_last_digit(made):
+    options = RunOptions(parameters=(("confirm_window_us", 123_456_789), ("range_sd_fraction", 0.3)))
+    changed = run_log(made.circle_log(steps=1), options).parameters
+    assert repr(changed["confirm_window_us"]) == "123456789"
+    assert changed["range_sd_fraction"] == 0.3
+
+
 def test_the_trace_has_the_covariance_as_a_matrix_and_the_changed_parameters(log):
     trace, _ = run(log)
     assert trace.covariance[1].tolist() == [[1.0, 2.0, 4.0], [2.0, 3.0, 5.0], [4.0, 5.0, 6.0]]
