@@ -6,7 +6,7 @@ UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c))
 # Helpers that several tests share (tests/unit/*.c); linked to every test.
 UNIT_HELPERS := $(sort $(wildcard tests/unit/*.c))
 
-SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 
 # A test may compare in double, and need not look at CMocka's `state`.
 UNIT_WARNINGS := $(C_WARNINGS) -Wno-unused-parameter

@@ -1,7 +1,7 @@
 /// Every compile-time size of the library, in one place.
 ///
 /// Override with -D or by naming a header in BSLAM_CONFIG_HEADER. Tuning that may change at run time is not
-/// here: it stands in the bslam_*_params_t structs. `make sizes` prints what each choice costs.
+/// here: it stands in bslam_params_t. `make sizes` prints what each choice costs.
 #ifndef BSLAM_BASE_CONFIG_H
 #define BSLAM_BASE_CONFIG_H
 

@@ -53,6 +53,15 @@ typedef struct bslam_beacon {
     uint8_t beacon_class;
 } bslam_beacon_t;
 
+/// What an image of the past needs beside the sensor's pose relative to the robot of now: with velocity
+/// states it is v and omega that took the robot from there to here, so the past pose depends on them. All 0
+/// for an image of now, and without velocity states, where the way since is taken as exact. MATH "Late
+/// sightings".
+typedef struct bslam_lag {
+    bslam_real_t mount_by_forward[2];  ///< d (x, y) of the past sensor on the robot of now / d v
+    bslam_real_t mount_by_turn[3];     ///< d (x, y, theta) of it / d omega
+} bslam_lag_t;
+
 /// All members are the filter's own; read them through the functions below.
 typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
@@ -63,6 +72,7 @@ typedef struct bslam_ekf {
     int32_t ray_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
+    bslam_lag_t lag;  ///< of the frame in hand; set by whoever feeds it, all 0 between frames
     // Scratch: holds nothing between calls.
     bslam_real_t pending[BSLAM_PENDING_MAX][BSLAM_STATE_PADDED];
     bslam_real_t pending_scale[BSLAM_PENDING_MAX];
@@ -93,9 +103,9 @@ void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real
 
 // ---- sightings --------------------------------------------------------------------------------------------
 
-/// A row of H: not zero only at the robot's pose and at `dim` neighbouring state values from `at` on.
+/// A row of H: not zero only at the robot's own values and at `dim` neighbouring state values from `at` on.
 typedef struct bslam_row {
-    bslam_real_t pose[3];
+    bslam_real_t base[5];  ///< by x, y, theta and, with velocity states, v, omega; else the last two are 0
     bslam_real_t other[BSLAM_RAY_DIM];
     uint16_t at;
     uint16_t dim;

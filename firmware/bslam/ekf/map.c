@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "bslam/ekf/ekf.h"
+#include "bslam/ekf/internal.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 
@@ -31,17 +32,39 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
 
 // ---- growing ----------------------------------------------------------------------------------------------
 
-/// A new state value that depends on the robot's pose, and through `own_var` on the sighting: writes its row
-/// of P.
-static void append_value(bslam_ekf_t *ekf, bslam_real_t value, const bslam_real_t by_pose[3],
-                         bslam_real_t own_var)
+/// A new state value: its derivatives by the robot's own values, and the variance that the sighting adds.
+typedef struct new_value {
+    bslam_real_t mean;
+    bslam_real_t by_base[5];
+    bslam_real_t own_var;
+} new_value_t;
+
+/// A value whose derivatives by the robot's pose and by the sensor's position and direction are given.
+static new_value_t new_value(const bslam_ekf_t *ekf, bslam_real_t mean, const bslam_real_t by_pose[3],
+                             bslam_real_t by_heading, bslam_real_t own_var)
+{
+    new_value_t value = {.mean = mean, .by_base = {by_pose[0], by_pose[1], by_pose[2]}, .own_var = own_var};
+    bslam_lag_by_velocity(ekf, by_pose[0], by_pose[1], by_heading, value.by_base + 3);
+    return value;
+}
+
+/// Writes the value and its row of P at the end of the state.
+static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
 {
     const int at = ekf->dim;
+    const bslam_real_t *by_base = value->by_base;
     bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
     memset(row, 0, (size_t)BSLAM_SYMMAT_PADDED(at + 1) * sizeof *row);
-    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, by_pose, row);
-    row[at] = by_pose[0] * row[0] + by_pose[1] * row[1] + by_pose[2] * row[2] + own_var;
-    ekf->mean[at] = value;
+    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, by_base, row);
+    if (by_base[3] != 0 || by_base[4] != 0) {
+        bslam_symmat_add_columns(ekf->covariance, at, BSLAM_STATE_FORWARD, 2, by_base + 3, row);
+    }
+    bslam_real_t variance = value->own_var;
+    for (int k = 0; k < ekf->base_dim; k++) {
+        variance += by_base[k] * row[k];
+    }
+    row[at] = variance;
+    ekf->mean[at] = value->mean;
     ekf->dim = at + 1;
 }
 
@@ -55,15 +78,18 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, true);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
+    const bslam_real_t xx = point.x_by_range * point.x_by_range * range_var +
+                            point.x_by_bearing * point.x_by_bearing * bearing_var;
+    const bslam_real_t yx = point.x_by_range * point.y_by_range * range_var +
+                            point.x_by_bearing * point.y_by_bearing * bearing_var;
+    const bslam_real_t yy = point.y_by_range * point.y_by_range * range_var +
+                            point.y_by_bearing * point.y_by_bearing * bearing_var;
+    const new_value_t x = new_value(ekf, point.x_m, x_by_pose, point.x_by_bearing, xx);
+    const new_value_t y = new_value(ekf, point.y_m, y_by_pose, point.y_by_bearing, yy);
     const int at = ekf->dim;
-    append_value(ekf, point.x_m, x_by_pose,
-                 point.x_by_range * point.x_by_range * range_var +
-                     point.x_by_bearing * point.x_by_bearing * bearing_var);
-    append_value(ekf, point.y_m, y_by_pose,
-                 point.y_by_range * point.y_by_range * range_var +
-                     point.y_by_bearing * point.y_by_bearing * bearing_var);
-    ekf->covariance[bslam_symmat_at(at + 1, at)] += point.x_by_range * point.y_by_range * range_var +
-                                                    point.x_by_bearing * point.y_by_bearing * bearing_var;
+    append_value(ekf, &x);
+    append_value(ekf, &y);
+    ekf->covariance[bslam_symmat_at(at + 1, at)] += yx;
 }
 
 static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
@@ -75,12 +101,18 @@ static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
     const bslam_real_t y_by_pose[3] = {0, 1, sensor.y_by_theta};
     const bslam_real_t direction_by_pose[3] = {0, 0, 1};
     const bslam_real_t distance_by_pose[3] = {0, 0, 0};
+    const bslam_real_t direction_rad = bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad);
+    const bslam_real_t direction_var = bslam_bearing_variance_rad2(params, false);
     const bslam_real_t sd = params->ray_inverse_distance_sd_per_m;
-    append_value(ekf, sensor.pose.x_m, x_by_pose, 0);
-    append_value(ekf, sensor.pose.y_m, y_by_pose, 0);
-    append_value(ekf, bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad), direction_by_pose,
-                 bslam_bearing_variance_rad2(params, false));
-    append_value(ekf, params->ray_inverse_distance_per_m, distance_by_pose, sd * sd);
+    const new_value_t values[BSLAM_RAY_DIM] = {
+        new_value(ekf, sensor.pose.x_m, x_by_pose, 0, 0),
+        new_value(ekf, sensor.pose.y_m, y_by_pose, 0, 0),
+        new_value(ekf, direction_rad, direction_by_pose, 1, direction_var),
+        new_value(ekf, params->ray_inverse_distance_per_m, distance_by_pose, 0, sd * sd),
+    };
+    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
+        append_value(ekf, &values[k]);
+    }
 }
 
 /// The next free place, filled with a beacon of this kind whose state values begin at the end of the state.

@@ -129,8 +129,8 @@ static void measure_velocity(bslam_ekf_t *ekf, const bslam_params_t *params, con
     const bslam_real_t forward_innovation = motion->forward_m * rate - ekf->mean[BSLAM_STATE_FORWARD];
     const bslam_real_t turn_innovation = motion->turn_rad * rate - ekf->mean[BSLAM_STATE_TURN];
 
-    const bslam_row_t forward_row = {.at = BSLAM_STATE_FORWARD, .dim = 1, .other = {forward_weight}};
-    const bslam_row_t turn_row = {.at = BSLAM_STATE_FORWARD, .dim = 2, .other = {carried, turn_weight}};
+    const bslam_row_t forward_row = {.base = {0, 0, 0, forward_weight}};
+    const bslam_row_t turn_row = {.base = {0, 0, 0, carried, turn_weight}};
     bslam_ekf_apply_scalar(ekf, &forward_row, forward_weight * forward_innovation, 1);
     bslam_ekf_apply_scalar(ekf, &turn_row, carried * forward_innovation + turn_weight * turn_innovation, 1);
     bslam_ekf_correct(ekf, params);

@@ -11,7 +11,10 @@
 
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
-    bslam_real_t sum = row->pose[0] * vector[0] + row->pose[1] * vector[1] + row->pose[2] * vector[2];
+    bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
+    if (bslam_row_has_velocity(row)) {
+        sum += row->base[3] * vector[3] + row->base[4] * vector[4];
+    }
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * vector[row->at + k];
     }
@@ -21,7 +24,10 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
     memset(out, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof *out);
-    bslam_symmat_add_columns(ekf->covariance, ekf->dim, 0, 3, row->pose, out);
+    bslam_symmat_add_columns(ekf->covariance, ekf->dim, 0, 3, row->base, out);
+    if (bslam_row_has_velocity(row)) {
+        bslam_symmat_add_columns(ekf->covariance, ekf->dim, BSLAM_STATE_FORWARD, 2, row->base + 3, out);
+    }
     if (row->dim > 0) {
         bslam_symmat_add_columns(ekf->covariance, ekf->dim, row->at, row->dim, row->other, out);
     }
@@ -34,38 +40,60 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
     }
 }
 
-static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
-                     const bslam_real_t *by_beacon, bslam_row_t *row)
+/// by_heading: the derivative by the sensor's own direction.
+static void fill_row(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
+                     bslam_real_t by_heading, const bslam_real_t *by_beacon, bslam_row_t *row)
 {
     static const uint16_t dims[] = {
         [BSLAM_BEACON_POINT] = BSLAM_POINT_DIM, [BSLAM_BEACON_RAY] = BSLAM_RAY_DIM};
     row->at = (uint16_t)beacon->at;
     row->dim = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : dims[beacon->kind];
-    memcpy(row->pose, by_pose, sizeof row->pose);
+    memcpy(row->base, by_pose, 3 * sizeof row->base[0]);
     memcpy(row->other, by_beacon, sizeof row->other);
+    bslam_lag_by_velocity(ekf, by_pose[0], by_pose[1], by_heading, row->base + 3);
 }
 
-/// The state index of a row's k-th value, pose first.
-static int row_index(const bslam_row_t *row, int k)
+void bslam_lag_by_velocity(const bslam_ekf_t *ekf, bslam_real_t by_x, bslam_real_t by_y,
+                           bslam_real_t by_heading, bslam_real_t out[2])
 {
-    return k < 3 ? k : row->at + k - 3;
+    const bslam_lag_t *lag = &ekf->lag;
+    out[0] = 0;
+    out[1] = 0;
+    if (lag->mount_by_turn[2] == 0) {
+        return;
+    }
+    bslam_real_t s;
+    bslam_real_t c;
+    bslam_sin_cos(ekf->mean[BSLAM_STATE_THETA], &s, &c);
+    const bslam_real_t by_ahead = c * by_x + s * by_y;
+    const bslam_real_t by_left = c * by_y - s * by_x;
+    out[0] = by_ahead * lag->mount_by_forward[0] + by_left * lag->mount_by_forward[1];
+    out[1] = by_ahead * lag->mount_by_turn[0] + by_left * lag->mount_by_turn[1] +
+             by_heading * lag->mount_by_turn[2];
 }
 
-static bslam_real_t row_value(const bslam_row_t *row, int k)
+/// The state index of a row's k-th value, the robot's own first.
+static int row_index(const bslam_ekf_t *ekf, const bslam_row_t *row, int k)
 {
-    return k < 3 ? row->pose[k] : row->other[k - 3];
+    return k < ekf->base_dim ? k : row->at + k - ekf->base_dim;
+}
+
+static bslam_real_t row_value(const bslam_ekf_t *ekf, const bslam_row_t *row, int k)
+{
+    return k < ekf->base_dim ? row->base[k] : row->other[k - ekf->base_dim];
 }
 
 /// a P bᵀ for two rows of one sighting, from the covariance as it is stored.
 static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
     bslam_real_t sum = 0;
-    for (int i = 0; i < 3 + a->dim; i++) {
+    for (int i = 0; i < ekf->base_dim + a->dim; i++) {
         bslam_real_t inner = 0;
-        for (int j = 0; j < 3 + b->dim; j++) {
-            inner += bslam_symmat_get(ekf->covariance, row_index(a, i), row_index(b, j)) * row_value(b, j);
+        for (int j = 0; j < ekf->base_dim + b->dim; j++) {
+            inner += bslam_symmat_get(ekf->covariance, row_index(ekf, a, i), row_index(ekf, b, j)) *
+                     row_value(ekf, b, j);
         }
-        sum += row_value(a, i) * inner;
+        sum += row_value(ekf, a, i) * inner;
     }
     return sum;
 }
@@ -78,7 +106,7 @@ static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beaco
                                        const bslam_observation_t *seen, const bslam_row_t *bearing)
 {
     bslam_row_t stretch;
-    fill_row(beacon, seen->stretch_by_pose, seen->stretch_by_beacon, &stretch);
+    fill_row(ekf, beacon, seen->stretch_by_pose, 0, seen->stretch_by_beacon, &stretch);
     const bslam_real_t cross = quadratic(ekf, &stretch, bearing);
     return quadratic(ekf, &stretch, &stretch) * quadratic(ekf, bearing, bearing) + cross * cross;
 }
@@ -115,7 +143,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
-    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    fill_row(ekf, beacon, seen.bearing_by_pose, -1, seen.bearing_by_beacon, &innovation->bearing_row);
     if (!sighting->has_range) {
         innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
@@ -123,7 +151,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     if (sighting->has_range) {
         innovation->range_m = sighting->range_m - seen.range_m;
         innovation->range_var_m2 = bslam_range_variance_m2(params, seen.range_m);
-        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+        fill_row(ekf, beacon, seen.range_by_pose, 0, seen.range_by_beacon, &innovation->range_row);
     }
     return BSLAM_OK;
 }
@@ -291,7 +319,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 /// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
 static void transport_covariance(bslam_ekf_t *ekf)
 {
-    const bslam_row_t theta_row = {.pose = {0, 0, 1}};
+    const bslam_row_t theta_row = {.base = {0, 0, 1}};
     bslam_ekf_project(ekf, &theta_row, ekf->mirror);
     const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
     for (int i = 0; i < ekf->dim; i++) {

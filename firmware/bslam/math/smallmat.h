@@ -13,24 +13,19 @@ typedef struct bslam_sym2 {
     bslam_real_t yy;
 } bslam_sym2_t;
 
-/// Lower triangle L with L Lᵀ = m. BSLAM_E_SINGULAR if m is not positive definite; then *l is unchanged.
+/// [[xx, 0], [yx, yy]].
 typedef struct bslam_lower2 {
     bslam_real_t xx;
     bslam_real_t yx;
     bslam_real_t yy;
 } bslam_lower2_t;
 
+/// Lower triangle L with L Lᵀ = m. BSLAM_E_SINGULAR if m is not positive definite; then *l is unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_sym2_cholesky(const bslam_sym2_t *m, bslam_lower2_t *l);
 
 /// vᵀ m⁻¹ v for v = (x, y): the squared Mahalanobis distance. BSLAM_E_SINGULAR if m is not positive definite;
 /// then *distance2 is unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_sym2_mahalanobis(const bslam_sym2_t *m, bslam_real_t x, bslam_real_t y,
                                                        bslam_real_t *distance2);
-
-/// Determinant.
-static inline bslam_real_t bslam_sym2_determinant(const bslam_sym2_t *m)
-{
-    return m->xx * m->yy - m->xy * m->xy;
-}
 
 #endif

@@ -192,6 +192,8 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
         return status;
     }
     if (odometry->has_time && is_jump(params, &travel, dt_s)) {
+        // Or the same jump would pass as soon as enough time has gone by.
+        odometry->has_ticks = odometry->has_ticks && reading->source != BSLAM_ODOMETRY_TICKS;
         return BSLAM_E_JUMP;
     }
     if (odometry->has_time) {

@@ -49,8 +49,9 @@ void bslam_odometry_restart(bslam_odometry_t *odometry);
 /// The motion since the reading before, into *motion. O(1).
 /// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 10 s. BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, an unknown source),
-/// BSLAM_E_JUMP: see status.h. On any of these nothing changes. A first reading without a started clock has
-/// no interval: BSLAM_OK with motion->dt_s = 0.
+/// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
+/// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
+/// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_params_t *params,
                                                     const bslam_odometry_reading_t *reading,
                                                     bslam_motion_t *motion);

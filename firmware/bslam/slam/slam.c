@@ -16,10 +16,11 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     if (status != BSLAM_OK) {
         return status;
     }
+    const bslam_params_t copy = *params;  // params may stand in *slam: starting over
     *slam = (bslam_slam_t){0};
-    slam->params = *params;
+    slam->params = copy;
     slam->bad_sighting = -1;
-    bslam_ekf_init(&slam->ekf, params);
+    bslam_ekf_init(&slam->ekf, &slam->params);
     bslam_odometry_init(&slam->odometry);
     return BSLAM_OK;
 }
@@ -41,6 +42,9 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
     bslam_odometry_t odometry = slam->odometry;
     bslam_motion_t motion;
     bslam_status_t status = bslam_odometry_read(&odometry, &slam->params, reading, &motion);
+    if (status == BSLAM_E_JUMP) {
+        slam->odometry = odometry;
+    }
     if (status != BSLAM_OK) {
         return status;
     }
@@ -93,34 +97,21 @@ static bslam_pose_t step_pose(const bslam_params_t *params, const bslam_history_
     return bslam_motion_step(kind, &start, step->forward_m * share, step->turn_rad * share, &unused);
 }
 
-/// The robot at time_us as seen from the robot now. BSLAM_E_TIME: outside the history, or too far ahead. MATH
-/// "Late sightings".
-static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
+static const bslam_history_step_t *newest_step(const bslam_slam_t *slam, int back)
+{
+    return &slam->history[(slam->history_next + 2 * BSLAM_HISTORY_MAX - 1 - back) % BSLAM_HISTORY_MAX];
+}
+
+/// The robot at an earlier time as seen from the robot now.
+static bslam_status_t look_back(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
 {
     bslam_pose_t since = {0, 0, 0};
-    if (!slam->odometry.has_time || time_us == slam->odometry.time_us) {
-        *relative = since;
-        return BSLAM_OK;
-    }
-    const int newest = (slam->history_next + BSLAM_HISTORY_MAX - 1) % BSLAM_HISTORY_MAX;
-    if (time_us > slam->odometry.time_us) {
-        if (time_us - slam->odometry.time_us > slam->params.ahead_max_us) {
-            return BSLAM_E_TIME;
-        }
-        if (slam->history_count > 0) {
-            const bslam_history_step_t *last = &slam->history[newest];
-            const bslam_real_t ahead_s = (bslam_real_t)(time_us - slam->odometry.time_us) * SECONDS_PER_US;
-            since = step_pose(&slam->params, last, ahead_s / last->dt_s);
-        }
-        *relative = since;
-        return BSLAM_OK;
-    }
     for (int k = 0; k < slam->history_count; k++) {
-        const bslam_history_step_t *step =
-            &slam->history[(newest + BSLAM_HISTORY_MAX - k) % BSLAM_HISTORY_MAX];
+        const bslam_history_step_t *step = newest_step(slam, k);
         const bslam_real_t back_s = (bslam_real_t)(step->end_us - time_us) * SECONDS_PER_US;
         const bool begins_before = back_s <= step->dt_s;
-        const bslam_pose_t part = step_pose(&slam->params, step, begins_before ? back_s / step->dt_s : 1);
+        const bslam_real_t share = begins_before ? back_s / step->dt_s : 1;
+        const bslam_pose_t part = step_pose(&slam->params, step, share);
         since = bslam_pose_compose(&part, &since);
         if (begins_before) {
             *relative = bslam_pose_inverse(&since);
@@ -128,6 +119,56 @@ static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, b
         }
     }
     return BSLAM_E_TIME;
+}
+
+/// The robot at a time after the last odometry: it goes on as in the last step.
+static bslam_status_t look_ahead(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
+{
+    const int64_t ahead_us = time_us - slam->odometry.time_us;
+    if (ahead_us > slam->params.ahead_max_us) {
+        return BSLAM_E_TIME;
+    }
+    *relative = (bslam_pose_t){0, 0, 0};
+    if (slam->history_count > 0) {
+        const bslam_history_step_t *last = newest_step(slam, 0);
+        *relative = step_pose(&slam->params, last, (bslam_real_t)ahead_us * SECONDS_PER_US / last->dt_s);
+    }
+    return BSLAM_OK;
+}
+
+/// The robot at time_us as seen from the robot now. BSLAM_E_TIME: outside the history, or too far ahead. MATH
+/// "Late sightings".
+static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
+{
+    if (!slam->odometry.has_time || time_us == slam->odometry.time_us) {
+        *relative = (bslam_pose_t){0, 0, 0};
+        return BSLAM_OK;
+    }
+    return time_us > slam->odometry.time_us ? look_ahead(slam, time_us, relative)
+                                            : look_back(slam, time_us, relative);
+}
+
+/// How the sensor of an image of the past depends on v and omega. `relative` is the robot then, seen from the
+/// robot now, and `mount` the sensor then.
+static bslam_lag_t describe_lag(const bslam_slam_t *slam, int64_t taken_us, const bslam_pose_t *relative,
+                                const bslam_pose_t *mount)
+{
+    bslam_lag_t lag = {{0, 0}, {0, 0, 0}};
+    if (slam->params.velocity_states == 0 || !slam->odometry.has_time) {
+        return lag;
+    }
+    // v and omega took the robot from there to here: backwards along the chord, and half of the turn about
+    // it.
+    const bslam_real_t elapsed_s = (bslam_real_t)(slam->odometry.time_us - taken_us) * SECONDS_PER_US;
+    bslam_real_t s;
+    bslam_real_t c;
+    bslam_sin_cos(relative->theta_rad / 2, &s, &c);
+    lag.mount_by_forward[0] = -elapsed_s * c;
+    lag.mount_by_forward[1] = -elapsed_s * s;
+    lag.mount_by_turn[0] = elapsed_s * (mount->y_m - relative->y_m / 2);
+    lag.mount_by_turn[1] = -elapsed_s * (mount->x_m - relative->x_m / 2);
+    lag.mount_by_turn[2] = -elapsed_s;
+    return lag;
 }
 
 // ---- sightings --------------------------------------------------------------------------------------------
@@ -145,7 +186,7 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 
 /// Checks a frame, and says where the sensor was relative to the robot's present pose.
 static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                  int count, bslam_pose_t *mount)
+                                  int count, bslam_pose_t *mount, bslam_lag_t *lag)
 {
     slam->bad_sighting = -1;
     if (count < 0 || count > BSLAM_SIGHTINGS_MAX) {
@@ -161,12 +202,14 @@ static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bsl
             return status;
         }
     }
+    const int64_t taken_us = time_us - slam->params.sighting_delay_us;
     bslam_pose_t relative;
-    const bslam_status_t status = relative_pose(slam, time_us - slam->params.sighting_delay_us, &relative);
+    const bslam_status_t status = relative_pose(slam, taken_us, &relative);
     if (status == BSLAM_OK) {
         const bslam_params_t *p = &slam->params;
         const bslam_pose_t fixed = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
         *mount = bslam_pose_compose(&relative, &fixed);
+        *lag = describe_lag(slam, taken_us, &relative, mount);
     }
     return status;
 }
@@ -317,15 +360,19 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
                                     int count)
 {
     bslam_pose_t mount;
-    const bslam_status_t status = check_frame(slam, time_us, sightings, count, &mount);
+    bslam_lag_t lag;
+    const bslam_status_t status = check_frame(slam, time_us, sightings, count, &mount, &lag);
     if (status != BSLAM_OK) {
         slam->counters.frames_refused++;
         return status;
     }
     const bslam_frame_t frame = {
         .ekf = &slam->ekf, .params = &slam->params, .mount = &mount, .sightings = sightings, .count = count};
-    bslam_associate_method (&slam->params)(&frame, slam->matches);
+    const bslam_associate_fn associate = bslam_associate_method(&slam->params);
+    slam->ekf.lag = lag;
+    associate(&frame, slam->matches);
     use_matches(slam, time_us, &mount, sightings, count);
+    slam->ekf.lag = (bslam_lag_t){{0, 0}, {0, 0, 0}};
     tidy_map(slam, time_us, &mount);
     slam->last_frame_us = time_us;
     slam->has_frame = true;

@@ -9,7 +9,7 @@
 ///     bslam_slam_pose(&slam);
 ///
 /// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing has changed but the
-/// counters and what bslam_slam_bad_sighting answers.
+/// counters and what bslam_slam_bad_sighting answers (and the tick reference, after BSLAM_E_JUMP).
 #ifndef BSLAM_SLAM_SLAM_H
 #define BSLAM_SLAM_SLAM_H
 

@@ -84,12 +84,6 @@ static void test_mahalanobis_not_positive_is_singular_and_changes_nothing(void *
     }
 }
 
-static void test_determinant_is_the_area_scale(void **state)
-{
-    const bslam_sym2_t m = {4, 2, 9};
-    assert_true(bslam_sym2_determinant(&m) == 32);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -98,7 +92,6 @@ int main(void)
         cmocka_unit_test(test_mahalanobis_is_the_closed_form),
         cmocka_unit_test(test_mahalanobis_of_nothing_is_zero),
         cmocka_unit_test(test_mahalanobis_not_positive_is_singular_and_changes_nothing),
-        cmocka_unit_test(test_determinant_is_the_area_scale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -396,13 +396,28 @@ static void test_read_gyro_turn_of_many_revolutions_is_refused(void **state)
     assert_refused(&odometry, &params, with_gyro(wheels(START_US + STEP_US, 0, 0), -1e12), BSLAM_E_RANGE);
 }
 
-static void test_read_after_an_encoder_reset_restart_takes_a_new_reference(void **state)
+static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(void **state)
 {
     bslam_params_t params = unit_params();
     params.speed_max_mps = 2;
     bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
-    assert_refused(&odometry, &params, ticks(START_US + STEP_US, 0, 0), BSLAM_E_JUMP);
+    bslam_motion_t untouched;
+    const bslam_odometry_reading_t reset = ticks(START_US + STEP_US, 0, 0);
+    assert_int_equal(bslam_odometry_read(&odometry, &params, &reset, &untouched), BSLAM_E_JUMP);
 
+    // The jump is not waited out: the next reading is the new reference, and all the time is a gap.
+    const bslam_motion_t blind = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 5, 5));
+    assert_near(blind.forward_m, 0, 0);
+    const double dt = 2 * STEP_S;
+    assert_near(blind.forward_var_m2, (0.09 + 0.04) * dt * dt / 4 + 0.04 * dt * dt, rounding_of(0.01));
+    const bslam_motion_t after = read_ok(&odometry, &params, ticks(START_US + 3 * STEP_US, 15, 15));
+    assert_near(after.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
+}
+
+static void test_restart_starts_clock_and_ticks_anew(void **state)
+{
+    bslam_params_t params = unit_params();
+    bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
     bslam_odometry_restart(&odometry);
     const bslam_motion_t first = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 0, 0));
     assert_near(first.dt_s, 0, 0);
@@ -547,7 +562,8 @@ int main(void)
         cmocka_unit_test(test_read_wheel_faster_than_possible_is_a_jump),
         cmocka_unit_test(test_read_turn_of_many_revolutions_is_a_jump),
         cmocka_unit_test(test_read_gyro_turn_of_many_revolutions_is_refused),
-        cmocka_unit_test(test_read_after_an_encoder_reset_restart_takes_a_new_reference),
+        cmocka_unit_test(test_read_after_an_encoder_reset_the_next_ticks_are_the_reference),
+        cmocka_unit_test(test_restart_starts_clock_and_ticks_anew),
         cmocka_unit_test(test_read_first_ticks_after_the_clock_started_leave_the_interval_open),
         cmocka_unit_test(test_read_ticks_after_another_source_start_afresh),
 
