@@ -10,6 +10,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from types import ModuleType
 
 from bslam.commands import calibrate, params, replay, run, sweep, tables
@@ -31,6 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
         print(_overview())
         return 0 if words else 2
+    if words[0] == "--version":
+        print(f"bslam {version('bslam')}")
+        return 0
     name, *rest = words
     try:
         if name not in COMMANDS:
@@ -67,6 +71,7 @@ def _parser(name: str, command: ModuleType) -> argparse.ArgumentParser:
 def _overview() -> str:
     lines = [
         "usage: bslam COMMAND [options]",
+        "       bslam --version",
         "",
         "SLAM with beacons that fits in a microcontroller.",
         "",

@@ -38,23 +38,32 @@ def finish(
     Raises BslamError if an input was bad, after all that could run did.
     """
     print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
-    files = [
-        "summary.json",
-        "NAME.estimate.tum",
-        "NAME.truth.tum",
-        "NAME.map.csv",
-        "*.png",
-        *([more] if more else []),
-    ]
-    print(f"files in {out}: {', '.join(files)}")
+    print(f"files in {out}: {', '.join(_files(result, more))}")
     for outcome in result.outcomes:
         if outcome.crash is not None:
             print(f"{outcome.name} failed:\n{outcome.crash}", file=sys.stderr)
+        elif _is_nameless(outcome.entry):
+            hint = "no sighting has an identity: --association nearest or mahalanobis needs none"
+            print(f"{outcome.name}: {hint}", file=sys.stderr)
     if result.interrupted:
         print("stopped: what was finished is kept", file=sys.stderr)
     if result.bad_input is not None:
         raise BslamError(result.bad_input)
     return 0 if result.ok else 1
+
+
+def _files(result: BatchResult, more: str) -> list[str]:
+    """What was written, a run that failed having left nothing."""
+    files = ["summary.json"]
+    if not all(outcome.failed for outcome in result.outcomes):
+        files += ["NAME.estimate.tum", "NAME.truth.tum", "NAME.map.csv", "*.png"]
+    return files + ([more] if more else [])
+
+
+def _is_nameless(entry: dict[str, Any]) -> bool:
+    """With identities known, the first sighting that has one is never rejected."""
+    known = str(entry["association"]).startswith("known")
+    return known and 0 < entry.get("sightings", 0) == entry["rejected"]
 
 
 def table(entries: Sequence[dict[str, Any]], means: bool = True) -> str:

@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -114,6 +116,22 @@ def test_the_overview_lists_every_command(capsys):
     text = capsys.readouterr().out
     assert all(f"  {name}" in text for name in COMMANDS)
     assert main([]) == 2
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"bslam {version('bslam')}\n"
+
+
+def test_a_log_without_identities_is_told_what_it_needs(made, tmp_path, capsys):
+    log = made.circle_log(20)
+    nameless = replace(log.sightings, beacon_id=np.full_like(log.sightings.beacon_id, -1))
+    for name, one in (("named", log), ("nameless", replace(log, sightings=nameless))):
+        write_folder(one, tmp_path / name)
+    words = ["replay", "csv", str(tmp_path / "named"), str(tmp_path / "nameless"), "--pictures", "0"]
+    main([*words, "--jobs", "1", "--out", str(tmp_path / "out")])
+    hints = [line for line in capsys.readouterr().err.splitlines() if "--association" in line]
+    assert hints == ["nameless: no sighting has an identity: --association nearest or mahalanobis needs none"]
 
 
 def test_replay_with_options_in_any_order(log_folder, made, tmp_path, capsys):
@@ -281,8 +299,12 @@ def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, c
         )
         == 2
     )
-    assert "odometry.csv, line 2" in last_line(capsys)
+    written = capsys.readouterr()
+    assert "odometry.csv, line 2" in written.err.strip().splitlines()[-1]
+    assert "summary.json, NAME.estimate.tum" in written.out
     assert [entry["diverged"] for entry in runs(out)] == [True, False]
+    assert status_of(["replay", "csv", str(broken), "--out", str(out)]) == 2
+    assert f"files in {out}: summary.json\n" in capsys.readouterr().out
 
 
 def test_a_reader_that_goes_away_leaves_no_traceback():
