@@ -90,7 +90,8 @@
     REAL(new_d2, 40.0, 1e-3, 1e6, \
          "mahalanobis: farther than this from any beacon is a new one, between: rejected") \
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
-    INTEGER(confirm_window_us, 0, 0, 1000000000, "one not confirmed after this long is removed (0: never)")
+    INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
+            "one not confirmed by then is removed (of told identity: if contradicted); 0: none")
 // clang-format on
 
 #define BSLAM_PARAMS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;

@@ -49,6 +49,7 @@ typedef struct bslam_beacon {
     int64_t first_seen_us;
     int64_t last_seen_us;
     uint32_t sightings;  ///< that were fused, the one that started it included
+    uint32_t gated;      ///< sightings taken for it that its gate rejected
     bool confirmed;
     uint8_t beacon_class;
 } bslam_beacon_t;

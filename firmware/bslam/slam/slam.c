@@ -246,6 +246,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beac
     const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->params, innovation, &fusion);
     if (status != BSLAM_OK) {
         reject(slam, status == BSLAM_E_RANGE ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon, account);
+        beacon->gated += status == BSLAM_E_RANGE ? 1u : 0u;
         account->test_ratio = test_ratio(&slam->params, fusion.distance2);
         return;
     }
@@ -316,13 +317,23 @@ static void use_matches(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t 
     }
 }
 
+/// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
+/// reason against it: it leaves if sightings contradicted it.
+static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
+{
+    const int64_t window_us = params->confirm_window_us;
+    if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
+        return false;
+    }
+    return params->association != 0 || beacon->gated > 0;
+}
+
 /// Rays whose distance is known become points; provisional beacons whose time is up leave.
 static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
 {
-    const int64_t window_us = slam->params.confirm_window_us;
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (window_us > 0 && !beacon->confirmed && time_us - beacon->first_seen_us > window_us) {
+        if (is_unconfirmed(&slam->params, beacon, time_us)) {
             bslam_ekf_remove(&slam->ekf, b);
             slam->counters.removed++;
         } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {

@@ -25,7 +25,7 @@ def test_late_sightings_leave_the_filter_consistent(delay_us):
         entry = metrics.summarise(log, trace, options, evaluation)
         nees.append(entry["nees_mean"])
         error_cm.append(100.0 * entry["position_error_m"]["mean"])
-    # Four runs: 3 is consistent; the band is as wide as their scatter, and far from the 10 to 1000 of a filter
-    # that takes the way since the image as exact.
+    # Four runs: 3 is consistent; the band is as wide as their scatter, and far from the 10 to 1000 of a
+    # filter that takes the way since the image as exact.
     assert 1.5 < np.mean(nees) < 4.5
     assert np.mean(error_cm) < 9.0

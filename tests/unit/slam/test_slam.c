@@ -544,13 +544,14 @@ static void test_sightings_one_sighting_confirms_where_that_is_asked(void **stat
 static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
 {
     bslam_params_t params = unit_params();
+    params.association = 2;
     params.confirm_sightings = 2;
     params.confirm_window_us = 10 * STEP_US;
     bslam_slam_t slam = started(params);
-    // Beacon 0 once, beacon 1 twice, a known beacon never, a ray once.
-    const bslam_sighting_t seen[] = {unit_polar(0.3, 4, 0), unit_polar(-0.3, 4, 1), unit_direction(1, 2)};
-    assert_int_equal(bslam_slam_add_known_beacon(&slam, 9, -5, 0), BSLAM_OK);
-    see(&slam, 0, seen, 3);
+    // The first once, the second twice; far apart, so that neither is taken for the other.
+    const bslam_sighting_t seen[] = {unit_polar(1.3, 4, BSLAM_LABEL_NONE),
+                                     unit_polar(-1.3, 4, BSLAM_LABEL_NONE)};
+    see(&slam, 0, seen, 2);
     drive(&slam, STEP_US, 0, 0);
     see(&slam, STEP_US, &seen[1], 1);
     for (int i = 2; i <= 10; i++) {
@@ -558,16 +559,36 @@ static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
         see(&slam, (int64_t)i * STEP_US, NULL, 0);
     }
     // The window's last moment is within it.
-    assert_int_equal(bslam_slam_beacon_count(&slam), 4);
-    see(&slam, 10 * STEP_US + 1, NULL, 0);
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
-    assert_int_equal(bslam_slam_counters(&slam)->removed, 2);
-    assert_int_equal(beacon(&slam, 0).label, 9);
-    assert_int_equal(beacon(&slam, 1).label, 1);
+    see(&slam, 10 * STEP_US + 1, NULL, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
+    assert_int_equal(beacon(&slam, 0).uid, 1);
     // It may come back, under a number of its own.
     drive(&slam, 11 * STEP_US, 0, 0);
     see(&slam, 11 * STEP_US, seen, 1);
-    assert_int_equal(beacon(&slam, 2).uid, 4);
+    assert_int_equal(beacon(&slam, 1).uid, 2);
+}
+
+static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.confirm_window_us = 2 * STEP_US;
+    params.gate_d2 = 9;
+    bslam_slam_t slam = started(params);
+    // Beacons 0 and 1 once; then label 1 shows where no beacon 1 can be.
+    const bslam_sighting_t seen[] = {unit_polar(1.3, 4, 0), unit_polar(-1.3, 4, 1)};
+    see(&slam, 0, seen, 2);
+    for (int i = 1; i <= 5; i++) {
+        drive(&slam, (int64_t)i * STEP_US, 0, 0);
+        see(&slam, (int64_t)i * STEP_US, NULL, 0);
+    }
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    drive(&slam, 6 * STEP_US, 0, 0);
+    see_one(&slam, 6 * STEP_US, unit_polar(1.3, 9, 1));
+    assert_int_equal(bslam_slam_counters(&slam)->gated, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(beacon(&slam, 0).label, 0);
 }
 
 static void test_remove_beacon_then_its_label_is_new_again(void **state)
@@ -1026,6 +1047,7 @@ int main(void)
         cmocka_unit_test(test_sightings_beacon_is_confirmed_by_its_number_of_sightings),
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
+        cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),
         cmocka_unit_test(test_remove_beacon_then_its_label_is_new_again),
         cmocka_unit_test(test_sightings_ray_seen_from_aside_settles_into_a_point),
 

@@ -225,6 +225,7 @@ static void test_window_removes_and_gives_the_room_back(void **state)
     bslam_params_t params = params_of(5);
     params.confirm_sightings = 1000;
     params.confirm_window_us = 3 * STEP_US;
+    params.association = 2;
     static drive_t drive;
     start(&drive, params, 8);
     for (int i = 0; i < STEPS; i++) {
