@@ -42,7 +42,8 @@ def feed_reference(reference: DenseEkf, step: Step) -> None:
     """One step of a run into the reference."""
     if step.time_us > 0:
         reference.predict(motion_of_wheels(reference.params, step.left_m, step.right_m, STEP_S))
-    reference.frame(step.sightings, mount(reference.params))
+    late_s = min(reference.params["sighting_delay_us"], step.time_us) * 1e-6
+    reference.frame(step.sightings, mount(reference.params), late_s)
 
 
 def difference(a: NDArray[np.float64], b: NDArray[np.float64], angles: list[int]) -> NDArray[np.float64]:

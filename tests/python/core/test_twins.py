@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bslam.core import Slam
-from core.feeding import KINDS, deviations, deviations_between, feed, feed_reference, name
+from core.feeding import KINDS, deviations, deviations_between, feed, feed_reference, look, name
 from reference.dense_ekf import DenseEkf, Sighting, motion_of_wheels
-from reference.runs import PARAMS, STEP_S, mount, places, run
+from reference.runs import PARAMS, STEP_S, Step, mount, places, run
 
 
 def pairs(
@@ -79,6 +79,22 @@ def test_double_core_is_the_reference_with_other_values(
     assert worst_deviation({**PARAMS, **kind, **values}, seed=7, steps=80, beacons=6, real="double") < DOUBLE
 
 
+@pytest.mark.parametrize("delay_us", [40_000, 100_000, 250_000])
+@pytest.mark.parametrize("kind", KINDS, ids=name)
+def test_double_core_is_the_reference_with_late_sightings(kind: dict[str, float], delay_us: int) -> None:
+    """Taken at the end of a step, in the middle of one, and further back."""
+    params = {**PARAMS, **kind, "sighting_delay_us": delay_us}
+    slam, reference = Slam(params, real="double"), DenseEkf(params)
+    for k, step in enumerate(run(10, 60, 6, params)):
+        # Before the clock began there is nothing to look back at.
+        seen = step if step.time_us >= delay_us else Step(step.time_us, step.left_m, step.right_m, [])
+        slam.odometry("wheels", step.time_us, step.left_m, step.right_m)
+        if seen.sightings:
+            look(slam, seen)
+        feed_reference(reference, seen)
+        assert deviations(slam, reference.mean, reference.covariance, reference.angles()) < DOUBLE, k
+
+
 @pytest.mark.parametrize("kind", KINDS[::3], ids=name)
 def test_double_core_is_the_reference_with_known_beacons(kind: dict[str, float]) -> None:
     params = {**PARAMS, **kind}
@@ -116,7 +132,9 @@ def test_reference_invariant_observation_does_not_depend_on_the_heading_error() 
         feed_reference(reference, step)
     for index, beacon in enumerate(reference.beacons):
         for range_m in (3.0, None):
-            rows, _, _ = reference.measurement(Sighting(beacon.label, 0.1, range_m), index, mount(PARAMS))
+            rows, _, _ = reference.measurement(
+                Sighting(beacon.label, 0.1, range_m), index, lambda _: mount(PARAMS)
+            )
             assert np.abs(np.array(rows)[:, 2]).max() < 1e-14
 
 

@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Sensor = Callable[..., tuple[object, object, object]]
+"""State -> the sensor's pose (x, y, yaw) on the robot of now."""
 
 X, Y, THETA, FORWARD, TURN = range(5)
 STEP = 1e-30
@@ -119,6 +121,9 @@ class DenseEkf:
         self.params = params
         self.invariant = params["filter"] == 1
         self.beacons: list[Beacon] = []
+        self.history: list[
+            tuple[float, float, float]
+        ] = []  # (dt_s, forward_m, turn_rad) as taken, oldest first
         extra: list[float] = []
         sds: list[float] = []
         if params["velocity_states"]:
@@ -236,26 +241,31 @@ class DenseEkf:
     def predict(self, motion: Motion) -> None:
         """One odometry increment: equations (2), (4), (5); with velocity states it is a measurement."""
         p = self.params
+        dt_s = motion.dt_s
         if p["velocity_states"]:
             self._walk(
-                [
-                    1 / (1 + motion.dt_s / p["velocity_decay_s"]),
-                    1 / (1 + motion.dt_s / p["turn_rate_decay_s"]),
-                ],
+                [1 / (1 + dt_s / p["velocity_decay_s"]), 1 / (1 + dt_s / p["turn_rate_decay_s"])],
                 [p["velocity_walk_mps_sqrt_s"], p["turn_rate_walk_radps_sqrt_s"]],
-                motion.dt_s,
+                dt_s,
             )
-            self._drive(lambda s, w: (s[FORWARD] * motion.dt_s, s[TURN] * motion.dt_s), NO_NOISE)
+            self._drive(lambda s, w: (s[FORWARD] * dt_s, s[TURN] * dt_s), NO_NOISE)
             self._measure_velocity(motion)
-        elif p["scale_states"]:
-            self._walk([1.0, 1.0], [p["scale_walk_sqrt_s"]] * 2, motion.dt_s)
+            self.history.append((dt_s, self.mean[FORWARD] * dt_s, self.mean[TURN] * dt_s))
+            return
+        if p["scale_states"]:
+            self._walk([1.0, 1.0], [p["scale_walk_sqrt_s"]] * 2, dt_s)
+            scales = self.mean[FORWARD], self.mean[TURN]
             self._drive(
                 lambda s, w: (s[FORWARD] * motion.forward_m + w[0], s[TURN] * motion.turn_rad + w[1]),
                 motion.covariance,
             )
         else:
-            forward_m, turn_rad = p["forward_scale"] * motion.forward_m, p["turn_scale"] * motion.turn_rad
-            self._drive(lambda s, w: (forward_m + w[0], turn_rad + w[1]), motion.covariance)
+            scales = p["forward_scale"], p["turn_scale"]
+            self._drive(
+                lambda s, w: (scales[0] * motion.forward_m + w[0], scales[1] * motion.turn_rad + w[1]),
+                motion.covariance,
+            )
+        self.history.append((dt_s, scales[0] * motion.forward_m, scales[1] * motion.turn_rad))
 
     def _walk(self, keep: Sequence[float], walk: Sequence[float], dt_s: float) -> None:
         """The two further states forget a share and take a random step."""
@@ -271,17 +281,19 @@ class DenseEkf:
 
         def changed(state, noises):  # type: ignore[no-untyped-def]
             forward_m, turn_rad = increment(state, noises)
-            if self.params["motion"] == 1:
-                # The way in the mean direction over the turn: quadrature, exact to rounding for turns below
-                # 4 rad.
-                turns = state[THETA] + turn_rad * (GAUSS_NODES[:, None] + 1) / 2
-                c, s = GAUSS_WEIGHTS @ np.cos(turns) / 2, GAUSS_WEIGHTS @ np.sin(turns) / 2
-            else:
-                c, s = np.cos(state[THETA]), np.sin(state[THETA])
+            c, s = self._way(state[THETA], turn_rad)
             pose = [state[X] + forward_m * c, state[Y] + forward_m * s, state[THETA] + turn_rad]
             return [*pose, *state[FORWARD:]]
 
         self._change(changed, noise)
+
+    def _way(self, theta, turn_rad):  # type: ignore[no-untyped-def]
+        """Where one metre forward leads while turning: (x, y)."""
+        if self.params["motion"] == 0:
+            return np.cos(theta), np.sin(theta)
+        # The mean direction over the turn, by quadrature: exact to rounding for turns below 4 rad.
+        turns = theta + turn_rad * (GAUSS_NODES[:, None] + 1) / 2
+        return GAUSS_WEIGHTS @ np.cos(turns) / 2, GAUSS_WEIGHTS @ np.sin(turns) / 2
 
     def _measure_velocity(self, motion: Motion) -> None:
         varied, _ = self._varied()
@@ -296,6 +308,45 @@ class DenseEkf:
             )
         )
 
+    # ---- the past ------------------------------------------------------------------------------------------
+
+    def look_back(self, late_s: float) -> tuple[float, float, float]:
+        """The robot late_s ago as seen from the robot of now: (x, y, theta)."""
+        x = y = theta = 0.0  # of the robot of now, seen from the one that the loop has come back to
+        for dt_s, forward_m, turn_rad in reversed(self.history):
+            share = min(1.0, late_s / dt_s)
+            c, s = (np.asarray(value).item() for value in self._way(0.0, share * turn_rad))
+            offset_x, offset_y = _turned(share * turn_rad, x, y)
+            x, y = share * forward_m * c + offset_x, share * forward_m * s + offset_y
+            theta += share * turn_rad
+            late_s -= share * dt_s
+            if late_s <= 0:
+                break
+        back_x, back_y = _turned(-theta, x, y)
+        return -float(back_x), -float(back_y), -theta
+
+    def _sensor(self, mount: Sequence[float], late_s: float) -> Sensor:
+        """The sensor late_s ago, on the robot of now.
+
+        Where that was is a number, but with velocity states it depends on v and omega, as if both had been
+        off by the same all the time since: then the way back is longer along its chord, and turned about
+        its middle.
+        """
+        x, y, theta = self.look_back(late_s)
+
+        def placed(state):  # type: ignore[no-untyped-def]
+            v_off, omega_off = 0.0, 0.0
+            if self.params["velocity_states"]:
+                v_off, omega_off = 1j * np.imag(state[FORWARD]), 1j * np.imag(state[TURN])
+            back_x, back_y = _turned(-omega_off * late_s / 2, x, y)
+            back_x = back_x - v_off * late_s * np.cos(theta / 2)
+            back_y = back_y - v_off * late_s * np.sin(theta / 2)
+            turn = theta - omega_off * late_s
+            mount_x, mount_y = _turned(turn, mount[0], mount[1])
+            return back_x + mount_x, back_y + mount_y, turn + mount[2]
+
+        return placed
+
     # ---- sightings -----------------------------------------------------------------------------------------
 
     def _update(self, rows: Matrix, innovation: Vector, noise: Matrix) -> Vector:
@@ -309,10 +360,11 @@ class DenseEkf:
         self.own_covariance = (kept + kept.T) / 2
         return gain @ innovation
 
-    def _seen(self, state, index: int, mount: Sequence[float]):  # type: ignore[no-untyped-def]
+    def _seen(self, state, index: int, sensor: Sensor):  # type: ignore[no-untyped-def]
         """How beacon `index` looks to the sensor: distance, direction, log of the length."""
         beacon, at = self.beacons[index], self.at(index)
-        offset_x, offset_y = _turned(state[THETA], mount[0], mount[1])
+        mount_x, mount_y, yaw = sensor(state)
+        offset_x, offset_y = _turned(state[THETA], mount_x, mount_y)
         sensor_x, sensor_y = state[X] + offset_x, state[Y] + offset_y
         if beacon.kind == "ray":
             # Seen along g = inverse distance * (anchor - sensor) + direction, which is finite for a far
@@ -327,14 +379,14 @@ class DenseEkf:
             dx = (beacon.place[0] if known else state[at]) - sensor_x
             dy = (beacon.place[1] if known else state[at + 1]) - sensor_y
             length = range_m = np.sqrt(dx * dx + dy * dy)
-        return range_m, _direction(dx, dy) - state[THETA] - mount[2], np.log(length)
+        return range_m, _direction(dx, dy) - state[THETA] - yaw, np.log(length)
 
     def measurement(
-        self, sighting: Sighting, index: int, mount: Sequence[float]
+        self, sighting: Sighting, index: int, sensor: Sensor
     ) -> tuple[list[Vector], list[float], list[float]]:
         """Rows of H, innovations and variances of one sighting, at the present estimate."""
         varied, _ = self._varied()
-        seen = self._seen(varied, index, mount)
+        seen = self._seen(varied, index, sensor)
         range_row, bearing_row, length_row = (np.imag(value) / STEP for value in seen)
         range_m, bearing_rad = float(np.real(seen[0][0])), float(np.real(seen[1][0]))
         p = self.params
@@ -355,23 +407,29 @@ class DenseEkf:
         parts = p["range_sd_floor_m"], p["range_sd_fraction"] * range_m, p["range_sd_per_m"] * range_m**2
         return sum(part**2 for part in parts)
 
-    def frame(self, sightings: Sequence[Sighting], mount: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    def frame(
+        self,
+        sightings: Sequence[Sighting],
+        mount: Sequence[float] = (0.0, 0.0, 0.0),
+        late_s: float = 0.0,
+    ) -> None:
         """One image: fuses what the map holds as one batch, adds the rest, turns rays into points.
 
-        mount: the sensor's pose (x, y, yaw) relative to the robot's present pose.
+        mount: the sensor's pose (x, y, yaw) on the robot. late_s: how long ago the image was taken.
         """
+        sensor = self._sensor(mount, late_s)
         measurements = []
         for sighting in sightings:
             index = self.find(sighting.label)
             if index is not None:
-                measurements.append(self.measurement(sighting, index, mount))
+                measurements.append(self.measurement(sighting, index, sensor))
         if measurements:
             self._move(self._update_all(measurements))
         for sighting in sightings:
             if self.find(sighting.label) is None:
-                self.add(sighting, mount)
+                self.add(sighting, sensor)
         for index in reversed(range(len(self.beacons))):
-            self._settle(index, mount)
+            self._settle(index, sensor)
 
     def _update_all(self, measurements: Sequence[tuple[list[Vector], list[float], list[float]]]) -> Vector:
         rows = np.array([row for rows, _, _ in measurements for row in rows])
@@ -385,13 +443,14 @@ class DenseEkf:
         """A beacon whose place is given: no part of the state."""
         self.beacons.append(Beacon(label, "known", (x_m, y_m)))
 
-    def add(self, sighting: Sighting, mount: Sequence[float]) -> None:
+    def add(self, sighting: Sighting, sensor: Sensor) -> None:
         """The augment step: a beacon is a function of the state and of its sighting's noise."""
         p = self.params
 
         def placed(state, noise):  # type: ignore[no-untyped-def]
-            offset_x, offset_y = _turned(state[THETA], mount[0], mount[1])
-            direction = state[THETA] + mount[2] + sighting.bearing_rad + noise[0]
+            mount_x, mount_y, yaw = sensor(state)
+            offset_x, offset_y = _turned(state[THETA], mount_x, mount_y)
+            direction = state[THETA] + yaw + sighting.bearing_rad + noise[0]
             sensor_x, sensor_y = state[X] + offset_x, state[Y] + offset_y
             if sighting.range_m is None:
                 inverse = p["ray_inverse_distance_per_m"] + noise[1]
@@ -413,10 +472,10 @@ class DenseEkf:
         others = [beacon for i, beacon in enumerate(self.beacons) if i != index]
         self._change(lambda state, noise: [*state[:at], *state[at + size :]], beacons=others)
 
-    def _settle(self, index: int, mount: Sequence[float]) -> None:
+    def _settle(self, index: int, sensor: Sensor) -> None:
         """A ray whose distance is known well enough becomes its point."""
         at = self.at(index)
-        if self.beacons[index].kind != "ray" or not self._is_linear(at, mount):
+        if self.beacons[index].kind != "ray" or not self._is_linear(at, sensor):
             return
 
         def settled(state, noise):  # type: ignore[no-untyped-def]
@@ -428,13 +487,14 @@ class DenseEkf:
         others[index] = Beacon(self.beacons[index].label, "point")
         self._change(settled, beacons=others)
 
-    def _is_linear(self, at: int, mount: Sequence[float]) -> bool:
+    def _is_linear(self, at: int, sensor: Sensor) -> bool:
         """Civera's index: 4 sd(distance) |cos(parallax)| / distance from the sensor, against its limit."""
         anchor_x, anchor_y, direction, inverse = self.mean[at : at + 4]
         variance = self.own_covariance[at + 3, at + 3]
         if not (inverse > 1e-3 and variance > 0):
             return False
-        offset_x, offset_y = _turned(self.mean[THETA], mount[0], mount[1])
+        mount_x, mount_y, _ = np.real(sensor(self.mean))
+        offset_x, offset_y = _turned(self.mean[THETA], mount_x, mount_y)
         dx = anchor_x + np.cos(direction) / inverse - (self.mean[X] + offset_x)
         dy = anchor_y + np.sin(direction) / inverse - (self.mean[Y] + offset_y)
         parallax = np.arctan2(dy, dx) - direction
