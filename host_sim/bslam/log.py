@@ -142,6 +142,7 @@ class Log:
     truth: Truth | None
     beacons: Beacons | None
     robot: Robot
+    collection: str = ""  # the published data set it is from, "mrclam" say; none for folders and simulations
 
 
 def read_folder(path: str | Path) -> Log:

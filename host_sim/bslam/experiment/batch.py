@@ -85,6 +85,7 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     After Ctrl-C what is finished stays. If a process dies (killed, or out of memory), so does the pool: every
     run that is not finished has failed then.
     """
+    out = out.absolute()  # worker processes may have another working directory
     finished: dict[int, Outcome] = {}
     interrupted = False
     try:

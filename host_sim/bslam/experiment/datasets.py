@@ -34,7 +34,7 @@ def find_directory(name: str, collection: str) -> Path:
     Raises BslamError that says what is missing, from where to get it, and which variable names its place.
     """
     if Path(name).is_dir():
-        return Path(name)
+        return Path(name).absolute()  # worker processes may have another working directory
     root = data_root()
     for place in [root / name, root / collection / name] if root else []:
         if place.is_dir():

@@ -82,6 +82,7 @@ def load_mrclam(directory: Path | str, robot: int) -> Log:
         truth=_read_truth(truth_path) if kind != "none" else None,
         beacons=_read_landmarks(folder),
         robot=ROBOT,
+        collection="mrclam",
     )
 
 

@@ -91,10 +91,10 @@ def uses_velocity_states(options: RunOptions, log: Log) -> bool:
 
 
 def odometry_lead_us(options: RunOptions, log: Log) -> int:
-    """How far odometry runs ahead of the true motion: asked for, else what is known of the kind of log."""
+    """How far odometry runs ahead of the true motion: asked for, else what is known of its data set."""
     if options.odometry_lead_us is not None:
         return options.odometry_lead_us
-    return defaults.REAL_ODOMETRY_LEAD_US if log.odometry.kind == "velocity" else 0
+    return defaults.REAL_ODOMETRY_LEAD_US if log.collection == "mrclam" else 0
 
 
 def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
@@ -106,9 +106,9 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         "association": ASSOCIATIONS.index(options.association),
     }
     params |= _robot_params(log.robot, log.odometry.kind)
-    if options.sigma_mps is not None and log.odometry.kind != "velocity":
+    if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
-    if log.odometry.kind == "velocity":
+    if log.collection == "mrclam":
         params |= defaults.REAL_LOG
         if options.association != "known":
             params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
@@ -122,6 +122,9 @@ def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
     range_sd_per_m = 1.0 / robot.range_sigma_scale_m
     range_errs = robot.range_sigma_floor_m > 0.0 or robot.range_sigma_fraction > 0.0 or range_sd_per_m > 0.0
     params: dict[str, Number] = {
+        "wheelbase_m": robot.wheelbase_m,
+        "left_speed_sd_mps": robot.wheel_speed_sigma_mps,
+        "right_speed_sd_mps": robot.wheel_speed_sigma_mps,
         "mount_x_m": robot.sensor_x_m,
         "mount_y_m": robot.sensor_y_m,
         "mount_yaw_rad": robot.sensor_yaw_rad,
@@ -131,12 +134,6 @@ def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
         "range_sd_fraction": robot.range_sigma_fraction,
         "range_sd_per_m": range_sd_per_m,
     }
-    if kind in ("wheels", "ticks"):
-        params |= {
-            "wheelbase_m": robot.wheelbase_m,
-            "left_speed_sd_mps": robot.wheel_speed_sigma_mps,
-            "right_speed_sd_mps": robot.wheel_speed_sigma_mps,
-        }
     if kind == "ticks":
         assert robot.left_radius_m is not None and robot.right_radius_m is not None
         assert robot.ticks_per_revolution is not None and robot.counter_bits is not None

@@ -124,14 +124,16 @@ def test_velocity_states_belong_to_speedometer_noise(made, options, expected):
 
 
 def test_real_logs_have_their_own_set(made):
-    params = core_params(RunOptions(), velocity(made.circle_log(steps=1)))
+    own = velocity(made.circle_log(steps=1))
+    log = replace(own, collection="mrclam")
+    params = core_params(RunOptions(), log)
     assert defaults.REAL_LOG.items() <= params.items()
     assert params["velocity_states"] == 0
-    assert (
-        odometry_lead_us(RunOptions(), velocity(made.circle_log(steps=1))) == defaults.REAL_ODOMETRY_LEAD_US
-    )
-    assert odometry_lead_us(RunOptions(), made.circle_log(steps=1)) == 0
-    asked = core_params(RunOptions(velocity_states=True), velocity(made.circle_log(steps=1)))
+    assert odometry_lead_us(RunOptions(), log) == defaults.REAL_ODOMETRY_LEAD_US
+    # A folder with velocities is told by its own robot.toml.
+    assert odometry_lead_us(RunOptions(), own) == 0
+    assert core_params(RunOptions(), own)["left_speed_sd_mps"] == own.robot.wheel_speed_sigma_mps
+    asked = core_params(RunOptions(velocity_states=True), log)
     assert (asked["velocity_states"], asked["scale_states"]) == (1, 0)
 
 
