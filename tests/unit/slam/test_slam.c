@@ -591,6 +591,25 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
     assert_int_equal(beacon(&slam, 0).label, 0);
 }
 
+static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.association = 2;
+    params.confirm_window_us = 2 * STEP_US;
+    bslam_slam_t slam = started(params);
+    assert_int_equal(bslam_slam_add_known_beacon(&slam, 9, -5, 0), BSLAM_OK);
+    see_one(&slam, 0, unit_direction(0.5, BSLAM_LABEL_NONE));
+    assert_int_equal(beacon(&slam, 1).kind, BSLAM_BEACON_RAY);
+    drive(&slam, 3 * STEP_US, 0, 0);
+    see(&slam, 3 * STEP_US, NULL, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(beacon(&slam, 0).label, 9);
+    assert_int_equal(slam.ekf.dim, 3);
+    // There is room for as many rays as before.
+    see_one(&slam, 3 * STEP_US + 1, unit_direction(0.5, BSLAM_LABEL_NONE));
+    assert_int_equal(slam.ekf.ray_count, 1);
+}
+
 static void test_remove_beacon_then_its_label_is_new_again(void **state)
 {
     bslam_slam_t slam = running(unit_params());
@@ -1048,6 +1067,7 @@ int main(void)
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
         cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),
+        cmocka_unit_test(test_sightings_known_beacon_is_never_removed_but_a_ray_is),
         cmocka_unit_test(test_remove_beacon_then_its_label_is_new_again),
         cmocka_unit_test(test_sightings_ray_seen_from_aside_settles_into_a_point),
 
