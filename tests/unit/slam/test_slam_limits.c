@@ -84,7 +84,8 @@ static double correlation(const bslam_ekf_t *ekf, int i, int j)
 static bool is_definite(const bslam_ekf_t *ekf)
 {
     static double lower[BSLAM_STATE_MAX][BSLAM_STATE_MAX];
-    const double rounding = 32 * UNIT_ROUNDING;
+    // A singular matrix' eigenvalues scatter about 0 by more, the larger it is.
+    const double rounding = (32 + ekf->dim / 4.0) * UNIT_ROUNDING;
     for (int i = 0; i < ekf->dim; i++) {
         for (int j = 0; j <= i; j++) {
             double rest = correlation(ekf, i, j) + (i == j ? rounding : 0);
