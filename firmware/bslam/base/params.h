@@ -54,7 +54,7 @@
     REAL(turn_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of the heading that grows with the way") \
     REAL(turn_sd_per_sqrt_rad, 0.0, 0.0, 10.0, "noise of the heading that grows with the turn") \
     REAL(gyro_sd_radps, 0.02, 1e-6, 100.0, "noise of the gyro rate, independent at each step") \
-    INTEGER(gap_us, 2000000, 1000, 10000000, "an odometry interval longer than this is a gap") \
+    INTEGER(gap_us, 1000000, 1000, 4000000, "an odometry interval longer than this is a gap") \
     REAL(gap_speed_sd_mps, 0.2, 0.0, 100.0, "unknown forward speed during the part of a gap beyond gap_us") \
     REAL(gap_turn_sd_radps, 0.5, 0.0, 100.0, "unknown turn rate during the part of a gap beyond gap_us") \
     /* sightings */ \

@@ -6,7 +6,7 @@ static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const int64_t TIME_MAX_US = INT64_MAX / 2;
 /// Longer than this is no interval of odometry but an interruption. It also keeps the variance that one
 /// interval can add within what float's digits carry through the next update.
-static const int64_t INTERVAL_MAX_US = INT64_C(10000000);
+static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
 /// More than this in one interval is no motion of a robot: 16 turns.
 static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
 

@@ -91,7 +91,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
                                                     const bslam_odometry_reading_t *reading);
 
-/// After an interruption of odometry (an encoder reset, a pause of more than 10 s, the robot carried), at a
+/// After an interruption of odometry (an encoder reset, a pause of more than 4 s, the robot carried), at a
 /// standstill: the next reading starts the clock and the tick reference anew, at any time stamp, and the pose
 /// becomes as doubtful as the caller says the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m
 /// outside 0 to 30 or heading_sd_rad outside 0 to 3.2 (NaN is).

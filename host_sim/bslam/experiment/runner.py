@@ -24,8 +24,8 @@ SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
 FALSE_BEACONS_ROOM = 80
-# After an interruption of odometry (the core takes intervals up to 10 s): the robot may have gone this fast.
-INTERRUPTION_US = 10_000_000
+# After an interruption of odometry (the core takes intervals up to 4 s): the robot may have gone this fast.
+INTERRUPTION_US = 4_000_000
 UNSEEN_SPEED_MPS = 0.5
 UNSEEN_POSITION_SD_MAX_M = 30.0
 UNSEEN_HEADING_SD_RAD = 3.0

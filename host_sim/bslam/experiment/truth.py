@@ -17,7 +17,7 @@ INTERPOLATE_US: Final = 500_000
 NEAR_US: Final = 50_000
 # A drive whose wheels are logged began no longer than this before the first row (what the core takes for one
 # step).
-START_WINDOW_US: Final = 10_000_000
+START_WINDOW_US: Final = 4_000_000
 
 
 def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
