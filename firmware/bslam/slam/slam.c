@@ -1,7 +1,6 @@
 #include "bslam/slam/slam.h"
 
 #include "bslam/math/trig.h"
-#include "bslam/model/motion.h"
 #include "bslam/model/pose.h"
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
@@ -27,16 +26,6 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
 
 // ---- odometry and the past --------------------------------------------------------------------------------
 
-static void remember(bslam_slam_t *slam, int64_t end_us, const bslam_motion_t *moved)
-{
-    slam->history[slam->history_next] = (bslam_history_step_t){
-        .end_us = end_us, .dt_s = moved->dt_s, .forward_m = moved->forward_m, .turn_rad = moved->turn_rad};
-    slam->history_next = (slam->history_next + 1) % BSLAM_HISTORY_MAX;
-    if (slam->history_count < BSLAM_HISTORY_MAX) {
-        slam->history_count++;
-    }
-}
-
 static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
 {
     bslam_odometry_t odometry = slam->odometry;
@@ -54,7 +43,7 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
         if (status != BSLAM_OK) {
             return status;
         }
-        remember(slam, reading->time_us, &moved);
+        bslam_history_add(&slam->history, reading->time_us, &moved);
     }
     slam->odometry = odometry;
     return BSLAM_OK;
@@ -82,70 +71,20 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
     bslam_ekf_resume(&slam->ekf, &slam->params, position_sd_m * position_sd_m,
                      heading_sd_rad * heading_sd_rad);
     bslam_odometry_restart(&slam->odometry);
-    slam->history_count = 0;
+    bslam_history_clear(&slam->history);
     slam->has_frame = false;
     return BSLAM_OK;
 }
 
-/// A part of a remembered step, as a pose in the frame at its beginning.
-static bslam_pose_t step_pose(const bslam_params_t *params, const bslam_history_step_t *step,
-                              bslam_real_t share)
-{
-    const bslam_pose_t start = {0, 0, 0};
-    const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
-    bslam_motion_jacobian_t unused;
-    return bslam_motion_step(kind, &start, step->forward_m * share, step->turn_rad * share, &unused);
-}
-
-static const bslam_history_step_t *newest_step(const bslam_slam_t *slam, int back)
-{
-    return &slam->history[(slam->history_next + 2 * BSLAM_HISTORY_MAX - 1 - back) % BSLAM_HISTORY_MAX];
-}
-
-/// The robot at an earlier time as seen from the robot now.
-static bslam_status_t look_back(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
-{
-    bslam_pose_t since = {0, 0, 0};
-    for (int k = 0; k < slam->history_count; k++) {
-        const bslam_history_step_t *step = newest_step(slam, k);
-        const bslam_real_t back_s = (bslam_real_t)(step->end_us - time_us) * SECONDS_PER_US;
-        const bool begins_before = back_s <= step->dt_s;
-        const bslam_real_t share = begins_before ? back_s / step->dt_s : 1;
-        const bslam_pose_t part = step_pose(&slam->params, step, share);
-        since = bslam_pose_compose(&part, &since);
-        if (begins_before) {
-            *relative = bslam_pose_inverse(&since);
-            return BSLAM_OK;
-        }
-    }
-    return BSLAM_E_TIME;
-}
-
-/// The robot at a time after the last odometry: it goes on as in the last step.
-static bslam_status_t look_ahead(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
-{
-    const int64_t ahead_us = time_us - slam->odometry.time_us;
-    if (ahead_us > slam->params.ahead_max_us) {
-        return BSLAM_E_TIME;
-    }
-    *relative = (bslam_pose_t){0, 0, 0};
-    if (slam->history_count > 0) {
-        const bslam_history_step_t *last = newest_step(slam, 0);
-        *relative = step_pose(&slam->params, last, (bslam_real_t)ahead_us * SECONDS_PER_US / last->dt_s);
-    }
-    return BSLAM_OK;
-}
-
-/// The robot at time_us as seen from the robot now. BSLAM_E_TIME: outside the history, or too far ahead. MATH
-/// "Late sightings".
+/// The robot at time_us as seen from the robot now, where it started while no clock has.
 static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
 {
-    if (!slam->odometry.has_time || time_us == slam->odometry.time_us) {
+    if (!slam->odometry.has_time) {
         *relative = (bslam_pose_t){0, 0, 0};
         return BSLAM_OK;
     }
-    return time_us > slam->odometry.time_us ? look_ahead(slam, time_us, relative)
-                                            : look_back(slam, time_us, relative);
+    return bslam_history_relative_pose(&slam->history, &slam->params, slam->odometry.time_us, time_us,
+                                       relative);
 }
 
 /// How the sensor of an image of the past depends on v and omega. `relative` is the robot then, seen from the

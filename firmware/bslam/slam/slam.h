@@ -15,6 +15,7 @@
 
 #include "bslam/association/association.h"
 #include "bslam/odometry/odometry.h"
+#include "bslam/slam/history.h"
 
 /// Never-decreasing counts of what happened.
 typedef struct bslam_counters {
@@ -53,22 +54,12 @@ typedef struct bslam_account {
     bslam_real_t weight;      ///< 1 for full weight, 0 for not used
 } bslam_account_t;
 
-/// A motion that the filter took, kept so that a sighting may be older than the pose.
-typedef struct bslam_history_step {
-    int64_t end_us;
-    bslam_real_t dt_s;
-    bslam_real_t forward_m;
-    bslam_real_t turn_rad;
-} bslam_history_step_t;
-
 /// All members are the pipeline's own; read them through the functions below.
 typedef struct bslam_slam {
     bslam_params_t params;
     bslam_ekf_t ekf;
     bslam_odometry_t odometry;
-    bslam_history_step_t history[BSLAM_HISTORY_MAX];
-    int32_t history_count;
-    int32_t history_next;
+    bslam_history_t history;
     int64_t last_frame_us;
     bool has_frame;
     bslam_counters_t counters;
