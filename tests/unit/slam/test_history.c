@@ -23,6 +23,13 @@ static bslam_history_t arc(int steps)
     return history;
 }
 
+static bslam_params_t arc_params(void)
+{
+    bslam_params_t params = unit_params();
+    params.motion = 1;
+    return params;
+}
+
 /// A point `steps` along the circle that arc() drives, behind (negative) or ahead of the robot.
 static void assert_on_circle(const bslam_pose_t *pose, double steps)
 {
@@ -36,7 +43,7 @@ static void assert_on_circle(const bslam_pose_t *pose, double steps)
 static void test_relative_pose_now_is_the_identity(void **state)
 {
     const bslam_history_t history = arc(3);
-    const bslam_params_t params = unit_params();
+    const bslam_params_t params = arc_params();
     bslam_pose_t pose;
     assert_int_equal(bslam_history_relative_pose(&history, &params, 3 * STEP_US, 3 * STEP_US, &pose),
                      BSLAM_OK);
@@ -47,7 +54,7 @@ static void test_relative_pose_within_the_history_is_on_the_arc(void **state)
 {
     const int steps = BSLAM_HISTORY_MAX;
     const bslam_history_t history = arc(steps);
-    const bslam_params_t params = unit_params();
+    const bslam_params_t params = arc_params();
     const int64_t now_us = (int64_t)steps * STEP_US;
     for (int quarter = 1; quarter <= 4 * steps; quarter++) {
         bslam_pose_t pose;
@@ -60,7 +67,7 @@ static void test_relative_pose_within_the_history_is_on_the_arc(void **state)
 static void test_relative_pose_ahead_goes_on_up_to_its_limit(void **state)
 {
     const bslam_history_t history = arc(2);
-    bslam_params_t params = unit_params();
+    bslam_params_t params = arc_params();
     params.ahead_max_us = STEP_US / 2;
     bslam_pose_t pose;
     const int64_t now_us = 2 * STEP_US;
@@ -78,7 +85,7 @@ static void test_relative_pose_before_the_history_is_refused(void **state)
     // One more than fits: the first is forgotten.
     const int steps = BSLAM_HISTORY_MAX + 1;
     const bslam_history_t history = arc(steps);
-    const bslam_params_t params = unit_params();
+    const bslam_params_t params = arc_params();
     const int64_t now_us = (int64_t)steps * STEP_US;
     bslam_pose_t pose = {1, 2, 3};
     assert_int_equal(bslam_history_relative_pose(&history, &params, now_us, STEP_US - 1, &pose),
@@ -90,7 +97,7 @@ static void test_relative_pose_before_the_history_is_refused(void **state)
 static void test_clear_forgets_all(void **state)
 {
     bslam_history_t history = arc(3);
-    const bslam_params_t params = unit_params();
+    const bslam_params_t params = arc_params();
     bslam_history_clear(&history);
     bslam_pose_t pose;
     assert_int_equal(bslam_history_relative_pose(&history, &params, 3 * STEP_US, 3 * STEP_US - 1, &pose),
