@@ -16,7 +16,7 @@ REAL_LOG: Final[dict[str, int | float]] = {
     # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
     # scales.
     "scale_states": 1,
-    "scale_sd": 0.25,
+    "scale_sd": 0.3,
     "scale_walk_sqrt_s": 0.001,
     # What a robot that follows commands errs by grows with the way and the turn. The wheels themselves read
     # nothing.
@@ -24,7 +24,7 @@ REAL_LOG: Final[dict[str, int | float]] = {
     "right_speed_sd_mps": 0.0,
     "forward_sd_per_sqrt_m": 0.05,
     "turn_sd_per_sqrt_m": 0.05,
-    "turn_sd_per_sqrt_rad": 0.2,
+    "turn_sd_per_sqrt_rad": 0.25,
     # The scatter is 0.02 rad and 0.02 m + 0.035 r, but successive errors are strongly correlated (0.67; 0.96
     # for the distance), and each robot's distances are biased by 1-2 %: counted as 0.05 rad and 0.18 r.
     "bearing_sd_rad": 0.05,
