@@ -175,6 +175,9 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
     fill_account(account, BSLAM_OUTCOME_REJECTED, reason, beacon);
     slam->counters.gated += reason == BSLAM_REASON_GATE ? 1u : 0u;
     slam->counters.map_full += reason == BSLAM_REASON_MAP_FULL ? 1u : 0u;
+    slam->counters.duplicates += reason == BSLAM_REASON_DUPLICATE ? 1u : 0u;
+    slam->counters.unidentified += reason == BSLAM_REASON_NO_IDENTITY ? 1u : 0u;
+    slam->counters.unmappable += reason == BSLAM_REASON_CLASS ? 1u : 0u;
 }
 
 /// Fuses a sighting with the beacon that association chose.

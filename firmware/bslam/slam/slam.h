@@ -31,6 +31,9 @@ typedef struct bslam_counters {
     uint32_t rejected;          ///< not used, any reason
     uint32_t gated;             ///< of these, outside the hard gate
     uint32_t map_full;          ///< of these, new without room
+    uint32_t duplicates;        ///< of these, a second sighting of one beacon in a frame
+    uint32_t unidentified;      ///< of these, without a label where identity is told
+    uint32_t unmappable;        ///< of these, of a class that is not mappable
     uint32_t deferred;          ///< left undecided
     uint32_t removed;           ///< provisional beacons taken out
     uint32_t settled;           ///< rays that became points
@@ -91,10 +94,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, b
 
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²).
-/// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than the
-/// history reaches, or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE
-/// (a distance outside 1 mm to 10 km, a direction beyond ±2 pi, a label below -1): bslam_slam_bad_sighting
-/// says which.
+/// Before the first odometry only frames
+/// within ahead_max_us of the first one are taken. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX.
+/// BSLAM_E_TIME: not after the last frame, older than the history reaches, or newer than the odometry by more
+/// than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance outside 1 mm to 10 km, a direction beyond
+/// ±2 pi, a label below -1): bslam_slam_bad_sighting says which.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);
 

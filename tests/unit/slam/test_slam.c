@@ -369,6 +369,10 @@ static void test_sightings_rejected_say_why(void **state)
     assert_account(&slam, 1, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_DUPLICATE);
     assert_account(&slam, 2, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_NO_IDENTITY);
     assert_account(&slam, 3, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_CLASS);
+    const bslam_counters_t *counters = bslam_slam_counters(&slam);
+    assert_int_equal(counters->duplicates, 1);
+    assert_int_equal(counters->unidentified, 1);
+    assert_int_equal(counters->unmappable, 1);
     // Beacon 5 stands at the sensor: it has no direction.
     assert_account(&slam, 4, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_SINGULAR);
     assert_true(account(&slam, 4)->has_beacon && account(&slam, 4)->beacon_uid == 0);
