@@ -51,4 +51,35 @@
 #error "BSLAM_HISTORY_MAX is 1 to 1024"
 #endif
 
+/// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: QVGA takes
+/// about 60 KB for the reduced frame, QQVGA 15 KB.
+#ifndef BSLAM_IMAGE_WIDTH_MAX
+#define BSLAM_IMAGE_WIDTH_MAX 320
+#endif
+#if BSLAM_IMAGE_WIDTH_MAX < 32 || BSLAM_IMAGE_WIDTH_MAX > 640 || BSLAM_IMAGE_WIDTH_MAX % 4 != 0
+#error "BSLAM_IMAGE_WIDTH_MAX is 32 to 640, a multiple of 4"
+#endif
+#ifndef BSLAM_IMAGE_HEIGHT_MAX
+#define BSLAM_IMAGE_HEIGHT_MAX 240
+#endif
+#if BSLAM_IMAGE_HEIGHT_MAX < 32 || BSLAM_IMAGE_HEIGHT_MAX > 480 || BSLAM_IMAGE_HEIGHT_MAX % 4 != 0
+#error "BSLAM_IMAGE_HEIGHT_MAX is 32 to 480, a multiple of 4"
+#endif
+
+/// Cameras on one robot: each has its own running colours of the room.
+#ifndef BSLAM_CAMERAS_MAX
+#define BSLAM_CAMERAS_MAX 4
+#endif
+#if BSLAM_CAMERAS_MAX < 1 || BSLAM_CAMERAS_MAX > 16
+#error "BSLAM_CAMERAS_MAX is 1 to 16"
+#endif
+
+/// Beacon candidates taken from one image.
+#ifndef BSLAM_CANDIDATES_MAX
+#define BSLAM_CANDIDATES_MAX 16
+#endif
+#if BSLAM_CANDIDATES_MAX < 1 || BSLAM_CANDIDATES_MAX > 64
+#error "BSLAM_CANDIDATES_MAX is 1 to 64"
+#endif
+
 #endif

@@ -1,0 +1,54 @@
+/// Everything trained that the vision front end uses, as one const view into flash: firmware/models/beacons.h
+/// holds the one that comes with the library, made by `make train`.
+#ifndef BSLAM_VISION_BEACON_MODEL_H
+#define BSLAM_VISION_BEACON_MODEL_H
+
+#include "bslam/base/status.h"
+#include "bslam/svm/svm.h"
+
+/// Lengths of the feature vectors (features.h); a model of other lengths is refused.
+#define BSLAM_CELL_FEATURES 22
+#define BSLAM_BLOB_FEATURES 60
+
+#define BSLAM_CLASSES_MAX 16
+
+/// A kind of beacon.
+typedef struct bslam_beacon_class {
+    const char *name;
+    float height_m;  ///< of every beacon of the kind; 0: not known, direction only
+} bslam_beacon_class_t;
+
+/// The detector for one kind of lens.
+///
+/// Kinds' rows: 0 any beacon, 1 to class_count a kind each, last clutter. The fusion's inputs are those rows'
+/// values followed by the screen's.
+typedef struct bslam_detector_model {
+    bslam_svm_t cell;          ///< 1 row, linear, BSLAM_CELL_FEATURES: beacon or surroundings
+    const float *blob_offset;  ///< [BSLAM_BLOB_FEATURES], subtracted from a feature,
+    const float *blob_scale;   ///< [BSLAM_BLOB_FEATURES], which is then multiplied by it: about unit range
+    bslam_svm_t screen;        ///< 1 row, linear, BSLAM_BLOB_FEATURES
+    float screen_threshold;    ///< a proposal below it is dropped before the quadratic machines
+    bslam_svm_t kinds;         ///< class_count + 2 rows, quadratic, BSLAM_BLOB_FEATURES
+    bslam_svm_t fusion;        ///< 1 row, linear, class_count + 3 inputs
+    float threshold;           ///< a proposal whose fusion value is below it is no candidate
+} bslam_detector_model_t;
+
+/// Objects of a user's own, recognised by their signatures.
+typedef struct bslam_recogniser {
+    bslam_svm_t svm;  ///< one row an object, linear, BSLAM_SIGNATURE_SIZE
+    const bslam_beacon_class_t *objects;
+    float reject_margin;  ///< the best row's value is at least this, or the object is none of them
+} bslam_recogniser_t;
+
+typedef struct bslam_beacon_model {
+    int32_t class_count;
+    const bslam_beacon_class_t *classes;  ///< class c of a candidate is classes[c - 1]
+    bslam_detector_model_t pinhole;
+    bslam_detector_model_t wide;           ///< lenses beyond 120 degrees
+    const bslam_recogniser_t *recogniser;  ///< NULL: none
+} bslam_beacon_model_t;
+
+/// BSLAM_OK; BSLAM_E_RANGE if a size is not as described above, BSLAM_E_NOT_FINITE if a number is not.
+BSLAM_MUST_CHECK bslam_status_t bslam_beacon_model_check(const bslam_beacon_model_t *model);
+
+#endif
