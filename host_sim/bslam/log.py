@@ -34,6 +34,8 @@ ODOMETRY_COLUMNS = {
     "ticks": ("left_ticks", "right_ticks"),
     "velocity": ("v_mps", "omega_radps"),
 }
+SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m")
+"""Columns of sightings that a detector may leave out."""
 BEACON_ID_MAX = 2**31 - 1
 """Labels are 32-bit numbers in the core."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
@@ -65,6 +67,10 @@ class Sightings:
     bearing_rad: NDArray[np.float64]  # (m,) from the sensor's forward axis
     range_m: NDArray[np.float64]  # (m,) NaN: no range
     mappable: NDArray[np.bool_]  # (m,) False: the detector says it is a moving thing
+    bearing_sd_rad: NDArray[np.float64] | None = (
+        None  # (m,) noise as the detector gives it; 0, None: it does not
+    )
+    range_sd_m: NDArray[np.float64] | None = None  # (m,)
 
 
 @dataclass(frozen=True)
@@ -219,7 +225,7 @@ def _texts_by_field(table: Truth | Beacons) -> dict[str, list[str]]:
 
 
 def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
-    """Columns of sightings.csv; range_m and mappable only where they say something."""
+    """Columns of sightings.csv; range_m, mappable and the noise only where they say something."""
     columns = {
         "time_us": _texts(sightings.time_us, int),
         "beacon_id": ["" if one < 0 else str(one) for one in sightings.beacon_id.tolist()],
@@ -229,6 +235,9 @@ def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
         columns["range_m"] = ["" if math.isnan(one) else repr(one) for one in sightings.range_m.tolist()]
     if not sightings.mappable.all():
         columns["mappable"] = _texts(sightings.mappable, int)
+    for name in SIGHTING_NOISE:
+        if getattr(sightings, name) is not None:
+            columns[name] = _texts(getattr(sightings, name), float)
     return columns
 
 
@@ -265,6 +274,10 @@ _COLUMNS = {
     "range_m": Column(
         "a number above 0, at most 1e6, or empty", lambda v: (v > 0) & (v <= _FARTHEST), empty=math.nan
     ),
+    "bearing_sd_rad": Column(
+        "0 or radians from 1e-5 to pi", lambda v: (v == 0) | ((v >= 1e-5) & (v <= math.pi))
+    ),
+    "range_sd_m": Column("0 or a number from 0.001 to 1e4", lambda v: (v == 0) | ((v >= 1e-3) & (v <= 1e4))),
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,
     "y_m": _NUMBER,
@@ -316,7 +329,8 @@ def _require_tick_range(table: Table, robot: Robot) -> None:
 
 def _read_sightings(folder: Path) -> Sightings:
     layout = _columns("time_us", "beacon_id", "bearing_rad")
-    table = read_table(_require_csv(folder, "sightings"), [layout], _columns("range_m", "mappable"))
+    optional = _columns("range_m", "mappable", *SIGHTING_NOISE)
+    table = read_table(_require_csv(folder, "sightings"), [layout], optional)
     table.require_order("time_us", strict=False)
     return Sightings(
         time_us=table.integers("time_us"),
@@ -324,6 +338,7 @@ def _read_sightings(folder: Path) -> Sightings:
         bearing_rad=wrap_rad(table.values["bearing_rad"]),
         range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
+        **{name: table.values.get(name) for name in SIGHTING_NOISE},
     )
 
 

@@ -110,6 +110,14 @@ def test_write_then_read_without_truth_map_and_ranges_gives_the_same_log(tmp_pat
     assert_same_log(log, read_folder(tmp_path))
 
 
+def test_write_then_read_keeps_the_noise_that_the_detector_gives(tmp_path: Path) -> None:
+    log = a_log()
+    noise = {"bearing_sd_rad": np.array([0.01, 0.0, 0.02]), "range_sd_m": np.array([0.1, 0.0, 1.0 / 3.0])}
+    log = replace(log, sightings=replace(log.sightings, **noise))
+    write_folder(log, tmp_path)
+    assert_same_log(log, read_folder(tmp_path))
+
+
 finite = st.floats(-1e6, 1e6)
 
 
@@ -267,6 +275,14 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
         (
             {"sightings_csv": "time_us,beacon_id,bearing_rad,mappable\n0,1,0,2\n"},
             r"column mappable: '2'.*0 or 1",
+        ),
+        (
+            {"sightings_csv": "time_us,beacon_id,bearing_rad,bearing_sd_rad\n0,1,0,-0.1\n"},
+            r"column bearing_sd_rad: '-0.1'.*0 or radians from 1e-5",
+        ),
+        (
+            {"sightings_csv": "time_us,beacon_id,bearing_rad,range_sd_m\n0,1,0,nan\n"},
+            r"column range_sd_m: 'nan'.*0 or a number from 0.001",
         ),
         (
             {"beacons_csv": "beacon_id,x_m,y_m\n1,0,0\n1,1,1\n"},

@@ -74,8 +74,8 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t range_var = bslam_range_variance_m2(params, sighting->range_m);
-    const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, true);
+    const bslam_real_t range_var = bslam_range_variance_m2(params, sighting, sighting->range_m);
+    const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
     const bslam_real_t xx = point.x_by_range * point.x_by_range * range_var +
@@ -102,7 +102,7 @@ static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
     const bslam_real_t direction_by_pose[3] = {0, 0, 1};
     const bslam_real_t distance_by_pose[3] = {0, 0, 0};
     const bslam_real_t direction_rad = bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad);
-    const bslam_real_t direction_var = bslam_bearing_variance_rad2(params, false);
+    const bslam_real_t direction_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t sd = params->ray_inverse_distance_sd_per_m;
     const new_value_t values[BSLAM_RAY_DIM] = {
         new_value(ekf, sensor.pose.x_m, x_by_pose, 0, 0),

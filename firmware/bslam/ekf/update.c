@@ -142,7 +142,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     }
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
-    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting->has_range);
+    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting);
     fill_row(ekf, beacon, seen.bearing_by_pose, -1, seen.bearing_by_beacon, &innovation->bearing_row);
     if (!sighting->has_range) {
         innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
@@ -150,7 +150,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     }
     if (sighting->has_range) {
         innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = bslam_range_variance_m2(params, seen.range_m);
+        innovation->range_var_m2 = bslam_range_variance_m2(params, sighting, seen.range_m);
         fill_row(ekf, beacon, seen.range_by_pose, 0, seen.range_by_beacon, &innovation->range_row);
     }
     return BSLAM_OK;

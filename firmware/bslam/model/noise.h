@@ -1,12 +1,20 @@
-/// Noise of a sighting. MATH "Observation".
+/// Noise of a sighting: its own if the detector gives one, else that of the parameters. MATH "Observation".
 #ifndef BSLAM_MODEL_NOISE_H
 #define BSLAM_MODEL_NOISE_H
 
 #include "bslam/base/params.h"
+#include "bslam/base/types.h"
 
-/// Variance of a measured distance to a beacon at range_m: floor² + (fraction r)² + (per_m r²)².
-static inline bslam_real_t bslam_range_variance_m2(const bslam_params_t *params, bslam_real_t range_m)
+/// Variance of a measured distance to a beacon predicted at range_m: floor² + (fraction r)² + (per_m r²)².
+/// The detector's own is in proportion to the distance: what is measured too short must not count as more
+/// exact.
+static inline bslam_real_t bslam_range_variance_m2(const bslam_params_t *params,
+                                                   const bslam_sighting_t *sighting, bslam_real_t range_m)
 {
+    if (sighting->range_sd_m > 0) {
+        const bslam_real_t sd_m = sighting->range_sd_m * (range_m / sighting->range_m);
+        return sd_m * sd_m;
+    }
     const bslam_real_t proportional = params->range_sd_fraction * range_m;
     const bslam_real_t quadratic = params->range_sd_per_m * range_m * range_m;
     return params->range_sd_floor_m * params->range_sd_floor_m + proportional * proportional +
@@ -15,10 +23,12 @@ static inline bslam_real_t bslam_range_variance_m2(const bslam_params_t *params,
 
 /// Variance of a measured direction; larger where no distance comes with it (docs/DESIGN.md, "Direction
 /// only").
-static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_params_t *params, bool has_range)
+static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_params_t *params,
+                                                       const bslam_sighting_t *sighting)
 {
-    const bslam_real_t variance = params->bearing_sd_rad * params->bearing_sd_rad;
-    return has_range ? variance : variance * params->bearing_only_variance_factor;
+    const bslam_real_t sd_rad =
+        sighting->bearing_sd_rad > 0 ? sighting->bearing_sd_rad : params->bearing_sd_rad;
+    return sighting->has_range ? sd_rad * sd_rad : sd_rad * sd_rad * params->bearing_only_variance_factor;
 }
 
 #endif

@@ -6,6 +6,7 @@
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
+static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
 
@@ -112,14 +113,24 @@ static bslam_lag_t describe_lag(const bslam_slam_t *slam, int64_t taken_us, cons
 
 // ---- sightings --------------------------------------------------------------------------------------------
 
+/// A standard deviation, or 0 where the detector gives none.
+static bool is_noise(bslam_real_t sd, bslam_real_t low, bslam_real_t high)
+{
+    return sd == 0 || bslam_in_range(sd, low, high);
+}
+
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
-    if (!bslam_is_number(sighting->bearing_rad) ||
-        (sighting->has_range && !bslam_is_number(sighting->range_m))) {
+    if (!bslam_is_number(sighting->bearing_rad) || !bslam_is_number(sighting->bearing_sd_rad) ||
+        (sighting->has_range &&
+         (!bslam_is_number(sighting->range_m) || !bslam_is_number(sighting->range_sd_m)))) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI);
-    const bool range_ok = !sighting->has_range || bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M);
+    const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI) &&
+                            is_noise(sighting->bearing_sd_rad, BEARING_SD_MIN_RAD, BSLAM_PI);
+    const bool range_ok =
+        !sighting->has_range || (bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M) &&
+                                 is_noise(sighting->range_sd_m, RANGE_MIN_M, RANGE_MAX_M));
     return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
 }
 

@@ -97,8 +97,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, b
 /// Before the first odometry only frames
 /// within ahead_max_us of the first one are taken. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX.
 /// BSLAM_E_TIME: not after the last frame, older than the history reaches, or newer than the odometry by more
-/// than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance outside 1 mm to 10 km, a direction beyond
-/// ±2 pi, a label below -1): bslam_slam_bad_sighting says which.
+/// than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance or its noise outside 1 mm to 10 km, a
+/// direction beyond ±2 pi or its noise outside 1e-5 to pi, a label below -1): bslam_slam_bad_sighting says
+/// which.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);
 

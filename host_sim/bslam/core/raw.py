@@ -41,16 +41,19 @@ class Library:
         elements = self.ffi.typeof(type_name).elements
         return {value: name.removeprefix(prefix).lower() for value, name in elements.items()}
 
-    def sightings(self, rows: Sequence[tuple[float, float, int, bool]]) -> Any:
-        """Rows (bearing_rad, range_m or NaN, label, mappable) as a C array."""
+    def sightings(self, rows: Sequence[tuple[float, float, int, bool, float, float]]) -> Any:
+        """Rows (bearing_rad, range_m or NaN, label, mappable, bearing_sd_rad, range_sd_m) as a C array."""
         array = self.ffi.new("bslam_sighting_t[]", len(rows))
         not_mappable = 255  # BSLAM_CLASS_NOT_MAPPABLE; a macro has no place in an ffi declaration
-        for sighting, (bearing_rad, range_m, label, mappable) in zip(array, rows, strict=True):
+        for sighting, row in zip(array, rows, strict=True):
+            bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m = row
             sighting.bearing_rad = bearing_rad
             sighting.has_range = range_m == range_m
             sighting.range_m = range_m if range_m == range_m else 0.0
             sighting.beacon_class = 0 if mappable else not_mappable
             sighting.label = label
+            sighting.bearing_sd_rad = bearing_sd_rad
+            sighting.range_sd_m = range_sd_m
         return array
 
 

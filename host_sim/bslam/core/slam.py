@@ -172,12 +172,18 @@ class Slam:
         range_m: Sequence[float],
         label: Sequence[int],
         mappable: Sequence[bool],
+        bearing_sd_rad: Sequence[float] | None = None,
+        range_sd_m: Sequence[float] | None = None,
     ) -> list[Account]:
         """One image: equal lengths; range NaN: direction only; label -1: no identity.
 
+        The noise as the detector gives it; 0, or none at all: as the parameters have it.
+
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
-        rows = list(zip(bearing_rad, range_m, label, mappable, strict=True))
+        silent = [0.0] * len(bearing_rad)
+        noise = (bearing_sd_rad or silent, range_sd_m or silent)
+        rows = list(zip(bearing_rad, range_m, label, mappable, *noise, strict=True))
         try:
             array = self._raw.sightings(rows)
             status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))

@@ -22,6 +22,7 @@ from bslam.log import Log, Odometry, Sightings
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
+MAPPABLE = 3  # its place among the columns of a frame
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
 FALSE_BEACONS_ROOM = 80
 # After an interruption of odometry (the core takes intervals up to 4 s): the robot may have gone this fast.
@@ -115,7 +116,7 @@ class _Run:
         """
         while self.frames.waiting_before(time_us):
             _, true_id, columns = self.frames.take()
-            self.ledger.book_refused(true_id, columns[-1])
+            self.ledger.book_refused(true_id, columns[MAPPABLE])
             self.refusals["before_start"] += 1
         if not self.frames.waiting_before(time_us + 1):
             self._try(self.slam.sightings, time_us, [], [], [], [])
@@ -137,9 +138,9 @@ class _Run:
             accounts = self._try(self.slam.sightings, time_us, *columns)
             core_ns += clock() - began
             if accounts is None:
-                self.ledger.book_refused(true_id, columns[-1])
+                self.ledger.book_refused(true_id, columns[MAPPABLE])
             else:
-                self.ledger.book(true_id, columns[-1], accounts)
+                self.ledger.book(true_id, columns[MAPPABLE], accounts)
         self.seen.append(seen)
         return core_ns
 
@@ -224,7 +225,7 @@ class _Frames:
         return until_us is None or self._time_us[self._next] < until_us
 
     def take(self) -> tuple[int, Sequence[int], list[list[Any]]]:
-        """Time, true identities, and the columns bearing_rad, range_m, label, mappable of the next frame."""
+        """Time, true identities, and the columns of the next frame, see `_columns_for_filter`."""
         frame = self._next
         rows = slice(self._bounds[frame], self._bounds[frame + 1])
         self._next = frame + 1
@@ -232,11 +233,17 @@ class _Frames:
 
 
 def _columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:
-    """bearing_rad, range_m, label, mappable of all sightings, with what the options hide hidden."""
+    """bearing_rad, range_m, label, mappable of all sightings, with what the options hide hidden.
+
+    And the noise, bearing_sd_rad, range_sd_m, of a detector that gives it.
+    """
     nothing: NDArray[np.float64] = np.full(len(sightings.time_us), np.nan)
     range_m = sightings.range_m if options.observation == "distance" else nothing
     label = np.full(len(sightings.time_us), -1, dtype=np.int64)
     if options.association == "known":
         mappable_id = np.where(sightings.mappable, sightings.beacon_id, -1)
         label = corrupt_identities(mappable_id, options.wrong_identity_rate, options.seed)
-    return [column.tolist() for column in (sightings.bearing_rad, range_m, label, sightings.mappable)]
+    columns = [sightings.bearing_rad, range_m, label, sightings.mappable]
+    if sightings.bearing_sd_rad is not None and sightings.range_sd_m is not None:
+        columns += [sightings.bearing_sd_rad, sightings.range_sd_m]
+    return [column.tolist() for column in columns]

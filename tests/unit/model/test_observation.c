@@ -387,9 +387,18 @@ static void test_range_variance_is_the_sum_of_its_three_parts(void **state)
     params.range_sd_floor_m = BSLAM_R(0.5);
     params.range_sd_fraction = BSLAM_R(0.25);
     params.range_sd_per_m = BSLAM_R(0.125);
+    const bslam_sighting_t sighting = {.range_m = 4, .has_range = true};
     // At 4 m: 0.25 + 1 + 4.
-    assert_near(bslam_range_variance_m2(&params, 4), 5.25, 16 * UNIT_ROUNDING);
-    assert_near(bslam_range_variance_m2(&params, 0), 0.25, UNIT_ROUNDING);
+    assert_near(bslam_range_variance_m2(&params, &sighting, 4), 5.25, 16 * UNIT_ROUNDING);
+    assert_near(bslam_range_variance_m2(&params, &sighting, 0), 0.25, UNIT_ROUNDING);
+}
+
+static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance(void **state)
+{
+    const bslam_params_t params = unit_params();
+    const bslam_sighting_t sighting = {.range_m = 4, .has_range = true, .range_sd_m = BSLAM_R(0.5)};
+    assert_near(bslam_range_variance_m2(&params, &sighting, 4), 0.25, 0);
+    assert_near(bslam_range_variance_m2(&params, &sighting, 8), 1, 0);
 }
 
 static void test_bearing_variance_grows_by_its_factor_without_a_distance(void **state)
@@ -397,8 +406,12 @@ static void test_bearing_variance_grows_by_its_factor_without_a_distance(void **
     bslam_params_t params = unit_params();
     params.bearing_sd_rad = BSLAM_R(0.5);
     params.bearing_only_variance_factor = 3;
-    assert_near(bslam_bearing_variance_rad2(&params, true), 0.25, 0);
-    assert_near(bslam_bearing_variance_rad2(&params, false), 0.75, 0);
+    bslam_sighting_t sighting = {.has_range = true};
+    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 0.25, 0);
+    sighting.has_range = false;
+    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 0.75, 0);
+    sighting.bearing_sd_rad = 1;
+    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 3, 0);
 }
 
 int main(void)
@@ -419,6 +432,7 @@ int main(void)
         cmocka_unit_test(test_locate_point_undoes_observe_point),
 
         cmocka_unit_test(test_range_variance_is_the_sum_of_its_three_parts),
+        cmocka_unit_test(test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance),
         cmocka_unit_test(test_bearing_variance_grows_by_its_factor_without_a_distance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

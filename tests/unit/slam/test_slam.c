@@ -251,6 +251,22 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
         seen[0] = seen[2];
         assert_frame_refused(&slam, 11 * STEP_US, seen, 3, cases[i].expected, 0);
     }
+    // The detector's noise: not below the least, not beyond the largest, not without a value.
+    const struct {
+        double bearing_sd_rad;
+        double range_sd_m;
+        bslam_status_t expected;
+    } noises[] = {
+        {NAN, 0, BSLAM_E_NOT_FINITE}, {0, NAN, BSLAM_E_NOT_FINITE}, {INFINITY, 0, BSLAM_E_NOT_FINITE},
+        {-0.01, 0, BSLAM_E_RANGE},    {9e-6, 0, BSLAM_E_RANGE},     {3.2, 0, BSLAM_E_RANGE},
+        {0, -0.01, BSLAM_E_RANGE},    {0, 9e-4, BSLAM_E_RANGE},     {0, 10001, BSLAM_E_RANGE},
+    };
+    for (int i = 0; i < COUNT_OF(noises); i++) {
+        bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(-0.8, 3, 2)};
+        seen[1].bearing_sd_rad = (bslam_real_t)noises[i].bearing_sd_rad;
+        seen[1].range_sd_m = (bslam_real_t)noises[i].range_sd_m;
+        assert_frame_refused(&slam, 11 * STEP_US, seen, 2, noises[i].expected, 1);
+    }
     // A good frame forgets which sighting was bad.
     see_one(&slam, 11 * STEP_US, unit_polar(0.3, 4, 1));
     assert_int_equal(bslam_slam_bad_sighting(&slam), -1);
