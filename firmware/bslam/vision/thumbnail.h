@@ -1,0 +1,43 @@
+/// Reduces a frame while its rows stream in: cells, half-resolution copy, brightness. No frame is kept.
+///
+/// Everything is summed in one word a pixel pair: the three channels of RGB565, spread so that 16 of them add
+/// without meeting (docs/MATH.md "Cells").
+#ifndef BSLAM_VISION_THUMBNAIL_H
+#define BSLAM_VISION_THUMBNAIL_H
+
+#include "bslam/base/status.h"
+#include "bslam/vision/frame.h"
+
+/// A frame's width is a multiple of this, its height of BSLAM_CELL_PX; both at least BSLAM_IMAGE_SIDE_MIN.
+#define BSLAM_IMAGE_WIDTH_STEP 8
+#define BSLAM_IMAGE_SIDE_MIN 32
+
+typedef enum bslam_pixel_format {
+    BSLAM_PIXELS_RGB565 = 0,  ///< 2 bytes, in the machine's byte order; red in the upper bits
+    BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
+} bslam_pixel_format_t;
+
+typedef struct bslam_thumbnail {
+    bslam_pixel_format_t format;
+    int32_t width_px;
+    int32_t height_px;
+    int32_t rows_seen;  ///< of the frame that is streaming in
+    uint32_t pair_sums[BSLAM_IMAGE_WIDTH_MAX / 2];
+    uint32_t cell_sums[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
+    uint16_t darkest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
+    uint16_t brightest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
+    bslam_cell_t cells[BSLAM_CELLS_MAX];
+    uint16_t half[BSLAM_HALF_MAX];
+} bslam_thumbnail_t;
+
+/// Starts a frame; what streamed in before is forgotten. BSLAM_E_RANGE, and nothing changed, if the size is
+/// not as said above, is beyond BSLAM_IMAGE_WIDTH_MAX or _HEIGHT_MAX, or the format is none of the enum.
+BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_begin(bslam_thumbnail_t *thumbnail,
+                                                      bslam_pixel_format_t format, int32_t width_px,
+                                                      int32_t height_px);
+
+/// The next row, uppermost first, of width_px pixels. BSLAM_E_COUNT, and nothing changed, if the frame has
+/// all its rows already.
+BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, const void *pixels);
+
+#endif
