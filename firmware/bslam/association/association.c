@@ -3,7 +3,7 @@
 #include "bslam/math/trig.h"
 
 /// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
-typedef bslam_real_t (*distance2_fn)(const bslam_frame_t *frame, const bslam_sighting_t *sighting,
+typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                      int beacon);
 
 static bool is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
@@ -24,7 +24,7 @@ static bool classes_differ(const bslam_sighting_t *sighting, const bslam_beacon_
 }
 
 /// Leaves each beacon to the nearest of the sightings that chose it, the first of equals.
-static void keep_one_to_one(const bslam_frame_t *frame, bslam_match_t *matches)
+static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
     for (int i = 1; i < frame->count; i++) {
         for (int j = 0; j < i && matches[i].verdict == BSLAM_VERDICT_MATCH; j++) {
@@ -51,7 +51,7 @@ static int find_label(const bslam_ekf_t *ekf, int32_t label)
     return -1;
 }
 
-static bool label_is_repeated(const bslam_frame_t *frame, int i)
+static bool label_is_repeated(const bslam_sighting_frame_t *frame, int i)
 {
     for (int j = 0; j < i; j++) {
         const bslam_sighting_t *earlier = &frame->sightings[j];
@@ -63,7 +63,7 @@ static bool label_is_repeated(const bslam_frame_t *frame, int i)
     return false;
 }
 
-void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
@@ -85,8 +85,8 @@ void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches)
 // ---- by distance ------------------------------------------------------------------------------------------
 
 /// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
-static void associate_by_distance(const bslam_frame_t *frame, distance2_fn distance2, bslam_real_t match2,
-                                  bslam_real_t new2, bslam_match_t *matches)
+static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2_fn distance2,
+                                  bslam_real_t match2, bslam_real_t new2, bslam_match_t *matches)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
@@ -118,7 +118,8 @@ static void associate_by_distance(const bslam_frame_t *frame, distance2_fn dista
 }
 
 /// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
-static bslam_real_t euclidean2(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
 {
     const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
     bslam_real_t x;
@@ -140,7 +141,8 @@ static bslam_real_t euclidean2(const bslam_frame_t *frame, const bslam_sighting_
     return difference * difference;
 }
 
-static bslam_real_t mahalanobis2(const bslam_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                                 int beacon)
 {
     bslam_innovation_t innovation;
     bslam_real_t d2;
@@ -152,12 +154,12 @@ static bslam_real_t mahalanobis2(const bslam_frame_t *frame, const bslam_sightin
     return d2;
 }
 
-void bslam_associate_nearest(const bslam_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
     associate_by_distance(frame, euclidean2, 1, 1, matches);
 }
 
-void bslam_associate_mahalanobis(const bslam_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
     associate_by_distance(frame, mahalanobis2, frame->params->match_d2, frame->params->new_d2, matches);
 }

@@ -34,26 +34,26 @@ typedef struct bslam_match {
 } bslam_match_t;
 
 /// All a method may look at.
-typedef struct bslam_frame {
+typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
     const bslam_params_t *params;
     const bslam_pose_t *mount;  ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
-} bslam_frame_t;
+} bslam_sighting_frame_t;
 
 /// Decides for every sighting of the frame: matches[0..count). A beacon is matched at most once in a frame.
-typedef void (*bslam_associate_fn)(const bslam_frame_t *frame, bslam_match_t *matches);
+typedef void (*bslam_associate_fn)(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// By label: the detector knows which beacon it is. O(count * beacons).
-void bslam_associate_known(const bslam_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// The paper's baseline (Bailey's flowchart): far from any found feature is new, else it is the nearest one.
 /// Measured in the map, or as an angle where there is no distance. O(count * beacons).
-void bslam_associate_nearest(const bslam_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
-void bslam_associate_mahalanobis(const bslam_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// The method that params->association names.
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params);

@@ -330,7 +330,7 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
         slam->counters.frames_refused++;
         return status;
     }
-    const bslam_frame_t frame = {
+    const bslam_sighting_frame_t frame = {
         .ekf = &slam->ekf, .params = &slam->params, .mount = &mount, .sightings = sightings, .count = count};
     const bslam_associate_fn associate = bslam_associate_method(&slam->params);
     slam->ekf.lag = lag;
