@@ -1,0 +1,215 @@
+"""Trained models: what a support vector machine and a user's recogniser hold, and the file they stand in.
+
+The file is JSON, so that it can be read, compared and kept in version control. Reading is strict: a file that
+is cut short, of another version, with a number that is none, or made for another feature vector is refused
+whole, and the error names file, key, value and what is allowed. Numbers have nine significant digits, which
+give every float back to the bit.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+
+FORMAT = "bslam recogniser"
+VERSION = 1
+ROWS_MAX = 255
+HEIGHT_MAX_M = 100.0
+
+
+def weights_in_row(features: int, quadratic: bool) -> int:
+    """As BSLAM_SVM_WEIGHTS in firmware/bslam/svm/svm.h."""
+    return features + (features * (features + 1) // 2 if quadratic else 0)
+
+
+@dataclass(frozen=True)
+class Svm:
+    """A machine as bslam_svm_t takes it: weights (rows, weights_in_row) of float32, or of int8 to scale."""
+
+    features: int
+    quadratic: bool
+    weights: NDArray[np.float32] | NDArray[np.int8]
+    bias: NDArray[np.float32]  # (rows,)
+    byte_scale: NDArray[np.float32] | None = None  # (rows,), with int8 weights only
+
+    @property
+    def rows(self) -> int:
+        return len(self.bias)
+
+
+@dataclass(frozen=True)
+class BeaconClass:
+    """A kind of beacon, or one object of a user's; height 0: not known."""
+
+    name: str
+    height_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recogniser:
+    """A user's own objects, told by their signatures: row r of the machine is for objects[r]."""
+
+    svm: Svm
+    objects: tuple[BeaconClass, ...]
+    reject_margin: float
+    notes: Mapping[str, str] = field(
+        default_factory=dict
+    )  # how it came about: training set, settings, figures
+
+
+def write_recogniser(path: Path, recogniser: Recogniser) -> None:
+    """Write the model file; the same recogniser gives the same bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(recogniser_text(recogniser), encoding="utf-8")
+
+
+def recogniser_text(recogniser: Recogniser) -> str:
+    """The content of the model file."""
+    svm = recogniser.svm
+    if svm.byte_scale is not None:
+        raise ValueError("a model file holds float weights; bytes are made when the header is written")
+    rows = ",\n".join(f"  {_numbers(row)}" for row in svm.weights)
+    head = {
+        "format": FORMAT,
+        "version": VERSION,
+        "notes": dict(recogniser.notes),
+        "objects": [{"name": one.name, "height_m": one.height_m} for one in recogniser.objects],
+        "features": svm.features,
+        "reject_margin": _rounded(recogniser.reject_margin),
+    }
+    opening = json.dumps(head, indent=1, ensure_ascii=False).removesuffix("\n}")
+    return f'{opening},\n "bias": {_numbers(svm.bias)},\n "weights": [\n{rows}\n ]\n}}\n'
+
+
+def read_recogniser(path: Path, features: int) -> Recogniser:
+    """The recogniser in a model file; `features` is the length of the signature that this program computes.
+
+    Raises BslamError that names file, key, value and what is allowed.
+    """
+    document = _Document(path, _load(path))
+    document.equal("format", FORMAT)
+    document.equal("version", VERSION)
+    document.equal("features", features)
+    objects = tuple(
+        BeaconClass(one.text("name"), one.number("height_m", 0.0, HEIGHT_MAX_M))
+        for one in document.children("objects", ROWS_MAX)
+    )
+    rows = len(objects)
+    notes = document.mapping("notes")
+    return Recogniser(
+        svm=Svm(
+            features, False, document.array("weights", (rows, features)), document.array("bias", (rows,))
+        ),
+        objects=objects,
+        reject_margin=document.number("reject_margin", -1e12, 1e12),
+        notes={str(key): str(value) for key, value in notes.items()},
+    )
+
+
+def _numbers(values: NDArray[Any]) -> str:
+    return "[" + ", ".join(f"{value:.9g}" for value in values.tolist()) + "]"
+
+
+def _rounded(value: float) -> float:
+    """To the nearest float32, which is what the C core compares with."""
+    return float(f"{float(np.float32(value)):.9g}")
+
+
+def _load(path: Path) -> Mapping[str, Any]:
+    def refuse(word: str) -> float:
+        raise ValueError(f"{word} is no number")
+
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    except (OSError, UnicodeDecodeError) as error:
+        raise BslamError(f"{path}: cannot be read: {error}; allowed: a UTF-8 text file") from error
+    except ValueError as error:
+        allowed = "a whole model file, as tools/train_beacons.py writes it"
+        raise BslamError(f"{path}: not JSON, or cut short: {error}; allowed: {allowed}") from error
+    if not isinstance(document, dict):
+        raise BslamError(
+            f"{path}: holds no table; allowed: a model file, as tools/train_beacons.py writes it"
+        )
+    return document
+
+
+@dataclass(frozen=True)
+class _Document:
+    """A JSON table that is asked for its keys one by one, each with what it may hold."""
+
+    path: Path
+    table: Mapping[str, Any]
+    prefix: str = ""
+
+    def _get(self, key: str, allowed: str) -> Any:
+        if key not in self.table:
+            raise BslamError(f"{self.path}, key {self.prefix}{key}: is missing; allowed: {allowed}")
+        return self.table[key]
+
+    def _error(self, key: str, value: object, allowed: str) -> BslamError:
+        shown = repr(value) if len(repr(value)) < 60 else f"{repr(value)[:57]}..."
+        return BslamError(f"{self.path}, key {self.prefix}{key}: {shown} is not allowed; allowed: {allowed}")
+
+    def equal(self, key: str, wanted: str | int) -> None:
+        value = self._get(key, repr(wanted))
+        if type(value) is not type(wanted) or value != wanted:
+            raise self._error(key, value, repr(wanted))
+
+    def text(self, key: str) -> str:
+        value = self._get(key, "a name")
+        if not isinstance(value, str) or not value:
+            raise self._error(key, value, "a name")
+        return value
+
+    def number(self, key: str, low: float, high: float) -> float:
+        allowed = f"a number from {low:g} to {high:g}"
+        value = self._get(key, allowed)
+        if not _is_number(value) or not low <= value <= high:
+            raise self._error(key, value, allowed)
+        return float(value)
+
+    def mapping(self, key: str) -> Mapping[str, Any]:
+        value = self._get(key, "a table")
+        if not isinstance(value, dict):
+            raise self._error(key, value, "a table")
+        return value
+
+    def children(self, key: str, most: int) -> list[_Document]:
+        allowed = f"a list of 1 to {most} tables"
+        value = self._get(key, allowed)
+        if not isinstance(value, list) or not 1 <= len(value) <= most:
+            raise self._error(key, value, allowed)
+        for index, one in enumerate(value):
+            if not isinstance(one, dict):
+                raise self._error(f"{key}[{index}]", one, "a table")
+        return [_Document(self.path, one, f"{self.prefix}{key}[{i}].") for i, one in enumerate(value)]
+
+    def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Finite float32 numbers of a shape of one or two dimensions."""
+        value = self._get(key, f"{shape[0]} entries")
+        self._check_nested(key, value, shape)
+        return np.array(value, dtype=np.float32)
+
+    def _check_nested(self, key: str, value: object, shape: tuple[int, ...]) -> None:
+        if not shape:
+            if not _is_number(value) or not abs(value) <= 1e12:  # type: ignore[arg-type]
+                raise self._error(key, value, "a number from -1e12 to 1e12")
+            return
+        if not isinstance(value, list) or len(value) != shape[0]:
+            count = f"{len(value)} entries" if isinstance(value, list) else value
+            raise self._error(key, count, f"a list of {shape[0]}")
+        for index, one in enumerate(value):
+            self._check_nested(f"{key}[{index}]", one, shape[1:])
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

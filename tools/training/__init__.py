@@ -1,0 +1,1 @@
+"""Offline training: samples in, support vector machines for the C core out."""
