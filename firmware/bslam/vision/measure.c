@@ -1,0 +1,93 @@
+#include "bslam/vision/measure.h"
+
+#include <string.h>
+
+#include "bslam/math/trig.h"
+#include "bslam/vision/signature.h"
+
+static const bslam_real_t HEIGHT_MAX_M = 10;
+// A rough box this close to the frame's edge may go on outside.
+static const bslam_real_t CUT_PX = 2;
+// Below this height no distance, below this width or height no direction.
+static const bslam_real_t HEIGHT_MIN_PX = 8;
+static const bslam_real_t SIDE_MIN_PX = 5;
+// How well a side of the outline is found, pixels.
+static const bslam_real_t SIDE_SD_PX = BSLAM_R(0.7);
+// Of a direction that no outline improves, radians; of a distance, as a fraction of it.
+static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(0.003);
+static const bslam_real_t RANGE_SD_MIN = BSLAM_R(0.01);
+
+static bool box_is_number(const bslam_box_t *box)
+{
+    return bslam_is_number(box->left_px) && bslam_is_number(box->top_px) && bslam_is_number(box->right_px) &&
+           bslam_is_number(box->bottom_px);
+}
+
+/// Marks of a box that reaches the frame's edge, or is small.
+static unsigned marks_of(const bslam_frame_t *frame, const bslam_box_t *rough)
+{
+    const bslam_real_t right = (bslam_real_t)frame->width_px - BSLAM_R(0.5);
+    const bslam_real_t bottom = (bslam_real_t)frame->height_px - BSLAM_R(0.5);
+    const bool small =
+        rough->right_px - rough->left_px < SIDE_MIN_PX || rough->bottom_px - rough->top_px < HEIGHT_MIN_PX;
+    return (rough->left_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_LEFT : 0U) |
+           (rough->right_px > right - CUT_PX ? (unsigned)BSLAM_MARK_CUT_RIGHT : 0U) |
+           (rough->top_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_TOP : 0U) |
+           (rough->bottom_px > bottom - CUT_PX ? (unsigned)BSLAM_MARK_CUT_BOTTOM : 0U) |
+           (small ? (unsigned)BSLAM_MARK_SMALL : 0U);
+}
+
+/// The object's middle in plan is half way between the feet of its two sides, which are at H / height_left
+/// and H / height_right: seen obliquely, the nearer half looks wider and the middle is not in the middle.
+static void measure_outline(const bslam_outline_t *outline, bslam_real_t height_m,
+                            bslam_candidate_t *candidate)
+{
+    const bslam_real_t height_left = outline->top_left - outline->bottom_left;
+    const bslam_real_t height_right = outline->top_right - outline->bottom_right;
+    const bslam_real_t sum = height_left + height_right;
+    const bslam_real_t across = (outline->left * height_right + outline->right * height_left) / sum;
+    const bslam_real_t edge_sd = SIDE_SD_PX * outline->pixel;
+
+    candidate->bearing_rad = bslam_angle_wrap(outline->facing_rad + bslam_atan2(across, 1));
+    candidate->bearing_sd_rad = bslam_sqrt(edge_sd * edge_sd / 2 + BEARING_SD_MIN_RAD * BEARING_SD_MIN_RAD);
+    candidate->has_bearing = true;
+    if (height_m > 0) {
+        const bslam_real_t depth = height_m / 2 * (1 / height_left + 1 / height_right);
+        const bslam_real_t relative = 2 * edge_sd / sum;
+        candidate->range_m = depth * bslam_sqrt(1 + across * across);
+        candidate->range_sd_m =
+            candidate->range_m * bslam_sqrt(2 * relative * relative + RANGE_SD_MIN * RANGE_SD_MIN);
+        candidate->has_range = true;
+    }
+}
+
+bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
+                             const bslam_box_t *rough, bslam_real_t height_m, bslam_candidate_t *candidate)
+{
+    if (!box_is_number(rough) || !bslam_is_number(height_m)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
+        return BSLAM_E_PARAMETER;
+    }
+    bslam_outline_t outline;
+    if (!bslam_in_range(height_m, 0, HEIGHT_MAX_M) ||
+        bslam_outline_find(frame, camera, rough, &outline) != BSLAM_OK) {
+        return BSLAM_E_RANGE;
+    }
+    const unsigned marks = marks_of(frame, rough);
+    const unsigned sideways = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL;
+    const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
+    candidate->has_bearing = false;
+    candidate->has_range = false;
+    if ((marks & sideways) == 0U) {
+        measure_outline(&outline, (marks & upright) == 0U ? height_m : 0, candidate);
+    }
+    candidate->marks = (uint16_t)marks;
+    candidate->outline = (bslam_box_t){outline.quad.left_px, outline.quad.top_left_px, outline.quad.right_px,
+                                       outline.quad.bottom_left_px};
+    if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {
+        memset(candidate->signature, 0, sizeof candidate->signature);
+    }
+    return BSLAM_OK;
+}

@@ -1,0 +1,45 @@
+/// Where exactly an object's four sides are: a rough box in, an upright trapezoid out, to a fraction of a
+/// pixel. MATH "Outline".
+///
+/// Sides are described in a plane that stands upright at unit distance before the camera and faces the
+/// object, so that neither the lens nor the camera's pitch bends them: upright edges of things in the room
+/// are upright lines there, and level ones straight lines whose slope tells how obliquely they are seen.
+#ifndef BSLAM_VISION_OUTLINE_H
+#define BSLAM_VISION_OUTLINE_H
+
+#include "bslam/base/status.h"
+#include "bslam/vision/frame.h"
+#include "bslam/vision/lens.h"
+
+/// A part of the frame between two upright lines; its upper and lower ends may slope. Whole-frame pixels,
+/// edges as in bslam_box_t.
+typedef struct bslam_quad {
+    bslam_real_t left_px;
+    bslam_real_t right_px;
+    bslam_real_t top_left_px;
+    bslam_real_t bottom_left_px;
+    bslam_real_t top_right_px;
+    bslam_real_t bottom_right_px;
+} bslam_quad_t;
+
+/// The sides in the facing plane, tangents: across is y/x (positive to the left), up is z/x, in axes whose x
+/// looks in the direction facing_rad.
+typedef struct bslam_outline {
+    bslam_real_t facing_rad;  ///< bearing of the plane's centre, in the robot's frame
+    bslam_real_t left;        ///< across; left > right
+    bslam_real_t right;
+    bslam_real_t top_left;  ///< up, at the left side
+    bslam_real_t bottom_left;
+    bslam_real_t top_right;
+    bslam_real_t bottom_right;
+    bslam_real_t pixel;  ///< size of a frame pixel in these units, at the centre
+    bslam_quad_t quad;   ///< the same corners in the frame
+} bslam_outline_t;
+
+/// Finds the outline near a rough box, which may be 4 pixels off on each side.
+/// BSLAM_E_RANGE, and *outline unchanged, if the box is empty, lies outside the frame, or the lens sees no
+/// upright plane there.
+BSLAM_MUST_CHECK bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera_t *camera,
+                                                   const bslam_box_t *rough, bslam_outline_t *outline);
+
+#endif
