@@ -23,7 +23,7 @@ from bslam.errors import BslamError
 FORMAT = "bslam recogniser"
 VERSION = 1
 ROWS_MAX = 255
-HEIGHT_MAX_M = 100.0
+HEIGHT_MAX_M = 10.0
 
 
 def weights_in_row(features: int, quadratic: bool) -> int:
@@ -125,11 +125,8 @@ def _rounded(value: float) -> float:
 
 
 def _load(path: Path) -> Mapping[str, Any]:
-    def refuse(word: str) -> float:
-        raise ValueError(f"{word} is no number")
-
     try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+        document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise BslamError(f"{path}: cannot be read: {error}; allowed: a UTF-8 text file") from error
     except ValueError as error:
