@@ -49,7 +49,8 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
 }
 # The command line ties the parts together and may import them all.
 PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})
-RAW_LAYERS = frozenset({"core/build.py", "core/raw.py"})
+RAW_LAYERS = frozenset({"core/build.py", "core/raw.py", "world/camera/build.py", "world/camera/raw.py"})
+EXTENSIONS = re.compile(r"bslam\.(core|world\.camera)\._[a-z]")
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
@@ -106,8 +107,7 @@ def imported_names(tree: ast.Module, package: list[str]) -> Iterator[tuple[int, 
 def python_fault(part: str, relative: str, name: str) -> str | None:
     """What is wrong with importing `name` in the file `relative` of `part`, or None."""
     words = name.split(".")
-    is_extension = words[:2] == ["bslam", "core"] and len(words) > 2 and words[2].startswith("_")
-    if words[0] == "cffi" or is_extension:
+    if words[0] == "cffi" or EXTENSIONS.match(name):
         return None if relative in RAW_LAYERS else f"{name}: only {', '.join(sorted(RAW_LAYERS))} touch cffi"
     if words[0] != "bslam" or part in PYTHON_TOP or len(words) == 1:
         return None
