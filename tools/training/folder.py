@@ -6,8 +6,8 @@ One line a box, in any order:
     kitchen_01.jpg,red box,812,400,1033,911,0.3
 
 `picture` is a file in the folder (or below it), `class` the name of one object or kind. Edges count from the
-upper left corner of the upright picture: 0 to its width and height. `height_m` is the real height, the same on
-every line of a class; it may be empty, and the whole column may be missing: then the class has no distance. A
+upper left corner of the upright picture: 0 to its width and height. `height_m` is the real height, the same
+on every line of a class; it may be empty, and the column may be missing: then the class has no distance. A
 picture with nothing in it stands on a line with its name alone: what is seen in it is none of the objects.
 """
 
