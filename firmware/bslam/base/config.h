@@ -74,6 +74,14 @@
 #error "BSLAM_CAMERAS_MAX is 1 to 16"
 #endif
 
+/// Boxes of one image that are looked at more closely.
+#ifndef BSLAM_PROPOSALS_MAX
+#define BSLAM_PROPOSALS_MAX 96
+#endif
+#if BSLAM_PROPOSALS_MAX < 8 || BSLAM_PROPOSALS_MAX > 255
+#error "BSLAM_PROPOSALS_MAX is 8 to 255"
+#endif
+
 /// Beacon candidates taken from one image.
 #ifndef BSLAM_CANDIDATES_MAX
 #define BSLAM_CANDIDATES_MAX 16

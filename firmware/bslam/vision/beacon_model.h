@@ -6,9 +6,12 @@
 #include "bslam/base/status.h"
 #include "bslam/svm/svm.h"
 
-/// Lengths of the feature vectors (features.h); a model of other lengths is refused.
-#define BSLAM_CELL_FEATURES 22
-#define BSLAM_BLOB_FEATURES 60
+/// Lengths of the feature vectors (proposals.h, features.h); a model of other lengths is refused. Not macros,
+/// so that Python sees them.
+enum {
+    BSLAM_CELL_FEATURES = 22,
+    BSLAM_BLOB_FEATURES = 61,
+};
 
 #define BSLAM_CLASSES_MAX 16
 
@@ -48,7 +51,9 @@ typedef struct bslam_beacon_model {
     const bslam_recogniser_t *recogniser;  ///< NULL: none
 } bslam_beacon_model_t;
 
-/// BSLAM_OK; BSLAM_E_RANGE if a size is not as described above, BSLAM_E_NOT_FINITE if a number is not.
+/// BSLAM_OK if the front end may be given this model. BSLAM_E_COUNT: a count is out of range or a machine's
+/// size is not as described above. BSLAM_E_RANGE: a height is not 0 to 10 m. BSLAM_E_NOT_FINITE or
+/// BSLAM_E_PARAMETER: a number is not finite, or what bslam_svm_check refuses.
 BSLAM_MUST_CHECK bslam_status_t bslam_beacon_model_check(const bslam_beacon_model_t *model);
 
 #endif

@@ -11,21 +11,26 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from cffi import FFI
 
-from bslam.core.builds import REALS, SIZE_CLASSES, extension_name
+from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 
 CORE_DIR = Path(__file__).resolve().parent
 FIRMWARE_DIR = CORE_DIR.parents[2] / "firmware"
 LIBRARY_DIR = FIRMWARE_DIR / "bslam"
+BEACONS_HEADER = FIRMWARE_DIR / "models" / "beacons.h"
 
 LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limits.h", "float.h")
 
 
-def _macros(real: str, beacons_max: int) -> list[tuple[str, str]]:
+Macros = Sequence[tuple[str, str]]
+
+
+def _macros(real: str, beacons_max: int) -> Macros:
     return [
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
@@ -51,30 +56,50 @@ def _drop_inline_functions(text: str) -> str:
     return "".join(kept)
 
 
-def declarations(real: str, beacons_max: int) -> str:
-    """The public headers as cffi reads them."""
+def declarations(macros: Macros, header: str) -> str:
+    """A public header of the library, "bslam.h" say, with all it includes, as cffi reads it."""
     with tempfile.TemporaryDirectory() as empty:
-        for header in LIBC_HEADERS:
-            Path(empty, header).touch()
-        defines = [f"-D{name}={value}" for name, value in _macros(real, beacons_max)]
+        for libc_header in LIBC_HEADERS:
+            Path(empty, libc_header).touch()
+        defines = [f"-D{name}={value}" for name, value in macros]
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
-        command += [*defines, "-D__attribute__(x)=", str(LIBRARY_DIR / "bslam.h")]
+        command += [*defines, "-D__attribute__(x)=", str(LIBRARY_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return _drop_inline_functions(text)
 
 
 def build(real: str, beacons_max: int) -> Path:
+    """Builds the filter for a scalar type and size class; returns where."""
+    macros = _macros(real, beacons_max)
+    name = extension_name(real, beacons_max)
+    return _compile(name, declarations(macros, "bslam.h"), '#include "bslam/bslam.h"', macros)
+
+
+def build_vision() -> Path:
+    """Builds the vision front end, in float as on the target, with its model where there is one yet."""
+    includes = '#include "bslam/vision/vision.h"\n'
+    text = declarations((), "vision/vision.h")
+    text += "const bslam_beacon_model_t *built_in_model(void);\n"
+    if BEACONS_HEADER.is_file():
+        includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
+        model = "&bslam_beacons_model"
+    else:
+        model = "NULL"
+    function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
+    return _compile(VISION_EXTENSION, text, includes + function, ())
+
+
+def _compile(name: str, declared: str, source: str, macros: Macros) -> Path:
     """Compiles one extension and puts it beside this file; returns where."""
     ffi = FFI()
-    ffi.cdef(declarations(real, beacons_max))
-    name = extension_name(real, beacons_max)
+    ffi.cdef(declared)
     with tempfile.TemporaryDirectory() as work:
         ffi.set_source(
             name,
-            '#include "bslam/bslam.h"',
+            source,
             sources=sorted(str(path) for path in LIBRARY_DIR.rglob("*.c")),
             include_dirs=[str(FIRMWARE_DIR)],
-            define_macros=_macros(real, beacons_max),
+            define_macros=list(macros),
             extra_compile_args=[
                 "-std=c11",
                 "-O2",
@@ -98,7 +123,8 @@ def main() -> int:
     """Builds every extension, one on a core (in processes, since cffi changes the directory)."""
     sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
     with ProcessPoolExecutor() as pool:
-        for path in pool.map(build, reals, sizes):
+        vision = pool.submit(build_vision)
+        for path in [*pool.map(build, reals, sizes), vision.result()]:
             print(f"built {path.name}", file=sys.stderr)
     return 0
 

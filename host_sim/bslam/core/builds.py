@@ -10,3 +10,7 @@ REALS = ("float", "double")
 def extension_name(real: str, beacons_max: int) -> str:
     """The module of one build: `bslam.core._float_20`."""
     return f"bslam.core._{real}_{beacons_max}"
+
+
+VISION_EXTENSION = "bslam.core._vision"
+"""The build of the vision front end: it holds no map, so one size serves all."""

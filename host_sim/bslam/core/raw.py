@@ -5,9 +5,13 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from bslam.core.builds import REALS, SIZE_CLASSES, extension_name
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
+from bslam.modelfile import Svm
 
 
 class Library:
@@ -69,3 +73,73 @@ def library(real: str, beacons_max: int) -> Library:
         f"{beacons_max} beacons: allowed are 1 to {SIZE_CLASSES[-1]}, as the largest build holds "
         "(core/builds.py, SIZE_CLASSES)"
     )
+
+
+class VisionLibrary:
+    """The vision front end 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
+
+    def __init__(self) -> None:
+        try:
+            module = import_module(VISION_EXTENSION)
+        except ImportError as error:
+            raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error
+        self.ffi = module.ffi
+        self.lib = module.lib
+
+    def ensure(self, status: int, message: str) -> None:
+        """Raises CoreError unless status is BSLAM_OK."""
+        if status != self.lib.BSLAM_OK:
+            raise CoreError(self.ffi.string(self.lib.bslam_status_name(status)).decode(), message)
+
+    def new_filled(self, type_name: str, **values: Any) -> Any:
+        """A struct with these members set and all else zero."""
+        struct = self.ffi.new(f"{type_name} *")
+        for name, value in values.items():
+            setattr(struct, name, value)
+        return struct
+
+    def table(self, kind: str, values: NDArray[Any], keep: list[Any]) -> Any:
+        """A C array of `kind` that holds a copy of the values; `keep` keeps it alive."""
+        array = self.ffi.new(f"{kind}[]", values.ravel().tolist())
+        keep.append(array)
+        return array
+
+    def svm(self, svm: Svm, keep: list[Any]) -> Any:
+        """A bslam_svm_t; `keep` keeps its tables alive."""
+        made = self.new_filled(
+            "bslam_svm_t",
+            rows=svm.rows,
+            features=svm.features,
+            quadratic=svm.quadratic,
+            bias=self.table("float", svm.bias, keep),
+        )
+        if svm.byte_scale is None:
+            made.weights = self.table("float", svm.weights, keep)
+        else:
+            made.bytes = self.table("int8_t", svm.weights, keep)
+            made.byte_scale = self.table("float", svm.byte_scale, keep)
+        keep.append(made)
+        return made[0]
+
+    def pixels(self, rgb: NDArray[Any]) -> Any:
+        """The bytes of a C-contiguous picture, good as long as the array is."""
+        return self.ffi.cast("uint8_t *", rgb.ctypes.data)
+
+    def floats(self, array: NDArray[np.float32]) -> Any:
+        """The numbers of a C-contiguous float32 array, to be written by C."""
+        return self.ffi.cast("float *", array.ctypes.data)
+
+    def shorts(self, array: NDArray[np.int16]) -> Any:
+        """The numbers of a C-contiguous int16 array, to be written by C."""
+        return self.ffi.cast("int16_t *", array.ctypes.data)
+
+    def copy_of(self, pointer: Any, count: int, dtype: Any) -> NDArray[Any]:
+        """`count` numbers from a C array, copied."""
+        size = count * np.dtype(dtype).itemsize
+        return np.frombuffer(self.ffi.buffer(pointer, size), dtype=dtype).copy()
+
+
+@cache
+def vision_library() -> VisionLibrary:
+    """The one build of the front end."""
+    return VisionLibrary()

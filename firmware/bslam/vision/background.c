@@ -1,0 +1,216 @@
+#include "bslam/vision/background.h"
+
+#include <string.h>
+
+/// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
+static const uint8_t tone_log[256] = {
+    0,   10,  19,  26,  32,  37,  42,  47,  51,  54,  58,  61,  64,  67,  69,  72,  74,  77,  79,  81,
+    83,  85,  86,  88,  90,  91,  93,  95,  96,  97,  99,  100, 101, 103, 104, 105, 106, 107, 109, 110,
+    111, 112, 113, 114, 115, 116, 117, 118, 118, 119, 120, 121, 122, 123, 123, 124, 125, 126, 127, 127,
+    128, 129, 129, 130, 131, 131, 132, 133, 133, 134, 135, 135, 136, 137, 137, 138, 138, 139, 139, 140,
+    141, 141, 142, 142, 143, 143, 144, 144, 145, 145, 146, 146, 147, 147, 148, 148, 149, 149, 150, 150,
+    150, 151, 151, 152, 152, 153, 153, 153, 154, 154, 155, 155, 155, 156, 156, 157, 157, 157, 158, 158,
+    159, 159, 159, 160, 160, 160, 161, 161, 161, 162, 162, 162, 163, 163, 163, 164, 164, 164, 165, 165,
+    165, 166, 166, 166, 167, 167, 167, 168, 168, 168, 169, 169, 169, 169, 170, 170, 170, 171, 171, 171,
+    171, 172, 172, 172, 173, 173, 173, 173, 174, 174, 174, 174, 175, 175, 175, 175, 176, 176, 176, 177,
+    177, 177, 177, 178, 178, 178, 178, 178, 179, 179, 179, 179, 180, 180, 180, 180, 181, 181, 181, 181,
+    182, 182, 182, 182, 182, 183, 183, 183, 183, 184, 184, 184, 184, 184, 185, 185, 185, 185, 185, 186,
+    186, 186, 186, 186, 187, 187, 187, 187, 187, 188, 188, 188, 188, 188, 189, 189, 189, 189, 189, 190,
+    190, 190, 190, 190, 191, 191, 191, 191, 191, 191, 192, 192, 192, 192, 192, 193,
+};
+
+/// Angles between which the zones lie where the camera looks straight: the floor is surely within 2 m there.
+#define FLOOR_BELOW_RAD BSLAM_R(0.24)
+#define WALL_ABOVE_RAD BSLAM_R(0.20)
+#define WALL_BELOW_RAD BSLAM_R(0.04)
+#define CEILING_ABOVE_RAD BSLAM_R(0.28)
+
+/// A frame counts one, the first one as many as history would hold; history fades by an eighth a frame.
+#define FIRST_WEIGHT 8
+#define FADE_SHIFT 3
+/// The running colours take a quarter of a new frame's.
+#define COLOUR_RATE 0.25f
+
+static int32_t clamp(int32_t value, int32_t low, int32_t high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+static int32_t magnitude(int32_t value)
+{
+    return value < 0 ? -value : value;
+}
+
+void bslam_background_init(bslam_background_t *background)
+{
+    memset(background, 0, sizeof *background);
+}
+
+static bslam_tone_t tone_of_cell(bslam_cell_t cell)
+{
+    const int32_t red = tone_log[cell.red], green = tone_log[cell.green], blue = tone_log[cell.blue];
+    const int32_t luma = cell.green + cell.red / 2;  // as thumbnail.c weighs it for the spread
+    const bslam_tone_t tone = {
+        .light = (uint8_t)((red + 2 * green + blue) / 4),
+        .reddish = (int8_t)clamp(red - green, -127, 127),
+        .bluish = (int8_t)clamp(blue - green, -127, 127),
+        .spread = (uint8_t)clamp(128 * cell.spread / (luma + 8), 0, 255),
+    };
+    return tone;
+}
+
+void bslam_background_tones(const bslam_frame_t *frame, bslam_tone_t *tones)
+{
+    const int32_t count = frame->rows * frame->columns;
+    for (int32_t i = 0; i < count; i++) {
+        tones[i] = tone_of_cell(frame->cells[i]);
+    }
+}
+
+/// Index of the row that looks `up_rad` above the horizontal in the middle of the frame.
+static int32_t row_looking(const bslam_camera_t *camera, bslam_real_t up_rad)
+{
+    const bslam_real_t from_axis_rad = up_rad + camera->pitch_rad;
+    const bslam_real_t v_px = camera->cy_px - camera->fy_px * from_axis_rad;
+    return (int32_t)(v_px / BSLAM_CELL_PX);
+}
+
+int32_t bslam_horizon_row(const bslam_camera_t *camera)
+{
+    return row_looking(camera, 0);
+}
+
+static bslam_zone_rows_t zone_rows(const bslam_camera_t *camera, int32_t rows, bslam_zone_t zone)
+{
+    bslam_zone_rows_t span = {0, rows};
+    if (zone == BSLAM_ZONE_FLOOR) {
+        span.first = clamp(row_looking(camera, -FLOOR_BELOW_RAD), 0, rows - 1);
+    } else if (zone == BSLAM_ZONE_CEILING) {
+        span.end = clamp(row_looking(camera, CEILING_ABOVE_RAD), 1, rows);
+    } else {
+        span.first = clamp(row_looking(camera, WALL_ABOVE_RAD), 0, rows - 1);
+        span.end = clamp(row_looking(camera, -WALL_BELOW_RAD), span.first + 1, rows);
+    }
+    return span;
+}
+
+int32_t bslam_tone_bin(bslam_tone_t tone)
+{
+    const int32_t light = tone.light / 12 > 15 ? 15 : tone.light / 12;
+    const int32_t reddish = clamp(tone.reddish / 8 + 4, 0, 7);
+    const int32_t bluish = clamp(tone.bluish / 8 + 4, 0, 7);
+    return light << 6 | reddish << 3 | bluish;
+}
+
+int32_t bslam_tone_distance(bslam_tone_t a, bslam_tone_t b)
+{
+    return magnitude(a.light - b.light) + 2 * magnitude(a.reddish - b.reddish) +
+           2 * magnitude(a.bluish - b.bluish);
+}
+
+static void count_tones(uint8_t *counts, bslam_zone_rows_t span, int32_t columns, const bslam_tone_t *tones,
+                        int32_t weight)
+{
+    for (int32_t row = span.first; row < span.end; row += 2) {
+        for (int32_t column = row / 2 % 2; column < columns; column += 2) {
+            uint8_t *count = &counts[bslam_tone_bin(tones[row * columns + column])];
+            *count = (uint8_t)clamp(*count + weight, 0, 255);
+        }
+    }
+}
+
+/// Sums of a zone's colour and tone, each cell weighed by how frequent its tone is there.
+typedef struct zone_sums {
+    float weight;
+    bslam_rgb_t colour;
+    float light, reddish, bluish;
+} zone_sums_t;
+
+static zone_sums_t sum_zone(const uint8_t *counts, bslam_zone_rows_t span, const bslam_frame_t *frame,
+                            const bslam_tone_t *tones)
+{
+    zone_sums_t sums = {0};
+    for (int32_t row = span.first; row < span.end; row += 2) {
+        for (int32_t column = row / 2 % 2; column < frame->columns; column += 2) {
+            const int32_t i = row * frame->columns + column;
+            const float share = (float)counts[bslam_tone_bin(tones[i])];
+            const float weight = share * share;
+            sums.weight += weight;
+            sums.colour.red += weight * (float)frame->cells[i].red;
+            sums.colour.green += weight * (float)frame->cells[i].green;
+            sums.colour.blue += weight * (float)frame->cells[i].blue;
+            sums.light += weight * (float)tones[i].light;
+            sums.reddish += weight * (float)tones[i].reddish;
+            sums.bluish += weight * (float)tones[i].bluish;
+        }
+    }
+    return sums;
+}
+
+static void mix(bslam_rgb_t *colour, const zone_sums_t *sums, float rate)
+{
+    colour->red += rate * (sums->colour.red / sums->weight - colour->red);
+    colour->green += rate * (sums->colour.green / sums->weight - colour->green);
+    colour->blue += rate * (sums->colour.blue / sums->weight - colour->blue);
+}
+
+void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,
+                            const bslam_camera_t *camera, const bslam_tone_t *tones)
+{
+    bslam_surroundings_t *known = &background->surroundings;
+    bslam_rgb_t *colours[BSLAM_ZONE_COUNT] = {&known->wall, &known->floor, &known->ceiling};
+    for (int32_t z = 0; z < BSLAM_ZONE_COUNT; z++) {
+        uint8_t *counts = background->counts[z];
+        const bslam_zone_rows_t span = zone_rows(camera, frame->rows, (bslam_zone_t)z);
+        for (int32_t i = 0; i < BSLAM_TONE_BINS; i++) {
+            counts[i] = (uint8_t)(counts[i] - (counts[i] >> FADE_SHIFT));
+        }
+        count_tones(counts, span, frame->columns, tones, known->known ? 1 : FIRST_WEIGHT);
+        const zone_sums_t sums = sum_zone(counts, span, frame, tones);
+        mix(colours[z], &sums, known->known ? COLOUR_RATE : 1.0f);
+        background->tone[z].light = (uint8_t)(sums.light / sums.weight + 0.5f);
+        background->tone[z].reddish = (int8_t)(sums.reddish / sums.weight);
+        background->tone[z].bluish = (int8_t)(sums.bluish / sums.weight);
+    }
+    known->known = true;
+}
+
+/// How much more a cell looks like floor than like wall.
+static int32_t floor_evidence(const bslam_background_t *background, bslam_tone_t tone)
+{
+    const int32_t bin = bslam_tone_bin(tone);
+    const int32_t frequent = tone_log[background->counts[BSLAM_ZONE_FLOOR][bin]] -
+                             tone_log[background->counts[BSLAM_ZONE_WALL][bin]];
+    const int32_t nearer = bslam_tone_distance(tone, background->tone[BSLAM_ZONE_WALL]) -
+                           bslam_tone_distance(tone, background->tone[BSLAM_ZONE_FLOOR]);
+    return frequent + clamp(nearer, -64, 64);
+}
+
+/// Horizontal distance of the floor at a pixel, 0 where it does not look down at it.
+static bslam_real_t floor_distance_m(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_t v_px)
+{
+    bslam_direction_t ray = {0};
+    if (bslam_camera_unproject(camera, u_px, v_px, &ray) != BSLAM_OK || ray.z > BSLAM_R(-1e-3)) {
+        return 0;
+    }
+    return camera->z_m * bslam_sqrt(ray.x * ray.x + ray.y * ray.y) / -ray.z;
+}
+
+void bslam_background_floor_line(const bslam_background_t *background, const bslam_frame_t *frame,
+                                 const bslam_camera_t *camera, const bslam_tone_t *tones,
+                                 bslam_floor_line_t *line)
+{
+    const int32_t stop = clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
+    for (int32_t column = 0; column < frame->columns; column++) {
+        int32_t row = frame->rows;  // the row below which all is floor
+        for (int32_t r = frame->rows - 1; r >= stop && r >= row - 2; r--) {
+            if (floor_evidence(background, tones[r * frame->columns + column]) > 0) {
+                row = r;
+            }
+        }
+        line->row[column] = (int16_t)(row - 1);
+        const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
+        const bslam_real_t v_px = (bslam_real_t)(row * BSLAM_CELL_PX) - BSLAM_R(0.5);
+        line->distance_m[column] = row < frame->rows ? floor_distance_m(camera, u_px, v_px) : 0;
+    }
+}

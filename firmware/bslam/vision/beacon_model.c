@@ -1,0 +1,67 @@
+#include "bslam/vision/beacon_model.h"
+
+#include <stddef.h>
+
+#include "bslam/base/real.h"
+#include "bslam/vision/frame.h"
+
+static bool are_numbers(const float *values, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++) {
+        if (!bslam_is_number((bslam_real_t)values[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bslam_status_t check_svm(const bslam_svm_t *svm, int32_t rows, int32_t features)
+{
+    if (svm->rows != rows) {
+        return BSLAM_E_COUNT;
+    }
+    return bslam_svm_check(svm, features);
+}
+
+static bslam_status_t check_detector(const bslam_detector_model_t *detector, int32_t class_count)
+{
+    const struct {
+        const bslam_svm_t *svm;
+        int32_t rows;
+        int32_t features;
+    } parts[] = {
+        {&detector->cell, 1, BSLAM_CELL_FEATURES},
+        {&detector->screen, 1, BSLAM_BLOB_FEATURES},
+        {&detector->kinds, class_count + 2, BSLAM_BLOB_FEATURES},
+        {&detector->fusion, 1, class_count + 3},
+    };
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        const bslam_status_t status = check_svm(parts[i].svm, parts[i].rows, parts[i].features);
+        if (status != BSLAM_OK) {
+            return status;
+        }
+    }
+    const float limits[] = {detector->screen_threshold, detector->threshold};
+    if (!are_numbers(limits, 2) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
+        !are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_beacon_model_check(const bslam_beacon_model_t *model)
+{
+    if (model->class_count < 1 || model->class_count > BSLAM_CLASSES_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    for (int32_t c = 0; c < model->class_count; c++) {
+        if (!bslam_in_range((bslam_real_t)model->classes[c].height_m, 0, 10)) {
+            return BSLAM_E_RANGE;
+        }
+    }
+    const bslam_status_t status = check_detector(&model->pinhole, model->class_count);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    return check_detector(&model->wide, model->class_count);
+}

@@ -1,0 +1,121 @@
+#include "bslam/vision/detector.h"
+
+#include <string.h>
+
+#include "bslam/base/types.h"
+
+/// Of two candidates that overlap more than this, or of which one lies this much within the other, the surer
+/// one stays.
+#define OVERLAP_MAX BSLAM_R(0.3)
+#define WITHIN_MAX BSLAM_R(0.7)
+
+void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES])
+{
+    for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
+        const float x = (features[i] - model->blob_offset[i]) * model->blob_scale[i];
+        features[i] = x < -BSLAM_FEATURE_LIMIT  ? -BSLAM_FEATURE_LIMIT
+                      : x > BSLAM_FEATURE_LIMIT ? BSLAM_FEATURE_LIMIT
+                                                : x;
+    }
+}
+
+/// The kind whose machine is surest, and by how much.
+static void choose_class(const float *kinds, int32_t class_count, bslam_candidate_t *candidate)
+{
+    int32_t best = 0;
+    float second = -1e9f;
+    for (int32_t c = 1; c < class_count; c++) {
+        if (kinds[c] > kinds[best]) {
+            second = kinds[best];
+            best = c;
+        } else if (kinds[c] > second) {
+            second = kinds[c];
+        }
+    }
+    candidate->beacon_class = (uint8_t)(best + 1);
+    candidate->class_margin = kinds[best] - second;
+}
+
+/// True if the proposal is a candidate: its score, class and outline are then written.
+static bool judge_one(const bslam_detector_model_t *model, int32_t class_count, const bslam_view_t *view,
+                      const bslam_proposal_t *proposal, bslam_candidate_t *candidate)
+{
+    float features[BSLAM_BLOB_FEATURES];
+    float values[BSLAM_CLASSES_MAX + 3];
+    bslam_blob_features(view, proposal, features);
+    bslam_detector_normalise(model, features);
+    float *screen = &values[class_count + 2];
+    bslam_svm_decide(&model->screen, features, screen);
+    if (!(*screen >= model->screen_threshold)) {
+        return false;
+    }
+    float score;
+    bslam_svm_decide(&model->kinds, features, values);
+    bslam_svm_decide(&model->fusion, values, &score);
+    if (!(score >= model->threshold)) {
+        return false;
+    }
+    memset(candidate, 0, sizeof *candidate);
+    candidate->outline = proposal->box;
+    candidate->score = score;
+    choose_class(values + 1, class_count, candidate);
+    return true;
+}
+
+static bslam_real_t area_px2(const bslam_box_t *box)
+{
+    return (box->right_px - box->left_px) * (box->bottom_px - box->top_px);
+}
+
+static bool is_same_thing(const bslam_box_t *a, const bslam_box_t *b)
+{
+    const bslam_real_t overlap = bslam_box_overlap(a, b);
+    const bslam_real_t area_a = area_px2(a), area_b = area_px2(b);
+    const bslam_real_t smaller = area_a < area_b ? area_a : area_b;
+    const bslam_real_t both = overlap * (area_a + area_b) / (1 + overlap);
+    return overlap > OVERLAP_MAX || both > WITHIN_MAX * smaller;
+}
+
+/// Puts a candidate among those known, surest first, unless a surer one stands in its place; takes out those
+/// it beats. Returns how many there are then.
+static int32_t insert(bslam_candidate_t *candidates, int32_t count, const bslam_candidate_t *candidate,
+                      uint32_t *dropped)
+{
+    int32_t at = 0;
+    while (at < count && candidates[at].score >= candidate->score) {
+        if (is_same_thing(&candidates[at].outline, &candidate->outline)) {
+            return count;
+        }
+        at++;
+    }
+    int32_t kept = at;
+    for (int32_t i = at; i < count; i++) {
+        if (!is_same_thing(&candidates[i].outline, &candidate->outline)) {
+            candidates[kept++] = candidates[i];
+        }
+    }
+    if (at == BSLAM_CANDIDATES_MAX || kept == BSLAM_CANDIDATES_MAX) {
+        (*dropped)++;
+        kept = at == BSLAM_CANDIDATES_MAX ? kept : kept - 1;
+    }
+    if (at < BSLAM_CANDIDATES_MAX) {
+        memmove(&candidates[at + 1], &candidates[at], (size_t)(kept - at) * sizeof candidates[0]);
+        candidates[at] = *candidate;
+        kept++;
+    }
+    return kept;
+}
+
+int32_t bslam_detector_judge(const bslam_detector_model_t *model, int32_t class_count,
+                             const bslam_view_t *view, const bslam_proposals_t *proposals,
+                             bslam_candidate_t *candidates, uint32_t *dropped)
+{
+    int32_t count = 0;
+    for (int32_t i = 0; i < proposals->count; i++) {
+        bslam_candidate_t candidate;
+        if (judge_one(model, class_count, view, &proposals->items[i], &candidate)) {
+            count = insert(candidates, count, &candidate, dropped);
+        }
+    }
+    return count;
+}

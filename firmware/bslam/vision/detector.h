@@ -1,0 +1,18 @@
+/// Which of the proposed boxes are beacons, and of which kind: a linear machine screens them, quadratic ones
+/// judge what is left, a last linear one weighs their answers; overlapping boxes give way to the best.
+#ifndef BSLAM_VISION_DETECTOR_H
+#define BSLAM_VISION_DETECTOR_H
+
+#include "bslam/vision/features.h"
+
+/// Judges proposals and writes the best, surest first, to candidates[BSLAM_CANDIDATES_MAX]: outline, class,
+/// margin and score; all else zero. Returns how many. *dropped grows by those that found no room.
+int32_t bslam_detector_judge(const bslam_detector_model_t *model, int32_t class_count,
+                             const bslam_view_t *view, const bslam_proposals_t *proposals,
+                             bslam_candidate_t *candidates, uint32_t *dropped);
+
+/// Features minus offset, times scale, within +-BSLAM_FEATURE_LIMIT.
+#define BSLAM_FEATURE_LIMIT 3.0f
+void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES]);
+
+#endif

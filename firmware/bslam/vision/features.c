@@ -1,0 +1,260 @@
+#include "bslam/vision/features.h"
+
+/// Columns or rows of cells beside a box that count as its surroundings.
+#define STRIP 2
+#define ZONES 3
+
+static int32_t least(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static int32_t most(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static float clampf(float value, float low, float high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+/// A rectangle of cells: [left, right) by [top, bottom).
+typedef struct area {
+    int32_t left, top, right, bottom;
+} area_t;
+
+/// Sums over the cells of a rectangle.
+typedef struct sums {
+    int32_t cells;
+    int32_t light, reddish, bluish;
+    int32_t light_sq, reddish_sq, bluish_sq;
+    int32_t spread, step_x, step_y;
+    int32_t value, likely;  ///< decision values of the cells; how many are above 0
+    int32_t wall, floor;    ///< how frequent the tones are in the zones' histograms
+} sums_t;
+
+static void add_cell(sums_t *sums, const bslam_view_t *view, int32_t i)
+{
+    const bslam_tone_t tone = view->tones[i];
+    const int32_t bin = bslam_tone_bin(tone);
+    sums->cells++;
+    sums->light += tone.light;
+    sums->reddish += tone.reddish;
+    sums->bluish += tone.bluish;
+    sums->light_sq += tone.light * tone.light;
+    sums->reddish_sq += tone.reddish * tone.reddish;
+    sums->bluish_sq += tone.bluish * tone.bluish;
+    sums->spread += tone.spread;
+    sums->step_x += view->step_x[i];
+    sums->step_y += view->step_y[i];
+    sums->value += view->values[i];
+    sums->likely += view->values[i] > 0 ? 1 : 0;
+    sums->wall += least(view->background->counts[BSLAM_ZONE_WALL][bin], 32);
+    sums->floor += least(view->background->counts[BSLAM_ZONE_FLOOR][bin], 32);
+}
+
+static sums_t sum_area(const bslam_view_t *view, area_t area)
+{
+    sums_t sums = {0};
+    for (int32_t row = most(area.top, 0); row < least(area.bottom, view->frame->rows); row++) {
+        for (int32_t column = most(area.left, 0); column < least(area.right, view->frame->columns);
+             column++) {
+            add_cell(&sums, view, row * view->frame->columns + column);
+        }
+    }
+    return sums;
+}
+
+static void merge(sums_t *into, const sums_t *from)
+{
+    int32_t *a = &into->cells;
+    const int32_t *b = &from->cells;
+    for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
+        a[i] += b[i];
+    }
+}
+
+static float mean(const sums_t *sums, int32_t sum)
+{
+    return sums->cells > 0 ? (float)sum / (float)sums->cells : 0.0f;
+}
+
+static float deviation(const sums_t *sums, int32_t sum, int32_t sum_sq)
+{
+    const float m = mean(sums, sum);
+    const float variance = mean(sums, sum_sq) - m * m;
+    return variance > 0 ? sqrtf(variance) : 0.0f;
+}
+
+/// Slope of a pixel's direction, tan(elevation), and its horizontal unit vector.
+typedef struct ray {
+    bool exists;
+    float slope, x, y;
+} ray_t;
+
+static ray_t ray_at(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_t v_px)
+{
+    bslam_direction_t d = {0};
+    ray_t ray = {0};
+    if (bslam_camera_unproject(camera, u_px, v_px, &d) != BSLAM_OK) {
+        return ray;
+    }
+    const bslam_real_t flat = bslam_sqrt(d.x * d.x + d.y * d.y);
+    if (flat < BSLAM_R(1e-3)) {
+        return ray;
+    }
+    ray.exists = true;
+    ray.slope = clampf((float)(d.z / flat), -10.0f, 10.0f);
+    ray.x = (float)(d.x / flat);
+    ray.y = (float)(d.y / flat);
+    return ray;
+}
+
+/// Natural logarithm to 0.01, without libm: exponent by halving, then a parabola.
+static float log_of(float x)
+{
+    float halvings = 0;
+    x = clampf(x, 1e-4f, 1e4f);
+    while (x >= 2.0f) {
+        x *= 0.5f;
+        halvings += 1.0f;
+    }
+    while (x < 1.0f) {
+        x *= 2.0f;
+        halvings -= 1.0f;
+    }
+    return 0.6931472f * (halvings + (x - 1.0f) * (1.3465553f - 0.3465553f * x));
+}
+
+/// Mean distance of the floor line over columns [first, end); 0, and *share 0, where no column knows it.
+static float line_distance_m(const bslam_view_t *view, int32_t first, int32_t end, float *share)
+{
+    float inverse = 0;
+    int32_t known = 0;
+    first = most(first, 0);
+    end = least(end, view->frame->columns);
+    for (int32_t column = first; column < end; column++) {
+        const float distance_m = (float)view->floor_line->distance_m[column];
+        if (distance_m > 0) {
+            inverse += 1.0f / distance_m;
+            known++;
+        }
+    }
+    *share = end > first ? (float)known / (float)(end - first) : 0.0f;
+    return known > 0 ? (float)known / inverse : 0.0f;
+}
+
+/// Size and place in metres, by the floor line. 12 features.
+static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p, float *x)
+{
+    const bslam_camera_t *camera = view->camera;
+    const bslam_real_t u_px = (p->box.left_px + p->box.right_px) / 2;
+    const bslam_real_t v_px = (p->box.top_px + p->box.bottom_px) / 2;
+    const ray_t top = ray_at(camera, u_px, p->box.top_px), bottom = ray_at(camera, u_px, p->box.bottom_px);
+    const ray_t left = ray_at(camera, p->box.left_px, v_px), right = ray_at(camera, p->box.right_px, v_px);
+    const float height_m = (float)camera->z_m;
+    float share, ignored;
+    float wall_m = line_distance_m(view, p->left - STRIP, p->right + STRIP, &share);
+    const float left_m = line_distance_m(view, p->left - STRIP, p->left + 1, &ignored);
+    const float right_m = line_distance_m(view, p->right - 1, p->right + STRIP, &ignored);
+    const bool known = wall_m > 0;
+    wall_m = known ? clampf(wall_m, 0.3f, 20.0f) : 1.0f;
+    const float chord_x = left.x - right.x, chord_y = left.y - right.y;
+    const float chord = sqrtf(chord_x * chord_x + chord_y * chord_y);
+    const float base_m = bottom.exists && bottom.slope < -0.02f ? height_m / -bottom.slope : 25.0f;
+    const float width_px = (float)(p->box.right_px - p->box.left_px);
+    const float height_px = (float)(p->box.bottom_px - p->box.top_px);
+
+    *x++ = log_of(wall_m * chord);
+    *x++ = log_of(wall_m * (top.slope - bottom.slope));
+    *x++ = clampf(height_m + wall_m * bottom.slope, -1.0f, 3.0f);
+    *x++ = clampf(height_m + wall_m * top.slope, -1.0f, 4.0f);
+    *x++ = log_of(height_px / width_px);
+    *x++ = log_of(height_px * width_px);
+    *x++ = (float)p->cells / (float)((p->right - p->left) * (p->bottom - p->top));
+    *x++ = known ? 1.0f / wall_m : 0.0f;
+    *x++ = share;
+    *x++ = known ? log_of(base_m / wall_m) : 0.0f;
+    *x++ = left_m > 0 && right_m > 0 ? log_of(left_m / right_m) : 0.0f;
+    *x++ = (top.slope + bottom.slope) / 2;
+    return x;
+}
+
+/// How the box differs from a strip beside it. 4 features: light, chroma, the cells' values, spread.
+static float *contrast_features(const bslam_view_t *view, const sums_t *inside, area_t strip, float *x)
+{
+    const sums_t beside = sum_area(view, strip);
+    const bool seen = beside.cells > 0;
+    const float reddish = mean(inside, inside->reddish) - mean(&beside, beside.reddish);
+    const float bluish = mean(inside, inside->bluish) - mean(&beside, beside.bluish);
+    *x++ = seen ? mean(inside, inside->light) - mean(&beside, beside.light) : 0.0f;
+    *x++ = seen ? sqrtf(reddish * reddish + bluish * bluish) : 0.0f;
+    *x++ = seen ? mean(&beside, beside.value) : 0.0f;
+    *x++ = seen ? mean(&beside, beside.spread) : 0.0f;
+    return x;
+}
+
+/// Means over the whole box. 15 features.
+static float *texture_features(const bslam_view_t *view, const sums_t *inside, float *x)
+{
+    const bslam_tone_t wall = view->background->tone[BSLAM_ZONE_WALL];
+    const sums_t *s = inside;
+    *x++ = mean(s, s->light) - (float)wall.light;
+    *x++ = mean(s, s->reddish) - (float)wall.reddish;
+    *x++ = mean(s, s->bluish) - (float)wall.bluish;
+    *x++ = mean(s, s->reddish);
+    *x++ = mean(s, s->bluish);
+    *x++ = mean(s, s->value);
+    *x++ = mean(s, s->likely);
+    *x++ = mean(s, s->spread);
+    *x++ = mean(s, s->step_x);
+    *x++ = mean(s, s->step_y);
+    *x++ = deviation(s, s->light, s->light_sq);
+    *x++ = deviation(s, s->reddish, s->reddish_sq);
+    *x++ = deviation(s, s->bluish, s->bluish_sq);
+    *x++ = mean(s, s->wall);
+    *x++ = mean(s, s->floor);
+    return x;
+}
+
+/// How the zones of the box differ from its mean. 2 features a zone: light, chroma.
+static float *zone_features(const sums_t zones[ZONES * ZONES], const sums_t *inside, float *x)
+{
+    for (int32_t z = 0; z < ZONES * ZONES; z++) {
+        const sums_t *zone = zones[z].cells > 0 ? &zones[z] : inside;
+        const float reddish = mean(zone, zone->reddish) - mean(inside, inside->reddish);
+        const float bluish = mean(zone, zone->bluish) - mean(inside, inside->bluish);
+        *x++ = mean(zone, zone->light) - mean(inside, inside->light);
+        *x++ = sqrtf(reddish * reddish + bluish * bluish);
+    }
+    return x;
+}
+
+void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *proposal,
+                         float features[BSLAM_BLOB_FEATURES])
+{
+    const bslam_proposal_t *p = proposal;
+    const int32_t width = p->right - p->left, height = p->bottom - p->top;
+    sums_t zones[ZONES * ZONES];
+    sums_t inside = {0};
+    for (int32_t z = 0; z < ZONES * ZONES; z++) {
+        const int32_t column = z % ZONES, row = z / ZONES;
+        const area_t area = {p->left + column * width / ZONES, p->top + row * height / ZONES,
+                             p->left + (column + 1) * width / ZONES, p->top + (row + 1) * height / ZONES};
+        zones[z] = sum_area(view, area);
+        merge(&inside, &zones[z]);
+    }
+    const area_t sides[4] = {
+        {p->left - STRIP, p->top, p->left, p->bottom},
+        {p->right, p->top, p->right + STRIP, p->bottom},
+        {p->left, p->top - STRIP, p->right, p->top},
+        {p->left, p->bottom, p->right, p->bottom + STRIP},
+    };
+    float *x = place_features(view, p, features);
+    for (int32_t side = 0; side < 4; side++) {
+        x = contrast_features(view, &inside, sides[side], x);
+    }
+    x = texture_features(view, &inside, x);
+    (void)zone_features(zones, &inside, x);
+}

@@ -1,0 +1,236 @@
+#include "bslam/vision/vision.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "bslam/math/trig.h"
+#include "bslam/vision/measure.h"
+
+/// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
+/// than these shares of its cells are, in percent.
+#define BLACK_BELOW 16
+#define SATURATED_FROM 244
+#define BLACK_PERCENT 95
+#define SATURATED_PERCENT 60
+/// A frame whose cells' green differs by at most this is of one colour.
+#define FLAT_RANGE 12
+
+static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
+    [BSLAM_VISION_SEEN] = "seen",
+    [BSLAM_VISION_NOTHING] = "nothing",
+    [BSLAM_VISION_UNFINISHED] = "unfinished",
+    [BSLAM_VISION_BLACK] = "black",
+    [BSLAM_VISION_OVEREXPOSED] = "overexposed",
+    [BSLAM_VISION_FLAT] = "flat",
+};
+
+const char *bslam_vision_reason_name(bslam_vision_reason_t reason)
+{
+    return (int)reason >= 0 && reason < BSLAM_VISION_REASON_COUNT ? reason_names[reason] : "unknown reason";
+}
+
+static const bslam_detector_model_t *detector_for(const bslam_beacon_model_t *model,
+                                                  const bslam_camera_t *camera)
+{
+    return camera->lens == BSLAM_LENS_PINHOLE ? &model->pinhole : &model->wide;
+}
+
+bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
+                                 const bslam_camera_t *cameras, int32_t camera_count)
+{
+    if (camera_count < 1 || camera_count > BSLAM_CAMERAS_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    bslam_status_t status = bslam_beacon_model_check(model);
+    for (int32_t i = 0; i < camera_count && status == BSLAM_OK; i++) {
+        status = bslam_camera_check(&cameras[i]);
+    }
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    memset(vision, 0, sizeof *vision);
+    vision->model = model;
+    vision->camera_count = camera_count;
+    vision->reason = BSLAM_VISION_UNFINISHED;
+    for (int32_t i = 0; i < camera_count; i++) {
+        vision->cameras[i] = cameras[i];
+        vision->machines[i] = bslam_cell_machine(&detector_for(model, &cameras[i])->cell);
+        bslam_background_init(&vision->backgrounds[i]);
+    }
+    return BSLAM_OK;
+}
+
+static bool is_unfinished(const bslam_vision_t *vision)
+{
+    const int32_t seen = vision->thumbnail.rows_seen;
+    return vision->reason == BSLAM_VISION_UNFINISHED && seen > 0;
+}
+
+bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_pixel_format_t format,
+                                  int32_t width_px, int32_t height_px)
+{
+    if (camera < 0 || camera >= vision->camera_count || width_px != vision->cameras[camera].width_px ||
+        height_px != vision->cameras[camera].height_px) {
+        return BSLAM_E_RANGE;
+    }
+    const bool gives_up = is_unfinished(vision);
+    const bslam_status_t status = bslam_thumbnail_begin(&vision->thumbnail, format, width_px, height_px);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    vision->frames[BSLAM_VISION_UNFINISHED] += gives_up ? 1 : 0;
+    vision->camera = camera;
+    vision->candidate_count = 0;
+    vision->proposals.count = 0;
+    vision->reason = BSLAM_VISION_UNFINISHED;
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
+{
+    return bslam_thumbnail_row(&vision->thumbnail, pixels);
+}
+
+bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)
+{
+    if (camera < 0 || camera >= vision->camera_count || !bslam_in_range(yaw_rad, -BSLAM_PI, BSLAM_PI)) {
+        return BSLAM_E_RANGE;
+    }
+    vision->cameras[camera].yaw_rad = yaw_rad;
+    return BSLAM_OK;
+}
+
+/// What makes a frame unusable, or BSLAM_VISION_NOTHING if nothing does.
+static bslam_vision_reason_t judge_light(const bslam_frame_t *frame)
+{
+    const int32_t count = frame->rows * frame->columns;
+    int32_t black = 0, saturated = 0;
+    uint8_t low = 255, high = 0;
+    for (int32_t i = 0; i < count; i++) {
+        const bslam_cell_t cell = frame->cells[i];
+        const uint8_t green = cell.green;
+        black += green < BLACK_BELOW && cell.red < BLACK_BELOW && cell.blue < BLACK_BELOW ? 1 : 0;
+        saturated += green >= SATURATED_FROM && cell.red >= SATURATED_FROM && cell.blue >= SATURATED_FROM;
+        low = green < low ? green : low;
+        high = green > high ? green : high;
+    }
+    if (100 * black > BLACK_PERCENT * count) {
+        return BSLAM_VISION_BLACK;
+    }
+    if (100 * saturated > SATURATED_PERCENT * count) {
+        return BSLAM_VISION_OVEREXPOSED;
+    }
+    return high - low <= FLAT_RANGE ? BSLAM_VISION_FLAT : BSLAM_VISION_NOTHING;
+}
+
+static bslam_frame_t finished_frame(const bslam_vision_t *vision)
+{
+    const bslam_frame_t frame = {
+        .width_px = vision->thumbnail.width_px,
+        .height_px = vision->thumbnail.height_px,
+        .columns = vision->thumbnail.width_px / BSLAM_CELL_PX,
+        .rows = vision->thumbnail.height_px / BSLAM_CELL_PX,
+        .cells = vision->thumbnail.cells,
+        .half = vision->thumbnail.half,
+        .surroundings = &vision->backgrounds[vision->camera].surroundings,
+    };
+    return frame;
+}
+
+/// The view of the finished frame, for readers; its writable tables are the instance's own.
+static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *frame)
+{
+    const bslam_view_t view = {
+        .frame = frame,
+        .camera = &vision->cameras[vision->camera],
+        .background = &vision->backgrounds[vision->camera],
+        .floor_line = &vision->floor_line,
+        .tones = vision->tones,
+        .step_x = vision->step_x,
+        .step_y = vision->step_y,
+        .values = vision->values,
+    };
+    return view;
+}
+
+/// Direction, distance and signature of each candidate; one that has no direction is of no use.
+static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
+{
+    const bslam_camera_t *camera = &vision->cameras[vision->camera];
+    int32_t kept = 0;
+    for (int32_t i = 0; i < vision->candidate_count; i++) {
+        bslam_candidate_t candidate = vision->candidates[i];
+        const float height_m = vision->model->classes[candidate.beacon_class - 1].height_m;
+        const bslam_box_t rough = candidate.outline;
+        const bslam_status_t status =
+            bslam_measure(frame, camera, &rough, (bslam_real_t)height_m, &candidate);
+        if (status == BSLAM_OK) {
+            vision->candidates[kept++] = candidate;
+        }
+    }
+    vision->candidate_count = kept;
+}
+
+static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_moved)
+{
+    const int32_t camera = vision->camera;
+    bslam_background_t *background = &vision->backgrounds[camera];
+    const bslam_detector_model_t *detector = detector_for(vision->model, &vision->cameras[camera]);
+    const bslam_view_t view = view_of(vision, frame);
+
+    bslam_background_tones(frame, vision->tones);
+    if (robot_moved || !background->surroundings.known) {
+        bslam_background_learn(background, frame, view.camera, vision->tones);
+    }
+    bslam_background_floor_line(background, frame, view.camera, vision->tones, &vision->floor_line);
+    bslam_cells_step(&view, vision->step_x, vision->step_y);
+    bslam_cells_decide(&view, &vision->machines[camera], vision->values);
+    bslam_proposals_find(&vision->proposals, &view);
+    vision->candidate_count =
+        bslam_detector_judge(detector, vision->model->class_count, &view, &vision->proposals,
+                             vision->candidates, &vision->candidates_dropped);
+    measure(vision, frame);
+}
+
+bslam_status_t bslam_vision_end(bslam_vision_t *vision, bool robot_moved)
+{
+    if (vision->reason != BSLAM_VISION_UNFINISHED || vision->thumbnail.rows_seen == 0 ||
+        vision->thumbnail.rows_seen < vision->thumbnail.height_px) {
+        return BSLAM_E_COUNT;
+    }
+    const bslam_frame_t frame = finished_frame(vision);
+    vision->reason = judge_light(&frame);
+    if (vision->reason == BSLAM_VISION_NOTHING) {
+        look(vision, &frame, robot_moved);
+        vision->reason = vision->candidate_count > 0 ? BSLAM_VISION_SEEN : BSLAM_VISION_NOTHING;
+    }
+    vision->frames[vision->reason]++;
+    return BSLAM_OK;
+}
+
+const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, int32_t *count)
+{
+    *count = vision->candidate_count;
+    return vision->candidates;
+}
+
+bslam_vision_reason_t bslam_vision_reason(const bslam_vision_t *vision)
+{
+    return vision->reason;
+}
+
+void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
+                                float features[BSLAM_BLOB_FEATURES])
+{
+    const bslam_frame_t frame = finished_frame(vision);
+    const bslam_view_t view = view_of(vision, &frame);
+    bslam_blob_features(&view, &vision->proposals.items[index], features);
+}
+
+void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,
+                                int16_t features[BSLAM_CELL_FEATURES])
+{
+    const bslam_frame_t frame = finished_frame(vision);
+    const bslam_view_t view = view_of(vision, &frame);
+    bslam_cell_features(&view, row, column, features);
+}

@@ -1,0 +1,88 @@
+/// The vision front end: camera rows stream in, beacon candidates come out. Paper, modules BOE and BOR.
+///
+///     bslam_vision_init(&vision, &bslam_beacons_model, cameras, 3)
+///     bslam_vision_begin(&vision, camera, BSLAM_PIXELS_RGB565, 320, 240)
+///     bslam_vision_row(&vision, pixels)                   for every row
+///     bslam_vision_end(&vision, robot_moved)
+///     bslam_vision_candidates(&vision, &count)
+///
+/// One instance serves several cameras in turn: each has its own memory of the room (background.h), all else
+/// is scratch. `make sizes` prints what an instance takes. The work a frame costs is bounded by the sizes in
+/// base/config.h. A frame that shows nothing usable gives no candidate and a reason, never a made-up one.
+#ifndef BSLAM_VISION_VISION_H
+#define BSLAM_VISION_VISION_H
+
+#include "bslam/vision/detector.h"
+#include "bslam/vision/thumbnail.h"
+
+/// What came of the last frame.
+typedef enum bslam_vision_reason {
+    BSLAM_VISION_SEEN = 0,     ///< there are candidates
+    BSLAM_VISION_NOTHING,      ///< a good frame without a beacon
+    BSLAM_VISION_UNFINISHED,   ///< rows are missing: the frame is streaming in, or was cut short
+    BSLAM_VISION_BLACK,        ///< nearly all of the frame is black
+    BSLAM_VISION_OVEREXPOSED,  ///< most of the frame is saturated
+    BSLAM_VISION_FLAT,         ///< one colour all over: a covered lens, a wall too close
+    BSLAM_VISION_REASON_COUNT
+} bslam_vision_reason_t;
+
+typedef struct bslam_vision {
+    const bslam_beacon_model_t *model;
+    int32_t camera_count;
+    int32_t camera;  ///< of the present frame
+    int32_t candidate_count;
+    bslam_vision_reason_t reason;
+    uint32_t frames[BSLAM_VISION_REASON_COUNT];  ///< finished or given up frames by what came of them
+    uint32_t candidates_dropped;                 ///< BSLAM_CANDIDATES_MAX did not suffice
+    bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
+    bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
+    bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
+    bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];
+    bslam_thumbnail_t thumbnail;
+    bslam_proposals_t proposals;
+    bslam_floor_line_t floor_line;
+    bslam_tone_t tones[BSLAM_CELLS_MAX];
+    uint8_t step_x[BSLAM_CELLS_MAX];
+    uint8_t step_y[BSLAM_CELLS_MAX];
+    int8_t values[BSLAM_CELLS_MAX];
+} bslam_vision_t;
+
+/// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are
+/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. Else what bslam_camera_check or
+/// bslam_beacon_model_check refuses. *vision is then unchanged.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
+                                                  const bslam_camera_t *cameras, int32_t camera_count);
+
+/// Starts a frame of a camera (its index in bslam_vision_init's array). An unfinished frame before it is
+/// given up and counted. BSLAM_E_RANGE, and nothing changed, for another camera index, format or size than
+/// allowed: the size is the camera's own.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera,
+                                                   bslam_pixel_format_t format, int32_t width_px,
+                                                   int32_t height_px);
+
+/// The next row, uppermost first. BSLAM_E_COUNT, and nothing changed, if the frame has all its rows already.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels);
+
+/// Looks at the frame. robot_moved: since this camera's frame before; while it is false the memory of the
+/// room stays as it is. BSLAM_E_COUNT, nothing learned and no candidate, if rows are missing.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_end(bslam_vision_t *vision, bool robot_moved);
+
+/// Turns a camera on a pan unit. BSLAM_E_RANGE, and nothing changed: no such camera, |yaw| above pi.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera,
+                                                   bslam_real_t yaw_rad);
+
+/// The candidates of the last finished frame, surest first; good until the next frame begins.
+const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, int32_t *count);
+
+/// What came of the last frame, and its name: "black" say.
+bslam_vision_reason_t bslam_vision_reason(const bslam_vision_t *vision);
+const char *bslam_vision_reason_name(bslam_vision_reason_t reason);
+
+/// For training: the features of proposal `index` of the last finished frame, as bslam_blob_features gives
+/// them, and those of a cell. Indices in range.
+void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
+                                float features[BSLAM_BLOB_FEATURES]);
+void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,
+                                int16_t features[BSLAM_CELL_FEATURES]);
+
+#endif

@@ -1,0 +1,248 @@
+"""The vision front end of the C core: pictures in, beacon candidates out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.raw import vision_library
+from bslam.errors import BslamError
+from bslam.modelfile import BeaconClass, Svm
+from bslam.rig import Camera
+
+Picture = NDArray[np.uint8] | NDArray[np.uint16]
+
+MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "occluded")
+"""Names of the bits of a candidate's marks, lowest first."""
+
+
+@dataclass(frozen=True)
+class DetectorModel:
+    """The detector for one kind of lens, as bslam_detector_model_t describes it."""
+
+    cell: Svm
+    blob_offset: NDArray[np.float32]
+    blob_scale: NDArray[np.float32]
+    screen: Svm
+    screen_threshold: float
+    kinds: Svm
+    fusion: Svm
+    threshold: float
+
+
+@dataclass(frozen=True)
+class BeaconModel:
+    """Everything trained: the kinds of beacons, and a detector for each kind of lens."""
+
+    classes: tuple[BeaconClass, ...]
+    pinhole: DetectorModel
+    wide: DetectorModel
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A thing that is probably a beacon, as bslam_candidate_t describes it; None: not measured."""
+
+    outline: tuple[float, float, float, float]  # left, top, right, bottom, px
+    bearing_rad: float | None
+    bearing_sd_rad: float | None
+    range_m: float | None
+    range_sd_m: float | None
+    beacon_class: int
+    kind: str
+    class_margin: float
+    score: float
+    marks: frozenset[str]
+    signature: NDArray[np.float32]  # (71,)
+
+
+@dataclass(frozen=True)
+class Seeing:
+    """What came of a frame: candidates, surest first; "seen", or why there is none ("black" say)."""
+
+    candidates: tuple[Candidate, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """The boxes of a frame that were looked at more closely: for training."""
+
+    boxes: NDArray[np.float32]  # (n, 4) left, top, right, bottom, px
+    segmentations: NDArray[np.int64]  # (n,) which segmentation found each first
+    features: NDArray[np.float32]  # (n, blob features), not normalised
+
+
+class FrontEnd:
+    """One robot's cameras, taken in turn. The memory of the room starts empty."""
+
+    def __init__(self, cameras: Sequence[Camera], model: BeaconModel | None = None) -> None:
+        """`model`: the built-in one unless given. BslamError if the library refuses model or cameras."""
+        self._library = vision_library()
+        ffi, lib = self._library.ffi, self._library.lib
+        self._cameras = tuple(cameras)
+        self._keep: list[Any] = []
+        self._model = lib.built_in_model() if model is None else self._new_model(model)
+        if self._model == ffi.NULL:
+            raise BslamError("no built-in model: run `make train`, or give one")
+        self._vision = ffi.new("bslam_vision_t *")
+        array = ffi.new("bslam_camera_t[]", [self._camera(camera)[0] for camera in cameras])
+        self._library.ensure(
+            lib.bslam_vision_init(self._vision, self._model, array, len(self._cameras)),
+            f"the front end refuses its model or one of its {len(self._cameras)} cameras",
+        )
+
+    def see(self, rgb: Picture, camera: int = 0, moved: bool = True) -> Seeing:
+        """Looks at a picture of a camera by its index: (height, width, 3) uint8, or (height, width) uint16 of
+        RGB565; C-contiguous.
+
+        `moved`: the robot moved since this camera's picture before. BslamError for another shape, dtype or
+        camera than allowed.
+        """
+        lib = self._library.lib
+        self._check_picture(rgb, camera)
+        height, width = rgb.shape[:2]
+        pixels_are = lib.BSLAM_PIXELS_RGB888 if rgb.ndim == 3 else lib.BSLAM_PIXELS_RGB565
+        begun = lib.bslam_vision_begin(self._vision, camera, pixels_are, width, height)
+        self._library.ensure(begun, f"a frame of {width}x{height} for camera {camera}")
+        pixels = self._library.pixels(rgb)
+        for row in range(height):
+            self._library.ensure(
+                lib.bslam_vision_row(self._vision, pixels + row * rgb.strides[0]), f"row {row}"
+            )
+        self._library.ensure(lib.bslam_vision_end(self._vision, moved), "the end of a frame")
+        return Seeing(tuple(self._candidates()), self._reason(lib.bslam_vision_reason(self._vision)))
+
+    def point(self, camera: int, yaw_rad: float) -> None:
+        """Turns a camera on a pan unit. BslamError: no such camera, or |yaw| above pi."""
+        status = self._library.lib.bslam_vision_point(self._vision, camera, yaw_rad)
+        self._library.ensure(status, f"camera {camera} turned to {yaw_rad} rad")
+
+    def counts(self) -> dict[str, int]:
+        """How many frames there were so far, by what came of them."""
+        return {self._reason(number): count for number, count in enumerate(self._vision.frames)}
+
+    def proposals(self) -> Proposals:
+        """The proposals of the last frame."""
+        found = self._vision.proposals
+        items = [found.items[i] for i in range(found.count)]
+        sides = ("left_px", "top_px", "right_px", "bottom_px")
+        features = np.empty((found.count, self._library.lib.BSLAM_BLOB_FEATURES), dtype=np.float32)
+        for i in range(found.count):
+            self._library.lib.bslam_vision_blob_features(self._vision, i, self._library.floats(features[i]))
+        return Proposals(
+            boxes=np.array(
+                [[getattr(item.box, side) for side in sides] for item in items], np.float32
+            ).reshape(-1, 4),
+            segmentations=np.array([item.segmentation for item in items], np.int64),
+            features=features,
+        )
+
+    def cell_features(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.int16]:
+        """Features (n, cell features) of cells of the last frame."""
+        features = np.empty((len(rows), self._library.lib.BSLAM_CELL_FEATURES), dtype=np.int16)
+        write = self._library.lib.bslam_vision_cell_features
+        for i, (row, column) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True)):
+            write(self._vision, row, column, self._library.shorts(features[i]))
+        return features
+
+    def cell_values(self) -> NDArray[np.int8]:
+        """Decision values (rows, columns) of the last frame's cells, 32 steps for 1."""
+        thumbnail = self._vision.thumbnail
+        shape = (thumbnail.height_px // 4, thumbnail.width_px // 4)
+        return self._library.copy_of(self._vision.values, shape[0] * shape[1], np.int8).reshape(shape)
+
+    def floor_distances(self) -> NDArray[np.float32]:
+        """Distance of the floor line in each column of cells, m; 0: not known."""
+        columns = self._vision.thumbnail.width_px // 4
+        return self._library.copy_of(self._vision.floor_line.distance_m, columns, np.float32)
+
+    def _check_picture(self, rgb: Picture, camera: int) -> None:
+        if not 0 <= camera < len(self._cameras):
+            raise BslamError(f"camera {camera}: allowed are 0 to {len(self._cameras) - 1}")
+        lens = self._cameras[camera].lens
+        colour, packed = (lens.height_px, lens.width_px, 3), (lens.height_px, lens.width_px)
+        if (rgb.shape, rgb.dtype) not in (
+            (colour, np.uint8),
+            (packed, np.uint16),
+        ) or not rgb.flags.c_contiguous:
+            raise BslamError(
+                f"a picture of shape {rgb.shape}, {rgb.dtype}: allowed for camera {camera}, C-contiguous: "
+                f"{colour} uint8, or {packed} uint16 (RGB565)"
+            )
+
+    def _reason(self, number: int) -> str:
+        return self._library.ffi.string(self._library.lib.bslam_vision_reason_name(number)).decode()
+
+    def _candidates(self) -> list[Candidate]:
+        count = self._library.ffi.new("int32_t *")
+        found = self._library.lib.bslam_vision_candidates(self._vision, count)
+        return [self._candidate(found[i]) for i in range(count[0])]
+
+    def _candidate(self, found: Any) -> Candidate:
+        box = found.outline
+        name = self._library.ffi.string(self._model.classes[found.beacon_class - 1].name).decode()
+        return Candidate(
+            outline=(box.left_px, box.top_px, box.right_px, box.bottom_px),
+            bearing_rad=found.bearing_rad if found.has_bearing else None,
+            bearing_sd_rad=found.bearing_sd_rad if found.has_bearing else None,
+            range_m=found.range_m if found.has_range else None,
+            range_sd_m=found.range_sd_m if found.has_range else None,
+            beacon_class=found.beacon_class,
+            kind=name,
+            class_margin=found.class_margin,
+            score=found.score,
+            marks=frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1),
+            signature=self._library.copy_of(found.signature, 71, np.float32),
+        )
+
+    def _camera(self, camera: Camera) -> Any:
+        lens = camera.lens
+        kinds = {
+            "pinhole": self._library.lib.BSLAM_LENS_PINHOLE,
+            "equidistant": self._library.lib.BSLAM_LENS_EQUIDISTANT,
+        }
+        same = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2")
+        return self._library.new_filled(
+            "bslam_camera_t",
+            lens=kinds[lens.kind],
+            yaw_rad=camera.yaw_rad,
+            pitch_rad=camera.pitch_rad,
+            z_m=camera.z_m,
+            **{name: getattr(lens, name) for name in same},
+        )
+
+    def _new_model(self, model: BeaconModel) -> Any:
+        names = [self._library.ffi.new("char[]", one.name.encode()) for one in model.classes]
+        classes = self._library.ffi.new(
+            "bslam_beacon_class_t[]",
+            [(name, one.height_m) for name, one in zip(names, model.classes, strict=True)],
+        )
+        self._keep += [*names, classes]
+        return self._library.new_filled(
+            "bslam_beacon_model_t",
+            class_count=len(model.classes),
+            classes=classes,
+            pinhole=self._detector(model.pinhole),
+            wide=self._detector(model.wide),
+        )
+
+    def _detector(self, model: DetectorModel) -> Any:
+        library, keep = self._library, self._keep
+        made = library.new_filled(
+            "bslam_detector_model_t",
+            cell=library.svm(model.cell, keep),
+            blob_offset=library.table("float", model.blob_offset, keep),
+            blob_scale=library.table("float", model.blob_scale, keep),
+            screen=library.svm(model.screen, keep),
+            screen_threshold=model.screen_threshold,
+            kinds=library.svm(model.kinds, keep),
+            fusion=library.svm(model.fusion, keep),
+            threshold=model.threshold,
+        )
+        keep.append(made)
+        return made[0]
