@@ -34,13 +34,19 @@ setup-run:
 
 EXTENSION_STAMP := build/extension.stamp
 EXTENSION_BUILD := host_sim/bslam/core/build.py host_sim/bslam/core/builds.py
+CAMERA_DIR := host_sim/bslam/world/camera
+CAMERA_STAMP := build/camera.stamp
 
 .PHONY: extension
-extension: $(EXTENSION_STAMP)
+extension: $(EXTENSION_STAMP) $(CAMERA_STAMP)
 
 $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/run.stamp
 	@echo "setup: building the cffi extensions"
 	@$(PYTHON) -m bslam.core.build
+	@mkdir -p $(@D) && touch $@
+
+$(CAMERA_STAMP): $(CAMERA_DIR)/build.py $(wildcard $(CAMERA_DIR)/*.[ch]) $(VENV)/run.stamp
+	@$(PYTHON) -m bslam.world.camera.build
 	@mkdir -p $(@D) && touch $@
 
 # --- The main job -------------------------------------------------------------------------------------------

@@ -41,10 +41,11 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "errors": frozenset(),
     "parsing": frozenset({"errors"}),
     "log": LOG,
+    "rig": frozenset({"errors", "parsing"}),
     "modelfile": frozenset({"errors"}),
-    "core": frozenset({"errors", "modelfile"}),
-    "world": LOG,
-    "experiment": LOG | {"core", "world"},
+    "core": frozenset({"errors", "modelfile", "rig"}),
+    "world": LOG | {"rig"},
+    "experiment": LOG | {"rig", "core", "world"},
     "view": LOG,
 }
 # The command line ties the parts together and may import them all.

@@ -1,0 +1,176 @@
+"""Whole scenes: random furnished rooms to train and test detectors in, and the arenas of scenarios."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bslam.errors import BslamError
+from bslam.world.arena import Point, Wall
+from bslam.world.camera import looks
+from bslam.world.camera.furnish import Area, Furnisher, WallFace
+from bslam.world.camera.kinds import KINDS, draw_kind
+from bslam.world.camera.scene import IDENTITY_MAX, Scene
+from bslam.world.scenario import Scenario
+
+STYLES = ("train", "test")
+_STYLE_STREAMS = {"train": 0x7261, "test": 0x7E57}  # the two styles never share a random stream
+
+_SIDE_M = (5.0, 12.0)
+_ROOM_SIDE_MIN_M = 3.5
+_GAP_M = (1.2, 2.2)
+_BEACONS = (6, 16)
+_CLUTTER = (3, 8)
+_WALL_THINGS = (2, 6)
+_TRIES = 60
+
+_ON_WALL_M = 0.05  # a scenario's beacon this near to a wall hangs on it
+_GAP_SHARE = 0.9  # of the way to the neighbour that two beacons may take together
+_DRESSED_DEPTH_M = 0.25  # a scenario's robot comes as near to the walls as 0.3 m
+
+
+def make_world(seed: int, style: str = "train") -> Scene:
+    """A random furnished arena of one to three rooms. The styles differ in settings and in all textures.
+
+    BslamError names a bad seed (allowed: 0 and up) or style.
+    """
+    random = _random(seed, style, 0)
+    low, high = (0.0, 0.0), (random.uniform(*_SIDE_M), random.uniform(*_SIDE_M))
+    walls, areas = _rooms(low, high, int(random.integers(0, 3)), random)
+    furnisher = Furnisher(walls, areas, style, random)
+    wanted = int(random.integers(_BEACONS[0], _BEACONS[1] + 1))
+    names = _balanced_names(wanted, random)
+    beacon_id = 0
+    for name in names:
+        kind = KINDS[name]
+        width_m = random.uniform(*kind.width_m)
+        place = furnisher.draw_place(width_m, kind.depth_m[1])
+        if place is not None:
+            furnisher.add_beacon(beacon_id, name, kind, *place, width_m)
+            beacon_id += 1
+    furnisher.add_wall_things(int(random.integers(_WALL_THINGS[0], _WALL_THINGS[1] + 1)))
+    _stand_clutter(furnisher, int(random.integers(_CLUTTER[0], _CLUTTER[1] + 1)))
+    return furnisher.finish(seed)
+
+
+def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
+    """A scenario's arena, furnished: each beacon gets a kind that fits its place, and a look.
+
+    A beacon's foot is where the scenario has it; what stands out from the wall is seen its depth farther in
+    (`Scene.beacons`, `Scene.arena`). Nothing stands where the robot drives. BslamError: a beacon that hangs
+    on no wall, or too close to another for the narrowest kind; an id beyond 32767; a bad seed or style.
+    """
+    random = _random(seed, style, 1)
+    arena = scenario.arena
+    areas = tuple(Area((one.x_m[0], one.y_m[0]), (one.x_m[1], one.y_m[1])) for one in scenario.areas) or (
+        Area(arena.low, arena.high),
+    )
+    furnisher = Furnisher(arena.walls, areas, style, random)
+    for beacon in arena.beacons:
+        where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
+        if beacon.beacon_id > IDENTITY_MAX:
+            raise BslamError(f"{where}: allowed with a camera: ids up to {IDENTITY_MAX}")
+        face, along_m = _hang(furnisher, beacon.at, where)
+        free_m = _free_width(face, along_m, beacon.at, [other.at for other in arena.beacons])
+        name = draw_kind(random, free_m)
+        if name is None:
+            raise BslamError(f"{where}: {free_m:.2f} m of free wall; allowed: enough for a beacon, 0.18 m")
+        kind = KINDS[name].shallow(_DRESSED_DEPTH_M)
+        width_m = random.uniform(kind.width_m[0], min(kind.width_m[1], free_m))
+        furnisher.add_beacon(beacon.beacon_id, name, kind, face, along_m, width_m)
+    furnisher.add_wall_things(int(random.integers(_WALL_THINGS[0], _WALL_THINGS[1] + 1)) * len(areas))
+    return furnisher.finish(seed)
+
+
+def _random(seed: int, style: str, purpose: int) -> np.random.Generator:
+    if style not in STYLES:
+        raise BslamError(f"style {style!r}: allowed: {', '.join(STYLES)}")
+    if seed < 0:
+        raise BslamError(f"seed {seed}: allowed: 0 and up")
+    return np.random.default_rng([_STYLE_STREAMS[style], purpose, seed])
+
+
+def _rooms(
+    low: Point, high: Point, partitions: int, random: np.random.Generator
+) -> tuple[tuple[Wall, ...], tuple[Area, ...]]:
+    """Outer walls and rooms: the longest room is parted, so many times, by a wall with a passage."""
+    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
+    walls = [Wall(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    rooms = [Area(low, high)]
+    for _ in range(partitions):
+        sides = [max(room.high[i] - room.low[i] for i in range(2)) for room in rooms]
+        room = rooms.pop(int(np.argmax(sides)))
+        across = int(room.high[1] - room.low[1] > room.high[0] - room.low[0])  # the axis that is parted
+        if room.high[across] - room.low[across] < 2.0 * _ROOM_SIDE_MIN_M:
+            rooms.append(room)
+            break
+        cut_m = random.uniform(room.low[across] + _ROOM_SIDE_MIN_M, room.high[across] - _ROOM_SIDE_MIN_M)
+        from_m, to_m = room.low[1 - across], room.high[1 - across]
+        gap_m = random.uniform(*_GAP_M)
+        gap_from_m = random.uniform(from_m + 0.3, to_m - 0.3 - gap_m)
+        for start_m, end_m in ((from_m, gap_from_m), (gap_from_m + gap_m, to_m)):
+            walls.append(Wall(_point(across, cut_m, start_m), _point(across, cut_m, end_m)))
+        rooms.append(Area(room.low, _point(across, cut_m, to_m)))
+        rooms.append(Area(_point(across, cut_m, from_m), room.high))
+    return tuple(walls), tuple(rooms)
+
+
+def _point(axis: int, on_axis_m: float, other_m: float) -> Point:
+    return (on_axis_m, other_m) if axis == 0 else (other_m, on_axis_m)
+
+
+def _balanced_names(count: int, random: np.random.Generator) -> list[str]:
+    """Kinds in random order, all about equally often; the widest come first, while there is place."""
+    names: list[str] = []
+    while len(names) < count:
+        names += random.permutation(list(KINDS)).tolist()
+    return sorted(names[:count], key=lambda name: -KINDS[name].width_m[1])
+
+
+def _stand_clutter(furnisher: Furnisher, count: int) -> None:
+    random = furnisher.random
+    for _ in range(count):
+        look, width_m, height_m = looks.clutter_look(furnisher.style, random)
+        for _ in range(_TRIES):
+            area = furnisher.areas[int(random.integers(len(furnisher.areas)))]
+            x_m, y_m = (random.uniform(area.low[i] + 0.35, area.high[i] - 0.35) for i in range(2))
+            before_wall = random.random() < 0.7
+            away_m = min(x_m - area.low[0], area.high[0] - x_m, y_m - area.low[1], area.high[1] - y_m)
+            if before_wall and away_m > 0.9:
+                continue
+            if furnisher.is_free_floor(x_m, y_m, 0.5 * width_m):
+                furnisher.add_clutter(x_m, y_m, look, width_m, height_m)
+                break
+
+
+def _hang(furnisher: Furnisher, at: Point, where: str) -> tuple[WallFace, float]:
+    """The wall face that a point lies on, and how far from its left end.
+
+    Of the two faces of a wall, the one on whose side the point is; on the wall itself, the one that looks
+    into the arena.
+    """
+    best: tuple[float, WallFace, float] | None = None
+    for face in furnisher.faces:
+        to_x, to_y = at[0] - face.left[0], at[1] - face.left[1]
+        along_m = to_x * face.right[0] + to_y * face.right[1]
+        out_m = to_x * face.normal[0] + to_y * face.normal[1]
+        if not (0.0 <= along_m <= face.length_m and -1e-6 <= out_m <= _ON_WALL_M):
+            continue
+        if not furnisher.is_inside(face.at(along_m, 0.2)):
+            continue
+        if best is None or out_m < best[0]:
+            best = (out_m, face, along_m)
+    if best is None:
+        raise BslamError(f"{where}: hangs on no wall; allowed: at most {_ON_WALL_M:g} m before one")
+    return best[1], best[2]
+
+
+def _free_width(face: WallFace, along_m: float, at: Point, others: list[Point]) -> float:
+    """How wide a beacon may be: up to the wall's ends, and half-way to each neighbour on it."""
+    half_m = min(along_m, face.length_m - along_m)
+    for other in others:
+        distance_m = math.dist(at, other)
+        if distance_m > 0.0:
+            half_m = min(half_m, 0.5 * _GAP_SHARE * distance_m)
+    return 2.0 * half_m
