@@ -1,4 +1,4 @@
-"""`bslam calibrate`: estimate scale and noise of odometry from one log, and try them on another."""
+"""`bslam calibrate`: odometry from one log, tried on another; a camera from pictures of a checkerboard."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bslam.commands.arguments import core_parameters
+from bslam.commands.calibrate_camera import add_camera_arguments, execute_camera
 from bslam.commands.drawing import draw
 from bslam.commands.replay import log_sources
 from bslam.commands.report import finish, table_of
@@ -18,19 +19,24 @@ from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_atomically
 from bslam.experiment.sources import Source
 
-SUMMARY = "estimate scale and noise of odometry from one log with truth, and try them on another"
+SUMMARY = "odometry's scale and noise from a log with truth; a camera's lens and mounting from pictures"
 EXAMPLES = """examples:
   bslam calibrate mrclam MRCLAM_Dataset6 --robot 1 --test MRCLAM_Dataset6 --test-robot 2
   bslam calibrate csv paper_room_700_sigma0.6 --test paper_room_701_sigma0.6
   bslam replay mrclam MRCLAM_Dataset6 --params out/calibrate/calibrated.toml
+  bslam calibrate camera boards/ --lens pinhole --board 9x6 --square 0.025
+  bslam calibrate camera boards/ --plumb plumb/ --board-height 0.31 --log drive/
 
-Writes calibrated.toml for --params; with --test, the other log is replayed before and after."""
+Logs: writes calibrated.toml for --params; with --test, the other log is replayed before and after.
+Camera: writes camera.toml, a rig of that one camera, with the same for the C core in a comment."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("kind", choices=("csv", "mrclam"), help="format of the logs")
-    parser.add_argument("directory", metavar="DIR", help="log to calibrate with")
+    parser.add_argument("kind", choices=("csv", "mrclam", "camera"), help="format of the logs, or: camera")
+    parser.add_argument(
+        "directory", metavar="DIR", help="log to calibrate with; camera: folder of checkerboard pictures"
+    )
     parser.add_argument("--robot", type=int, choices=range(1, ROBOTS + 1), help="mrclam: its robot")
     parser.add_argument("--test", metavar="DIR", help="log to try the result on")
     parser.add_argument(
@@ -49,10 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where files go (default: out/calibrate)",
     )
+    add_camera_arguments(parser)
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
+    if arguments.kind == "camera":
+        return execute_camera(arguments)
     before = RunOptions(sensor="recorded", parameters=tuple(core_parameters(arguments).items()))
     source = _one_source(arguments.kind, arguments.directory, arguments.robot)
     calibration = calibrate(source.load())
