@@ -86,6 +86,9 @@ enum {
     BSLAM_MARK_OCCLUDED = 64,  ///< something stands before it
 };
 
+/// No object of the model's recogniser.
+#define BSLAM_OBJECT_NONE (-1)
+
 /// A thing that is probably a beacon.
 typedef struct bslam_candidate {
     bslam_box_t outline;
@@ -98,6 +101,8 @@ typedef struct bslam_candidate {
     uint8_t beacon_class;  ///< 1 + index in the model's class table; BSLAM_CLASS_NONE if unsure
     float class_margin;    ///< value of the best class less that of the next
     float score;           ///< detector's decision value: larger is surer
+    int16_t object;        ///< index in the model's recogniser; BSLAM_OBJECT_NONE: none of its objects
+    float object_margin;   ///< what the recogniser's machine for the likeliest object says
     uint16_t marks;
     float signature[BSLAM_SIGNATURE_SIZE];
 } bslam_candidate_t;

@@ -5,6 +5,7 @@
 
 #include "bslam/math/trig.h"
 #include "bslam/vision/measure.h"
+#include "bslam/vision/recogniser.h"
 
 /// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
 /// than these shares of its cells are, in percent.
@@ -26,7 +27,8 @@ static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
 
 const char *bslam_vision_reason_name(bslam_vision_reason_t reason)
 {
-    return (int)reason >= 0 && reason < BSLAM_VISION_REASON_COUNT ? reason_names[reason] : "unknown reason";
+    const unsigned number = (unsigned)reason;
+    return number < BSLAM_VISION_REASON_COUNT ? reason_names[number] : "unknown reason";
 }
 
 static const bslam_detector_model_t *detector_for(const bslam_beacon_model_t *model,
@@ -42,6 +44,9 @@ bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_mode
         return BSLAM_E_COUNT;
     }
     bslam_status_t status = bslam_beacon_model_check(model);
+    if (status == BSLAM_OK && model->recogniser != NULL) {
+        status = bslam_recogniser_check(model->recogniser);
+    }
     for (int32_t i = 0; i < camera_count && status == BSLAM_OK; i++) {
         status = bslam_camera_check(&cameras[i]);
     }
@@ -153,18 +158,36 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
     return view;
 }
 
-/// Direction, distance and signature of each candidate; one that has no direction is of no use.
-static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
+/// Direction, distance and signature of a candidate; of a recognised object the distance is by its own
+/// height.
+static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_frame_t *frame,
+                                  bslam_candidate_t *candidate)
 {
     const bslam_camera_t *camera = &vision->cameras[vision->camera];
+    const bslam_recogniser_t *recogniser = vision->model->recogniser;
+    const float height_m = vision->model->classes[candidate->beacon_class - 1].height_m;
+    const bslam_box_t rough = candidate->outline;
+    candidate->object = BSLAM_OBJECT_NONE;
+    candidate->object_margin = 0;
+    const bslam_status_t status = bslam_measure(frame, camera, &rough, (bslam_real_t)height_m, candidate);
+    if (status != BSLAM_OK || recogniser == NULL) {
+        return status;
+    }
+    candidate->object = bslam_recognise(recogniser, candidate->signature, &candidate->object_margin);
+    if (candidate->object == BSLAM_OBJECT_NONE) {
+        return status;
+    }
+    const float own_height_m = recogniser->objects[candidate->object].height_m;
+    return bslam_measure(frame, camera, &rough, (bslam_real_t)own_height_m, candidate);
+}
+
+/// Measures the candidates; one that has no outline is of no use.
+static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
+{
     int32_t kept = 0;
     for (int32_t i = 0; i < vision->candidate_count; i++) {
         bslam_candidate_t candidate = vision->candidates[i];
-        const float height_m = vision->model->classes[candidate.beacon_class - 1].height_m;
-        const bslam_box_t rough = candidate.outline;
-        const bslam_status_t status =
-            bslam_measure(frame, camera, &rough, (bslam_real_t)height_m, &candidate);
-        if (status == BSLAM_OK) {
+        if (measure_one(vision, frame, &candidate) == BSLAM_OK) {
             vision->candidates[kept++] = candidate;
         }
     }
@@ -233,4 +256,11 @@ void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32
     const bslam_frame_t frame = finished_frame(vision);
     const bslam_view_t view = view_of(vision, &frame);
     bslam_cell_features(&view, row, column, features);
+}
+
+bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_box_t *rough,
+                                    bslam_real_t height_m, bslam_candidate_t *candidate)
+{
+    const bslam_frame_t frame = finished_frame(vision);
+    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, height_m, candidate);
 }

@@ -48,8 +48,9 @@ typedef struct bslam_vision {
 } bslam_vision_t;
 
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are
-/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. Else what bslam_camera_check or
-/// bslam_beacon_model_check refuses. *vision is then unchanged.
+/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. Else what bslam_camera_check,
+/// bslam_beacon_model_check or, where the model has a recogniser, bslam_recogniser_check refuses. *vision is
+/// then unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
                                                   const bslam_camera_t *cameras, int32_t camera_count);
 
@@ -84,5 +85,9 @@ void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
                                 float features[BSLAM_BLOB_FEATURES]);
 void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,
                                 int16_t features[BSLAM_CELL_FEATURES]);
+
+/// For training: what bslam_measure says of a box in the last finished frame; its statuses.
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_box_t *rough,
+                                                     bslam_real_t height_m, bslam_candidate_t *candidate);
 
 #endif
