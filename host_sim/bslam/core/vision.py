@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from bslam.core.raw import vision_library
 from bslam.errors import BslamError
-from bslam.modelfile import BeaconClass, Svm
+from bslam.modelfile import BeaconClass, Recogniser, Svm
 from bslam.rig import Camera
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
+
+SIGNATURE_SIZE = 71
+"""Values of a signature."""
 
 MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "occluded")
 """Names of the bits of a candidate's marks, lowest first."""
@@ -58,6 +61,8 @@ class Candidate:
     score: float
     marks: frozenset[str]
     signature: NDArray[np.float32]  # (71,)
+    object: str | None  # of the recogniser's, None: none of them
+    object_margin: float  # what the recogniser says for the likeliest
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,16 @@ class Proposals:
 class FrontEnd:
     """One robot's cameras, taken in turn. The memory of the room starts empty."""
 
-    def __init__(self, cameras: Sequence[Camera], model: BeaconModel | None = None) -> None:
-        """`model`: the built-in one unless given. BslamError if the library refuses model or cameras."""
+    def __init__(
+        self,
+        cameras: Sequence[Camera],
+        model: BeaconModel | None = None,
+        recogniser: Recogniser | None = None,
+    ) -> None:
+        """`model`: the built-in one unless given; `recogniser`: of a user's own objects, besides.
+
+        BslamError if the library refuses model, recogniser or cameras.
+        """
         self._library = vision_library()
         ffi, lib = self._library.ffi, self._library.lib
         self._cameras = tuple(cameras)
@@ -89,6 +102,10 @@ class FrontEnd:
         self._model = lib.built_in_model() if model is None else self._new_model(model)
         if self._model == ffi.NULL:
             raise BslamError("no built-in model: run `make train`, or give one")
+        self._objects = () if recogniser is None else recogniser.objects
+        if recogniser is not None:
+            self._model = ffi.new("bslam_beacon_model_t *", self._model[0])
+            self._model.recogniser = self._recogniser(recogniser)
         self._vision = ffi.new("bslam_vision_t *")
         array = ffi.new("bslam_camera_t[]", [self._camera(camera)[0] for camera in cameras])
         self._library.ensure(
@@ -116,6 +133,20 @@ class FrontEnd:
             )
         self._library.ensure(lib.bslam_vision_end(self._vision, moved), "the end of a frame")
         return Seeing(tuple(self._candidates()), self._reason(lib.bslam_vision_reason(self._vision)))
+
+    def signature(self, box: tuple[float, float, float, float]) -> NDArray[np.float32] | None:
+        """The signature (71,) of what a box (left, top, right, bottom, px) in the last frame holds.
+
+        None: none can be taken there, the box is too small, dark or outside.
+        """
+        library = self._library
+        sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))
+        rough = library.new_filled("bslam_box_t", **sides)
+        found = library.ffi.new("bslam_candidate_t *")
+        if library.lib.bslam_vision_measure(self._vision, rough, 0.0, found) != library.lib.BSLAM_OK:
+            return None
+        signature = library.copy_of(found.signature, library.lib.BSLAM_SIGNATURE_SIZE, np.float32)
+        return signature if signature.any() else None
 
     def point(self, camera: int, yaw_rad: float) -> None:
         """Turns a camera on a pan unit. BslamError: no such camera, or |yaw| above pi."""
@@ -197,7 +228,9 @@ class FrontEnd:
             class_margin=found.class_margin,
             score=found.score,
             marks=frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1),
-            signature=self._library.copy_of(found.signature, 71, np.float32),
+            signature=self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32),
+            object=self._objects[found.object].name if found.object >= 0 else None,
+            object_margin=found.object_margin,
         )
 
     def _camera(self, camera: Camera) -> Any:
@@ -217,19 +250,31 @@ class FrontEnd:
         )
 
     def _new_model(self, model: BeaconModel) -> Any:
-        names = [self._library.ffi.new("char[]", one.name.encode()) for one in model.classes]
-        classes = self._library.ffi.new(
-            "bslam_beacon_class_t[]",
-            [(name, one.height_m) for name, one in zip(names, model.classes, strict=True)],
-        )
-        self._keep += [*names, classes]
         return self._library.new_filled(
             "bslam_beacon_model_t",
             class_count=len(model.classes),
-            classes=classes,
+            classes=self._classes(model.classes),
             pinhole=self._detector(model.pinhole),
             wide=self._detector(model.wide),
         )
+
+    def _classes(self, classes: Sequence[BeaconClass]) -> Any:
+        ffi = self._library.ffi
+        names = [ffi.new("char[]", one.name.encode()) for one in classes]
+        rows = [(name, one.height_m) for name, one in zip(names, classes, strict=True)]
+        table = ffi.new("bslam_beacon_class_t[]", rows)
+        self._keep += [*names, table]
+        return table
+
+    def _recogniser(self, recogniser: Recogniser) -> Any:
+        made = self._library.new_filled(
+            "bslam_recogniser_t",
+            svm=self._library.svm(recogniser.svm, self._keep),
+            objects=self._classes(recogniser.objects),
+            reject_margin=recogniser.reject_margin,
+        )
+        self._keep.append(made)
+        return made
 
     def _detector(self, model: DetectorModel) -> Any:
         library, keep = self._library, self._keep
@@ -246,3 +291,9 @@ class FrontEnd:
         )
         keep.append(made)
         return made[0]
+
+
+def feature_counts() -> tuple[int, int]:
+    """Features of a cell and of a proposal."""
+    lib = vision_library().lib
+    return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_BLOB_FEATURES)
