@@ -1,4 +1,4 @@
-"""Driving: from goal to goal around the walls, unsteadily, and into a wall now and then."""
+"""Driving: from goal to goal on a planned route, unsteadily, and into a wall now and then."""
 
 from __future__ import annotations
 
@@ -16,16 +16,11 @@ from bslam.world.planner import RoutePlanner
 from bslam.world.robot import Body
 from bslam.world.scenario import Area, Scenario
 
-_GOAL_DRAWS = 1000  # so many draws without a place that is free and can be reached: there is none
-_STALLS_PER_GOAL = 6  # so many on the way, and the goal is given up
+_GOAL_DRAWS = 1000  # so many goals drawn in turn that the robot is at already: there is nowhere to go
 
-# After a stall the robot turns on the spot until it faces its way so well, and first drives to a point a bit
-# farther from the wall than a path must be.
-_FACING_RAD = 0.5
-_STEP_OFF_M = 0.05
-_STEP_OFF_REACH_M = 0.03
-
-_FORGET_STALL = 0.25  # seconds of pushing forgotten in a second of rolling: jittering wheels roll on and off
+# After a bump the robot turns on the spot, to either side, for a random time and a bit slower than it can.
+_BUMP_TURN_S = (0.4, 1.8)
+_BUMP_TURN_SHARE = 0.9
 
 
 @dataclass(frozen=True)
@@ -67,31 +62,30 @@ def drive(
 
 
 class Driver:
-    """Steers the body along planned routes to random goals; commands change no faster than the motors can."""
+    """Steers the body along planned routes to random goals; commands change no faster than the motors can.
+
+    It heads for a point some cells ahead on the route, so it cuts corners, unsteadily, and hits door posts.
+    """
 
     def __init__(self, scenario: Scenario, body: Body, random: np.random.Generator) -> None:
         self._name = scenario.name
-        self._settings = scenario.driving
+        self._settings = settings = scenario.driving
         self._step_s = scenario.step_us * 1e-6
         self._body = body
-        noise_random, goal_random = random.spawn(2)
+        noise_random, goal_random, self._bump_random = random.spawn(3)
         self._turn_noise_radps = iter(_turn_noise(scenario, noise_random))
-        self._goals = _draw_goals(scenario, goal_random)
-        self._planner = RoutePlanner(scenario.arena, scenario.driving.path_clearance_m)
-        self._route: list[tuple[Point, float]] = []  # the points ahead, and how near is near enough
+        start = (scenario.start.x_m, scenario.start.y_m)
+        self._planner = RoutePlanner(scenario.arena, settings.cell_m, settings.path_clearance_m, start)
+        self._goals = _draw_goals(scenario, self._planner.places, goal_random)
+        self._route: list[Point] = []  # what is left of it, from the cell that the robot is nearest to
         self._v_mps = self._omega_radps = 0.0
-        self._pushing_s = 0.0
-        self._stalls = 0  # on the way to this goal
-        self._facing = False  # only turning, to face the next point
+        self._bump_turn_radps = 0.0
+        self._bump_turn_steps = 0  # what is left of the turn after a bump
 
     def command(self) -> tuple[float, float]:
         """Forward speed m/s and turning rate rad/s of the next step."""
         settings = self._settings
-        error_rad = self._heading_error()
-        self._facing = self._facing and abs(error_rad) > _FACING_RAD
-        v_mps = 0.0 if self._facing else settings.speed_mps * max(0.0, math.cos(error_rad))
-        omega_radps = settings.heading_gain_per_s * error_rad + next(self._turn_noise_radps)
-        omega_radps = _clip(omega_radps, settings.turn_rate_radps)
+        v_mps, omega_radps = self._wanted(next(self._turn_noise_radps))
         v_step_mps = settings.acceleration_mps2 * self._step_s
         omega_step_radps = settings.turn_acceleration_radps2 * self._step_s
         self._v_mps += _clip(v_mps - self._v_mps, v_step_mps)
@@ -99,59 +93,50 @@ class Driver:
         return self._v_mps, self._omega_radps
 
     def feel(self, stalled: bool) -> None:
-        """What the bumper says of the step just made: after enough pushing, stop and look for a way."""
-        change_s = self._step_s if stalled else -_FORGET_STALL * self._step_s
-        self._pushing_s = max(0.0, self._pushing_s + change_s)
-        if stalled and self._pushing_s >= self._settings.stall_time_s:
-            self._v_mps = self._omega_radps = self._pushing_s = 0.0
-            self._facing = True
-            self._stalls += 1
-            self._route = self._plan(self._route[-1][0]) if self._stalls < _STALLS_PER_GOAL else []
+        """What the bumper says of the step just made. At a wall: stop, turn, look for another goal."""
+        if stalled and self._bump_turn_steps == 0:
+            self._v_mps = self._omega_radps = 0.0
+            side = self._bump_random.choice((-1.0, 1.0))
+            self._bump_turn_radps = side * _BUMP_TURN_SHARE * self._settings.turn_rate_radps
+            self._bump_turn_steps = round(self._bump_random.uniform(*_BUMP_TURN_S) / self._step_s)
+            self._route = []
+
+    def _wanted(self, turn_noise_radps: float) -> tuple[float, float]:
+        """The speeds that the motors should reach."""
+        if self._bump_turn_steps > 0:
+            self._bump_turn_steps -= 1
+            return 0.0, self._bump_turn_radps
+        settings = self._settings
+        error_rad = self._heading_error()
+        omega_radps = settings.heading_gain_per_s * error_rad + turn_noise_radps
+        if abs(error_rad) > settings.turn_on_spot_rad:
+            return 0.0, _clip(omega_radps, settings.turn_rate_radps)
+        v_mps = settings.speed_mps * max(0.0, math.cos(error_rad))
+        return v_mps, _clip(omega_radps, settings.turn_rate_radps)
 
     def _heading_error(self) -> float:
-        """Angle from where the robot heads to where it should: to the next point, but away from walls."""
+        """Angle from where the robot heads to the point ahead on its route."""
         x_m, y_m, theta_rad = self._body.pose
-        target_x_m, target_y_m = self._next_point(x_m, y_m)
-        to_x, to_y = target_x_m - x_m, target_y_m - y_m
-        wall = self._body.feeler.nearest_within(x_m, y_m, self._settings.avoid_clearance_m)
-        if wall is not None:
-            distance_m, away_x, away_y = wall
-            push = (1.0 - distance_m / self._settings.avoid_clearance_m) * math.hypot(to_x, to_y)
-            to_x, to_y = to_x + push * away_x, to_y + push * away_y
-        return math.remainder(math.atan2(to_y, to_x) - theta_rad, math.tau)
+        self._follow((x_m, y_m))
+        ahead_x_m, ahead_y_m = self._route[min(self._settings.cells_ahead, len(self._route) - 1)]
+        return math.remainder(math.atan2(ahead_y_m - y_m, ahead_x_m - x_m) - theta_rad, math.tau)
 
-    def _next_point(self, x_m: float, y_m: float) -> Point:
-        while True:
-            for passed, (point, reach_m) in enumerate(self._route):
-                if math.hypot(point[0] - x_m, point[1] - y_m) > reach_m:
-                    del self._route[:passed]
-                    return point
-            self._route = self._plan_new()
+    def _follow(self, place: Point) -> None:
+        """Drop the cells that are passed; at the goal, plan the route to another."""
+        if not self._route or math.dist(self._route[-1], place) <= self._settings.reach_m:
+            self._route = self._plan(place)
+        while len(self._route) > 1 and math.dist(self._route[1], place) < math.dist(self._route[0], place):
+            del self._route[0]
 
-    def _plan_new(self) -> list[tuple[Point, float]]:
-        """The route to the next goal that can be reached."""
+    def _plan(self, place: Point) -> list[Point]:
+        """The route to the next goal that is not where the robot is."""
         for goal in islice(self._goals, _GOAL_DRAWS):
-            x_m, y_m, _ = self._body.pose
-            if math.hypot(goal[0] - x_m, goal[1] - y_m) <= self._settings.reach_m:
-                continue
-            route = self._plan(goal)
-            if route:
-                self._stalls = 0
-                return route
+            if math.dist(goal, place) > self._settings.reach_m:
+                return self._planner.route(place, goal)
         raise BslamError(
-            f"scenario {self._name}: no goal can be reached from {self._body.pose[:2]!r}; "
-            f"allowed: an arena with ways that keep path_clearance_m, {self._settings.path_clearance_m:g}"
+            f"scenario {self._name}: no goal is farther than reach_m from {place!r}; "
+            f"allowed: areas with places beyond reach_m, {self._settings.reach_m:g}"
         )
-
-    def _plan(self, goal: Point) -> list[tuple[Point, float]]:
-        """The points to pass on the way to the goal, at a wall first one away from it; empty: no way."""
-        x_m, y_m, _ = self._body.pose
-        settings = self._settings
-        if self._body.feeler.nearest_within(x_m, y_m, settings.path_clearance_m) is None:
-            return [(point, settings.reach_m) for point in self._planner.route((x_m, y_m), goal)]
-        free = self._planner.step_off((x_m, y_m), _STEP_OFF_M)
-        way = [(point, settings.reach_m) for point in self._planner.route(free, goal)]
-        return [(free, _STEP_OFF_REACH_M), *way] if way else []
 
 
 def _clip(value: float, limit: float) -> float:
@@ -170,23 +155,26 @@ def _turn_noise(scenario: Scenario, random: np.random.Generator) -> list[float]:
     return values
 
 
-def _draw_goals(scenario: Scenario, random: np.random.Generator) -> Iterator[Point]:
+def _draw_goals(
+    scenario: Scenario, places: NDArray[np.float64], random: np.random.Generator
+) -> Iterator[Point]:
     """Endless random places: one in each area, the areas in a new order every time round."""
     (low_x, low_y), (high_x, high_y) = scenario.arena.low, scenario.arena.high
     areas = scenario.areas or (Area((low_x, high_x), (low_y, high_y)),)
+    choices = [_places_in(scenario, area, places) for area in areas]
     while True:
         for index in random.permutation(len(areas)).tolist():
-            yield _draw_place(scenario, areas[index], random)
+            x_m, y_m = random.choice(choices[index]).tolist()
+            yield x_m, y_m
 
 
-def _draw_place(scenario: Scenario, area: Area, random: np.random.Generator) -> Point:
-    """A random place in the area that is far enough from all walls."""
-    clearance_m = scenario.driving.goal_clearance_m
-    for _ in range(_GOAL_DRAWS):
-        x_m, y_m = random.uniform(*area.x_m), random.uniform(*area.y_m)
-        if scenario.arena.nearest_wall(x_m, y_m)[0] >= clearance_m:
-            return x_m, y_m
+def _places_in(scenario: Scenario, area: Area, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    (low_x, high_x), (low_y, high_y) = area.x_m, area.y_m
+    x_m, y_m = places.T
+    inside = places[(x_m >= low_x) & (x_m <= high_x) & (y_m >= low_y) & (y_m <= high_y)]
+    if len(inside) > 0:
+        return inside
     raise BslamError(
-        f"scenario {scenario.name}: no free place in the area x {area.x_m}, y {area.y_m}; "
-        f"allowed: one with places that are goal_clearance_m, {clearance_m:g}, from every wall"
+        f"scenario {scenario.name}: no goal can be reached in the area x {area.x_m}, y {area.y_m}; "
+        f"allowed: one with ways there that keep path_clearance_m, {scenario.driving.path_clearance_m:g}"
     )

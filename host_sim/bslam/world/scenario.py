@@ -37,13 +37,16 @@ from bslam.parsing.settings import (
     check_keys,
     integer,
     load_toml,
+    number,
     one_of,
     parse_table,
     setting,
 )
 from bslam.world.arena import Arena, Beacon, Point, Wall
+from bslam.world.planner import grid_size
 
 _SHORTEST_WALL_M = 0.001
+_CELLS_MAX = 1_000_000  # of the grid that routes are planned on
 _FOLDER = Path(__file__).resolve().parent.parent / "scenarios"
 
 T = TypeVar("T")
@@ -97,10 +100,12 @@ class Area:
 
 @dataclass(frozen=True)
 class Driving:
-    """How the robot goes from goal to goal. Clearances are distances from the robot's middle to a wall.
+    """How the robot goes from goal to goal: on routes over a grid of square cells.
 
-    Its turning rate is heading_gain_per_s times the heading error plus noise: a Gauss-Markov process of
-    standard deviation turn_noise_radps and correlation time turn_noise_time_s.
+    It heads for the point of the route that is cells_ahead cells on. Its speed is speed_mps times the cosine
+    of the heading error, its turning rate is heading_gain_per_s times the error plus noise: a Gauss-Markov
+    process of standard deviation turn_noise_radps and correlation time turn_noise_time_s. With an error
+    above turn_on_spot_rad it only turns.
     """
 
     speed_mps: float = setting(POSITIVE)
@@ -110,11 +115,11 @@ class Driving:
     heading_gain_per_s: float = setting(POSITIVE)
     turn_noise_radps: float = setting(NOT_NEGATIVE)
     turn_noise_time_s: float = setting(POSITIVE)
-    goal_clearance_m: float = setting(POSITIVE)
-    path_clearance_m: float = setting(POSITIVE)
-    avoid_clearance_m: float = setting(POSITIVE)  # nearer to a wall than this, the robot steers away from it
-    reach_m: float = setting(POSITIVE)  # so near to a point of the route, the next one is headed for
-    stall_time_s: float = setting(NOT_NEGATIVE)  # how long the robot pushes against a wall before it gives up
+    turn_on_spot_rad: float = setting(POSITIVE)
+    cell_m: float = setting(number(0.01, 10.0))
+    path_clearance_m: float = setting(POSITIVE)  # from the middle of a cell on the route to any wall
+    cells_ahead: int = setting(integer(1, 1000))
+    reach_m: float = setting(POSITIVE)  # so near to the goal, the next one is headed for
 
 
 @dataclass(frozen=True)
@@ -314,8 +319,11 @@ def _check_together(scenario: Scenario, path: Path) -> None:
     require(to_wall_m >= radius_m, "[start], keys x_m, y_m", place, f"a place {radius_m:g} m from every wall")
     mount = (sensor.x_m, sensor.y_m)
     require(math.hypot(*mount) <= radius_m, "[sensor], keys x_m, y_m", mount, "a place on the robot's body")
-    path_m, goal_m = driving.path_clearance_m, driving.goal_clearance_m
+    path_m, cell_m = driving.path_clearance_m, driving.cell_m
     require(
         path_m > radius_m, "[driving], key path_clearance_m", path_m, f"above the body's radius, {radius_m:g}"
     )
-    require(goal_m >= path_m, "[driving], key goal_clearance_m", goal_m, f"from path_clearance_m, {path_m:g}")
+    # Cells wider than that could lie on two sides of a wall, next to each other.
+    require(cell_m <= path_m, "[driving], key cell_m", cell_m, f"at most path_clearance_m, {path_m:g}")
+    cells = math.prod(grid_size(scenario.arena, cell_m))
+    require(cells <= _CELLS_MAX, "[driving], key cell_m", cell_m, f"{_CELLS_MAX} cells at most, not {cells}")

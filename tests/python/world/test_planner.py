@@ -7,66 +7,79 @@ import numpy as np
 import pytest
 
 from bslam.world.arena import Arena, Point, Wall
-from bslam.world.planner import RoutePlanner
-from bslam.world.scenario import load_scenario
+from bslam.world.planner import RoutePlanner, grid_size
+from bslam.world.scenario import Scenario, load_scenario
 
-WALL_WITH_DOOR = Arena((Wall((0.0, -10.0), (0.0, 0.0)), Wall((0.0, 2.0), (0.0, 10.0))), ())
+CELL_M = 0.2
+CLEARANCE_M = 0.45
 
 
-def clearance_m(arena: Arena, way: list[Point]) -> float:
-    points = np.array(way)
-    return float(arena.path_clearance(points[:-1], points[1:]).min())
+def planner(arena: Arena, start: Point = (1.5, 2.5)) -> RoutePlanner:
+    return RoutePlanner(arena, CELL_M, CLEARANCE_M, start)
 
 
 def length_m(way: list[Point]) -> float:
     return sum(math.dist(a, b) for a, b in pairwise(way))
 
 
-def test_route_in_the_open_is_straight() -> None:
-    assert RoutePlanner(WALL_WITH_DOOR, 0.4).route((1.0, 1.0), (5.0, -3.0)) == [(5.0, -3.0)]
+def test_grid_size_counts_a_border_around_the_arena(square: Arena) -> None:
+    assert grid_size(square, 0.5) == (10, 10)
+    assert grid_size(square, 0.6) == (9, 9)
 
 
-def test_route_through_a_door_keeps_the_distance_and_is_short() -> None:
-    start, goal = (-3.0, -4.0), (3.0, -4.0)
-    way = [start, *RoutePlanner(WALL_WITH_DOOR, 0.4).route(start, goal)]
-    assert way[-1] == goal
-    assert clearance_m(WALL_WITH_DOOR, way) >= 0.4
-    # The shortest way of all winds around a circle; the octagon around it is a little longer.
-    assert 2.0 * math.hypot(3.0, 4.0) < length_m(way) < 2.0 * math.hypot(3.0, 4.0) + 1.0
+def test_places_in_a_room_with_a_door_are_those_far_from_walls(paper_room: Scenario) -> None:
+    arena = paper_room.arena
+    places = planner(arena).places
+    assert all(arena.nearest_wall(x_m, y_m)[0] >= CLEARANCE_M for x_m, y_m in places.tolist())
+    # Each room is 5.5 x 8 m, its cells lie from 0.5 m off the walls on; in the door's line y is 3.5 to 4.5 m.
+    assert (abs(places[:, 0] - 5.5) > 0.5).sum() == 2 * 23 * 36
+    assert (abs(places[:, 0] - 5.5) < 0.1).sum() == 6
 
 
-def test_route_through_a_door_too_narrow_is_none() -> None:
-    assert (
-        RoutePlanner(WALL_WITH_DOOR, 1.05).route((-3.0, 1.0), (3.0, 1.0)) != []
-    )  # around the wall's far ends
-    closed = Arena((*load_scenario("paper_room").arena.walls, Wall((5.5, 3.0), (5.5, 5.0))), ())
-    assert RoutePlanner(closed, 0.4).route((2.0, 4.0), (9.0, 4.0)) == []
+def test_places_behind_a_closed_door_are_left_out(paper_room: Scenario) -> None:
+    closed = Arena((*paper_room.arena.walls, Wall((5.5, 3.0), (5.5, 5.0))), ())
+    assert planner(closed).places[:, 0].max() < 5.5
+    assert planner(closed, start=(7.0, 2.0)).places[:, 0].min() > 5.5
 
 
-def test_route_to_a_goal_in_a_wall_is_none() -> None:
-    assert RoutePlanner(WALL_WITH_DOOR, 0.4).route((-3.0, 0.0), (0.2, -3.0)) == []
+def test_places_where_nothing_is_free_are_none(square: Arena) -> None:
+    assert RoutePlanner(square, 0.2, 2.5, (0.0, 0.0)).places.shape == (0, 2)
+
+
+def test_route_in_the_open_goes_diagonally_first(square: Arena) -> None:
+    way = planner(square, start=(0.0, 0.0)).route((-0.5, -0.5), (0.9, 0.1))
+    assert np.array(way).ravel() == pytest.approx(
+        [-0.5, -0.5, -0.3, -0.3, -0.1, -0.1, 0.1, 0.1, 0.3, 0.1, 0.5, 0.1, 0.7, 0.1, 0.9, 0.1]
+    )
+
+
+def test_route_to_the_same_place_is_one_cell(square: Arena) -> None:
+    assert np.array(
+        planner(square, start=(0.0, 0.0)).route((0.1, 0.1), (0.12, 0.08))
+    ).ravel() == pytest.approx([0.1, 0.1])
+
+
+def test_route_from_beside_a_wall_starts_at_the_nearest_free_cell(square: Arena) -> None:
+    way = planner(square, start=(0.0, 0.0)).route((1.7, 0.08), (0.1, 0.1))
+    assert way[0] == pytest.approx((1.5, 0.1))
+
+
+def test_route_through_a_door_is_short(paper_room: Scenario) -> None:
+    way = planner(paper_room.arena).route((4.9, 1.5), (6.1, 1.5))
+    # Straight up to (4.9, 3.1), two diagonals to (5.3, 3.5), one cell to (5.5, 3.5), and back the same way.
+    assert length_m(way) == pytest.approx(2.0 * (1.6 + 0.4 * math.sqrt(2.0) + 0.2))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_route_in_the_building_keeps_the_distance(seed: int) -> None:
+def test_route_in_the_building_goes_from_cell_to_cell_and_keeps_off_the_walls(seed: int) -> None:
     building = load_scenario("building20")
-    planner = RoutePlanner(building.arena, 0.45)
-    random = np.random.default_rng(seed)
-    areas = [building.areas[index] for index in random.permutation(len(building.areas))]
-    places = [(float(random.uniform(*a.x_m)), float(random.uniform(*a.y_m))) for a in areas]
-    free = [place for place in places if building.arena.nearest_wall(*place)[0] > 0.45]
-    for start, goal in pairwise(free):
-        way = [start, *planner.route(start, goal)]
-        assert way[-1] == goal
-        assert clearance_m(building.arena, way) >= 0.45 - 1e-12
-
-
-def test_step_off_goes_straight_away_from_the_wall() -> None:
-    x_m, y_m = RoutePlanner(WALL_WITH_DOOR, 0.4).step_off((0.3, -5.0), 0.1)
-    assert 0.5 <= x_m < 0.53
-    assert y_m == -5.0
-
-
-def test_step_off_between_two_walls_finds_the_middle() -> None:
-    lane = Arena((Wall((-5.0, 0.0), (5.0, 0.0)), Wall((-5.0, 0.7), (5.0, 0.7))), ())
-    assert RoutePlanner(lane, 0.4).step_off((0.0, 0.3), 0.1) == pytest.approx((0.0, 0.35), abs=0.02)
+    ways = planner(building.arena, (building.start.x_m, building.start.y_m))
+    places = np.random.default_rng(seed).choice(ways.places, size=8).tolist()
+    for start, goal in pairwise((x_m, y_m) for x_m, y_m in places):
+        way = ways.route(start, goal)
+        assert (way[0], way[-1]) == (pytest.approx(start), pytest.approx(goal))
+        points = np.array(way)
+        assert np.hypot(*np.diff(points, axis=0).T).max() <= CELL_M * math.sqrt(2.0) + 1e-9
+        # Between two cells the way is nearer to a wall than in them by half a diagonal at most.
+        least_m = building.arena.path_clearance(points[:-1], points[1:]).min()
+        assert least_m >= CLEARANCE_M - CELL_M * math.sqrt(0.5)

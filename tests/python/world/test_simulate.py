@@ -224,8 +224,8 @@ def test_simulate_refuses_what_is_not_allowed(short_room: Scenario, arguments: d
 
 
 def test_simulate_where_no_goal_can_be_says_so(edited_room: Callable[..., Path]) -> None:
-    full = load_scenario(edited_room("goal_clearance_m = 0.7", "goal_clearance_m = 6.0"))
-    with pytest.raises(BslamError, match=r"scenario edited: no free place .*goal_clearance_m, 6"):
+    full = load_scenario(edited_room("path_clearance_m = 0.45", "path_clearance_m = 6.0"))
+    with pytest.raises(BslamError, match=r"scenario edited: no goal can be reached .*path_clearance_m, 6"):
         simulate(full, 0)
 
 
@@ -233,24 +233,41 @@ def test_simulate_where_no_goal_can_be_reached_says_so(edited_room: Callable[...
     areas = "areas = [{ x_m = [7.0, 9.0], y_m = [3.0, 5.0] }]\nsteps = 5"
     shut = load_scenario(edited_room("steps = 5", areas))
     shut = replace(shut, arena=load_scenario(edited_room(", doors = [[3.0, 5.0]]", "")).arena)
-    with pytest.raises(BslamError, match=r"scenario edited: no goal can be reached from \(1\.5, 2\.5\)"):
+    with pytest.raises(BslamError, match=r"scenario edited: no goal can be reached in the area x \(7\.0, 9"):
         simulate(shut, 0)
 
 
 def test_simulate_in_an_area_the_robot_fills_says_so(edited_room: Callable[..., Path]) -> None:
     """Every goal there is reached at once: this must end, and not with a robot that stands for ever."""
     areas = "areas = [{ x_m = [1.4, 1.6], y_m = [2.4, 2.6] }]\nsteps = 5"
-    with pytest.raises(BslamError, match="no goal can be reached"):
+    with pytest.raises(BslamError, match="no goal is farther than reach_m"):
         simulate(load_scenario(edited_room("steps = 5", areas)), 0)
 
 
 def test_drive_in_a_lane_hardly_wider_than_the_robot_goes_on(edited_room: Callable[..., Path]) -> None:
     """A door 10 cm wider than the robot, which hits its posts: it gives up at times but does not stick."""
     scenario = load_scenario(edited_room("[[3.0, 5.0]]", "[[3.0, 3.7]]"))
+    scenario = replace(scenario, driving=replace(scenario.driving, cell_m=0.1, path_clearance_m=0.31))
     for seed in range(4):
         drive = true_drive(scenario, seed)
         assert least_clearance_m(scenario.arena, drive.x_m, drive.y_m) > 0.3 - 2e-4
         assert drive.stalled.mean() < 0.25
+        assert np.hypot(np.diff(drive.x_m), np.diff(drive.y_m)).sum() > 30.0
+
+
+def test_drive_through_a_door_too_narrow_for_routes_stays_in_its_room(
+    edited_room: Callable[..., Path],
+) -> None:
+    drive = true_drive(load_scenario(edited_room("[[3.0, 5.0]]", "[[3.0, 3.7]]")), 0)
+    assert drive.x_m.max() < 5.5
+
+
+def test_drive_after_a_bump_turns_on_the_spot(paper_room: Scenario) -> None:
+    drive = next(one for one in (true_drive(paper_room, seed) for seed in range(20)) if one.stalled.any())
+    bump = int(np.flatnonzero(drive.stalled)[0])
+    turning = slice(bump + 1, bump + 11)  # 0.4 s, the shortest such turn
+    np.testing.assert_allclose(drive.left_m[turning], -drive.right_m[turning], atol=1e-12)
+    assert abs(drive.right_m[turning]).min() > 0.0
 
 
 def test_simulate_is_quick_enough(paper_room: Scenario) -> None:
