@@ -19,14 +19,19 @@ from bslam.experiment.options import (
     MOTIONS,
     OBSERVATIONS,
     REALS,
+    SENSORS,
     TARGETS,
     Number,
     RunOptions,
     parse_association,
 )
+from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 
 T = TypeVar("T")
+
+# Rendering takes about a minute a drive: what a later command needs again is kept here.
+CAMERA_STORE = Path("out") / "camera"
 
 
 def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = ()) -> None:
@@ -86,6 +91,32 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     )
 
 
+def add_sensor_options(parser: argparse.ArgumentParser) -> None:
+    """Where the sightings come from."""
+    group = parser.add_argument_group("sensor")
+    group.add_argument(
+        "--sensor",
+        choices=SENSORS,
+        default="simulated",
+        help="simulated: sightings from geometry; camera: rendered images, looked at (default: simulated)",
+    )
+    group.add_argument(
+        "--rig",
+        default="three60",
+        metavar="RIG",
+        help="the cameras: three60, wide180, pan60, or the path of a TOML file (default: three60)",
+    )
+
+
+def scenario_source(
+    arguments: argparse.Namespace, seed: int, sigma_mps: float | None, noise: str
+) -> ScenarioSource:
+    """The simulated drive that the options ask for."""
+    if arguments.sensor == "camera":
+        return CameraSource(arguments.scenario, seed, sigma_mps, noise, arguments.rig, CAMERA_STORE)
+    return ScenarioSource(arguments.scenario, seed, sigma_mps, noise)
+
+
 def add_batch_options(
     parser: argparse.ArgumentParser, command: str, seeds: str = "0:1", pictures: int = 5
 ) -> None:
@@ -128,6 +159,8 @@ def run_options(arguments: argparse.Namespace, **changes: Any) -> RunOptions:
         "motion": arguments.motion,
         "velocity_states": arguments.velocity_states,
         "noise": arguments.noise,
+        "sensor": getattr(arguments, "sensor", "simulated"),
+        "rig": arguments.rig if getattr(arguments, "sensor", "") == "camera" else None,
         "target": arguments.target,
         "real": arguments.real,
         "known_map": arguments.known_map,

@@ -7,10 +7,9 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from bslam.commands.arguments import run_options
+from bslam.commands.arguments import run_options, scenario_source
 from bslam.commands.drawing import draw
 from bslam.experiment.batch import Job, make_jobs
-from bslam.experiment.sources import ScenarioSource
 from bslam.world.simulate import load_scenario
 
 
@@ -39,7 +38,7 @@ def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None)
             arguments.seeds,
         )
     ]
-    sources = [ScenarioSource(arguments.scenario, one.seed, one.sigma_mps, noise) for one in options]
+    sources = [scenario_source(arguments, one.seed, one.sigma_mps, noise) for one in options]
     return make_jobs(sources, options, draw, arguments.pictures)
 
 

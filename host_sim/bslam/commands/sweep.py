@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
-from bslam.commands.arguments import add_batch_options, add_filter_options
+from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
 from bslam.commands.grid import grid_jobs
 from bslam.commands.report import HEADINGS, finish, mean_row, table_of
 from bslam.experiment.batch import Outcome, run_batch
@@ -26,6 +26,7 @@ seeds."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("scenario", metavar="SCENARIO", help="name, or path of a TOML file")
+    add_sensor_options(parser)
     add_filter_options(parser, lists=("observation", "association", "filter", "sigma"))
     add_batch_options(parser, "sweep", pictures=0)
 

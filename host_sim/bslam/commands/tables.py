@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bslam.commands.arguments import add_batch_options, add_filter_options
+from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
 from bslam.commands.grid import grid_jobs
 from bslam.commands.report import finish, table_of
 from bslam.experiment.batch import Job, Outcome, run_batch
@@ -42,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scenario", default="paper_room", help="name, or path of a TOML file (default: paper_room)"
     )
+    add_sensor_options(parser)
     add_filter_options(parser, lists=("observation", "sigma"))
     parser.set_defaults(sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
     add_batch_options(parser, "tables", seeds="0:10", pictures=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import signal
 import threading
@@ -89,6 +90,7 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     finished: dict[int, Outcome] = {}
     interrupted = False
     try:
+        _prepare(jobs, processes)
         for index, outcome in tqdm(
             _outcomes(jobs, out, processes), total=len(jobs), desc="runs", unit="run", disable=_bar_off(jobs)
         ):
@@ -103,6 +105,22 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     more = {"interrupted": True} if interrupted else {}
     write_summary(out, [outcome.entry for outcome in outcomes], **more)
     return BatchResult(outcomes, interrupted)
+
+
+def _prepare(jobs: Sequence[Job], processes: int) -> None:
+    """Do the preparations that several runs share, each once; what fails here fails again in its run."""
+    needed = {job.source.shared: job.source for job in jobs if job.source.shared is not None}
+    if not needed:
+        return
+    parallel = joblib.Parallel(n_jobs=min(processes, len(needed)), return_as="generator_unordered")
+    done = parallel(joblib.delayed(_prepare_one)(source) for source in needed.values())
+    for _ in tqdm(done, total=len(needed), desc="drives", unit="drive", disable=_bar_off(jobs)):
+        pass
+
+
+def _prepare_one(source: Source) -> None:
+    with contextlib.suppress(BslamError):
+        source.prepare()
 
 
 def execute(job: Job, out: Path) -> Outcome:

@@ -97,6 +97,7 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "seed": options.seed,
         "sigma_mps": sigma_mps,
         "sensor": options.sensor,
+        "rig": options.rig,
         "observation": options.observation,
         "association": options.association_name,
         "filter": options.filter,

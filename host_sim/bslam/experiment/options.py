@@ -13,7 +13,7 @@ OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis")
 FILTERS = ("standard", "invariant")
 MOTIONS = ("euler", "arc")
-SENSORS = ("simulated",)
+SENSORS = ("simulated", "camera")
 TARGETS = ("host",)
 REALS = ("float", "double")
 
@@ -40,6 +40,7 @@ class RunOptions:
     )
     noise: str | None = None  # what errs, reading or motion; None: as the log's robot says
     sensor: str = "simulated"
+    rig: str | None = None  # the cameras, if the sensor is one
     target: str = "host"
     real: str = "float"  # scalar type of the core: as on the target, or the twin
     known_map: bool = False  # the log's true beacons are given to the filter, which only localises

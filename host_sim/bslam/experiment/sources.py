@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Protocol
@@ -10,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.experiment.align import Rigid
+from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.mrclam import best_truth, load_mrclam
 from bslam.log import Log, read_folder
+from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario, simulate
 
 
@@ -30,6 +33,13 @@ class Source(Protocol):
     def truth_kind(self) -> str:
         """ "simulated", "recorded" or how complete a data set's truth is."""
 
+    @property
+    def shared(self) -> Hashable | None:
+        """Sources with the same value rest on the same costly preparation; None: there is none."""
+
+    def prepare(self) -> None:
+        """Do what `shared` speaks of, unless it is done. Raises BslamError."""
+
     def load(self) -> Log:
         """The log. Raises BslamError."""
 
@@ -37,8 +47,17 @@ class Source(Protocol):
         """Walls (w, 4) x1, y1, x2, y2 in the frame of the truth; none where nobody knows them."""
 
 
+class _Unshared:
+    """Nothing to prepare."""
+
+    shared: ClassVar[Hashable | None] = None
+
+    def prepare(self) -> None:
+        """Nothing."""
+
+
 @dataclass(frozen=True)
-class ScenarioSource:
+class ScenarioSource(_Unshared):
     """A drive to simulate."""
 
     scenario: str  # name or path of a TOML file
@@ -65,7 +84,27 @@ class ScenarioSource:
 
 
 @dataclass(frozen=True)
-class FolderSource:
+class CameraSource(ScenarioSource):
+    """A drive to simulate, watched by cameras."""
+
+    rig: str  # name or path of a TOML file
+    store: Path  # where the rendered drives are kept
+
+    @property
+    def shared(self) -> Hashable | None:  # type: ignore[override]
+        sigma_mps = self.sigma_mps if self.noise == "actuation" else None
+        return self.scenario, self.seed, self.rig, self.noise, sigma_mps
+
+    def prepare(self) -> None:
+        self.load()
+
+    def load(self) -> Log:
+        scenario, rig = load_scenario(self.scenario), load_rig(self.rig)
+        return camera_log(scenario, self.seed, self.sigma_mps, self.noise, rig, CameraStore(self.store))
+
+
+@dataclass(frozen=True)
+class FolderSource(_Unshared):
     """A recorded log folder; its truth is in the frame of the start pose."""
 
     path: Path
@@ -85,7 +124,7 @@ class FolderSource:
 
 
 @dataclass(frozen=True)
-class MrclamSource:
+class MrclamSource(_Unshared):
     """One robot of an MRCLAM data set."""
 
     directory: Path

@@ -25,7 +25,7 @@ from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
 from bslam.world.wheels import count_ticks, read_travel
 
-__all__ = ["load_scenario", "scenario_names", "simulate", "true_drive"]
+__all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
 
 
 def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, noise: str | None = None) -> Log:
@@ -35,7 +35,7 @@ def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, nois
     changes neither the path nor the sightings. `sigma_mps` and `noise` ("speedometer", "actuation") stand in
     for the scenario's. Raises BslamError if they are not allowed, or if there is nowhere to go in the arena.
     """
-    scenario = _with_noise(scenario, sigma_mps, noise)
+    scenario = with_noise(scenario, sigma_mps, noise)
     time_us = np.arange(scenario.steps + 1, dtype=np.int64) * scenario.step_us
     path = true_drive(scenario, seed)
     poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1)
@@ -57,7 +57,8 @@ def true_drive(scenario: Scenario, seed: int) -> Drive:
     return drive(scenario, _random_streams(seed)[0], jitter_m)
 
 
-def _with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -> Scenario:
+def with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -> Scenario:
+    """The scenario with this wheel noise where it is not None. Raises BslamError if it is not allowed."""
     wheels = scenario.wheels
     sigma_mps = wheels.sigma_mps if sigma_mps is None else sigma_mps
     noise = wheels.noise if noise is None else noise

@@ -1,0 +1,188 @@
+"""Sightings from images: the true drive is rendered frame by frame, and the C front end says what it sees.
+
+What a camera sees hangs on the true path only, not on the noise of the wheels' readings: one drive is
+rendered once and kept in a file, and every filter, sigma and observation that is asked for replays it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import bslam.world as world_package
+from bslam.core.build import FIRMWARE_DIR
+from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd
+from bslam.errors import BslamError
+from bslam.log import Log, Sightings
+from bslam.rig import Rig
+from bslam.world.arena import Arena, Beacon
+from bslam.world.camera import Renderer, Scene, dress
+from bslam.world.scenario import Scenario
+from bslam.world.simulate import simulate, true_drive, with_noise
+
+NO_BEACON = -1  # identity of a sighting whose box no beacon fills
+_COVER = 0.3  # a beacon that fills less of a box than this is not what the box shows
+_BEARING_SD_MIN_RAD, _RANGE_SD_MIN_M = 1e-5, 1e-3  # the least that the core takes
+
+SEEN = np.dtype(
+    [
+        ("frame", np.int64),  # which is the step
+        ("beacon_id", np.int64),  # the beacon that covers most of the box; -1: none does
+        ("bearing_rad", np.float64),  # in the robot's frame
+        ("bearing_sd_rad", np.float64),
+        ("range_m", np.float64),  # from the camera; NaN: not measured
+        ("range_sd_m", np.float64),  # 0: no range
+        ("signature", np.float32, SIGNATURE_SIZE),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class CameraDrive:
+    """What the front end saw on one drive."""
+
+    places: NDArray[np.float64]  # (b, 3) each beacon's id, and where its front face is, x m, y m in the arena
+    seen: NDArray[np.void]  # (m,) of SEEN, in order of time
+
+    def arena(self, arena: Arena) -> Arena:
+        """With the beacons where they are seen, which for a thick one is not on the wall."""
+        beacons = tuple(Beacon(int(number), (x_m, y_m)) for number, x_m, y_m in self.places.tolist())
+        return Arena(arena.walls, beacons)
+
+    def sightings(self, step_us: int) -> Sightings:
+        """As a log has them, stamped with the time of their frames."""
+        return Sightings(
+            time_us=self.seen["frame"] * step_us,
+            beacon_id=self.seen["beacon_id"].copy(),
+            bearing_rad=self.seen["bearing_rad"].copy(),
+            range_m=self.seen["range_m"].copy(),
+            mappable=np.ones(len(self.seen), dtype=np.bool_),
+            bearing_sd_rad=self.seen["bearing_sd_rad"].copy(),
+            range_sd_m=self.seen["range_sd_m"].copy(),
+        )
+
+
+@dataclass(frozen=True)
+class CameraStore:
+    """Where rendered drives are kept. A file's name holds all that it depends on: nothing stale is read."""
+
+    folder: Path
+
+    def drive(self, scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
+        """The drive from its file, or rendered now (about a minute for 5000 frames) and kept."""
+        path = self.folder / f"{scenario.name}_seed{seed}_{rig.name}_{_digest(scenario, rig)}.npz"
+        if path.is_file():
+            with np.load(path) as file:
+                return CameraDrive(file["places"], file["seen"])
+        drive = watch(scenario, seed, rig)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=self.folder, suffix=".part", delete=False) as part:
+            np.savez_compressed(part, places=drive.places, seen=drive.seen)
+        os.replace(part.name, path)  # whole or not at all, whoever else writes the same
+        return drive
+
+
+def camera_log(
+    scenario: Scenario, seed: int, sigma_mps: float | None, noise: str | None, rig: Rig, store: CameraStore
+) -> Log:
+    """As `simulate`, but with sightings from images. Raises BslamError as that does."""
+    first = rig.cameras[0]
+    if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
+        raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
+    scenario = with_noise(scenario, sigma_mps, noise)
+    drive = store.drive(scenario, seed, rig)
+    log = simulate(replace(scenario, arena=drive.arena(scenario.arena)), seed)
+    robot = replace(
+        log.robot, sensor_x_m=first.x_m, sensor_y_m=first.y_m, sensor_yaw_rad=0.0, sighting_delay_us=0
+    )
+    return replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
+
+
+def watch(scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
+    """Drive, render one frame a step, the cameras in turn, and keep what the front end sees in each."""
+    scene = dress(scenario, seed)
+    seen = np.array(list(_watch(scene, scenario, seed, rig)), dtype=SEEN)
+    places = np.array([(one.beacon_id, *one.at) for one in scene.arena.beacons]).reshape(-1, 3)
+    return CameraDrive(places, seen)
+
+
+def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig) -> Iterator[tuple[Any, ...]]:
+    """A row of SEEN for each thing in a frame that has a direction."""
+    path = true_drive(scenario, seed)
+    renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
+    front_end, aim = FrontEnd(rig.cameras), Aim(rig)
+    step_s = scenario.step_us * 1e-6
+    poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1).tolist()
+    for step, (x_m, y_m, theta_rad) in enumerate(poses):
+        camera = step % len(rig.cameras)
+        if rig.pan is not None:
+            front_end.point(camera, math.remainder(rig.cameras[camera].yaw_rad + aim.angle_rad, math.tau))
+        picture = renderers[camera].render((x_m, y_m, theta_rad), step * step_s, aim.angle_rad)
+        before = poses[max(step - len(rig.cameras), 0)]  # when this camera took its last picture
+        seeing = front_end.see(picture.rgb, camera, step == 0 or aim.moved or before != poses[step])
+        rows = [_row(step, one, picture.identity) for one in seeing.candidates if one.bearing_rad is not None]
+        yield from rows
+        aim.turn([row[2] for row in rows], step * step_s, step_s)
+
+
+class Aim:
+    """Where a pan unit points: at the surest thing in view, and to and fro while there is none."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._pan = rig.pan
+        self.angle_rad = 0.0
+        self.moved = False
+
+    def turn(self, bearings_rad: Sequence[float], time_s: float, step_s: float) -> None:
+        """Turn for a step; bearings of what was seen, in the robot's frame, the surest first."""
+        if self._pan is None:
+            return
+        wanted_rad = bearings_rad[0] if bearings_rad else self._pan.sweep(time_s)
+        angle_rad = self._pan.step(self.angle_rad, wanted_rad, step_s)
+        self.moved = angle_rad != self.angle_rad
+        self.angle_rad = angle_rad
+
+
+def _row(step: int, one: Candidate, identity: NDArray[np.int16]) -> tuple[Any, ...]:
+    assert one.bearing_rad is not None and one.bearing_sd_rad is not None
+    bearing_sd_rad = max(one.bearing_sd_rad, _BEARING_SD_MIN_RAD)
+    range_m, range_sd_m = math.nan, 0.0
+    if one.range_m is not None and one.range_sd_m is not None:
+        range_m, range_sd_m = one.range_m, max(one.range_sd_m, _RANGE_SD_MIN_M)
+    beacon_id = covering_beacon(one.outline, identity)
+    return step, beacon_id, one.bearing_rad, bearing_sd_rad, range_m, range_sd_m, one.signature
+
+
+def covering_beacon(outline: tuple[float, float, float, float], identity: NDArray[np.int16]) -> int:
+    """The beacon that covers most of a box, if it fills enough of it; else NO_BEACON.
+
+    outline: left, top, right, bottom, px; pixel i covers [i - 0.5, i + 0.5]. identity: (height, width).
+    """
+    left, top, right, bottom = (max(math.floor(edge + 0.5), 0) for edge in outline)
+    inside = identity[top:bottom, left:right]
+    ids, counts = np.unique(inside[inside >= 0], return_counts=True)
+    if len(ids) == 0 or counts.max() < _COVER * inside.size:
+        return NO_BEACON
+    return int(ids[counts.argmax()])
+
+
+def _digest(scenario: Scenario, rig: Rig) -> str:
+    """Of everything that decides what is seen: the scenario, the rig, and the code that renders and looks."""
+    if scenario.wheels.noise == "speedometer":  # how much a reading errs does not change the path
+        scenario = replace(scenario, wheels=replace(scenario.wheels, sigma_mps=0.0))
+    words = hashlib.sha256(repr((scenario, rig)).encode())
+    world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "bslam" / "vision"
+    code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.glob("*.[ch]")]
+    code += [*vision.with_name("svm").glob("svm.[ch]"), *(FIRMWARE_DIR / "models").glob("*.h")]
+    for path in sorted(code):
+        words.update(path.read_bytes())
+    return words.hexdigest()[:12]
