@@ -10,7 +10,7 @@ import numpy as np
 from bslam.world.arena import Arena, Beacon, Point, Wall
 from bslam.world.camera import looks, raw
 from bslam.world.camera.kinds import ROUND, Kind
-from bslam.world.camera.looks import Look
+from bslam.world.camera.looks import Artist, Look, Piece
 from bslam.world.camera.scene import (
     CLUTTER,
     BeaconLook,
@@ -23,12 +23,17 @@ from bslam.world.camera.scene import (
 )
 
 _FLOOR_PIECE_M = 6.0  # a light map is coarse: floors and ceilings are laid in pieces
-_FLOOR_PERIOD_M = 1.2
 _LAMP_SPACING_M = 3.5
-_WALL_PERIOD_M = 2.4
+_LAMP_SIDES_M = ((0.6, 0.6), (1.2, 0.3), (0.3, 1.2))
+_LAMP_GLOW = 1.5
 _SIDES_FROM_M = 0.015  # a body thinner than this has no sides worth drawing
 _MARGIN_M = 0.08  # between things on a wall
-_WINDOW_LIGHT = 3.0
+_WINDOW_LIGHT = 2.0  # for each metre of its width
+_WALL_LOOKS = 3  # at most so many in an arena
+_LAMP_DRIFT, _SKY_DRIFT = 0.15, 0.5
+_DRIFT_PERIOD_S = (8.0, 60.0)
+_HEIGHT_M = (2.4, 3.2)
+_TRIES = 40
 
 
 @dataclass(frozen=True)
@@ -76,17 +81,26 @@ class Footprint:
         return all(self.low[i] < other.high[i] and other.low[i] < self.high[i] for i in range(2))
 
 
-class Furnisher:
-    """Furnishes one arena; everything random comes from one generator."""
+@dataclass(frozen=True)
+class Mount:
+    """Where on a wall a thing hangs: its middle along the wall, and its sizes."""
 
-    def __init__(
-        self, walls: tuple[Wall, ...], areas: tuple[Area, ...], style: str, random: np.random.Generator
-    ) -> None:
-        self.walls, self.areas, self.random = walls, areas, random
-        self.style = style
+    face: WallFace
+    along_m: float
+    width_m: float
+    depth_m: float
+    bottom_m: float
+    height_m: float
+
+
+class Furnisher:
+    """Furnishes one arena; everything random comes from the artist."""
+
+    def __init__(self, walls: tuple[Wall, ...], areas: tuple[Area, ...], artist: Artist) -> None:
+        self.walls, self.areas, self._artist = walls, areas, artist
         shell = Arena(walls, ())
         self._low, self._high = shell.low, shell.high
-        self.height_m = random.uniform(2.4, 3.2)
+        self._height_m = artist.between(*_HEIGHT_M)
         self._builder = SceneBuilder()
         self._beacons: list[BeaconLook] = []
         self._bodies: list[Body] = []
@@ -94,7 +108,8 @@ class Furnisher:
         self._lamps: list[tuple[float, float, float, float, float]] = []
         self._taken: list[Footprint] = []
         self.faces = [face for wall in walls for face in faces_of(wall)]
-        self._build_shell()
+        self._cover_walls()
+        self._lay_floor()
         self._hang_lamps()
 
     # --- Beacons and things ---------------------------------------------------------------------------------
@@ -111,51 +126,51 @@ class Furnisher:
         self, beacon_id: int, name: str, kind: Kind, face: WallFace, along_m: float, width_m: float
     ) -> None:
         """A beacon of a kind on a wall, its middle so far from the wall's left end."""
-        depth_m, bottom_m = self.random.uniform(*kind.depth_m), self.random.uniform(*kind.bottom_m)
+        depth_m, bottom_m = self._artist.between(*kind.depth_m), self._artist.between(*kind.bottom_m)
+        place = Mount(face, along_m, width_m, depth_m, bottom_m, kind.height_m)
         x_m, y_m = face.at(along_m, depth_m)
         facing_rad = math.atan2(face.normal[1], face.normal[0])
-        beacon = BeaconLook(beacon_id, name, x_m, y_m, kind.height_m, width_m, bottom_m, depth_m, facing_rad)
-        look = looks.beacon_look(name, self.style, self.random)
         first = self._builder.surface_count
-        turns = name in ROUND
-        self._box(face, along_m, width_m, depth_m, bottom_m, kind.height_m, look, beacon_id, turns)
-        self._beacons.append(beacon)
-        self._bodies.append(self._builder.body(first))
-        self._taken.append(_footprint(face, along_m, width_m, depth_m))
+        self._hang(place, looks.BEACONS[name](self._artist), beacon_id, name in ROUND)
+        self._beacons.append(
+            BeaconLook(beacon_id, name, x_m, y_m, kind.height_m, width_m, bottom_m, depth_m, facing_rad)
+        )
+        self._bodies.append(self._builder.body(first, name in ROUND))
         if name == "window":
             lamp_x_m, lamp_y_m = face.at(along_m, 0.3)
-            self._lamps.append((lamp_x_m, lamp_y_m, bottom_m + 0.7, _WINDOW_LIGHT * width_m, 1.0))
+            middle_m = bottom_m + 0.5 * kind.height_m
+            self._lamps.append((lamp_x_m, lamp_y_m, middle_m, _WINDOW_LIGHT * width_m, 1.0))
 
     def add_wall_things(self, count: int) -> None:
-        """Small things on the walls that are no beacons."""
+        """Small things on the walls that are no beacons; those that find no place stay away."""
         for _ in range(count):
-            look, width_m, height_m, bottom_m = looks.wall_thing_look(self.style, self.random)
-            place = self.draw_place(width_m, 0.02)
-            if place is None:
-                continue
-            face, along_m = place
-            self._box(face, along_m, width_m, 0.02, bottom_m, height_m, look, CLUTTER, False)
-            self._taken.append(_footprint(face, along_m, width_m, 0.02))
+            piece = looks.wall_thing(self._artist)
+            place = self.draw_place(piece.width_m, piece.out_m)
+            if place is not None:
+                face, along_m = place
+                mount = Mount(face, along_m, piece.width_m, piece.out_m, piece.bottom_m, piece.height_m)
+                self._hang(mount, piece.look, CLUTTER, False)
 
-    def add_clutter(self, x_m: float, y_m: float, look: Look, width_m: float, height_m: float) -> None:
+    def add_clutter(self, piece: Piece, x_m: float, y_m: float) -> None:
         """A thing that stands on the floor and always shows the same side."""
         self._builder.rectangle(
-            np.array([x_m - 0.5 * width_m, y_m, height_m]),
-            np.array([width_m, 0.0, 0.0]),
-            np.array([0.0, 0.0, -height_m]),
-            self._builder.texture(look.front),
+            np.array([x_m - 0.5 * piece.width_m, y_m, piece.height_m]),
+            np.array([piece.width_m, 0.0, 0.0]),
+            np.array([0.0, 0.0, -piece.height_m]),
+            self._builder.texture(piece.look.front),
             CLUTTER,
             flags=raw.CUT_OUT | raw.BILLBOARD,
         )
-        self._obstacles.append(Obstacle(x_m, y_m, 0.5 * width_m))
+        self._obstacles.append(Obstacle(x_m, y_m, 0.5 * piece.width_m))
 
     def draw_place(self, width_m: float, depth_m: float) -> tuple[WallFace, float] | None:
         """A free place on some wall's inner face, or None if none was found."""
         inner = [face for face in self.faces if self.is_inside(face.at(0.5 * face.length_m, 0.2))]
-        lengths_m = np.array([face.length_m for face in inner])
-        for _ in range(40):
-            face = inner[int(self.random.choice(len(inner), p=lengths_m / lengths_m.sum()))]
-            along_m = self.random.uniform(0.0, face.length_m)
+        ends_m = np.cumsum([face.length_m for face in inner])
+        for _ in range(_TRIES):
+            at_m = self._artist.between(0.0, ends_m[-1])
+            face = inner[int(np.searchsorted(ends_m, at_m))]
+            along_m = self._artist.between(0.0, face.length_m)
             if self.is_free(face, along_m, width_m, depth_m):
                 return face, along_m
         return None
@@ -172,86 +187,95 @@ class Furnisher:
         )
 
     def finish(self, seed: int) -> Scene:
-        beacons = tuple(Beacon(one.beacon_id, (one.x_m, one.y_m)) for one in self._beacons)
+        artist = self._artist
         walls = np.array([[*wall.start, *wall.end] for wall in self.walls])
-        ambient = self.random.uniform(0.1, 0.3), self.random.uniform(0.03, 0.2)
+        ambient = artist.between(*artist.style.ambient), 0.5 * artist.between(*artist.style.ambient)
         return Scene(
             seed=seed,
-            style=self.style,
-            arena=Arena(self.walls, beacons),
+            style=artist.style.name,
+            arena=Arena(
+                self.walls, tuple(Beacon(one.beacon_id, (one.x_m, one.y_m)) for one in self._beacons)
+            ),
             areas=tuple((*area.low, *area.high) for area in self.areas),
-            height_m=self.height_m,
+            height_m=self._height_m,
             beacons=tuple(self._beacons),
             bodies=tuple(self._bodies),
             obstacles=tuple(self._obstacles),
-            lighting=self._draw_lighting(),
+            lighting=_draw_lighting(artist),
             tables=self._builder.tables(np.array(self._lamps), walls, ambient),
         )
 
     # --- The shell ------------------------------------------------------------------------------------------
 
-    def _build_shell(self) -> None:
-        height = np.array([0.0, 0.0, -self.height_m])
-        wall = self._builder.texture(looks.wall_look(self.style, self.random))
+    def _cover_walls(self) -> None:
+        """Most walls alike, a few otherwise; all with the same skirting."""
+        artist = self._artist
+        style = looks.wall_style(artist)
+        coverings = [looks.wall(artist, style, self._height_m) for _ in range(artist.count(1, _WALL_LOOKS))]
+        textures = [self._builder.texture(one.picture) for one in coverings]
+        down = np.array([0.0, 0.0, -self._height_m])
         for face in self.faces:
-            corner = np.array([*face.left, self.height_m])
+            index = 0 if artist.chance(0.6) else artist.count(0, len(coverings) - 1)
+            corner = np.array([*face.left, self._height_m])
             right = np.array([*face.right, 0.0]) * face.length_m
-            self._builder.rectangle(corner, right, height, wall, tiles=(face.length_m / _WALL_PERIOD_M, 1.0))
-        floor = self._builder.texture(looks.floor_look(self.style, self.random))
-        ceiling = self._builder.texture(looks.ceiling_look(self.style, self.random))
+            tiles = (face.length_m / coverings[index].period_m, 1.0)
+            self._builder.rectangle(corner, right, down, textures[index], tiles=tiles)
+
+    def _lay_floor(self) -> None:
+        floor, ceiling = looks.floor(self._artist), looks.ceiling(self._artist)
+        floor_texture, ceiling_texture = (self._builder.texture(one.picture) for one in (floor, ceiling))
         for low, high in _pieces(self._low, self._high, _FLOOR_PIECE_M):
             width_m, depth_m = high[0] - low[0], high[1] - low[1]
             right, back = np.array([width_m, 0.0, 0.0]), np.array([0.0, depth_m, 0.0])
-            tiles = (width_m / _FLOOR_PERIOD_M, depth_m / _FLOOR_PERIOD_M)
-            self._builder.rectangle(np.array([low[0], high[1], 0.0]), right, -back, floor, tiles=tiles)
-            self._builder.rectangle(np.array([*low, self.height_m]), right, back, ceiling, tiles=tiles)
+            tiles = (width_m / floor.period_m, depth_m / floor.period_m)
+            self._builder.rectangle(
+                np.array([low[0], high[1], 0.0]), right, -back, floor_texture, tiles=tiles
+            )
+            tiles = (width_m / ceiling.period_m, depth_m / ceiling.period_m)
+            corner = np.array([*low, self._height_m])
+            self._builder.rectangle(corner, right, back, ceiling_texture, tiles=tiles)
 
     def _hang_lamps(self) -> None:
+        """A grid of luminous panels under the ceiling, each with a strength of its own, some of them off."""
+        artist = self._artist
+        texture = self._builder.texture(looks.lamp(artist))
+        side_m, strength = artist.pick(_LAMP_SIDES_M), artist.between(*artist.style.lamp_strength)
         for low, high in _pieces(self._low, self._high, _LAMP_SPACING_M):
             x_m, y_m = (0.5 * (low[i] + high[i]) for i in range(2))
-            self._lamps.append((x_m, y_m, self.height_m - 0.1, self.random.uniform(1.5, 4.0), 0.0))
+            share = 0.0 if artist.chance(0.1) else artist.between(0.6, 1.2)
+            self._lamps.append((x_m, y_m, self._height_m - 0.1, share * strength, 0.0))
+            corner = np.array([x_m - 0.5 * side_m[0], y_m - 0.5 * side_m[1], self._height_m - 0.03])
+            right, back = np.array([side_m[0], 0.0, 0.0]), np.array([0.0, side_m[1], 0.0])
+            self._builder.rectangle(corner, right, back, texture, glow=(_LAMP_GLOW * share, 0.0))
 
-    def _draw_lighting(self) -> Lighting:
-        drifts = [
-            Drift(
-                self.random.uniform(0.0, most),
-                self.random.uniform(10.0, 60.0),
-                self.random.uniform(0.0, 6.28),
-            )
-            for most in (0.15, 0.5)
-        ]
-        lamp = (1.0, self.random.uniform(0.85, 1.0), self.random.uniform(0.65, 1.0))
-        sky = (self.random.uniform(0.8, 1.0), 0.95, 1.0)
-        return Lighting(lamp, sky, *drifts)
-
-    def _box(
-        self,
-        face: WallFace,
-        along_m: float,
-        width_m: float,
-        depth_m: float,
-        bottom_m: float,
-        height_m: float,
-        look: Look,
-        identity: int,
-        turns: bool,
-    ) -> None:
+    def _hang(self, mount: Mount, look: Look, identity: int, turns: bool) -> None:
         """A thing on a wall: its front, and its sides if it stands out enough."""
-        left_m = along_m - 0.5 * width_m
-        right = np.array([*face.right, 0.0]) * width_m
-        out = np.array([*face.normal, 0.0]) * depth_m
-        down = np.array([0.0, 0.0, -height_m])
-        at_wall = np.array([*face.at(left_m), bottom_m + height_m])
+        face = mount.face
+        right = np.array([*face.right, 0.0]) * mount.width_m
+        out = np.array([*face.normal, 0.0]) * mount.depth_m
+        down = np.array([0.0, 0.0, -mount.height_m])
+        at_wall = np.array([*face.at(mount.along_m - 0.5 * mount.width_m), mount.bottom_m + mount.height_m])
         flags = (raw.CUT_OUT if look.cut_out else 0) | (raw.BILLBOARD if turns else 0)
         front = self._builder.texture(look.front)
         self._builder.rectangle(at_wall + out, right, down, front, identity, glow=look.glow, flags=flags)
-        if depth_m < _SIDES_FROM_M or look.cut_out:
+        self._taken.append(_footprint(face, mount.along_m, mount.width_m, mount.depth_m))
+        if mount.depth_m < _SIDES_FROM_M or look.cut_out:
             return
-        side = self._builder.texture(look.side)
+        side = self._builder.texture(look.side_picture)
         self._builder.rectangle(at_wall, out, down, side, identity)
         self._builder.rectangle(at_wall + right + out, -out, down, side, identity)
         self._builder.rectangle(at_wall, right, out, side, identity)
         self._builder.rectangle(at_wall + out + down, right, -out, side, identity)
+
+
+def _draw_lighting(artist: Artist) -> Lighting:
+    blue = artist.between(*artist.style.lamp_warmth)
+    lamp_drift, sky_drift = (
+        Drift(artist.between(0.0, most), artist.between(*_DRIFT_PERIOD_S), artist.between(0.0, math.tau))
+        for most in (_LAMP_DRIFT, _SKY_DRIFT)
+    )
+    sky_rgb = (artist.between(0.8, 1.0), 0.95, artist.between(1.0, 1.15))
+    return Lighting((1.0, 0.5 + 0.5 * blue, blue), sky_rgb, lamp_drift, sky_drift)
 
 
 def _footprint(face: WallFace, along_m: float, width_m: float, depth_m: float) -> Footprint:

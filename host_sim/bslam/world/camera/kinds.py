@@ -37,7 +37,20 @@ ROUND = frozenset({"extinguisher"})
 """As wide from every side: they are drawn turned to the eye."""
 
 
-def draw_kind(random: np.random.Generator, free_m: float) -> str | None:
-    """Any of the kinds that can be as narrow as free_m; None if none can."""
-    fitting = [name for name, kind in KINDS.items() if kind.width_m[0] <= free_m]
-    return fitting[int(random.integers(len(fitting)))] if fitting else None
+class KindDeck:
+    """Draws kinds so that all that fit come before any comes again."""
+
+    def __init__(self, random: np.random.Generator) -> None:
+        self._random = random
+        self._drawn = dict.fromkeys(KINDS, 0)
+
+    def draw(self, free_m: float) -> str | None:
+        """Of the kinds that can be as narrow as free_m one of those drawn least; None if none fits."""
+        fitting = [name for name, kind in KINDS.items() if kind.width_m[0] <= free_m]
+        if not fitting:
+            return None
+        least = min(self._drawn[name] for name in fitting)
+        rare = [name for name in fitting if self._drawn[name] == least]
+        name = rare[int(self._random.integers(len(rare)))]
+        self._drawn[name] += 1
+        return name

@@ -65,7 +65,7 @@ class Frame:
 
 
 class Renderer:
-    """Keeps one camera's exposure, white balance and noise. The same calls give the same pictures, to the bit."""
+    """One camera's exposure, white balance and noise. The same calls give the same pictures, to the bit."""
 
     def __init__(self, scene: Scene, camera: Camera, seed: int | Sequence[int]) -> None:
         random = np.random.default_rng(np.random.SeedSequence(seed))
@@ -144,7 +144,7 @@ class Renderer:
         yaw_rad: float,
         theta_rad: float,
     ) -> Seen:
-        found = lens.outline(self._camera, _to_level(body.corners_m, eye, yaw_rad))
+        found = lens.outline(self._camera, _to_level(body.corners_from(eye), eye, yaw_rad))
         assert found is not None  # some of it is in the picture
         to_x, to_y = beacon.x_m - eye[0], beacon.y_m - eye[1]
         direction_rad = math.atan2(to_y, to_x)

@@ -90,11 +90,24 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Body:
-    """Which of the scene's surfaces are a beacon's, and their corners (n, 4, 3)."""
+    """Which of the scene's surfaces are a beacon's, and their corners (n, 4, 3); `turns`: it faces every eye."""
 
     first: int
     count: int
     corners_m: Floats
+    turns: bool
+
+    def corners_from(self, eye: tuple[float, float, float]) -> Floats:
+        """The corners as an eye sees them."""
+        if not self.turns:
+            return self.corners_m
+        middle = self.corners_m.mean(axis=(0, 1))
+        away = math.atan2(middle[1] - eye[1], middle[0] - eye[0])
+        half_m = 0.5 * float(np.linalg.norm(self.corners_m[0, 1] - self.corners_m[0, 0]))
+        turned = self.corners_m.copy()
+        for index, side in enumerate((-half_m, half_m, half_m, -half_m)):
+            turned[:, index, :2] = middle[:2] + side * np.array([math.sin(away), -math.cos(away)])
+        return turned
 
 
 @dataclass(frozen=True)
@@ -172,12 +185,12 @@ class SceneBuilder:
             raw.bake(surfaces, lamps, walls, ambient),
         )
 
-    def body(self, first: int) -> Body:
+    def body(self, first: int, turns: bool) -> Body:
         """The surfaces from `first` on."""
         surfaces = self._array()[first:]
         corner, right, down = (surfaces[key].astype(float) for key in ("corner_m", "right_m", "down_m"))
         corners = np.stack([corner, corner + right, corner + right + down, corner + down], axis=1)
-        return Body(first, len(surfaces), corners)
+        return Body(first, len(surfaces), corners, turns)
 
     def _array(self) -> NDArray[Any]:
         return np.array(self._surfaces, dtype=raw.SURFACE)

@@ -8,14 +8,11 @@ import numpy as np
 
 from bslam.errors import BslamError
 from bslam.world.arena import Point, Wall
-from bslam.world.camera import looks
 from bslam.world.camera.furnish import Area, Furnisher, WallFace
-from bslam.world.camera.kinds import KINDS, draw_kind
+from bslam.world.camera.kinds import KINDS, KindDeck
+from bslam.world.camera.looks import Artist, clutter, style_of
 from bslam.world.camera.scene import IDENTITY_MAX, Scene
 from bslam.world.scenario import Scenario
-
-STYLES = ("train", "test")
-_STYLE_STREAMS = {"train": 0x7261, "test": 0x7E57}  # the two styles never share a random stream
 
 _SIDE_M = (5.0, 12.0)
 _ROOM_SIDE_MIN_M = 3.5
@@ -24,6 +21,7 @@ _BEACONS = (6, 16)
 _CLUTTER = (3, 8)
 _WALL_THINGS = (2, 6)
 _TRIES = 60
+_BEFORE_WALL_M, _BEFORE_WALL_SHARE = 0.9, 0.9
 
 _ON_WALL_M = 0.05  # a scenario's beacon this near to a wall hangs on it
 _GAP_SHARE = 0.9  # of the way to the neighbour that two beacons may take together
@@ -35,22 +33,19 @@ def make_world(seed: int, style: str = "train") -> Scene:
 
     BslamError names a bad seed (allowed: 0 and up) or style.
     """
-    random = _random(seed, style, 0)
-    low, high = (0.0, 0.0), (random.uniform(*_SIDE_M), random.uniform(*_SIDE_M))
-    walls, areas = _rooms(low, high, int(random.integers(0, 3)), random)
-    furnisher = Furnisher(walls, areas, style, random)
-    wanted = int(random.integers(_BEACONS[0], _BEACONS[1] + 1))
-    names = _balanced_names(wanted, random)
+    artist = _artist(seed, style, 0)
+    low, high = (0.0, 0.0), (artist.between(*_SIDE_M), artist.between(*_SIDE_M))
+    furnisher = Furnisher(*_rooms(low, high, artist.count(0, 2), artist), artist)
     beacon_id = 0
-    for name in names:
+    for name in _balanced_names(artist.count(*_BEACONS), artist):
         kind = KINDS[name]
-        width_m = random.uniform(*kind.width_m)
+        width_m = artist.between(*kind.width_m)
         place = furnisher.draw_place(width_m, kind.depth_m[1])
         if place is not None:
             furnisher.add_beacon(beacon_id, name, kind, *place, width_m)
             beacon_id += 1
-    furnisher.add_wall_things(int(random.integers(_WALL_THINGS[0], _WALL_THINGS[1] + 1)))
-    _stand_clutter(furnisher, int(random.integers(_CLUTTER[0], _CLUTTER[1] + 1)))
+    furnisher.add_wall_things(artist.count(*_WALL_THINGS))
+    _stand_clutter(furnisher, artist, artist.count(*_CLUTTER))
     return furnisher.finish(seed)
 
 
@@ -61,38 +56,38 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
     (`Scene.beacons`, `Scene.arena`). Nothing stands where the robot drives. BslamError: a beacon that hangs
     on no wall, or too close to another for the narrowest kind; an id beyond 32767; a bad seed or style.
     """
-    random = _random(seed, style, 1)
+    artist = _artist(seed, style, 1)
     arena = scenario.arena
     areas = tuple(Area((one.x_m[0], one.y_m[0]), (one.x_m[1], one.y_m[1])) for one in scenario.areas) or (
         Area(arena.low, arena.high),
     )
-    furnisher = Furnisher(arena.walls, areas, style, random)
+    furnisher = Furnisher(arena.walls, areas, artist)
+    deck = KindDeck(artist.random)
     for beacon in arena.beacons:
         where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
         if beacon.beacon_id > IDENTITY_MAX:
             raise BslamError(f"{where}: allowed with a camera: ids up to {IDENTITY_MAX}")
         face, along_m = _hang(furnisher, beacon.at, where)
         free_m = _free_width(face, along_m, beacon.at, [other.at for other in arena.beacons])
-        name = draw_kind(random, free_m)
+        name = deck.draw(free_m)
         if name is None:
             raise BslamError(f"{where}: {free_m:.2f} m of free wall; allowed: enough for a beacon, 0.18 m")
         kind = KINDS[name].shallow(_DRESSED_DEPTH_M)
-        width_m = random.uniform(kind.width_m[0], min(kind.width_m[1], free_m))
+        width_m = artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
         furnisher.add_beacon(beacon.beacon_id, name, kind, face, along_m, width_m)
-    furnisher.add_wall_things(int(random.integers(_WALL_THINGS[0], _WALL_THINGS[1] + 1)) * len(areas))
+    furnisher.add_wall_things(artist.count(*_WALL_THINGS) * len(areas))
     return furnisher.finish(seed)
 
 
-def _random(seed: int, style: str, purpose: int) -> np.random.Generator:
-    if style not in STYLES:
-        raise BslamError(f"style {style!r}: allowed: {', '.join(STYLES)}")
+def _artist(seed: int, style: str, purpose: int) -> Artist:
+    known = style_of(style)
     if seed < 0:
         raise BslamError(f"seed {seed}: allowed: 0 and up")
-    return np.random.default_rng([_STYLE_STREAMS[style], purpose, seed])
+    return Artist(known, np.random.default_rng([known.stream, purpose, seed]))
 
 
 def _rooms(
-    low: Point, high: Point, partitions: int, random: np.random.Generator
+    low: Point, high: Point, partitions: int, artist: Artist
 ) -> tuple[tuple[Wall, ...], tuple[Area, ...]]:
     """Outer walls and rooms: the longest room is parted, so many times, by a wall with a passage."""
     corners = [low, (high[0], low[1]), high, (low[0], high[1])]
@@ -105,10 +100,10 @@ def _rooms(
         if room.high[across] - room.low[across] < 2.0 * _ROOM_SIDE_MIN_M:
             rooms.append(room)
             break
-        cut_m = random.uniform(room.low[across] + _ROOM_SIDE_MIN_M, room.high[across] - _ROOM_SIDE_MIN_M)
+        cut_m = artist.between(room.low[across] + _ROOM_SIDE_MIN_M, room.high[across] - _ROOM_SIDE_MIN_M)
         from_m, to_m = room.low[1 - across], room.high[1 - across]
-        gap_m = random.uniform(*_GAP_M)
-        gap_from_m = random.uniform(from_m + 0.3, to_m - 0.3 - gap_m)
+        gap_m = artist.between(*_GAP_M)
+        gap_from_m = artist.between(from_m + 0.3, to_m - 0.3 - gap_m)
         for start_m, end_m in ((from_m, gap_from_m), (gap_from_m + gap_m, to_m)):
             walls.append(Wall(_point(across, cut_m, start_m), _point(across, cut_m, end_m)))
         rooms.append(Area(room.low, _point(across, cut_m, to_m)))
@@ -120,27 +115,26 @@ def _point(axis: int, on_axis_m: float, other_m: float) -> Point:
     return (on_axis_m, other_m) if axis == 0 else (other_m, on_axis_m)
 
 
-def _balanced_names(count: int, random: np.random.Generator) -> list[str]:
+def _balanced_names(count: int, artist: Artist) -> list[str]:
     """Kinds in random order, all about equally often; the widest come first, while there is place."""
     names: list[str] = []
     while len(names) < count:
-        names += random.permutation(list(KINDS)).tolist()
+        names += artist.random.permutation(list(KINDS)).tolist()
     return sorted(names[:count], key=lambda name: -KINDS[name].width_m[1])
 
 
-def _stand_clutter(furnisher: Furnisher, count: int) -> None:
-    random = furnisher.random
+def _stand_clutter(furnisher: Furnisher, artist: Artist, count: int) -> None:
+    """Most of it before the walls, the rest anywhere."""
     for _ in range(count):
-        look, width_m, height_m = looks.clutter_look(furnisher.style, random)
+        piece = clutter(artist)
         for _ in range(_TRIES):
-            area = furnisher.areas[int(random.integers(len(furnisher.areas)))]
-            x_m, y_m = (random.uniform(area.low[i] + 0.35, area.high[i] - 0.35) for i in range(2))
-            before_wall = random.random() < 0.7
-            away_m = min(x_m - area.low[0], area.high[0] - x_m, y_m - area.low[1], area.high[1] - y_m)
-            if before_wall and away_m > 0.9:
+            area = artist.pick(furnisher.areas)
+            x_m, y_m = (artist.between(area.low[i] + 0.35, area.high[i] - 0.35) for i in range(2))
+            to_wall_m = min(x_m - area.low[0], area.high[0] - x_m, y_m - area.low[1], area.high[1] - y_m)
+            if to_wall_m > _BEFORE_WALL_M and artist.chance(_BEFORE_WALL_SHARE):
                 continue
-            if furnisher.is_free_floor(x_m, y_m, 0.5 * width_m):
-                furnisher.add_clutter(x_m, y_m, look, width_m, height_m)
+            if furnisher.is_free_floor(x_m, y_m, 0.5 * piece.width_m):
+                furnisher.add_clutter(piece, x_m, y_m)
                 break
 
 
