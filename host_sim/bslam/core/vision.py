@@ -145,7 +145,7 @@ class FrontEnd:
         found = library.ffi.new("bslam_candidate_t *")
         if library.lib.bslam_vision_measure(self._vision, rough, 0.0, found) != library.lib.BSLAM_OK:
             return None
-        signature = library.copy_of(found.signature, library.lib.BSLAM_SIGNATURE_SIZE, np.float32)
+        signature = library.copy_of(found.signature, len(found.signature), np.float32)
         return signature if signature.any() else None
 
     def point(self, camera: int, yaw_rad: float) -> None:
@@ -297,3 +297,9 @@ def feature_counts() -> tuple[int, int]:
     """Features of a cell and of a proposal."""
     lib = vision_library().lib
     return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_BLOB_FEATURES)
+
+
+def frame_size_max() -> tuple[int, int]:
+    """Width and height of the largest frame that the front end takes, px."""
+    lib = vision_library().lib
+    return int(lib.BSLAM_IMAGE_WIDTH_MAX), int(lib.BSLAM_IMAGE_HEIGHT_MAX)

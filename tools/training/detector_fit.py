@@ -1,0 +1,142 @@
+"""Fits the machines of a detector to samples, one after the other: cells, screen, kinds, fusion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.preprocessing import StandardScaler
+
+from bslam.core.vision import DetectorModel
+from bslam.modelfile import Svm
+from training.detector_samples import CLUTTER, BoxSamples, CellSamples
+from training.fit import choose_cost, fit, quantised
+from training.render_set import KINDS
+from training.truth import IGNORED, NOTHING
+
+CELLS_MAX = 200_000
+CELL_COSTS = (0.01, 0.1)
+KIND_COST = 0.003
+SCREEN_COST = 0.01
+SCREEN_RECALL = 0.995
+FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
+OVERLAP_SURE = 0.5
+OVERLAP_NEGATIVE = 0.4
+POSITIVES_MAX = 15_000
+NEGATIVES_FIRST = 12_000
+NEGATIVES_HARD = 12_000
+FUSION_SHARE = 5  # every so many worlds are kept for the fusion
+
+
+def fit_cells(samples: CellSamples) -> Svm:
+    """The linear machine that tells a beacon's cell."""
+    random = np.random.default_rng(0)
+    chosen = random.permutation(len(samples.is_beacon))[:CELLS_MAX]
+    x = samples.features[chosen].astype(np.float64)
+    targets = samples.is_beacon[chosen, None]
+    few = slice(0, CELLS_MAX // 5)
+    cost, _ = choose_cost(
+        x[few], targets[few], balanced=True, groups=samples.world[chosen][few], costs=CELL_COSTS
+    )
+    return fit(x, targets, cost, balanced=True).svm
+
+
+def normaliser(features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Offset and scale that bring the features to mean 0 and deviation 1."""
+    scaler = StandardScaler().fit(features.astype(np.float64))
+    return scaler.mean_.astype(np.float32), (1.0 / scaler.scale_).astype(np.float32)
+
+
+def normalised(features: NDArray[np.float32], detector: DetectorModel) -> NDArray[np.float32]:
+    """As bslam_detector_normalise."""
+    return np.clip((features - detector.blob_offset) * detector.blob_scale, -FEATURE_LIMIT, FEATURE_LIMIT)
+
+
+def kind_targets(samples: BoxSamples) -> NDArray[np.bool_]:
+    """Any beacon, each kind, clutter: (n, kinds + 2)."""
+    kinds = samples.label[:, None] == np.arange(len(KINDS))[None, :]
+    return np.column_stack([kinds.any(axis=1), kinds, samples.label == CLUTTER])
+
+
+def usable(samples: BoxSamples) -> NDArray[np.bool_]:
+    """Samples that are clearly one thing: not on a beacon that does not count, not a half-hit."""
+    half = (samples.label < 0) & (samples.overlap >= OVERLAP_NEGATIVE)
+    weak = (samples.label >= 0) & (samples.label != CLUTTER) & (samples.overlap < OVERLAP_SURE)
+    return (samples.label != IGNORED) & ~half & ~weak
+
+
+def decide(svm: Svm, x: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Decision values (n, rows) in float32, in parts that fit in memory."""
+    first, second = np.triu_indices(svm.features)
+    weights = svm.weights.astype(np.float32)
+    if svm.byte_scale is not None:
+        weights = weights * svm.byte_scale[:, None]
+    values = np.empty((len(x), svm.rows), np.float32)
+    for start in range(0, len(x), 20_000):
+        part = x[start : start + 20_000].astype(np.float32)
+        phi = np.hstack([part, part[:, first] * part[:, second]]) if svm.quadratic else part
+        values[start : start + 20_000] = phi @ weights.T + svm.bias
+    return values
+
+
+def fit_screen(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+    """The linear machine that keeps SCREEN_RECALL of the objects' boxes."""
+    good = np.flatnonzero(usable(samples))
+    random = np.random.default_rng(0)
+    chosen = random.permutation(good)[:80_000]
+    x = normalised(samples.features[chosen], detector)
+    positive = kind_targets(samples)[chosen, :1]
+    svm = fit(x, positive, SCREEN_COST, balanced=True).svm
+    values = decide(svm, x)[:, 0]
+    return replace(
+        detector, screen=svm, screen_threshold=float(np.quantile(values[positive[:, 0]], 1 - SCREEN_RECALL))
+    )
+
+
+def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+    """The quadratic machines, with the hardest negatives found in a second round; int8 weights."""
+    random = np.random.default_rng(1)
+    fits = np.flatnonzero(usable(samples) & (samples.world % FUSION_SHARE != 0))
+    screened = decide(detector.screen, normalised(samples.features[fits], detector))[:, 0]
+    fits = fits[screened >= detector.screen_threshold]
+    targets = kind_targets(samples)
+    is_beacon = targets[fits, 0]
+    positives = random.permutation(fits[is_beacon])[:POSITIVES_MAX]
+    negatives = random.permutation(fits[~is_beacon])
+    chosen = np.concatenate([positives, negatives[:NEGATIVES_FIRST]])
+    rest = negatives[NEGATIVES_FIRST:]
+    machine = _fit_kinds(samples, detector, targets, chosen)
+    if len(rest):
+        worst = decide(machine, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
+        order = np.argsort(-worst)[:NEGATIVES_HARD]
+        hard = rest[order[worst[order] > -1.0]]
+        machine = _fit_kinds(samples, detector, targets, np.concatenate([chosen, hard]))
+    return replace(detector, kinds=quantised(machine))
+
+
+def _fit_kinds(
+    samples: BoxSamples, detector: DetectorModel, targets: NDArray[np.bool_], chosen: NDArray[np.intp]
+) -> Svm:
+    x = normalised(samples.features[chosen], detector)
+    return fit(x, targets[chosen], KIND_COST, quadratic=True).svm
+
+
+def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+    """The linear machine on all machines' values, from worlds that the kinds were not fitted to."""
+    chosen = np.flatnonzero(usable(samples) & (samples.world % FUSION_SHARE == 0))
+    x = normalised(samples.features[chosen], detector)
+    screened = decide(detector.screen, x)
+    passed = screened[:, 0] >= detector.screen_threshold
+    values = np.hstack([decide(detector.kinds, x), screened])[passed]
+    svm = fit(values, kind_targets(samples)[chosen][passed][:, :1], 1.0).svm
+    return replace(detector, fusion=svm)
+
+
+def summary(samples: BoxSamples) -> str:
+    """How many boxes of which kind."""
+    names: Sequence[str] = (*KINDS, "clutter")
+    counts = [f"{name} {int((samples.label == i).sum())}" for i, name in enumerate(names)]
+    nothing, ignored = int((samples.label == NOTHING).sum()), int((samples.label == IGNORED).sum())
+    return f"{len(samples.label)} boxes: {', '.join(counts)}, nothing {nothing}, not counted {ignored}"

@@ -1,0 +1,160 @@
+"""What the front end makes of rendered worlds, with the truth beside it: samples to train and measure on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, feature_counts
+from bslam.modelfile import BeaconClass, Svm, weights_in_row
+from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
+from training.truth import NOTHING, areas, owners
+
+CLASSES = tuple(
+    BeaconClass(name, height_m)
+    for name, height_m in zip(KINDS, (0.60, 0.60, 2.00, 1.20, 0.84, 0.30, 1.80), strict=True)
+)
+CLUTTER = len(KINDS)
+"""Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""
+
+CELLS_A_FRAME = 80
+CELL_FRAMES_STEP = 3
+
+
+@dataclass(frozen=True)
+class CellSamples:
+    """Cells of some frames: features, and whether a beacon is in them (all 16 pixels nearly) or none."""
+
+    features: NDArray[np.int16]
+    is_beacon: NDArray[np.bool_]
+    world: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class BoxSamples:
+    """Proposals, or candidates, of all frames."""
+
+    features: NDArray[np.float32]
+    label: NDArray[np.int64]
+    overlap: NDArray[np.float32]  # with the best object that counts
+    object_row: NDArray[np.int64]  # of the world's `seen`, or -1
+    frame: NDArray[np.int32]
+    world: NDArray[np.int32]
+
+
+def blank_svm(rows: int, features: int, quadratic: bool = False) -> Svm:
+    """A machine that decides 0."""
+    weights = np.zeros((rows, weights_in_row(features, quadratic)), np.float32)
+    return Svm(features, quadratic, weights, np.zeros(rows, np.float32))
+
+
+def blank_detector() -> DetectorModel:
+    """A detector that proposes nothing and accepts nothing: what training starts with."""
+    cells, blobs = feature_counts()
+    return DetectorModel(
+        cell=Svm(cells, False, np.zeros((1, cells), np.float32), np.array([-4.0], np.float32)),
+        blob_offset=np.zeros(blobs, np.float32),
+        blob_scale=np.ones(blobs, np.float32),
+        screen=blank_svm(1, blobs),
+        screen_threshold=1.0,
+        kinds=blank_svm(len(KINDS) + 2, blobs, quadratic=True),
+        fusion=blank_svm(1, len(KINDS) + 3),
+        threshold=1.0,
+    )
+
+
+def model_of(detector: DetectorModel) -> BeaconModel:
+    """A whole model with one detector for every lens."""
+    return BeaconModel(CLASSES, detector, detector)
+
+
+def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], processes: int) -> CellSamples:
+    """Cells of the worlds' frames."""
+    work = partial(_cells_of_world, folder, lens, style, model_of(blank_detector()))
+    return _joined(CellSamples, work, seeds, processes, f"cells {lens}")
+
+
+def gather_boxes(
+    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel, processes: int
+) -> BoxSamples:
+    """Proposals of the worlds' frames."""
+    work = partial(_boxes_of_world, folder, lens, style, model_of(detector))
+    return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
+
+
+def _joined(kind, work, seeds: Iterable[int], processes: int, title: str):  # type: ignore[no-untyped-def]
+    seeds = list(seeds)
+    with ProcessPoolExecutor(processes) as pool:
+        parts = list(tqdm(pool.map(work, seeds), total=len(seeds), desc=title, unit="world"))
+    return kind(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(kind)))
+
+
+def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> CellSamples:
+    world = read_world(folder, lens, style, seed)
+    front_end = FrontEnd([camera_of(lens, seed)], model)
+    random = np.random.default_rng([seed, 3])
+    features, labels = [], []
+    for index, picture in enumerate(world.pictures):
+        front_end.see(picture)
+        if index % CELL_FRAMES_STEP:
+            continue
+        for is_beacon in (False, True):
+            good = world.cover[index] >= 14 if is_beacon else world.cover[index] == 0
+            rows, columns = np.nonzero(good)
+            chosen = random.permutation(len(rows))[:CELLS_A_FRAME]
+            features.append(front_end.cell_features(rows[chosen], columns[chosen]))
+            labels.append(np.full(len(chosen), is_beacon))
+    label = np.concatenate(labels)
+    return CellSamples(np.concatenate(features), label, np.full(len(label), seed, np.int32))
+
+
+def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> BoxSamples:
+    world = read_world(folder, lens, style, seed)
+    front_end = FrontEnd([camera_of(lens, seed)], model)
+    parts = []
+    for index, picture in enumerate(world.pictures):
+        front_end.see(picture)
+        found = front_end.proposals()
+        parts.append(_label_boxes(world, index, found.boxes, found.features))
+    return BoxSamples(
+        *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(BoxSamples))
+    )
+
+
+def _label_boxes(
+    world: World, index: int, boxes: NDArray[np.float32], features: NDArray[np.float32]
+) -> BoxSamples:
+    rows = np.flatnonzero(world.seen["frame"] == index)
+    seen = world.seen[rows]
+    owner, overlap = owners(boxes, seen)
+    label = owner.copy()
+    label[owner >= 0] = seen["kind"][owner[owner >= 0]]
+    is_clutter = (owner == NOTHING) & (_clutter_share(world.clutter[index], boxes) > 0.4)
+    label[is_clutter] = CLUTTER
+    object_row = np.full(len(boxes), -1)
+    object_row[owner >= 0] = rows[owner[owner >= 0]]
+    return BoxSamples(
+        features,
+        label,
+        overlap.astype(np.float32),
+        object_row,
+        np.full(len(boxes), index, np.int32),
+        np.full(len(boxes), world.seed, np.int32),
+    )
+
+
+def _clutter_share(clutter: NDArray[np.uint8], boxes: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Share of each box (n, 4) that clutter covers, to the cell."""
+    total = np.zeros((clutter.shape[0] + 1, clutter.shape[1] + 1))
+    total[1:, 1:] = clutter.cumsum(axis=0).cumsum(axis=1)
+    limits = np.array([clutter.shape[1], clutter.shape[0]] * 2)
+    left, top, right, bottom = np.clip(np.rint((boxes + 0.5) / CELL_PX), 0, limits).astype(int).T
+    inside = total[bottom, right] - total[top, right] - total[bottom, left] + total[top, left]
+    return inside / np.maximum(areas(boxes), 1.0)
