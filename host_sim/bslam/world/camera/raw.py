@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from statistics import NormalDist
 from typing import Any
 
@@ -170,9 +171,16 @@ class Caster:
         every = self._linear[::4, ::4]
         return float(np.minimum(every, 4.0 * every.mean()).mean())
 
-    def own_px(self, first: int, count: int) -> int:
-        """Pixel centres that some surfaces would cover in the picture as traced, if nothing hid them."""
-        return lib.render_own_px(self._scene.c, self._lens.c, self._faces, first, count)
+    def own_px(self, first: int, count: int, box: tuple[float, float, float, float]) -> int:
+        """Pixel centres that some surfaces would cover in the picture as traced, if nothing hid them.
+
+        box: left, top, right, bottom of their projection in px edges, within the frame.
+        """
+        height, width = self._lens.shape
+        left, top = (max(0, math.floor(edge)) for edge in box[:2])
+        right, bottom = min(width - 1, math.ceil(box[2])), min(height - 1, math.ceil(box[3]))
+        corners = [left, top, right, bottom]
+        return lib.render_own_px(self._scene.c, self._lens.c, self._faces, first, count, corners)
 
     def expose(
         self,

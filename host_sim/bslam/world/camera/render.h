@@ -98,7 +98,8 @@ typedef struct render_eye {
     float sin_yaw;
 } render_eye_t;
 
-/* What the sensor does with the light. A value's noise has the variance shot * value + read^2, values 0 to 1.
+/* What the sensor does with the light. The noise of a pixel's three values has the
+ * variance shot * (their mean before white balance) + read^2; values are 0 to 1.
  */
 typedef struct render_sensor {
     float gain[3]; /* exposure times white balance, by channel */
@@ -125,9 +126,10 @@ void render_place(const render_scene_t *scene, const render_eye_t *eye, render_f
 void render_trace(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
                   int32_t *list, int16_t *hits);
 
-/* How many pixel centres the surfaces first .. first + count - 1 would cover if nothing stood before them. */
+/* How many pixel centres the surfaces first .. first + count - 1 would cover if nothing stood before them.
+ * All of those lie within the pixels box {left, top, right, bottom}. */
 int32_t render_own_px(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                      int32_t first, int32_t count);
+                      int32_t first, int32_t count, const int32_t box[4]);
 
 /* From hits to pictures: linear colour times shading of the lens [height][width][3], identity and distance
  * along the ray in m (inf: nothing) [height][width]. */

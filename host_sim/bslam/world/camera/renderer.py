@@ -14,7 +14,7 @@ from bslam.rig import Camera
 from bslam.world.camera import lens, raw
 from bslam.world.camera.scene import BeaconLook, Body, Drift, Floats, Scene
 
-_TARGET_BRIGHTNESS = (0.14, 0.22)  # of the mean linear light, where the auto-exposure settles
+_TARGET_BRIGHTNESS = (0.16, 0.28)  # of the mean linear light, where the auto-exposure settles
 _EXPOSURE_LAG_S = (0.25, 0.9)
 _SHUTTER_S = (0.004, 0.02)
 _MOTION_BLUR_PX_MAX = 4.0
@@ -153,7 +153,7 @@ class Renderer:
             kind=beacon.kind,
             box=found[0],
             visible_px=visible_px,
-            own_px=self._caster.own_px(body.first, body.count),
+            own_px=self._caster.own_px(body.first, body.count, found[0]),
             cut=found[1],
             slant_rad=abs(math.remainder(direction_rad + math.pi - beacon.facing_rad, math.tau)),
             bearing_rad=math.remainder(direction_rad - theta_rad, math.tau),

@@ -90,7 +90,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Body:
-    """Which of the scene's surfaces are a beacon's, and their corners (n, 4, 3); `turns`: it faces every eye."""
+    """Which of the scene's surfaces are a beacon's; their corners (n, 4, 3); `turns`: it faces every eye."""
 
     first: int
     count: int

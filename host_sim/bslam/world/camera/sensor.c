@@ -59,11 +59,13 @@ void render_expose(const render_lens_t *lens, const render_sensor_t *sensor, con
     blur_columns(lens, sensor->blur_column, scratch, linear);
     const float square = sensor->read * sensor->read;
     for (int32_t at = 0; at < lens->width_px * lens->height_px; at++) {
+        const float *light = &linear[3 * at];
+        const float middle = sensor->gain[1] * (light[0] + light[1] + light[2]) / 3.0f;
+        const float sigma = sqrtf(sensor->shot * middle + square) * (float)(RENDER_TONES - 1);
         uint64_t bits = next(random);
         for (int32_t i = 0; i < 3; i++) {
-            const float value = sensor->gain[i] * linear[3 * at + i];
-            const float sigma = sqrtf(sensor->shot * value + square);
-            const float noisy = (value + sigma * normals[bits % RENDER_NORMALS]) * (float)(RENDER_TONES - 1);
+            const float value = sensor->gain[i] * light[i] * (float)(RENDER_TONES - 1);
+            const float noisy = value + sigma * normals[bits % RENDER_NORMALS];
             bits /= RENDER_NORMALS;
             const int32_t tone =
                 noisy > 0.0f ? (noisy < (float)(RENDER_TONES - 1) ? (int32_t)noisy : RENDER_TONES - 1) : 0;

@@ -63,16 +63,24 @@ static float within(float x, float highest)
     return x < 0.0f ? 0.0f : x > highest ? highest : x;
 }
 
+/* A call of floorf costs more than all the rest of a fetch. */
+static int32_t floor_of(float x)
+{
+    const int32_t towards_zero = (int32_t)x;
+    return towards_zero - (x < (float)towards_zero);
+}
+
 /* Bilinear; sides are powers of two, so a mask repeats them. */
 static uint64_t fetch(const level_t *level, const spot_t *spot)
 {
     const float free_x = spot->u * (float)level->width - 0.5f, free_y = spot->v * (float)level->height - 0.5f;
     const float x = spot->ends_u ? within(free_x, (float)(level->width - 1)) : free_x;
     const float y = spot->ends_v ? within(free_y, (float)(level->height - 1)) : free_y;
-    const float floor_x = floorf(x), floor_y = floorf(y);
-    const uint32_t share_x = (uint32_t)((x - floor_x) * 256.0f), share_y = (uint32_t)((y - floor_y) * 256.0f);
-    const int32_t x0 = (int32_t)floor_x & (level->width - 1), x1 = (x0 + 1) & (level->width - 1);
-    const int32_t y0 = (int32_t)floor_y & (level->height - 1), y1 = (y0 + 1) & (level->height - 1);
+    const int32_t column = floor_of(x), row = floor_of(y);
+    const uint32_t share_x = (uint32_t)((x - (float)column) * 256.0f);
+    const uint32_t share_y = (uint32_t)((y - (float)row) * 256.0f);
+    const int32_t x0 = column & (level->width - 1), x1 = (x0 + 1) & (level->width - 1);
+    const int32_t y0 = row & (level->height - 1), y1 = (y0 + 1) & (level->height - 1);
     const uint32_t *row0 = &level->texels[y0 * level->width], *row1 = &level->texels[y1 * level->width];
     return blend(blend(lanes(row0[x0]), lanes(row0[x1]), share_x),
                  blend(lanes(row1[x0]), lanes(row1[x1]), share_x), share_y);
@@ -100,10 +108,8 @@ uint32_t texture_alpha(const render_scene_t *scene, int32_t texture, float u, fl
     int32_t index = texels > 1.0f ? (int32_t)rough_log2(texels) : 0;
     index = index < picture->levels ? index : picture->levels - 1;
     const level_t level = level_of(scene, picture, index);
-    const int32_t x = (int32_t)(u * (float)level.width), y = (int32_t)(v * (float)level.height);
-    const int32_t column = x < level.width ? x : level.width - 1,
-                  row = y < level.height ? y : level.height - 1;
-    return level.texels[row * level.width + column] >> 24;
+    const spot_t spot = {u, v, true, true};
+    return (uint32_t)(fetch(&level, &spot) >> 48);
 }
 
 /* --- Light
@@ -278,25 +284,16 @@ static void add_colour(const render_scene_t *scene, const render_face_t *faces, 
     }
 }
 
-/* A pixel: the ray at its centre, the eight around it, and what they meet. */
-typedef struct pixel {
-    int32_t at[9]; /* indices of rays, the centre at 4 */
-    int16_t hits[9];
-    bool mixed;
-} pixel_t;
+static const float ray_weights[9] = {0.0625f, 0.125f,  0.0625f, 0.125f, 0.25f,
+                                     0.125f,  0.0625f, 0.125f,  0.0625f};
 
-static const float pixel_weights[9] = {0.0625f, 0.125f,  0.0625f, 0.125f, 0.25f,
-                                       0.125f,  0.0625f, 0.125f,  0.0625f};
-
-static pixel_t pixel_at(const int16_t *hits, int32_t stride, int32_t centre)
+/* Whether the nine rays of a pixel meet more than one surface; `hit` is the middle one's. */
+static bool is_mixed(const int16_t *hit, int32_t stride)
 {
-    pixel_t pixel = {.mixed = false};
-    for (int32_t i = 0; i < 9; i++) {
-        pixel.at[i] = centre + (i / 3 - 1) * stride + i % 3 - 1;
-        pixel.hits[i] = hits[pixel.at[i]];
-        pixel.mixed |= pixel.hits[i] != hits[centre];
-    }
-    return pixel;
+    const int16_t *above = hit - stride, *below = hit + stride;
+    const int32_t differ = (above[-1] ^ *hit) | (above[0] ^ *hit) | (above[1] ^ *hit) | (hit[-1] ^ *hit) |
+                           (hit[1] ^ *hit) | (below[-1] ^ *hit) | (below[0] ^ *hit) | (below[1] ^ *hit);
+    return differ != 0;
 }
 
 static void ray_at(const render_lens_t *lens, int32_t at, float ray[3])
@@ -306,44 +303,43 @@ static void ray_at(const render_lens_t *lens, int32_t at, float ray[3])
     ray[2] = lens->ray_z[at];
 }
 
-/* Each surface in the pixel counts by the weights of its rays, and is looked at in their mean direction. */
-static void mix(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                const render_light_t *light, const pixel_t *pixel, const float steps[2][3], float rgb[3])
+/* From one pixel to the next along the row and the column. */
+static void ray_steps(const render_lens_t *lens, int32_t centre, float steps[2][3])
 {
-    uint32_t done = 0;
-    for (int32_t first = 0; first < 9; first++) {
-        if (done >> first & 1u || pixel->hits[first] == RENDER_NOTHING)
-            continue;
-        float ray[3] = {0.0f}, weight = 0.0f;
-        for (int32_t i = first; i < 9; i++) {
-            if (pixel->hits[i] != pixel->hits[first])
-                continue;
-            done |= 1u << i;
-            weight += pixel_weights[i];
-            ray[0] += pixel_weights[i] * lens->ray_x[pixel->at[i]];
-            ray[1] += pixel_weights[i] * lens->ray_y[pixel->at[i]];
-            ray[2] += pixel_weights[i] * lens->ray_z[pixel->at[i]];
-        }
-        add_colour(scene, faces, light, pixel->hits[first], ray, steps, weight, rgb);
-    }
-}
-
-static void colour_of(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                      const render_light_t *light, const pixel_t *pixel, float rgb[3])
-{
-    float steps[2][3];
+    const int32_t offsets[2] = {1, rays_along(lens->width_px)};
     for (int32_t i = 0; i < 2; i++) {
-        const int32_t before = pixel->at[i == 0 ? 3 : 1], after = pixel->at[i == 0 ? 5 : 7];
+        const int32_t before = centre - offsets[i], after = centre + offsets[i];
         steps[i][0] = lens->ray_x[after] - lens->ray_x[before];
         steps[i][1] = lens->ray_y[after] - lens->ray_y[before];
         steps[i][2] = lens->ray_z[after] - lens->ray_z[before];
     }
-    if (pixel->mixed) {
-        mix(scene, lens, faces, light, pixel, steps, rgb);
-    } else if (pixel->hits[4] != RENDER_NOTHING) {
-        float ray[3];
-        ray_at(lens, pixel->at[4], ray);
-        add_colour(scene, faces, light, pixel->hits[4], ray, steps, 1.0f, rgb);
+}
+
+/* Each surface in the pixel counts by the weights of its rays, and is looked at in their mean direction. */
+static void mix(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
+                const render_light_t *light, const int16_t *hits, int32_t centre, const float steps[2][3],
+                float rgb[3])
+{
+    const int32_t stride = rays_along(lens->width_px);
+    int32_t at[9];
+    for (int32_t i = 0; i < 9; i++)
+        at[i] = centre + (i / 3 - 1) * stride + i % 3 - 1;
+    uint32_t done = 0;
+    for (int32_t first = 0; first < 9; first++) {
+        const int16_t hit = hits[at[first]];
+        if ((done >> first & 1u) || hit == RENDER_NOTHING)
+            continue;
+        float ray[3] = {0.0f}, weight = 0.0f;
+        for (int32_t i = first; i < 9; i++) {
+            if (hits[at[i]] != hit)
+                continue;
+            done |= 1u << i;
+            weight += ray_weights[i];
+            ray[0] += ray_weights[i] * lens->ray_x[at[i]];
+            ray[1] += ray_weights[i] * lens->ray_y[at[i]];
+            ray[2] += ray_weights[i] * lens->ray_z[at[i]];
+        }
+        add_colour(scene, faces, light, hit, ray, steps, weight, rgb);
     }
 }
 
@@ -352,18 +348,19 @@ void render_shade(const render_scene_t *scene, const render_lens_t *lens, const 
                   int16_t *identity, float *depth_m)
 {
     const int32_t stride = rays_along(lens->width_px);
-    for (int32_t y = 0; y < lens->height_px; y++) {
-        for (int32_t x = 0; x < lens->width_px; x++) {
-            const int32_t to = y * lens->width_px + x, centre = (2 * y + 1) * stride + 2 * x + 1;
-            const pixel_t pixel = pixel_at(hits, stride, centre);
-            const int16_t hit = pixel.hits[4];
-            float rgb[3] = {0.0f}, ray[3];
-            colour_of(scene, lens, faces, light, &pixel, rgb);
-            ray_at(lens, centre, ray);
-            for (int32_t i = 0; i < 3; i++)
-                linear[3 * to + i] = vignette[to] * rgb[i];
-            identity[to] = hit == RENDER_NOTHING ? -1 : (int16_t)scene->surfaces[hit].identity;
-            depth_m[to] = hit == RENDER_NOTHING ? INFINITY : 1.0f / dot3(faces[hit].s, ray);
-        }
+    for (int32_t to = 0; to < lens->width_px * lens->height_px; to++) {
+        const int32_t centre = (2 * (to / lens->width_px) + 1) * stride + 2 * (to % lens->width_px) + 1;
+        const int16_t hit = hits[centre];
+        float rgb[3] = {0.0f}, ray[3], steps[2][3];
+        ray_at(lens, centre, ray);
+        ray_steps(lens, centre, steps);
+        if (is_mixed(&hits[centre], stride))
+            mix(scene, lens, faces, light, hits, centre, steps, rgb);
+        else if (hit != RENDER_NOTHING)
+            add_colour(scene, faces, light, hit, ray, steps, 1.0f, rgb);
+        for (int32_t i = 0; i < 3; i++)
+            linear[3 * to + i] = vignette[to] * rgb[i];
+        identity[to] = hit == RENDER_NOTHING ? -1 : (int16_t)scene->surfaces[hit].identity;
+        depth_m[to] = hit == RENDER_NOTHING ? INFINITY : 1.0f / dot3(faces[hit].s, ray);
     }
 }

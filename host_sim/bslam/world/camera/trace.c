@@ -287,24 +287,19 @@ static int32_t centres_covered(const tile_t *tile, const cover_t *cover)
 }
 
 int32_t render_own_px(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                      int32_t first, int32_t count)
+                      int32_t first, int32_t count, const int32_t box[4])
 {
-    const int32_t columns = tiles_along(rays_along(lens->width_px));
-    const int32_t rows = tiles_along(rays_along(lens->height_px));
     int32_t own_px = 0;
-    for (int32_t at = 0; at < columns * rows; at++) {
-        const tile_t tile = tile_at(lens, at % columns, at / columns);
-        cover_t cover;
-        bool met = false;
-        for (int32_t i = first; i < first + count; i++) {
-            if (!may_meet(&faces[i], &tile))
-                continue;
-            if (!met)
-                clear(&cover);
-            met = true;
-            cover_tile(scene, lens, &faces[i], i, &tile, &cover);
+    for (int32_t row = 2 * box[1] / RENDER_TILE; row <= (2 * box[3] + 1) / RENDER_TILE; row++) {
+        for (int32_t column = 2 * box[0] / RENDER_TILE; column <= (2 * box[2] + 1) / RENDER_TILE; column++) {
+            const tile_t tile = tile_at(lens, column, row);
+            cover_t cover;
+            clear(&cover);
+            for (int32_t i = first; i < first + count; i++)
+                if (may_meet(&faces[i], &tile))
+                    cover_tile(scene, lens, &faces[i], i, &tile, &cover);
+            own_px += centres_covered(&tile, &cover);
         }
-        own_px += met ? centres_covered(&tile, &cover) : 0;
     }
     return own_px;
 }

@@ -129,7 +129,7 @@ _CABINETS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
 
 @dataclass(frozen=True)
 class Piece:
-    """Something that is no beacon, and its size in m; bottom_m: how high it hangs, out_m: how far it stands out."""
+    """Something that is no beacon; bottom_m: how high it hangs, out_m: how far it stands out."""
 
     look: Look
     width_m: float

@@ -134,7 +134,7 @@ def floor(artist: Artist) -> Covering:
 
 def _stone(artist: Artist) -> Colour:
     warm = hsv(artist.between(0.03, 0.15), artist.between(0.05, 0.5), artist.between(0.3, 0.85))
-    return artist.pick((artist.grey(0.25, 0.85), warm, mix(artist.accent(), artist.grey(0.4, 0.7), 0.6)))
+    return artist.pick((artist.grey(0.25, 0.85), warm, mix(artist.accent(), artist.grey(0.4, 0.7), 0.8)))
 
 
 def _grid_floor(artist: Artist, count: int, spread: float, period_m: float, checker: bool) -> Covering:
@@ -202,8 +202,8 @@ def _speckled(artist: Artist, colour: Colour, grain: float, cells: int, hue: flo
 
 
 def _carpet(artist: Artist) -> Covering:
-    colour = mix(artist.accent(), artist.grey(0.25, 0.6), artist.between(0.3, 0.8))
-    return _speckled(artist, colour, artist.between(0.04, 0.15), 96, 0.2)
+    colour = mix(artist.accent(), artist.grey(0.25, 0.6), artist.between(0.45, 0.95))
+    return _speckled(artist, colour, artist.between(0.04, 0.12), 96, 0.15)
 
 
 def _linoleum(artist: Artist) -> Covering:
@@ -211,7 +211,7 @@ def _linoleum(artist: Artist) -> Covering:
 
 
 def _terrazzo(artist: Artist) -> Covering:
-    return _speckled(artist, _stone(artist), artist.between(0.1, 0.2), 64, 0.8)
+    return _speckled(artist, _stone(artist), artist.between(0.06, 0.14), 64, 0.4)
 
 
 _FLOORS: dict[str, Callable[[Artist], Covering]] = {
