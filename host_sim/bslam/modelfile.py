@@ -48,10 +48,14 @@ class Svm:
 
 @dataclass(frozen=True)
 class BeaconClass:
-    """A kind of beacon, or one object of a user's; height 0: not known."""
+    """A kind of beacon, or one object of a user's.
+
+    height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known.
+    """
 
     name: str
     height_m: float = 0.0
+    depth_m: float = 0.0
 
 
 @dataclass(frozen=True)

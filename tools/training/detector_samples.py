@@ -18,8 +18,13 @@ from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners
 
 CLASSES = tuple(
-    BeaconClass(name, height_m)
-    for name, height_m in zip(KINDS, (0.60, 0.60, 2.00, 1.20, 0.84, 0.30, 1.80), strict=True)
+    BeaconClass(name, height_m, depth_m)
+    for name, height_m, depth_m in zip(
+        KINDS,
+        (0.60, 0.60, 2.00, 1.20, 0.84, 0.30, 1.80),
+        (0.0, 0.12, 0.035, 0.04, 0.015, 0.015, 0.30),  # an extinguisher is round and shows no flank
+        strict=True,
+    )
 )
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""

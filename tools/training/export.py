@@ -67,7 +67,10 @@ class Header:
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
         """Add a table of kinds or objects; its name."""
-        rows = "".join(f"    {{{c_string(one.name)}, {c_float(one.height_m)}}},\n" for one in classes)
+        rows = "".join(
+            f"    {{{c_string(one.name)}, {c_float(one.height_m)}, {c_float(one.depth_m)}}},\n"
+            for one in classes
+        )
         self._body.append(f"static const bslam_beacon_class_t {name}[{len(classes)}] = {{\n{rows}}};")
         return name
 

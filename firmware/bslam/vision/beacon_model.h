@@ -19,6 +19,7 @@ enum {
 typedef struct bslam_beacon_class {
     const char *name;
     float height_m;  ///< of every beacon of the kind; 0: not known, direction only
+    float depth_m;   ///< how far it stands out from the wall: what of it is a flank; 0: flat, or not known
 } bslam_beacon_class_t;
 
 /// The detector for one kind of lens.

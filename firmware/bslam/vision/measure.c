@@ -5,7 +5,7 @@
 #include "bslam/math/trig.h"
 #include "bslam/vision/signature.h"
 
-static const bslam_real_t HEIGHT_MAX_M = 10;
+static const bslam_real_t SIZE_MAX_M = 10;
 // A rough box this close to the frame's edge may go on outside.
 static const bslam_real_t CUT_PX = 2;
 // Below this height no distance, below this width or height no direction.
@@ -37,13 +37,24 @@ static unsigned marks_of(const bslam_frame_t *frame, const bslam_box_t *rough)
            (small ? (unsigned)BSLAM_MARK_SMALL : 0U);
 }
 
+static bslam_box_t box_around(const bslam_quad_t *quad)
+{
+    const bool left_higher = quad->top_left_px < quad->top_right_px;
+    const bool left_lower = quad->bottom_left_px > quad->bottom_right_px;
+    return (bslam_box_t){.left_px = quad->left_px,
+                         .top_px = left_higher ? quad->top_left_px : quad->top_right_px,
+                         .right_px = quad->right_px,
+                         .bottom_px = left_lower ? quad->bottom_left_px : quad->bottom_right_px};
+}
+
 /// The object's middle in plan is half way between the feet of its two sides, which are at H / height_left
 /// and H / height_right: seen obliquely, the nearer half looks wider and the middle is not in the middle.
 static void measure_outline(const bslam_outline_t *outline, bslam_real_t height_m,
                             bslam_candidate_t *candidate)
 {
-    const bslam_real_t height_left = outline->top_left - outline->bottom_left;
-    const bslam_real_t height_right = outline->top_right - outline->bottom_right;
+    const bslam_real_t tall = outline->top - outline->bottom;
+    const bslam_real_t height_left = tall * (1 + outline->turn * outline->left);
+    const bslam_real_t height_right = tall * (1 + outline->turn * outline->right);
     const bslam_real_t sum = height_left + height_right;
     const bslam_real_t across = (outline->left * height_right + outline->right * height_left) / sum;
     const bslam_real_t edge_sd = SIDE_SD_PX * outline->pixel;
@@ -62,17 +73,18 @@ static void measure_outline(const bslam_outline_t *outline, bslam_real_t height_
 }
 
 bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
-                             const bslam_box_t *rough, bslam_real_t height_m, bslam_candidate_t *candidate)
+                             const bslam_box_t *rough, const bslam_size_t *size, bslam_candidate_t *candidate)
 {
-    if (!box_is_number(rough) || !bslam_is_number(height_m)) {
+    if (!box_is_number(rough) || !bslam_is_number(size->height_m) || !bslam_is_number(size->depth_m)) {
         return BSLAM_E_NOT_FINITE;
     }
     if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
         return BSLAM_E_PARAMETER;
     }
     bslam_outline_t outline;
-    if (!bslam_in_range(height_m, 0, HEIGHT_MAX_M) ||
-        bslam_outline_find(frame, camera, rough, &outline) != BSLAM_OK) {
+    if (!bslam_in_range(size->height_m, 0, SIZE_MAX_M) || !bslam_in_range(size->depth_m, 0, SIZE_MAX_M) ||
+        bslam_outline_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
+                           &outline) != BSLAM_OK) {
         return BSLAM_E_RANGE;
     }
     const unsigned marks = marks_of(frame, rough);
@@ -81,11 +93,10 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     candidate->has_bearing = false;
     candidate->has_range = false;
     if ((marks & sideways) == 0U) {
-        measure_outline(&outline, (marks & upright) == 0U ? height_m : 0, candidate);
+        measure_outline(&outline, (marks & upright) == 0U ? size->height_m : 0, candidate);
     }
     candidate->marks = (uint16_t)marks;
-    candidate->outline = (bslam_box_t){outline.quad.left_px, outline.quad.top_left_px, outline.quad.right_px,
-                                       outline.quad.bottom_left_px};
+    candidate->outline = box_around(&outline.quad);
     if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {
         memset(candidate->signature, 0, sizeof candidate->signature);
     }

@@ -28,18 +28,20 @@ typedef struct bslam_outline {
     bslam_real_t facing_rad;  ///< bearing of the plane's centre, in the robot's frame
     bslam_real_t left;        ///< across; left > right
     bslam_real_t right;
-    bslam_real_t top_left;  ///< up, at the left side
-    bslam_real_t bottom_left;
-    bslam_real_t top_right;
-    bslam_real_t bottom_right;
-    bslam_real_t pixel;  ///< size of a frame pixel in these units, at the centre
-    bslam_quad_t quad;   ///< the same corners in the frame
+    bslam_real_t top;  ///< up, at across = 0
+    bslam_real_t bottom;
+    bslam_real_t turn;      ///< up at a place across is up (1 + turn across): tangent of the slant
+    bslam_real_t turn_var;  ///< its variance
+    bslam_real_t pixel;     ///< size of a frame pixel in these units, at the centre
+    bslam_quad_t quad;      ///< the same corners in the frame
 } bslam_outline_t;
 
-/// Finds the outline near a rough box, which may be 4 pixels off on each side.
-/// BSLAM_E_RANGE, and *outline unchanged, if the box is empty, lies outside the frame, or the lens sees no
-/// upright plane there.
+/// Finds the outline near a rough box, which may be 4 pixels off on each side. A body that stands out from
+/// the wall shows a flank as well as its front: `depth`, as a fraction of its height, tells how much; the
+/// outline is then the front's. 0: it is flat. BSLAM_E_RANGE, and *outline unchanged, if the box is empty,
+/// lies outside the frame, or the lens sees no upright plane there.
 BSLAM_MUST_CHECK bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera_t *camera,
-                                                   const bslam_box_t *rough, bslam_outline_t *outline);
+                                                   const bslam_box_t *rough, bslam_real_t depth,
+                                                   bslam_outline_t *outline);
 
 #endif

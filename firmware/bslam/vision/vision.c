@@ -158,6 +158,11 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
     return view;
 }
 
+static bslam_size_t size_of(const bslam_beacon_class_t *kind)
+{
+    return (bslam_size_t){.height_m = (bslam_real_t)kind->height_m, .depth_m = (bslam_real_t)kind->depth_m};
+}
+
 /// Direction, distance and signature of a candidate; of a recognised object the distance is by its own
 /// height.
 static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_frame_t *frame,
@@ -165,11 +170,11 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
 {
     const bslam_camera_t *camera = &vision->cameras[vision->camera];
     const bslam_recogniser_t *recogniser = vision->model->recogniser;
-    const float height_m = vision->model->classes[candidate->beacon_class - 1].height_m;
+    const bslam_size_t size = size_of(&vision->model->classes[candidate->beacon_class - 1]);
     const bslam_box_t rough = candidate->outline;
     candidate->object = BSLAM_OBJECT_NONE;
     candidate->object_margin = 0;
-    const bslam_status_t status = bslam_measure(frame, camera, &rough, (bslam_real_t)height_m, candidate);
+    const bslam_status_t status = bslam_measure(frame, camera, &rough, &size, candidate);
     if (status != BSLAM_OK || recogniser == NULL) {
         return status;
     }
@@ -177,8 +182,8 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
     if (candidate->object == BSLAM_OBJECT_NONE) {
         return status;
     }
-    const float own_height_m = recogniser->objects[candidate->object].height_m;
-    return bslam_measure(frame, camera, &rough, (bslam_real_t)own_height_m, candidate);
+    const bslam_size_t own_size = size_of(&recogniser->objects[candidate->object]);
+    return bslam_measure(frame, camera, &rough, &own_size, candidate);
 }
 
 /// Measures the candidates; one that has no outline is of no use.
@@ -262,5 +267,6 @@ bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_bo
                                     bslam_real_t height_m, bslam_candidate_t *candidate)
 {
     const bslam_frame_t frame = finished_frame(vision);
-    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, height_m, candidate);
+    const bslam_size_t size = {.height_m = height_m};
+    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, &size, candidate);
 }

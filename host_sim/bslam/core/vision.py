@@ -261,7 +261,7 @@ class FrontEnd:
     def _classes(self, classes: Sequence[BeaconClass]) -> Any:
         ffi = self._library.ffi
         names = [ffi.new("char[]", one.name.encode()) for one in classes]
-        rows = [(name, one.height_m) for name, one in zip(names, classes, strict=True)]
+        rows = [(name, one.height_m, one.depth_m) for name, one in zip(names, classes, strict=True)]
         table = ffi.new("bslam_beacon_class_t[]", rows)
         self._keep += [*names, table]
         return table
