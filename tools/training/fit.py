@@ -8,6 +8,7 @@ range to begin with: one byte scale serves a row.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -104,7 +105,8 @@ def choose_cost(
     Samples of one group (frames of one world, boxes of one picture) are left out together.
     """
     trials = {cost: held_out_values(x, targets, cost, quadratic, balanced, groups) for cost in sorted(costs)}
-    best = max(trials, key=lambda cost: score(targets, trials[cost]))  # of equals the smallest
+    # Of equals the one nearest to 1: an extreme one wants a reason.
+    best = max(trials, key=lambda cost: (score(targets, trials[cost]), -abs(math.log(cost))))
     return best, trials[best]
 
 

@@ -80,6 +80,7 @@ def build_vision() -> Path:
     includes = '#include "bslam/vision/vision.h"\n'
     text = declarations((), "vision/vision.h")
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
+    text += "#define BSLAM_IMAGE_WIDTH_MAX ...\n#define BSLAM_IMAGE_HEIGHT_MAX ...\n"
     if BEACONS_HEADER.is_file():
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"

@@ -1,0 +1,257 @@
+"""tools/train_beacons.py: from a folder of pictures to a header that compiles and recognises."""
+
+import csv
+import ctypes
+import os
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import train_beacons
+from bslam.core.vision import FrontEnd
+from bslam.errors import BslamError
+from bslam.modelfile import read_recogniser
+from tools import photographs
+from tools.compiled import FIRMWARE
+from training import samples
+from training.folder import COLUMNS, Label, read_folder
+
+SIGNATURE = 71
+
+
+@pytest.fixture(scope="module", autouse=True)
+def blind():
+    """A detector that finds nothing stands in for the trained one."""
+    patch = pytest.MonkeyPatch()
+    model = photographs.blind_model()
+    patch.setattr(samples, "FrontEnd", lambda cameras, _: FrontEnd(cameras, model))
+    yield
+    patch.undo()
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory):
+    """A user's folder of twenty pictures, and what the training made of it."""
+    folder = tmp_path_factory.mktemp("pictures")
+    photographs.take(folder, 20, seed=0)
+    out = tmp_path_factory.mktemp("models")
+    assert train_beacons.main([str(folder), "--out", str(out / "my_beacons.h")]) == 0
+    return folder, out
+
+
+class Compiled:
+    """The recogniser of a header, compiled with the C core as the firmware compiles it."""
+
+    def __init__(self, header: Path, folder: Path) -> None:
+        source = folder / "recognise.c"
+        source.write_text(
+            f'#include "bslam/vision/recogniser.h"\n#include "{header}"\n'
+            "int check(void);\nint recognise(const float *s, float *margin);\nconst char *name(int i);\n"
+            "int check(void) { return (int)bslam_recogniser_check(&bslam_my_beacons); }\n"
+            "int recognise(const float *s, float *margin)\n"
+            "{ return bslam_recognise(&bslam_my_beacons, s, margin); }\n"
+            "const char *name(int i) { return bslam_my_beacons.objects[i].name; }\n"
+        )
+        flags = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
+        parts = [FIRMWARE / "bslam/svm/svm.c", FIRMWARE / "bslam/vision/recogniser.c"]
+        out = folder / "recognise.so"
+        command = [os.environ.get("CC", "cc"), *flags, f"-I{FIRMWARE}", "-shared", "-fPIC"]
+        subprocess.run([*command, str(source), *map(str, parts), "-lm", "-o", str(out)], check=True)
+        self._library = ctypes.CDLL(str(out))
+        self._library.name.restype = ctypes.c_char_p
+
+    def check(self) -> int:
+        return self._library.check()
+
+    def recognise(self, signature: np.ndarray) -> str | None:
+        pointer = np.ascontiguousarray(signature, np.float32).ctypes.data_as(ctypes.c_void_p)
+        index = self._library.recognise(pointer, ctypes.byref(ctypes.c_float()))
+        return self._library.name(index).decode() if index >= 0 else None
+
+
+def boxes_of(folder):
+    """(name, signature) of every box in a folder of pictures, by a front end that knows the room."""
+    pictures = read_folder(folder).pictures
+    frames = [samples.load_frame(picture.path) for picture in pictures]
+    front_end = samples.FrontEnd([samples.camera_for(*frames[0].size_px)], None)
+    for frame in frames:
+        front_end.see(frame.rgb)
+    for picture, frame in zip(pictures, frames, strict=True):
+        front_end.see(frame.rgb)
+        for label in picture.labels:
+            yield label.name, front_end.signature(frame.box(label))
+
+
+def test_twenty_pictures_give_a_header_that_compiles_and_recognises(user, tmp_path):
+    folder, out = user
+    known = {one.name for one in read_folder(folder).objects}
+    library = Compiled(out / "my_beacons.h", tmp_path)
+    assert library.check() == 0
+    photographs.take(tmp_path / "new", 25, seed=1)
+    answers = [(name, library.recognise(signature)) for name, signature in boxes_of(tmp_path / "new")]
+    of_known = [(name, answer) for name, answer in answers if name in known]
+    assert len(of_known) > 25
+    named = [(name, answer) for name, answer in of_known if answer is not None]
+    assert np.mean([name == answer for name, answer in named]) > 0.9
+    assert len(named) > 0.8 * len(of_known)
+
+
+def test_model_file_recognises_as_the_header(user, tmp_path):
+    folder, out = user
+    library = Compiled(out / "my_beacons.h", tmp_path)
+    recogniser = read_recogniser(out / "my_beacons.json", SIGNATURE)
+    for _, signature in boxes_of(folder):
+        values = recogniser.svm.weights.astype(np.float64) @ signature + recogniser.svm.bias
+        best = int(values.argmax())
+        wanted = recogniser.objects[best].name if values[best] >= recogniser.reject_margin else None
+        assert library.recognise(signature) == wanted
+
+
+def test_training_leaves_a_picture_of_the_confusion_and_says_where_it_comes_from(user):
+    _, out = user
+    with Image.open(out / "my_beacons.png") as picture:
+        assert min(picture.size) > 300
+    text = (out / "my_beacons.h").read_text()
+    assert "// training set: 20 pictures" in text and "sha256" in text and "// figures: on pictures" in text
+
+
+def test_training_twice_gives_the_same_files(user, tmp_path):
+    folder, out = user
+    assert train_beacons.main([str(folder), "--out", str(tmp_path / "my_beacons.h")]) == 0
+    for suffix in (".h", ".json", ".png"):
+        name = f"my_beacons{suffix}"
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_other_things_are_rejected(tmp_path):
+    """Two of the objects are the user's, the others' boxes stand for what the detector finds besides."""
+    rows = photographs.take(tmp_path, 30, seed=2)
+    seen_in = {row[1]: len({one[0] for one in rows if one[1] == row[1]}) for row in rows if row[1]}
+    write_labels(tmp_path, [row for row in rows if seen_in.get(row[1], 0) >= 2])
+    folder = read_folder(tmp_path)
+    collected = samples.collect(folder)
+    mine = sorted(range(len(folder.objects)), key=lambda i: -seen_in[folder.objects[i].name])[:2]
+    labels = np.select([collected.labels == one for one in mine], [0, 1], samples.NONE)
+    objects = tuple(folder.objects[one] for one in mine)
+    counts = train_beacons.train(
+        replace(folder, objects=objects), replace(collected, labels=labels), precision=0.9
+    )[1]
+    assert counts[2].sum() > 20 and counts[2, 2] > 0.9 * counts[2].sum()
+    assert counts[0, 0] + counts[1, 1] > 0.8 * counts[:2].sum()
+
+
+# --- pictures -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [(320, 240), (1280, 960), (641, 483), (200, 400), (64, 48)])
+def test_load_frame_keeps_boxes_on_what_they_were_drawn_round(tmp_path, size):
+    pixels = np.full((size[1], size[0], 3), 200, np.uint8)
+    left, top, right, bottom = (
+        int(share * side) for share, side in zip((0.3, 0.2, 0.6, 0.7), size * 2, strict=True)
+    )
+    pixels[top:bottom, left:right] = (250, 10, 10)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    frame = samples.load_frame(tmp_path / "a.png")
+    height, width = frame.rgb.shape[:2]
+    assert width % 4 == 0 and height % 4 == 0 and width <= 320 and height <= 240
+    red = frame.rgb[:, :, 1] < 105  # more than half of the pixel
+    columns, rows = np.flatnonzero(red.any(axis=0)), np.flatnonzero(red.any(axis=1))
+    found = (columns[0] - 0.5, rows[0] - 0.5, columns[-1] + 0.5, rows[-1] + 0.5)
+    assert frame.box(Label("a", left, top, right, bottom)) == pytest.approx(
+        found, abs=0.6
+    )  # found to a pixel
+
+
+def test_load_frame_turns_a_picture_upright(tmp_path):
+    exif = Image.Exif()
+    exif[0x0112] = 6  # the camera lay on its right side
+    pixels = np.zeros((40, 80, 3), np.uint8)
+    pixels[:20] = 255
+    Image.fromarray(pixels).save(tmp_path / "a.png", exif=exif)
+    rgb = samples.load_frame(tmp_path / "a.png").rgb
+    assert rgb.shape == (80, 40, 3)
+    assert rgb[:, 30].min() == 255 and rgb[:, 5].max() == 0
+
+
+@pytest.mark.parametrize("size", [(12, 12), (4000, 16)])
+def test_load_frame_picture_of_no_use_is_refused(tmp_path, size):
+    Image.new("RGB", size).save(tmp_path / "a.png")
+    with pytest.raises(BslamError, match=rf"a\.png: is {size[0]}x{size[1]}; allowed: sides from 16 px"):
+        samples.load_frame(tmp_path / "a.png")
+
+
+def test_load_frame_truncated_picture_is_refused(tmp_path):
+    noise = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
+    Image.fromarray(noise).save(tmp_path / "a.png")
+    content = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(content[: len(content) // 2])
+    with pytest.raises(BslamError, match=r"a\.png: cannot be read"):
+        samples.load_frame(tmp_path / "a.png")
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+
+
+def refusal(folder, capsys, *words):
+    """What the command says, having written nothing."""
+    out = folder / "out/my_beacons.h"
+    assert train_beacons.main([str(folder), "--out", str(out), *words]) == 2
+    assert not out.parent.exists()
+    return capsys.readouterr().err
+
+
+def write_labels(folder, rows):
+    with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([COLUMNS, *rows])
+
+
+def test_missing_picture_is_refused(tmp_path, capsys):
+    rows = photographs.take(tmp_path, 4, seed=3)
+    (tmp_path / rows[0][0]).unlink()
+    error = refusal(tmp_path, capsys)
+    assert f"line 2, column picture: '{rows[0][0]}' is not allowed" in error
+
+
+def test_class_of_one_picture_is_refused(tmp_path, capsys):
+    rows = photographs.take(tmp_path, 6, seed=3)
+    write_labels(tmp_path, [*rows, [rows[0][0], "lamp", "10", "10", "60", "60", ""]])
+    error = refusal(tmp_path, capsys)
+    assert "class '" in error and "allowed: at least 2 pictures of each class" in error
+
+
+def test_class_without_any_signature_is_refused(tmp_path, capsys):
+    rows = photographs.take(tmp_path, 6, seed=3)
+    tiny = [[row[0], "dot", "100", "100", "102", "102", ""] for row in rows[:3]]
+    write_labels(tmp_path, tiny)
+    assert "class 'dot': 3 boxes give signatures in 0 pictures" in refusal(tmp_path, capsys)
+
+
+def test_single_class_and_nothing_else_is_refused(tmp_path, capsys):
+    rows = photographs.take(tmp_path, 12, seed=3)
+    names = [row[1] for row in rows]
+    most = max(set(names) - {""}, key=names.count)
+    write_labels(tmp_path, [row for row in rows if row[1] == most])
+    assert f"nothing but '{most}'; allowed: a second class" in refusal(tmp_path, capsys)
+
+
+def test_objects_that_cannot_be_told_apart_are_refused(tmp_path, capsys):
+    rows = [row for row in photographs.take(tmp_path, 14, seed=3) if row[1]]
+    random = np.random.default_rng(1)
+    write_labels(tmp_path, [[row[0], random.choice(["a", "b"]), *row[2:6], ""] for row in rows])
+    assert "objects are recognised at precision 1; allowed: at least half" in refusal(
+        tmp_path, capsys, "--precision", "1"
+    )
+
+
+@pytest.mark.parametrize(
+    "words", [["--out", "My.h"], ["--out", "a.txt"], ["--precision", "0.2"], ["--precision", "x"]]
+)
+def test_bad_option_is_refused(tmp_path, capsys, words):
+    with pytest.raises(SystemExit) as stop:
+        train_beacons.main([str(tmp_path), *words])
+    assert stop.value.code == 2
+    assert "is not allowed; allowed: " in capsys.readouterr().err

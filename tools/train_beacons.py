@@ -1,0 +1,164 @@
+"""Trains the front end to recognise your own objects, from a folder of pictures with labels.csv.
+
+    .venv/bin/python tools/train_beacons.py FOLDER --out firmware/models/my_beacons.h
+
+Writes the C header, the same as a model file for `bslam look --model` (.json), and the confusion matrix as a
+picture (.png); prints it too. The figures are of pictures that a machine was not trained on, by
+cross-validation. docs/RETRAIN.md is the guide, tools/training/folder.py describes labels.csv.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import sklearn
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+from bslam.modelfile import Recogniser, write_recogniser
+from training import export, fit
+from training.folder import Folder, read_folder
+from training.samples import NONE, Samples, collect, folder_sha256
+
+LEAST_RECOGNISED = 0.5
+"""Share of the objects below which a recogniser is of no use."""
+
+
+def confusion(labels: NDArray[np.integer], values: NDArray[np.floating], margin: float) -> NDArray[np.int64]:
+    """Counts (objects + 1, objects + 1): row what it is, column what it is taken for; the last is "none"."""
+    objects = values.shape[1]
+    taken_for = np.where(values.max(axis=1) >= margin, values.argmax(axis=1), objects)
+    counts = np.zeros((objects + 1, objects + 1), dtype=np.int64)
+    np.add.at(counts, (np.where(labels == NONE, objects, labels), taken_for), 1)
+    return counts
+
+
+def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recogniser, NDArray[np.int64]]:
+    """The recogniser, and its confusion matrix on pictures left out.
+
+    BslamError if the reject margin that gives the precision rejects most objects.
+    """
+    targets = fit.one_vs_rest(samples.labels, len(folder.objects))
+    cost, held_out = fit.choose_cost(samples.signatures, targets, balanced=True, groups=samples.pictures)
+    labels, values = samples.labels[samples.counts], held_out[samples.counts]
+    right = values.argmax(axis=1) == labels
+    margin, _ = fit.threshold_for_precision(values.max(axis=1), right, precision)
+    counts = confusion(labels, values, margin)
+    recognised, objects = int(np.trace(counts[:-1, :-1])), int(counts[:-1].sum())
+    if recognised < LEAST_RECOGNISED * objects:
+        raise BslamError(
+            f"{folder.path}: on pictures left out only {recognised} of {objects} objects are recognised at "
+            f"precision {precision:g}; allowed: at least half, by more pictures, objects that look less "
+            "alike, or a lower --precision"
+        )
+    machine = fit.fit(samples.signatures, targets, cost, balanced=True)
+    notes = {
+        "training set": f"{len(folder.pictures)} pictures, {sum(samples.boxes.values())} boxes, "
+        f"{len(samples.labels)} signatures; sha256 {folder_sha256(folder)}",
+        "settings": f"scikit-learn {sklearn.__version__} LinearSVC, one against the rest, C {cost:g} of "
+        f"{', '.join(f'{one:g}' for one in fit.COSTS)} by cross-validation, precision {precision:g}",
+        "figures": figures(counts),
+    }
+    return Recogniser(machine.svm, folder.objects, margin, notes), counts
+
+
+def figures(counts: NDArray[np.int64]) -> str:
+    """What the matrix says, in a sentence."""
+    right, named = int(np.trace(counts[:-1, :-1])), int(counts[:, :-1].sum())
+    objects, others = int(counts[:-1].sum()), int(counts[-1].sum())
+    return (
+        f"on pictures left out {right} of {objects} objects recognised, {named - right} of {named} names "
+        f"wrong, {int(counts[-1, -1])} of {others} other things rejected"
+    )
+
+
+def draw_confusion(path: Path, counts: NDArray[np.int64], names: list[str]) -> None:
+    """The matrix as a picture: shares of a row as colour, counts as numbers."""
+    size = 2.0 + 0.6 * len(names)
+    figure = Figure(figsize=(size + 1.0, size), layout="constrained")
+    axes = figure.subplots()
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
+    for (row, column), count in np.ndenumerate(counts):
+        colour = "white" if shares[row, column] > 0.5 else "black"
+        axes.text(column, row, str(count), ha="center", va="center", color=colour)
+    axes.set_xticks(range(len(names)), names, rotation=45, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xlabel("taken for")
+    axes.set_ylabel("is")
+    axes.set_title("On pictures left out")
+    figure.savefig(path, dpi=120, metadata={"Software": None})
+
+
+def report(samples: Samples, counts: NDArray[np.int64], names: list[str]) -> str:
+    """The matrix and what became of the boxes, as text."""
+    width = max(len(name) for name in names)
+    lines = ["confusion on pictures left out (row: what it is, column: what it is taken for):"]
+    lines.append(" " * (width + 2) + "  ".join(f"{name[:8]:>8}" for name in names))
+    for name, row in zip(names, counts, strict=True):
+        lines.append(f"  {name:<{width}}" + "  ".join(f"{count:>8}" for count in row))
+    lines.append("boxes, and how many of them the front end found by itself:")
+    for name in names[:-1]:
+        lines.append(f"  {name:<{width}}  {samples.found[name]} of {samples.boxes[name]}")
+    lines += [f"not used, {reason}: {picture}" for picture, reason in samples.useless.items()]
+    return "\n".join(lines)
+
+
+def run(folder_path: Path, out: Path, precision: float) -> None:
+    """From pictures to header, model file and matrix."""
+    folder = read_folder(folder_path)
+    samples = collect(folder)
+    recogniser, counts = train(folder, samples, precision)
+    header = export.recogniser_header(recogniser, out.stem)
+    names = [*(one.name for one in folder.objects), "none"]
+    export.write_header(out, header)
+    write_recogniser(out.with_suffix(".json"), recogniser)
+    draw_confusion(out.with_suffix(".png"), counts, names)
+    print(report(samples, counts, names))
+    print(f"{recogniser.notes['figures']}; reject margin {recogniser.reject_margin:.3f}")
+    print(f"written: {out}, {out.with_suffix('.json')}, {out.with_suffix('.png')}")
+
+
+def _precision(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.5 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a number from 0.5 to 1")
+    return value
+
+
+def _header(text: str) -> Path:
+    path = Path(text)
+    if path.suffix != ".h" or not export.NAME.fullmatch(path.stem):
+        allowed = "a path whose file is named by small letters, digits and _, and .h"
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: {allowed}")
+    return path
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command; exit status 0, or 2 for bad input."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="pictures and labels.csv")
+    parser.add_argument("--out", type=_header, default=Path("firmware/models/my_beacons.h"), metavar="FILE.h")
+    parser.add_argument(
+        "--precision", type=_precision, default=0.9, help="wanted of what is recognised (default: 0.9)"
+    )
+    words = parser.parse_args(arguments)
+    matplotlib.use("Agg")
+    try:
+        run(words.folder, words.out, words.precision)
+    except BslamError as error:
+        print(f"train_beacons: error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,253 @@
+"""Labelled pictures become training samples: signatures that the C core itself computes.
+
+A picture is scaled to a frame that the front end takes. What is in its boxes, and every candidate that lies
+on one, is an example of the box's class; candidates and other proposals that lie on no box are examples of
+what is none of the objects.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageOps
+
+from bslam.core.vision import BeaconModel, Candidate, FrontEnd, frame_size_max
+from bslam.errors import BslamError
+from bslam.rig import Camera, Lens
+from training.folder import FILE, Folder, Label
+from training.truth import overlaps
+
+NONE = -1
+"""The label of what is none of the objects."""
+
+CELL_PX = 4
+FIELD_OF_VIEW_RAD = math.radians(60.0)
+SAME_OVERLAP = 0.5  # intersection over union from which a candidate is of a box
+OTHER_OVERLAP = 0.1  # and up to which it is of none
+OTHERS_A_PICTURE = 20
+# A box drawn by hand is not the detector's: each is also taken with its sides moved by this share of it.
+SHAKES = 4
+SHAKE = 0.06
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Signatures (n, 71) with labels (n,), an index into the folder's objects or NONE, and picture (n,).
+
+    `counts` (n,) is False for the extra samples of shaken boxes, which would count a box several times.
+    """
+
+    signatures: NDArray[np.float32]
+    labels: NDArray[np.int64]
+    pictures: NDArray[np.int64]
+    counts: NDArray[np.bool_]
+    boxes: Counter[str]  # labelled boxes by class
+    found: Counter[str]  # and how many of them the front end found by itself
+    useless: dict[str, str]  # pictures that the front end sees nothing in, and its reason
+
+
+@dataclass
+class _Collected:
+    signatures: list[NDArray[np.float32]] = field(default_factory=list)
+    labels: list[int] = field(default_factory=list)
+    pictures: list[int] = field(default_factory=list)
+    counts: list[bool] = field(default_factory=list)
+
+    def add(
+        self, signature: NDArray[np.float32] | None, label: int, picture: int, counts: bool = True
+    ) -> None:
+        if signature is not None and signature.any():
+            self.signatures.append(signature)
+            self.labels.append(label)
+            self.pictures.append(picture)
+            self.counts.append(counts)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture as the front end gets it, and how its pixels became the frame's."""
+
+    rgb: NDArray[np.uint8]  # (h, w, 3)
+    scale: float
+    left_px: float  # of the picture, cut off
+    top_px: float
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.rgb.shape[1], self.rgb.shape[0]
+
+    def box(self, label: Label) -> Box:
+        """A label in pixels of the frame, where pixel i covers [i - 0.5, i + 0.5]."""
+        across = ((edge - self.left_px) * self.scale - 0.5 for edge in (label.left_px, label.right_px))
+        down = ((edge - self.top_px) * self.scale - 0.5 for edge in (label.top_px, label.bottom_px))
+        (left, right), (top, bottom) = across, down
+        return left, top, right, bottom
+
+
+def load_frame(path: Path) -> Frame:
+    """A picture, upright, made as large as a frame may be but not enlarged; BslamError if it cannot be read.
+
+    Its sides become multiples of a cell: up to three pixels of the frame are cut off, half on each side.
+    """
+    try:
+        with Image.open(path) as opened:
+            picture = ImageOps.exif_transpose(opened).convert("RGB")
+    except (OSError, SyntaxError) as error:
+        raise BslamError(f"{path}: cannot be read: {error}; allowed: a picture (PNG, JPEG)") from error
+    most_px = frame_size_max()
+    scale = min(1.0, *(most / side for most, side in zip(most_px, picture.size, strict=True)))
+    width_px, height_px = (CELL_PX * int(side * scale / CELL_PX) for side in picture.size)
+    if min(width_px, height_px) < 4 * CELL_PX:
+        size = f"{picture.size[0]}x{picture.size[1]}"
+        raise BslamError(f"{path}: is {size}; allowed: sides from {4 * CELL_PX} px, not longer than 20:1")
+    left_px = 0.5 * (picture.size[0] - width_px / scale)
+    top_px = 0.5 * (picture.size[1] - height_px / scale)
+    cut = (left_px, top_px, picture.size[0] - left_px, picture.size[1] - top_px)
+    small = picture.resize((width_px, height_px), Image.Resampling.BOX, box=cut)
+    return Frame(np.array(small), scale, left_px, top_px)
+
+
+def camera_for(width_px: int, height_px: int) -> Camera:
+    """A stand-in for the camera that took a picture: 60 degrees across. Signatures hardly depend on it."""
+    focal_px = 0.5 * width_px / math.tan(0.5 * FIELD_OF_VIEW_RAD)
+    centre_px = (0.5 * (width_px - 1), 0.5 * (height_px - 1))
+    return Camera(Lens("pinhole", width_px, height_px, focal_px, focal_px, *centre_px))
+
+
+def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
+    """The samples of all pictures; `model` finds candidates (the built-in one unless given).
+
+    The pictures are taken for one room, and are looked at twice in the order of their names: first the front
+    end learns the room's colours, which signatures are measured against, as it does on a robot.
+    BslamError if an object has no sample at all, or samples from one picture only.
+    """
+    frames = [load_frame(picture.path) for picture in folder.pictures]
+    front_ends = {size: FrontEnd([camera_for(*size)], model) for size in {frame.size_px for frame in frames}}
+    for frame in frames:
+        front_ends[frame.size_px].see(frame.rgb)
+    collected, found = _Collected(), Counter[str]()
+    useless = {}
+    for index, (picture, frame) in enumerate(zip(folder.pictures, frames, strict=True)):
+        front_end = front_ends[frame.size_px]
+        seeing = front_end.see(frame.rgb)
+        if seeing.reason in ("seen", "nothing"):
+            boxes = [frame.box(label) for label in picture.labels]
+            names = [label.name for label in picture.labels]
+            view = _View(front_end, boxes, [_index_of(folder, name) for name in names], index)
+            _add_boxes(collected, view)
+            owners = _add_candidates(collected, view, seeing.candidates)
+            found.update(names[owner] for owner in owners)
+            _add_others(collected, view)
+        else:
+            useless[picture.path.name] = seeing.reason
+    drawn = Counter(label.name for picture in folder.pictures for label in picture.labels)
+    _check(folder, collected, drawn)
+    return Samples(
+        np.array(collected.signatures, dtype=np.float32),
+        np.array(collected.labels, dtype=np.int64),
+        np.array(collected.pictures, dtype=np.int64),
+        np.array(collected.counts, dtype=np.bool_),
+        drawn,
+        found,
+        useless,
+    )
+
+
+@dataclass(frozen=True)
+class _View:
+    """A picture that the front end has just looked at: its labelled boxes, and their indices of objects."""
+
+    front_end: FrontEnd
+    boxes: list[Box]
+    objects: list[int]
+    picture: int
+
+
+def _index_of(folder: Folder, name: str) -> int:
+    return next(index for index, one in enumerate(folder.objects) if one.name == name)
+
+
+def _add_boxes(collected: _Collected, view: _View) -> None:
+    """Labelled boxes, as drawn and shaken."""
+    random = np.random.default_rng(view.picture)
+    for box, label in zip(view.boxes, view.objects, strict=True):
+        collected.add(view.front_end.signature(box), label, view.picture)
+        for one in _shaken(box, random):
+            collected.add(view.front_end.signature(one), label, view.picture, counts=False)
+
+
+def _add_candidates(collected: _Collected, view: _View, candidates: Sequence[Candidate]) -> set[int]:
+    """What the front end found by itself; the labelled boxes that are among it."""
+    owners = _owners([one.outline for one in candidates], view.boxes)
+    for candidate, owner in zip(candidates, owners, strict=True):
+        if owner is not None:
+            label = NONE if owner == NONE else view.objects[owner]
+            collected.add(candidate.signature, label, view.picture)
+    return {owner for owner in owners if owner is not None and owner != NONE}
+
+
+def _add_others(collected: _Collected, view: _View) -> None:
+    """Proposals that lie on no box."""
+    boxes: list[Box] = [(a, b, c, d) for a, b, c, d in view.front_end.proposals().boxes.tolist()]
+    owners = _owners(boxes, view.boxes)
+    others = [box for box, owner in zip(boxes, owners, strict=True) if owner == NONE]
+    for box in others[:OTHERS_A_PICTURE]:
+        collected.add(view.front_end.signature(box), NONE, view.picture)
+
+
+def folder_sha256(folder: Folder) -> str:
+    """Of the labels file and the pictures, in the order of their names."""
+    digest = hashlib.sha256((folder.path / FILE).read_bytes())
+    for picture in folder.pictures:
+        digest.update(picture.path.read_bytes())
+    return digest.hexdigest()
+
+
+def _owners(boxes: list[Box], targets: list[Box]) -> list[int | None]:
+    """For each box the index of the target that it is of, NONE, or None where it is neither."""
+    if not boxes:
+        return []
+    if not targets:
+        return [NONE] * len(boxes)
+    overlap = overlaps(np.array(boxes), np.array(targets))
+    best = overlap.argmax(axis=1)
+    return [
+        int(target) if row[target] >= SAME_OVERLAP else NONE if row[target] <= OTHER_OVERLAP else None
+        for row, target in zip(overlap, best, strict=True)
+    ]
+
+
+def _shaken(box: Box, random: np.random.Generator) -> list[Box]:
+    left, top, right, bottom = box
+    sides = np.array(box)
+    size = np.array([right - left, bottom - top] * 2)
+    moved = sides + SHAKE * size * random.uniform(-1.0, 1.0, (SHAKES, 4))
+    return [(float(a), float(b), float(c), float(d)) for a, b, c, d in moved]
+
+
+def _check(folder: Folder, collected: _Collected, boxes: Counter[str]) -> None:
+    labels, pictures = np.array(collected.labels), np.array(collected.pictures)
+    names = [one.name for one in folder.objects]
+    for index, name in enumerate(names):
+        of_it = len(np.unique(pictures[labels == index])) if len(labels) else 0
+        if of_it < 2:
+            what = f"{boxes[name]} boxes give signatures in {of_it} pictures"
+            raise BslamError(
+                f"{folder.path / FILE}, class {name!r}: {what} (too small, too dark or hardly in the frame "
+                "gives none); allowed: at least 2 pictures of each class"
+            )
+    if len(names) == 1 and not np.any(labels == NONE):
+        raise BslamError(
+            f"{folder.path / FILE}: nothing but {names[0]!r}; allowed: a second class, or pictures in which "
+            "something else is seen"
+        )
