@@ -28,6 +28,7 @@ _LAMP_SIDES_M = ((0.6, 0.6), (1.2, 0.3), (0.3, 1.2))
 _LAMP_GLOW = 1.5
 _SIDES_FROM_M = 0.015  # a body thinner than this has no sides worth drawing
 _MARGIN_M = 0.08  # between things on a wall
+_TOUCH_M = 0.001  # a wall that comes no nearer to another's front only touches it
 _WINDOW_LIGHT = 2.0  # for each metre of its width
 _WALL_LOOKS = 3  # at most so many in an arena
 _LAMP_DRIFT, _SKY_DRIFT = 0.15, 0.5
@@ -58,6 +59,14 @@ class WallFace:
         x_m = self.left[0] + along_m * self.right[0] + out_m * self.normal[0]
         y_m = self.left[1] + along_m * self.right[1] + out_m * self.normal[1]
         return x_m, y_m
+
+    def along_and_out(self, point: Point) -> tuple[float, float]:
+        """The inverse of `at`."""
+        x_m, y_m = point[0] - self.left[0], point[1] - self.left[1]
+        return (
+            x_m * self.right[0] + y_m * self.right[1],
+            x_m * self.normal[0] + y_m * self.normal[1],
+        )
 
 
 def faces_of(wall: Wall) -> tuple[WallFace, WallFace]:
@@ -118,6 +127,8 @@ class Furnisher:
         """Whether a thing fits the wall there and touches nothing else."""
         half_m = 0.5 * width_m + _MARGIN_M
         if along_m < half_m or along_m > face.length_m - half_m:
+            return False
+        if any(_stands_in(wall, face, along_m, half_m, depth_m) for wall in self.walls):
             return False
         footprint = _footprint(face, along_m, 2.0 * half_m, depth_m + _MARGIN_M)
         return not any(footprint.overlaps(other) for other in self._taken)
@@ -276,6 +287,23 @@ def _draw_lighting(artist: Artist) -> Lighting:
     )
     sky_rgb = (artist.between(0.8, 1.0), 0.95, artist.between(1.0, 1.15))
     return Lighting((1.0, 0.5 + 0.5 * blue, blue), sky_rgb, lamp_drift, sky_drift)
+
+
+def _stands_in(wall: Wall, face: WallFace, along_m: float, half_m: float, depth_m: float) -> bool:
+    """Whether a wall runs through the floor before a stretch of another wall's face."""
+    start, end = face.along_and_out(wall.start), face.along_and_out(wall.end)
+    enter, leave = 0.0, 1.0
+    for from_m, to_m, low_m, high_m in (
+        (start[0], end[0], along_m - half_m, along_m + half_m),
+        (start[1], end[1], _TOUCH_M, max(depth_m, 2.0 * _TOUCH_M)),
+    ):
+        if from_m == to_m:
+            if not low_m < from_m < high_m:
+                return False
+            continue
+        ends = sorted(((low_m - from_m) / (to_m - from_m), (high_m - from_m) / (to_m - from_m)))
+        enter, leave = max(enter, ends[0]), min(leave, ends[1])
+    return enter < leave
 
 
 def _footprint(face: WallFace, along_m: float, width_m: float, depth_m: float) -> Footprint:

@@ -146,9 +146,7 @@ def _hang(furnisher: Furnisher, at: Point, where: str) -> tuple[WallFace, float]
     """
     best: tuple[float, WallFace, float] | None = None
     for face in furnisher.faces:
-        to_x, to_y = at[0] - face.left[0], at[1] - face.left[1]
-        along_m = to_x * face.right[0] + to_y * face.right[1]
-        out_m = to_x * face.normal[0] + to_y * face.normal[1]
+        along_m, out_m = face.along_and_out(at)
         if not (0.0 <= along_m <= face.length_m and -1e-6 <= out_m <= _ON_WALL_M):
             continue
         if not furnisher.is_inside(face.at(along_m, 0.2)):
