@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from bslam.errors import BslamError
 FORMAT = "bslam recogniser"
 VERSION = 1
 ROWS_MAX = 255
-HEIGHT_MAX_M = 10.0
+SIZE_MAX_M = 10.0
 
 
 def weights_in_row(features: int, quadratic: bool) -> int:
@@ -86,7 +86,7 @@ def recogniser_text(recogniser: Recogniser) -> str:
         "format": FORMAT,
         "version": VERSION,
         "notes": dict(recogniser.notes),
-        "objects": [{"name": one.name, "height_m": one.height_m} for one in recogniser.objects],
+        "objects": [asdict(one) for one in recogniser.objects],
         "features": svm.features,
         "reject_margin": _rounded(recogniser.reject_margin),
     }
@@ -104,7 +104,7 @@ def read_recogniser(path: Path, features: int) -> Recogniser:
     document.equal("version", VERSION)
     document.equal("features", features)
     objects = tuple(
-        BeaconClass(one.text("name"), one.number("height_m", 0.0, HEIGHT_MAX_M))
+        BeaconClass(one.text("name"), *(one.number(key, 0.0, SIZE_MAX_M) for key in ("height_m", "depth_m")))
         for one in document.children("objects", ROWS_MAX)
     )
     rows = len(objects)

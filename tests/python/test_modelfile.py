@@ -20,7 +20,7 @@ def recogniser() -> Recogniser:
     weights = (random.standard_normal((3, FEATURES)) * 10.0 ** random.uniform(-9, 9, (3, FEATURES))).astype(
         np.float32
     )
-    objects = (BeaconClass("red box", 0.3), BeaconClass("Tür", 2.0), BeaconClass("poster"))
+    objects = (BeaconClass("red box", 0.3), BeaconClass("Tür", 2.0, 0.05), BeaconClass("poster"))
     svm = Svm(FEATURES, False, weights, np.array([0.1, -1 / 3, 1e-30], dtype=np.float32))
     return Recogniser(svm, objects, 0.1, {"pictures": "20 of the kitchen"})
 

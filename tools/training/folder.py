@@ -2,13 +2,14 @@
 
 One line a box, in any order:
 
-    picture,class,left_px,top_px,right_px,bottom_px,height_m
-    kitchen_01.jpg,red box,812,400,1033,911,0.3
+    picture,class,left_px,top_px,right_px,bottom_px,height_m,depth_m
+    kitchen_01.jpg,red box,812,400,1033,911,0.3,0.1
 
 `picture` is a file in the folder (or below it), `class` the name of one object or kind. Edges count from the
-upper left corner of the upright picture: 0 to its width and height. `height_m` is the real height, the same
-on every line of a class; it may be empty, and the column may be missing: then the class has no distance. A
-picture with nothing in it stands on a line with its name alone: what is seen in it is none of the objects.
+upper left corner of the upright picture: 0 to its width and height. `height_m` is the real height, `depth_m`
+how far the object stands out from the wall, both the same on every line of a class; either may be empty, and
+its column may be missing: without a height the class has no distance. A picture with nothing in it stands on
+a line with its name alone: what is seen in it is none of the objects.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from pathlib import Path
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from bslam.errors import BslamError
-from bslam.modelfile import HEIGHT_MAX_M, BeaconClass
+from bslam.modelfile import SIZE_MAX_M, BeaconClass
 
 FILE = "labels.csv"
-COLUMNS = ("picture", "class", "left_px", "top_px", "right_px", "bottom_px", "height_m")
-EDGES = COLUMNS[2:6]
+SIZES = ("height_m", "depth_m")
+REQUIRED = ("picture", "class", "left_px", "top_px", "right_px", "bottom_px")
+COLUMNS = (*REQUIRED, *SIZES)
+EDGES = REQUIRED[2:]
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def read_folder(path: Path) -> Folder:
     rows = _read_rows(file)
     sizes: dict[str, tuple[int, int]] = {}
     labels: dict[str, list[Label]] = {}
-    heights: dict[str, float] = {}
+    objects: dict[str, BeaconClass] = {}
     for row in rows:
         name = row.text("picture", "the name of a picture in the folder")
         if name not in sizes:
@@ -77,14 +80,16 @@ def read_folder(path: Path) -> Folder:
             continue
         label = _label(row, sizes[name])
         labels[name].append(label)
-        height_m = row.height_m()
-        if heights.setdefault(label.name, height_m) != height_m:
-            raise row.error("height_m", f"{heights[label.name]:g}, as on other lines of {label.name!r}")
-    if not heights:
+        size = {column: row.size_m(column) for column in SIZES}
+        known = objects.setdefault(label.name, BeaconClass(label.name, **size))
+        for column in SIZES:
+            if size[column] != getattr(known, column):
+                allowed = f"{getattr(known, column):g}, as on other lines of {label.name!r}"
+                raise row.error(column, allowed)
+    if not objects:
         raise BslamError(f"{file}: no box in it; allowed: at least one box of each of one or more classes")
     pictures = tuple(Picture(path / name, *sizes[name], tuple(labels[name])) for name in sorted(sizes))
-    objects = tuple(BeaconClass(name, heights[name]) for name in sorted(heights))
-    return Folder(path, pictures, objects)
+    return Folder(path, pictures, tuple(objects[name] for name in sorted(objects)))
 
 
 @dataclass(frozen=True)
@@ -116,9 +121,9 @@ class _Row:
             raise self.error(column, allowed)
         return value
 
-    def height_m(self) -> float:
+    def size_m(self, column: str) -> float:
         """0 where none is given."""
-        return self.number("height_m", 0.0, HEIGHT_MAX_M) if self.fields.get("height_m", "").strip() else 0.0
+        return self.number(column, 0.0, SIZE_MAX_M) if self.fields.get(column, "").strip() else 0.0
 
     def is_picture_alone(self) -> bool:
         return not any(self.fields.get(column, "").strip() for column in COLUMNS[1:])
@@ -131,8 +136,8 @@ def _read_rows(file: Path) -> list[_Row]:
         raise BslamError(f"{file}: cannot be read: {error}; allowed: a UTF-8 text file") from error
     reader = csv.reader(text.splitlines())
     names = [name.strip() for name in next(reader, [])]
-    if sorted(names) not in (sorted(COLUMNS), sorted(COLUMNS[:-1])):
-        allowed = f"{','.join(COLUMNS[:-1])} and perhaps {COLUMNS[-1]}"
+    if sorted(name for name in names if name not in SIZES) != sorted(REQUIRED) or len({*names}) < len(names):
+        allowed = f"{','.join(REQUIRED)} and perhaps {','.join(SIZES)}"
         raise BslamError(f"{file}, line 1: columns {','.join(names)!r} are not allowed; allowed: {allowed}")
     return [_row(file, reader.line_num, names, fields) for fields in reader if fields]
 

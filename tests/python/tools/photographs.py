@@ -1,7 +1,7 @@
 """Rendered pictures of one furnished room that stand for a user's photographs, with their labels.csv."""
 
 import csv
-from collections.abc import Sequence
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -27,33 +27,37 @@ def is_good(seen: Seen) -> bool:
     return whole and seen.slant_rad < 1.0
 
 
-def take(folder: Path, count: int, seed: int, names: Sequence[str] | None = None) -> list[list[str]]:
-    """Take `count` pictures into a folder; the rows of its labels.csv. `names`: who gets a box, None: all."""
+def take(folder: Path, count: int, seed: int) -> list[list[str]]:
+    """Take `count` pictures of the room into a folder; the rows of its labels.csv.
+
+    Who is in one picture only gets no box: a user has no use for that either.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     scene = make_world(WORLD, "test")
     renderer = Renderer(scene, load_rig("three60").cameras[1], [WORLD, seed])
     random = np.random.default_rng([WORLD, seed])
-    rows: list[list[str]] = []
-    taken = 0
-    while taken < count:
-        frame = renderer.render(tuple(free_pose(scene, random)), 10.0 * taken)
+    views: dict[str, list[Seen]] = {}
+    while len(views) < count:
+        frame = renderer.render(tuple(free_pose(scene, random)), 10.0 * len(views))
         good = [one for one in frame.seen if is_good(one)]
-        if not good:
-            continue
-        picture = f"{seed}_{taken:02}.png"
-        Image.fromarray(frame.rgb).save(folder / picture)
-        boxes = [_row(picture, one, scene) for one in good if names is None or name_of(one) in names]
-        rows += boxes or [[picture, *[""] * (len(COLUMNS) - 1)]]
-        taken += 1
+        if good:
+            name = f"{seed}_{len(views):02}.png"
+            Image.fromarray(frame.rgb).save(folder / name)
+            views[name] = good
+    often = Counter(one.beacon_id for seen in views.values() for one in seen)
+    rows = []
+    for name, seen in views.items():
+        boxes = [_row(name, one, scene) for one in seen if often[one.beacon_id] > 1]
+        rows += boxes or [[name, *[""] * (len(COLUMNS) - 1)]]
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([COLUMNS, *rows])
     return rows
 
 
 def _row(picture: str, seen: Seen, scene: Scene) -> list[str]:
-    height_m = next(one.height_m for one in scene.beacons if one.beacon_id == seen.beacon_id)
+    look = next(one for one in scene.beacons if one.beacon_id == seen.beacon_id)
     edges = [f"{edge + 0.5:.2f}" for edge in seen.box]
-    return [picture, name_of(seen), *edges, f"{height_m:g}"]
+    return [picture, name_of(seen), *edges, f"{look.height_m:g}", f"{look.depth_m:g}"]
 
 
 def blind_model() -> BeaconModel:

@@ -10,6 +10,7 @@ from bslam.modelfile import BeaconClass
 from training.folder import COLUMNS, Label, read_folder
 
 HEADER = ",".join(COLUMNS)
+HEIGHTS = HEADER.removesuffix(",depth_m")
 
 
 @pytest.fixture
@@ -28,20 +29,26 @@ def write_labels(folder: Path, *lines: str, header: str = HEADER) -> Path:
 def test_read_folder_gives_boxes_by_picture_and_objects_by_name(folder: Path) -> None:
     write_labels(
         folder,
-        "b.jpg,red box,10,20,30,40,0.3",
-        'a.png,"door, left",0,0,100,80,',
+        "b.jpg,red box,10,20,30,40,0.3,0.1",
+        'a.png,"door, left",0,0,100,80,,',
         "",
-        "b.jpg,red box,50.5,20,60,79.25,0.3",
+        "b.jpg,red box,50.5,20,60,79.25,0.3,0.1",
     )
     read = read_folder(folder)
-    assert read.objects == (BeaconClass("door, left", 0.0), BeaconClass("red box", 0.3))
+    assert read.objects == (BeaconClass("door, left", 0.0), BeaconClass("red box", 0.3, 0.1))
     assert [picture.path.name for picture in read.pictures] == ["a.png", "b.jpg"]
     assert read.pictures[0].labels == (Label("door, left", 0, 0, 100, 80),)
     assert read.pictures[1].labels[1] == Label("red box", 50.5, 20, 60, 79.25)
     assert (read.pictures[1].width_px, read.pictures[1].height_px) == (100, 80)
 
 
-def test_read_folder_without_heights_and_in_another_order_of_columns(folder: Path) -> None:
+def test_read_folder_depth_that_contradicts_is_refused(folder: Path) -> None:
+    write_labels(folder, "a.png,door,1,2,3,4,2,0.1", "b.jpg,door,1,2,3,4,2,")
+    with pytest.raises(BslamError, match=r"line 3, column depth_m: '' is .* allowed: 0\.1, as on other"):
+        read_folder(folder)
+
+
+def test_read_folder_without_sizes_and_in_another_order_of_columns(folder: Path) -> None:
     header = "class,picture,right_px,left_px,bottom_px,top_px"
     write_labels(folder, "door,a.png,30,10,40,20", header=header)
     read = read_folder(folder)
@@ -50,7 +57,7 @@ def test_read_folder_without_heights_and_in_another_order_of_columns(folder: Pat
 
 
 def test_read_folder_picture_alone_has_nothing_in_it(folder: Path) -> None:
-    write_labels(folder, "a.png,,,,,,", "b.jpg,door,1,2,3,4,2")
+    write_labels(folder, "a.png,,,,,,,", "b.jpg,door,1,2,3,4,2,")
     assert [len(picture.labels) for picture in read_folder(folder).pictures] == [0, 1]
 
 
@@ -58,7 +65,7 @@ def test_read_folder_picture_on_its_side_is_measured_upright(folder: Path) -> No
     exif = Image.Exif()
     exif[ExifTags.Base.Orientation] = 6
     Image.new("RGB", (100, 80)).save(folder / "a.png", exif=exif)
-    read = read_folder(write_labels(folder, "a.png,door,0,0,80,100,"))
+    read = read_folder(write_labels(folder, "a.png,door,0,0,80,100,,"))
     assert (read.pictures[0].width_px, read.pictures[0].height_px) == (80, 100)
 
 
@@ -82,7 +89,7 @@ def test_read_folder_picture_on_its_side_is_measured_upright(folder: Path) -> No
     ],
 )
 def test_read_folder_bad_line_is_refused(folder: Path, line: str, complaint: str) -> None:
-    write_labels(folder, "a.png,sign,1,2,3,4,0.3", line)
+    write_labels(folder, "a.png,sign,1,2,3,4,0.3", line, header=HEIGHTS)
     with pytest.raises(BslamError, match=complaint) as caught:
         read_folder(folder)
     assert str(caught.value).startswith(str(folder / "labels.csv"))
@@ -103,7 +110,7 @@ def test_read_folder_bad_header_is_refused(folder: Path, header: str, complaint:
 
 def test_read_folder_without_any_box_is_refused(folder: Path) -> None:
     with pytest.raises(BslamError, match="no box in it"):
-        read_folder(write_labels(folder, "a.png,,,,,,"))
+        read_folder(write_labels(folder, "a.png,,,,,,,"))
 
 
 def test_read_folder_without_labels_file_is_refused(folder: Path) -> None:
@@ -114,4 +121,4 @@ def test_read_folder_without_labels_file_is_refused(folder: Path) -> None:
 def test_read_folder_truncated_picture_is_refused_by_its_header(folder: Path) -> None:
     (folder / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     with pytest.raises(BslamError, match=r"column picture: 'a\.png' is not allowed"):
-        read_folder(write_labels(folder, "a.png,door,1,2,3,4,"))
+        read_folder(write_labels(folder, "a.png,door,1,2,3,4,,"))

@@ -9,6 +9,7 @@ import pytest
 import quickjs
 from PIL import Image
 
+from bslam.modelfile import BeaconClass
 from training.folder import COLUMNS, Label, read_folder
 
 PAGE = (Path(__file__).parents[3] / "tools/label.html").read_text(encoding="utf-8")
@@ -40,15 +41,15 @@ BOXES = {
     "a, first.png": [{"name": "Tür", "left": 0, "top": 0, "right": 9.96, "bottom": 8}],
     "c.png": [],
 }
-HEIGHTS = {"Tür": "2.0"}
+SIZES = {"Tür": ["2.0", "0.05"]}
 
 
 def test_to_csv_is_what_training_reads(page: quickjs.Context, tmp_path: Path) -> None:
     for name in BOXES:
         Image.new("RGB", (100, 80)).save(tmp_path / name)
-    (tmp_path / "labels.csv").write_text(call(page, "toCsv", BOXES, HEIGHTS), encoding="utf-8")
+    (tmp_path / "labels.csv").write_text(call(page, "toCsv", BOXES, SIZES), encoding="utf-8")
     folder = read_folder(tmp_path)
-    assert [(one.name, one.height_m) for one in folder.objects] == [("Tür", 2.0), ('a "red", big box', 0.0)]
+    assert folder.objects == (BeaconClass("Tür", 2.0, 0.05), BeaconClass('a "red", big box'))
     assert [picture.path.name for picture in folder.pictures] == ["a, first.png", "b.png", "c.png"]
     assert folder.pictures[0].labels == (Label("Tür", 0, 0, 10, 8),)
     assert folder.pictures[1].labels[0] == Label('a "red", big box', 1, 2.3, 30, 40)
@@ -56,11 +57,11 @@ def test_to_csv_is_what_training_reads(page: quickjs.Context, tmp_path: Path) ->
 
 
 def test_from_csv_goes_on_where_to_csv_ended(page: quickjs.Context) -> None:
-    text = call(page, "toCsv", BOXES, HEIGHTS)
+    text = call(page, "toCsv", BOXES, SIZES)
     read = call(page, "fromCsv", text)
-    assert read["heights"] == HEIGHTS
+    assert read["sizes"] == {'a "red", big box': ["", ""], **SIZES}
     assert set(read["boxes"]) == set(BOXES)
-    assert call(page, "toCsv", read["boxes"], read["heights"]) == text
+    assert call(page, "toCsv", read["boxes"], read["sizes"]) == text
 
 
 @pytest.mark.parametrize(

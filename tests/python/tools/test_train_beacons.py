@@ -218,14 +218,14 @@ def test_missing_picture_is_refused(tmp_path, capsys):
 
 def test_class_of_one_picture_is_refused(tmp_path, capsys):
     rows = photographs.take(tmp_path, 6, seed=3)
-    write_labels(tmp_path, [*rows, [rows[0][0], "lamp", "10", "10", "60", "60", ""]])
+    write_labels(tmp_path, [*rows, [rows[0][0], "lamp", "10", "10", "60", "60", "", ""]])
     error = refusal(tmp_path, capsys)
     assert "class '" in error and "allowed: at least 2 pictures of each class" in error
 
 
 def test_class_without_any_signature_is_refused(tmp_path, capsys):
     rows = photographs.take(tmp_path, 6, seed=3)
-    tiny = [[row[0], "dot", "100", "100", "102", "102", ""] for row in rows[:3]]
+    tiny = [[row[0], "dot", "100", "100", "102", "102", "", ""] for row in rows[:3]]
     write_labels(tmp_path, tiny)
     assert "class 'dot': 3 boxes give signatures in 0 pictures" in refusal(tmp_path, capsys)
 
@@ -241,7 +241,7 @@ def test_single_class_and_nothing_else_is_refused(tmp_path, capsys):
 def test_objects_that_cannot_be_told_apart_are_refused(tmp_path, capsys):
     rows = [row for row in photographs.take(tmp_path, 14, seed=3) if row[1]]
     random = np.random.default_rng(1)
-    write_labels(tmp_path, [[row[0], random.choice(["a", "b"]), *row[2:6], ""] for row in rows])
+    write_labels(tmp_path, [[row[0], random.choice(["a", "b"]), *row[2:6], "", ""] for row in rows])
     assert "objects are recognised at precision 1; allowed: at least half" in refusal(
         tmp_path, capsys, "--precision", "1"
     )
