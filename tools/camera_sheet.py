@@ -18,7 +18,8 @@ from bslam.world.scenario import load_scenario
 COLUMNS = 4
 SCALE = 0.75
 DRAWS = 12  # a pose is the one of so many that shows most beacons
-COLOURS = 48  # of the PNG: the file stays small
+SMALL_PX = 300  # what shows less of itself does not count as shown
+COLOURS = 224  # of the PNG: the file stays small
 
 
 def best_frame(scene: Scene, camera: Camera, seed: int) -> Frame:
@@ -26,7 +27,7 @@ def best_frame(scene: Scene, camera: Camera, seed: int) -> Frame:
     random = np.random.default_rng(seed)
     poses = [free_pose(scene, random) for _ in range(DRAWS)]
     frames = [Renderer(scene, camera, seed).render(pose, 0.0) for pose in poses]
-    return max(frames, key=lambda frame: sum(min(seen.visible_px, 3000) for seen in frame.seen))
+    return max(frames, key=lambda frame: sum(seen.visible_px > SMALL_PX for seen in frame.seen))
 
 
 def truth_picture(frame: Frame) -> NDArray[np.uint8]:

@@ -1,7 +1,7 @@
 """How long the simulated camera takes: makes worlds, walks in them and renders, as a training set does.
 
-Prints CPU seconds for --frames pictures (25 a world) of the 60-degree and the 180-degree camera, the making of
-the worlds included. `.venv/bin/python tools/measure_renderer.py [--frames 5000] [--seed 0] [--rigs wide180]`
+Prints CPU seconds for --frames pictures (25 a world) of the 60-degree and the 180-degree camera, the making
+of the worlds included. `.venv/bin/python tools/measure_renderer.py [--frames 5000] [--seed 0] [--rigs wide180]`
 """
 
 import argparse
@@ -44,7 +44,7 @@ def main() -> None:
         each_ms = 1000.0 * (making_s + rendering_s) / arguments.frames
         print(
             f"{rig_name}: {arguments.frames} frames in {making_s + rendering_s:.1f} s of CPU "
-            f"({making_s:.1f} s of it for {arguments.frames // FRAMES_A_WORLD} worlds), {each_ms:.1f} ms a frame"
+            f"({making_s:.1f} s for {arguments.frames // FRAMES_A_WORLD} worlds), {each_ms:.1f} ms a frame"
         )
 
 

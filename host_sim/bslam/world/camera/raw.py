@@ -161,9 +161,9 @@ class Caster:
             self._light,
             _pointer(self._lens.vignette),
             _pointer(self._linear),
-            _pointer(identity, "int16_t *"),
-            _pointer(depth_m),
         )
+        identity_c, depth_c = _pointer(identity, "int16_t *"), _pointer(depth_m)
+        lib.render_truth(scene, lens, self._faces, hits, identity_c, depth_c)
         return identity, depth_m
 
     def brightness(self) -> float:

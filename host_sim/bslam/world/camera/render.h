@@ -131,11 +131,13 @@ void render_trace(const render_scene_t *scene, const render_lens_t *lens, const 
 int32_t render_own_px(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
                       int32_t first, int32_t count, const int32_t box[4]);
 
-/* From hits to pictures: linear colour times shading of the lens [height][width][3], identity and distance
- * along the ray in m (inf: nothing) [height][width]. */
+/* From hits to linear colour times the lens's shading [height][width], linear [height][width][3]. */
 void render_shade(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                  const int16_t *hits, const render_light_t *light, const float *vignette, float *linear,
-                  int16_t *identity, float *depth_m);
+                  const int16_t *hits, const render_light_t *light, const float *vignette, float *linear);
+
+/* From hits to identity and distance along the ray in m (inf: nothing), [height][width]. */
+void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
+                  const int16_t *hits, int16_t *identity, float *depth_m);
 
 /* Blurs `linear` (scratch: the same size) and turns it into 8 bits with noise; `random` is advanced.
  * normals[RENDER_NORMALS]: quantiles of the normal distribution; tones[RENDER_TONES]: the tone curve. */

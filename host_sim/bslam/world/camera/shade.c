@@ -220,11 +220,12 @@ static footprint_t footprint_of(const render_face_t *face, const float s, const 
                                 const float steps[2][3], const float size[2])
 {
     const float row_s = dot3(face->s, steps[0]), column_s = dot3(face->s, steps[1]);
+    const float scale_u = size[0] / s, scale_v = size[1] / s;
     return (footprint_t){
-        .row_u = size[0] * (dot3(face->a, steps[0]) - u * row_s) / s,
-        .row_v = size[1] * (dot3(face->b, steps[0]) - v * row_s) / s,
-        .column_u = size[0] * (dot3(face->a, steps[1]) - u * column_s) / s,
-        .column_v = size[1] * (dot3(face->b, steps[1]) - v * column_s) / s,
+        .row_u = scale_u * (dot3(face->a, steps[0]) - u * row_s),
+        .row_v = scale_v * (dot3(face->b, steps[0]) - v * row_s),
+        .column_u = scale_u * (dot3(face->a, steps[1]) - u * column_s),
+        .column_v = scale_v * (dot3(face->b, steps[1]) - v * column_s),
     };
 }
 
@@ -345,24 +346,46 @@ static void mix(const render_scene_t *scene, const render_lens_t *lens, const re
     }
 }
 
-void render_shade(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                  const int16_t *hits, const render_light_t *light, const float *vignette, float *linear,
-                  int16_t *identity, float *depth_m)
+static void shade_row(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
+                      const render_light_t *light, const int16_t *hits, int32_t row, float *linear)
 {
     const int32_t stride = rays_along(lens->width_px);
-    for (int32_t to = 0; to < lens->width_px * lens->height_px; to++) {
-        const int32_t centre = (2 * (to / lens->width_px) + 1) * stride + 2 * (to % lens->width_px) + 1;
+    int32_t centre = (2 * row + 1) * stride + 1;
+    for (int32_t column = 0; column < lens->width_px; column++, centre += 2, linear += 3) {
         const int16_t hit = hits[centre];
-        float rgb[3] = {0.0f}, ray[3], steps[2][3];
+        float ray[3], steps[2][3];
+        linear[0] = linear[1] = linear[2] = 0.0f;
         ray_at(lens, centre, ray);
         ray_steps(lens, centre, steps);
         if (is_mixed(&hits[centre], stride))
-            mix(scene, lens, faces, light, hits, centre, steps, rgb);
+            mix(scene, lens, faces, light, hits, centre, steps, linear);
         else if (hit != RENDER_NOTHING)
-            add_colour(scene, faces, light, hit, ray, steps, 1.0f, rgb);
-        for (int32_t i = 0; i < 3; i++)
-            linear[3 * to + i] = vignette[to] * rgb[i];
-        identity[to] = hit == RENDER_NOTHING ? -1 : (int16_t)scene->surfaces[hit].identity;
-        depth_m[to] = hit == RENDER_NOTHING ? INFINITY : 1.0f / dot3(faces[hit].s, ray);
+            add_colour(scene, faces, light, hit, ray, steps, 1.0f, linear);
+    }
+}
+
+void render_shade(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
+                  const int16_t *hits, const render_light_t *light, const float *vignette, float *linear)
+{
+    const int32_t width = lens->width_px;
+    for (int32_t row = 0; row < lens->height_px; row++) {
+        shade_row(scene, lens, faces, light, hits, row, &linear[3 * row * width]);
+        for (int32_t i = 0; i < 3 * width; i++)
+            linear[3 * row * width + i] *= vignette[row * width + i / 3];
+    }
+}
+
+void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
+                  const int16_t *hits, int16_t *identity, float *depth_m)
+{
+    for (int32_t row = 0; row < lens->height_px; row++) {
+        int32_t centre = (2 * row + 1) * rays_along(lens->width_px) + 1;
+        for (int32_t column = 0; column < lens->width_px; column++, centre += 2) {
+            const int16_t hit = hits[centre];
+            float ray[3];
+            ray_at(lens, centre, ray);
+            *identity++ = hit == RENDER_NOTHING ? -1 : (int16_t)scene->surfaces[hit].identity;
+            *depth_m++ = hit == RENDER_NOTHING ? INFINITY : 1.0f / dot3(faces[hit].s, ray);
+        }
     }
 }

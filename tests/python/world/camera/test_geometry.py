@@ -74,7 +74,7 @@ def test_render_beacon_corners_are_where_the_lens_formula_says(
     found = [columns.min() - 0.5, rows.min() - 0.5, columns.max() + 0.5, rows.max() + 0.5]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     assert low.min() > 0.0 and high[0] < 319.0 and high[1] < 239.0  # whole, or this tests nothing
-    # Pixel centres: the outermost lies within a pixel of the edge. A fisheye's edges bulge beyond the corners.
+    # Pixel centres: the outermost lies within a pixel of the edge. A fisheye's edges bulge beyond corners.
     bulge_px = 0.0 if camera.lens == pinhole else 1.5
     assert_allclose(found, [*low, *high], rtol=0.0, atol=1.0 + bulge_px)
     (seen,) = frame.seen
@@ -152,7 +152,7 @@ def test_unproject_distortion_that_turns_back_is_refused(poster_room: Scene) -> 
         Renderer(poster_room, Camera(lens), 0)
 
 
-# --- What Seen says ---------------------------------------------------------------------------------------------
+# --- What Seen says -----------------------------------------------------------------------------------------
 
 
 def test_seen_slant_bearing_and_range_are_those_of_the_front(poster_room: Scene, pinhole: Lens) -> None:
