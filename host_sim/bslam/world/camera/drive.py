@@ -9,7 +9,7 @@ import numpy as np
 from bslam.errors import BslamError
 from bslam.world.camera.scene import Floats, Scene
 
-_CLEARANCE_M = 0.45
+_CLEARANCE_M = 0.45  # of the middle of the robot from walls and things
 _DRAWS = 2000
 _SPEED_MPS = (0.3, 0.7)
 _TURN_RADPS = (0.5, 1.2)
@@ -53,13 +53,9 @@ def walk(scene: Scene, random: np.random.Generator, frames: int, hz: float = 5.0
 
 
 def _is_clear(scene: Scene, x_m: float, y_m: float) -> bool:
-    return scene.arena.nearest_wall(x_m, y_m)[0] >= _CLEARANCE_M + _deepest_m(scene) and all(
+    return scene.arena.nearest_wall(x_m, y_m)[0] >= _CLEARANCE_M and all(
         math.hypot(one.x_m - x_m, one.y_m - y_m) >= _CLEARANCE_M + one.radius_m for one in scene.obstacles
     )
-
-
-def _deepest_m(scene: Scene) -> float:
-    return max((one.depth_m for one in scene.beacons), default=0.0)
 
 
 def _next_goal(scene: Scene, random: np.random.Generator, start: tuple[float, float]) -> tuple[float, float]:

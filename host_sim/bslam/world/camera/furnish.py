@@ -28,6 +28,7 @@ _LAMP_SIDES_M = ((0.6, 0.6), (1.2, 0.3), (0.3, 1.2))
 _LAMP_GLOW = 1.5
 _SIDES_FROM_M = 0.015  # a body thinner than this has no sides worth drawing
 _MARGIN_M = 0.08  # between things on a wall
+_OBSTACLE_FROM_M = 0.2  # what stands out farther than this is in the way of a robot along the wall
 _TOUCH_M = 0.001  # a wall that comes no nearer to another's front only touches it
 _WINDOW_LIGHT = 2.0  # for each metre of its width
 _WALL_LOOKS = 3  # at most so many in an arena
@@ -147,6 +148,8 @@ class Furnisher:
             BeaconLook(beacon_id, name, x_m, y_m, kind.height_m, width_m, bottom_m, depth_m, facing_rad)
         )
         self._bodies.append(self._builder.body(first, name in ROUND))
+        if depth_m > _OBSTACLE_FROM_M:
+            self._obstacles.append(Obstacle(*face.at(along_m, 0.5 * depth_m), 0.5 * width_m))
         if name == "window":
             lamp_x_m, lamp_y_m = face.at(along_m, 0.3)
             middle_m = bottom_m + 0.5 * kind.height_m
@@ -189,6 +192,11 @@ class Furnisher:
     def is_inside(self, point: Point) -> bool:
         """Whether a point lies between the arena's outermost walls."""
         return all(self._low[i] < point[i] < self._high[i] for i in range(2))
+
+    def draw_foot(self, width_m: float, out_m: float) -> Point | None:
+        """A place so far before a wall, with no beacon or thing behind it; None if none was found."""
+        place = self.draw_place(width_m, out_m)
+        return None if place is None else place[0].at(place[1], out_m)
 
     def is_free_floor(self, x_m: float, y_m: float, radius_m: float) -> bool:
         """Whether a round thing there would stand clear of all others."""

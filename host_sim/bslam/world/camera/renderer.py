@@ -20,6 +20,7 @@ _SHUTTER_S = (0.004, 0.02)
 _MOTION_BLUR_PX_MAX = 4.0
 _LONGEST_STEP_S = 0.5  # frames farther apart tell nothing about how fast the camera turns
 _LENS_BLUR_PX = (0.25, 0.6)  # standard deviation
+_FAINT = 0.005
 _CAST = 0.05  # white balance that a camera keeps, and (next) that it wanders by
 _BALANCE_DRIFT = 0.05
 _SHOT = (1e-4, 4e-4)  # variance at full light, when the exposure is 1
@@ -169,7 +170,8 @@ def _to_level(points: Floats, eye: tuple[float, float, float], yaw_rad: float) -
 
 
 def _blur(sigma_px: float, taps: int) -> list[float]:
-    """A normal distribution over an odd number of pixels."""
+    """A normal distribution over an odd number of pixels; what is too small to see is nothing."""
     offsets = np.arange(taps) - taps // 2
     weights = np.exp(-0.5 * (offsets / sigma_px) ** 2)
+    weights[weights < _FAINT] = 0.0
     return (weights / weights.sum()).tolist()

@@ -25,6 +25,7 @@ _BEFORE_WALL_M, _BEFORE_WALL_SHARE = 0.9, 0.9
 
 _ON_WALL_M = 0.05  # a scenario's beacon this near to a wall hangs on it
 _GAP_SHARE = 0.9  # of the way to the neighbour that two beacons may take together
+_AT_WALL_M = 0.15  # clutter of a dressed scenario stands so near to a wall, out of the robot's way
 _DRESSED_DEPTH_M = 0.25  # a scenario's robot comes as near to the walls as 0.3 m
 
 
@@ -53,8 +54,9 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
     """A scenario's arena, furnished: each beacon gets a kind that fits its place, and a look.
 
     A beacon's foot is where the scenario has it; what stands out from the wall is seen its depth farther in
-    (`Scene.beacons`, `Scene.arena`). Nothing stands where the robot drives. BslamError: a beacon that hangs
-    on no wall, or too close to another for the narrowest kind; an id beyond 32767; a bad seed or style.
+    (`Scene.beacons`, `Scene.arena`). Clutter stands at the walls, where no robot drives. BslamError: a beacon
+    that hangs on no wall, or too close to another for the narrowest kind; an id beyond 32767; a bad seed or
+    style.
     """
     artist = _artist(seed, style, 1)
     arena = scenario.arena
@@ -76,6 +78,11 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         width_m = artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
         furnisher.add_beacon(beacon.beacon_id, name, kind, face, along_m, width_m)
     furnisher.add_wall_things(artist.count(*_WALL_THINGS) * len(areas))
+    for _ in range(artist.count(*_CLUTTER) * len(areas)):
+        piece = clutter(artist)
+        foot = furnisher.draw_foot(piece.width_m, _AT_WALL_M)
+        if foot is not None:
+            furnisher.add_clutter(piece, *foot)
     return furnisher.finish(seed)
 
 

@@ -111,7 +111,7 @@ def _dots(canvas: Canvas, artist: Artist) -> None:
 
 
 def _rough(canvas: Canvas, artist: Artist) -> None:
-    canvas.grain(artist.random, artist.between(0.02, 0.06), 64, 90)
+    canvas.grain(artist.random, artist.between(0.02, 0.06), 100, 150)
 
 
 _WALLS: dict[str, Callable[[Canvas, Artist], None]] = {
