@@ -1,7 +1,9 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
 C_TEST_FILES := $(wildcard tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch])
-C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES))
+CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
+CAMERA_HEADERS := $(wildcard host_sim/bslam/world/camera/*.h)
+C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES) $(CAMERA_SOURCES) $(CAMERA_HEADERS))
 PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
 
 LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \
@@ -18,10 +20,10 @@ lint-c-format:
 	@$(VENV)/bin/clang-format --dry-run -Werror $(C_FILES)
 
 # clang-tidy is slow, so a file that passed is not looked at again until it, a header or the rules change.
-TIDY_STAMPS := $(CORE_SOURCES:%.c=build/tidy/%.ok)
+TIDY_STAMPS := $(patsubst %.c,build/tidy/%.ok,$(CORE_SOURCES) $(CAMERA_SOURCES))
 lint-c-tidy: $(TIDY_STAMPS)
 
-$(TIDY_STAMPS): build/tidy/%.ok: %.c $(CORE_HEADERS) .clang-tidy mk/config.mk mk/lint.mk
+$(TIDY_STAMPS): build/tidy/%.ok: %.c $(CORE_HEADERS) $(CAMERA_HEADERS) .clang-tidy mk/config.mk mk/lint.mk
 	@mkdir -p $(@D)
 	@$(VENV)/bin/clang-tidy --quiet $< -- $(C_STANDARD) $(C_INCLUDES) >$@.log 2>&1 \
 	    || { cat $@.log >&2; exit 1; }
