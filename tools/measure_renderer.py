@@ -1,7 +1,7 @@
 """How long the simulated camera takes: makes worlds, walks in them and renders, as a training set does.
 
 Prints CPU seconds for --frames pictures (25 a world) of the 60-degree and the 180-degree camera, the making
-of the worlds included. `.venv/bin/python tools/measure_renderer.py [--frames 5000] [--seed 0] [--rigs wide180]`
+of the worlds included. `.venv/bin/python tools/measure_renderer.py [--frames 5000] [--rigs wide180]`
 """
 
 import argparse

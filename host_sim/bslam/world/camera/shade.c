@@ -186,9 +186,9 @@ static void bake_surface(const render_surface_t *surface, const float *lamps, in
     for (int32_t i = 0; i < 3; i++)
         normal[i] = surface->flags & RENDER_BILLBOARD ? 0.0f : normal[i] / length;
     for (int32_t node = 0; node < RENDER_LIGHT_NODES * RENDER_LIGHT_NODES; node++) {
-        const float step = 1.0f / (float)(RENDER_LIGHT_NODES - 1);
-        const float u = step * (float)(node % RENDER_LIGHT_NODES),
-                    v = step * (float)(node / RENDER_LIGHT_NODES);
+        const int32_t row = node / RENDER_LIGHT_NODES, column = node % RENDER_LIGHT_NODES;
+        const float u = (float)column / (float)(RENDER_LIGHT_NODES - 1);
+        const float v = (float)row / (float)(RENDER_LIGHT_NODES - 1);
         float at[3];
         for (int32_t i = 0; i < 3; i++)
             at[i] = surface->corner_m[i] + (0.01f + 0.98f * u) * right[i] + (0.01f + 0.98f * v) * down[i] +
