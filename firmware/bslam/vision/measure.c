@@ -11,11 +11,14 @@ static const bslam_real_t CUT_PX = 2;
 // Below this height no distance, below this width or height no direction.
 static const bslam_real_t HEIGHT_MIN_PX = 8;
 static const bslam_real_t SIDE_MIN_PX = 5;
-// How well a side of the outline is found, pixels.
-static const bslam_real_t SIDE_SD_PX = BSLAM_R(0.7);
-// Of a direction that no outline improves, radians; of a distance, as a fraction of it.
-static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(0.003);
-static const bslam_real_t RANGE_SD_MIN = BSLAM_R(0.01);
+// The variances: a floor, how well an edge is found where it is sure which edge (pixels), and how much of the
+// outline's doubts about which edge it is counts. Fitted to the errors in training worlds;
+// docs/EXPERIMENTS.md has the errors that these leave in test worlds.
+static const bslam_real_t BEARING_FLOOR_RAD = BSLAM_R(0.0008);
+static const bslam_real_t RANGE_FLOOR = BSLAM_R(0.01);
+static const bslam_real_t POINT_SD_PX = BSLAM_R(0.3);
+static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.25);
+static const bslam_real_t RANGE_DOUBT = 1;
 
 static bool box_is_number(const bslam_box_t *box)
 {
@@ -47,27 +50,21 @@ static bslam_box_t box_around(const bslam_quad_t *quad)
                          .bottom_px = left_lower ? quad->bottom_left_px : quad->bottom_right_px};
 }
 
-/// The object's middle in plan is half way between the feet of its two sides, which are at H / height_left
-/// and H / height_right: seen obliquely, the nearer half looks wider and the middle is not in the middle.
-static void measure_outline(const bslam_outline_t *outline, bslam_real_t height_m,
-                            bslam_candidate_t *candidate)
+/// What is left of a direction's and of a distance's error when the outline is known.
+static void measure_outline(const bslam_outline_t *o, bslam_real_t height_m, bslam_candidate_t *candidate)
 {
-    const bslam_real_t tall = outline->top - outline->bottom;
-    const bslam_real_t height_left = tall * (1 + outline->turn * outline->left);
-    const bslam_real_t height_right = tall * (1 + outline->turn * outline->right);
-    const bslam_real_t sum = height_left + height_right;
-    const bslam_real_t across = (outline->left * height_right + outline->right * height_left) / sum;
-    const bslam_real_t edge_sd = SIDE_SD_PX * outline->pixel;
-
-    candidate->bearing_rad = bslam_angle_wrap(outline->facing_rad + bslam_atan2(across, 1));
-    candidate->bearing_sd_rad = bslam_sqrt(edge_sd * edge_sd / 2 + BEARING_SD_MIN_RAD * BEARING_SD_MIN_RAD);
+    const bslam_real_t point_var = POINT_SD_PX * POINT_SD_PX * o->pixel * o->pixel;
+    candidate->bearing_rad = bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1));
+    candidate->bearing_sd_rad =
+        bslam_sqrt(BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + point_var / 2 + BEARING_DOUBT * o->middle_var);
     candidate->has_bearing = true;
     if (height_m > 0) {
-        const bslam_real_t depth = height_m / 2 * (1 / height_left + 1 / height_right);
-        const bslam_real_t relative = 2 * edge_sd / sum;
-        candidate->range_m = depth * bslam_sqrt(1 + across * across);
-        candidate->range_sd_m =
-            candidate->range_m * bslam_sqrt(2 * relative * relative + RANGE_SD_MIN * RANGE_SD_MIN);
+        const bslam_real_t tall = o->top - o->bottom;
+        const bslam_real_t ahead_m = height_m / (tall * (1 + o->turn * o->middle));
+        const bslam_real_t tall_var = 2 * point_var + RANGE_DOUBT * (o->top_var + o->bottom_var);
+        const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + tall_var / (tall * tall);
+        candidate->range_m = ahead_m * bslam_sqrt(1 + o->middle * o->middle);
+        candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
         candidate->has_range = true;
     }
 }

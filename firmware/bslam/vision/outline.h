@@ -30,10 +30,16 @@ typedef struct bslam_outline {
     bslam_real_t right;
     bslam_real_t top;  ///< up, at across = 0
     bslam_real_t bottom;
+    bslam_real_t left_var;  ///< their variances: large where several lines may be the side
+    bslam_real_t right_var;
+    bslam_real_t top_var;
+    bslam_real_t bottom_var;
     bslam_real_t turn;      ///< up at a place across is up (1 + turn across): tangent of the slant
     bslam_real_t turn_var;  ///< its variance
-    bslam_real_t pixel;     ///< size of a frame pixel in these units, at the centre
-    bslam_quad_t quad;      ///< the same corners in the frame
+    bslam_real_t middle;    ///< across, of the point half way between the two sides in plan
+    bslam_real_t middle_var;
+    bslam_real_t pixel;  ///< size of a frame pixel in these units, at the centre
+    bslam_quad_t quad;   ///< the same corners in the frame
 } bslam_outline_t;
 
 /// Finds the outline near a rough box, which may be 4 pixels off on each side. A body that stands out from

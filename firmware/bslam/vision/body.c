@@ -1,0 +1,114 @@
+#include "bslam/vision/body.h"
+
+enum {
+    TURNS_MAX = 6,    // turns tried to either side
+    CORNER_STEPS = 3  // a flank's width depends on where its near corner is: rounds
+};
+
+// The largest turn that is looked for; and what one costs before it is seen: 1 / (2 BSLAM_TURN_SD²).
+static const bslam_real_t TURN_MAX = BSLAM_R(1.8);
+static const float TURN_COST = 0.7f;
+// By how much the two sides' scores together tell turns apart better than either tells places: they change
+// together.
+static const float TURN_SHARPNESS = 1.5f;
+
+bslam_stance_t bslam_body_stance(const bslam_body_t *body, bslam_real_t turn)
+{
+    const bslam_real_t back = body->depth * (body->top - body->bottom) / bslam_sqrt(1 + turn * turn);
+    bslam_real_t left = body->left;
+    bslam_real_t right = body->right;
+    for (int32_t i = 0; i < CORNER_STEPS; i++) {
+        const bslam_real_t left_flank = back * (1 + turn * left) * (turn - left);
+        const bslam_real_t right_flank = back * (1 + turn * right) * (turn - right);
+        left = left_flank > 0 ? body->left - left_flank : body->left;
+        right = right_flank < 0 ? body->right - right_flank : body->right;
+    }
+    return (bslam_stance_t){(float)turn, (float)left, (float)right};
+}
+
+bslam_real_t bslam_body_middle(const bslam_body_t *body, bslam_real_t turn)
+{
+    const bslam_stance_t stance = bslam_body_stance(body, turn);
+    const bslam_real_t half = (bslam_real_t)(stance.left - stance.right) / 2;
+    const bslam_real_t centre = (bslam_real_t)(stance.left + stance.right) / 2;
+    return centre - half * half * turn / (1 + centre * turn);
+}
+
+typedef struct sides {
+    bslam_side_t top;
+    bslam_side_t bottom;
+} sides_t;
+
+/// Both sides in one stance.
+typedef struct guess {
+    float score;
+    bslam_stance_t stance;
+    bslam_line_t top;
+    bslam_line_t bottom;
+} guess_t;
+
+static guess_t guess_at(const sides_t *sides, const bslam_body_t *body, bslam_real_t turn)
+{
+    guess_t guess = {.stance = bslam_body_stance(body, turn)};
+    guess.top = bslam_side_line(&sides->top, &guess.stance);
+    guess.bottom = bslam_side_line(&sides->bottom, &guess.stance);
+    guess.score = guess.top.score + guess.bottom.score - TURN_COST * guess.stance.turn * guess.stance.turn;
+    return guess;
+}
+
+/// How many turns to either side make a difference of a place at the ends of a side.
+static int32_t turn_count(const sides_t *sides, const bslam_body_t *body)
+{
+    const bslam_real_t top = bslam_abs((bslam_real_t)sides->top.reach);
+    const bslam_real_t bottom = bslam_abs((bslam_real_t)sides->bottom.reach);
+    const bslam_real_t most = TURN_MAX * (top > bottom ? top : bottom) * (body->left - body->right) / 2;
+    return most < TURNS_MAX ? (int32_t)most : TURNS_MAX;
+}
+
+static bslam_real_t turn_at(int32_t k, int32_t turns)
+{
+    return turns > 0 ? TURN_MAX * (bslam_real_t)k / (bslam_real_t)turns : 0;
+}
+
+static guess_t best_guess(const sides_t *sides, const bslam_body_t *body, bslam_level_t *level)
+{
+    const int32_t turns = turn_count(sides, body);
+    float scores[2 * TURNS_MAX + 1];
+    guess_t best = {.score = -1e9f};
+    for (int32_t k = -turns; k <= turns; k++) {
+        const guess_t guess = guess_at(sides, body, turn_at(k, turns));
+        scores[k + turns] = guess.score;
+        best = guess.score > best.score ? guess : best;
+    }
+    float whole = 0.0f;
+    float first = 0.0f;
+    float second = 0.0f;
+    for (int32_t k = -turns; k <= turns; k++) {
+        const float away = (float)turn_at(k, turns) - best.stance.turn;
+        const float share = bslam_falling(TURN_SHARPNESS * (best.score - scores[k + turns]));
+        whole += share;
+        first += share * away;
+        second += share * away * away;
+    }
+    const float mean = first / whole;
+    level->turn = (bslam_real_t)best.stance.turn;
+    level->turn_offset = (bslam_real_t)mean;
+    level->turn_var = (bslam_real_t)(second / whole - mean * mean);
+    return best;
+}
+
+bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
+                      bslam_level_t *level)
+{
+    sides_t sides;
+    if (!bslam_side_scan(&sides.top, frame, facing, BSLAM_SIDE_TOP, body->top, body->left, body->right,
+                         body->pixel) ||
+        !bslam_side_scan(&sides.bottom, frame, facing, BSLAM_SIDE_BOTTOM, body->bottom, body->left,
+                         body->right, body->pixel)) {
+        return false;
+    }
+    const guess_t best = best_guess(&sides, body, level);
+    bslam_side_trace(&sides.top, facing, &best.top, &best.stance, &level->top);
+    bslam_side_trace(&sides.bottom, facing, &best.bottom, &best.stance, &level->bottom);
+    return true;
+}

@@ -1,0 +1,271 @@
+#include "bslam/vision/side.h"
+
+#include <string.h>
+
+enum { CHANNELS = 3, STEP_MAX = 255, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
+
+// Which line is the side: weights of the contrast along it and next to it, from three places outside to one
+// inside. The contrast is C / (C + HALF_CONTRAST). The weights are a multinomial logistic regression's over
+// training worlds: beyond the side the wall is quiet, within it the object has edges of its own. MATH
+// "Outline".
+enum { TAPS = 5, TAPS_OUTSIDE = 3, LINE_FIRST = TAPS_OUTSIDE, LINE_END = PLACES - TAPS + TAPS_OUTSIDE };
+static const float TAP[TAPS] = {-2.2f, -2.6f, 2.6f, 5.0f, 2.1f};
+static const float HALF_CONTRAST = 20.0f;
+// The same for the square of the distance from the rough box, half-resolution pixels.
+static const float ROUGH_COST = 0.35f;
+
+// Scan lines stay this far from the ends of a side, as a fraction of it.
+static const bslam_real_t END_MARGIN = BSLAM_R(0.12);
+// An edge point needs this much change over three boundaries: squares of 1/63 of a channel's range.
+static const int32_t CHANGE_MIN = 12;
+
+// What lies farther from the axes than this is not looked for: coordinates fit in 16 bits, tangents stay
+// tame.
+static const bslam_real_t COORDINATE_MAX_PX = 16000;
+static const bslam_real_t AHEAD_MIN = BSLAM_R(0.05);
+
+bool bslam_facing_from_frame(const bslam_facing_t *facing, bslam_real_t u_px, bslam_real_t v_px,
+                             bslam_plane_point_t *point)
+{
+    bslam_direction_t direction;
+    if (bslam_camera_unproject(facing->camera, u_px, v_px, &direction) != BSLAM_OK) {
+        return false;
+    }
+    const bslam_real_t ahead = facing->cosine * direction.x + facing->sine * direction.y;
+    if (!(ahead > AHEAD_MIN)) {
+        return false;
+    }
+    point->across = (facing->cosine * direction.y - facing->sine * direction.x) / ahead;
+    point->up = direction.z / ahead;
+    return true;
+}
+
+bool bslam_facing_to_frame(const bslam_facing_t *facing, bslam_plane_point_t point, bslam_real_t *u_px,
+                           bslam_real_t *v_px)
+{
+    const bslam_direction_t direction = {facing->cosine - facing->sine * point.across,
+                                         facing->sine + facing->cosine * point.across, point.up};
+    return bslam_camera_project(facing->camera, &direction, u_px, v_px) == BSLAM_OK &&
+           bslam_abs(*u_px) <= COORDINATE_MAX_PX && bslam_abs(*v_px) <= COORDINATE_MAX_PX;
+}
+
+static void begin(bslam_side_t *side, const bslam_frame_t *frame, bslam_side_name_t name)
+{
+    const int32_t width = frame->width_px / 2;
+    const int32_t height = frame->height_px / 2;
+    memset(side, 0, sizeof *side);
+    side->half = frame->half;
+    side->level = name == BSLAM_SIDE_TOP || name == BSLAM_SIDE_BOTTOM;
+    side->backwards = name == BSLAM_SIDE_RIGHT || name == BSLAM_SIDE_BOTTOM;
+    side->across = side->level ? width : 1;
+    side->along = side->level ? 1 : width;
+    side->size = side->level ? height : width;
+    side->lines = side->level ? width : height;
+}
+
+typedef struct rgb {
+    int32_t value[CHANNELS];
+} rgb_t;
+
+/// The pixel that lies just inside a place, in 1/63 of each channel's range; beyond the frame, its last one.
+static rgb_t inside_of(const bslam_side_t *side, int32_t index, int32_t place)
+{
+    const int32_t first = side->first[index];
+    const int32_t pixel = side->backwards ? first - 1 - place : first + place;
+    const int32_t last = side->size - 1;
+    const int32_t inside = pixel < 0 ? 0 : pixel > last ? last : pixel;
+    const uint16_t value = side->half[side->scan[index] * side->along + inside * side->across];
+    return (rgb_t){{(value >> 11) * 2, (value >> 5) & 63, (value & 31) * 2}};
+}
+
+static int32_t magnitude(int32_t x)
+{
+    return x < 0 ? -x : x;
+}
+
+/// Contrast at each place: the two pixels inside against the two outside.
+static void fill_steps(bslam_side_t *side, int32_t index)
+{
+    rgb_t a = inside_of(side, index, -2);
+    rgb_t b = inside_of(side, index, -1);
+    rgb_t c = inside_of(side, index, 0);
+    for (int32_t place = 0; place < PLACES; place++) {
+        const rgb_t d = inside_of(side, index, place + 1);
+        int32_t sum = 0;
+        for (int32_t k = 0; k < CHANNELS; k++) {
+            sum += magnitude(c.value[k] + d.value[k] - a.value[k] - b.value[k]);
+        }
+        side->steps[index][place] = (uint8_t)(sum > STEP_MAX ? STEP_MAX : sum);
+        a = b;
+        b = c;
+        c = d;
+    }
+}
+
+static int32_t round_to_int(bslam_real_t x)
+{
+    return (int32_t)(x + (x < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
+}
+
+/// Adds the scan line through a point of the rough side, unless the frame has none there or it is the same as
+/// the one before. False if the lens does not see the point.
+static bool add_scan(bslam_side_t *side, const bslam_facing_t *facing, bslam_plane_point_t rough)
+{
+    bslam_real_t u_px;
+    bslam_real_t v_px;
+    if (!bslam_facing_to_frame(facing, rough, &u_px, &v_px)) {
+        return false;
+    }
+    const int32_t scan = round_to_int(((side->level ? u_px : v_px) - BSLAM_R(0.5)) / 2);
+    const bslam_real_t across = ((side->level ? v_px : u_px) + BSLAM_R(0.5)) / 2;
+    const int32_t i = side->count;
+    if (scan < 0 || scan >= side->lines || (i > 0 && scan == side->scan[i - 1])) {
+        return true;
+    }
+    const int32_t boundary = round_to_int(across);
+    const float rest = (float)(across - (bslam_real_t)boundary);
+    side->scan[i] = (int16_t)scan;
+    side->first[i] = (int16_t)(boundary + (side->backwards ? REACH_OUT : -REACH_OUT));
+    side->at[i] = (float)rough.across;
+    side->base[i] = (float)REACH_OUT + (side->backwards ? -rest : rest);
+    fill_steps(side, i);
+    side->count++;
+    return true;
+}
+
+bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam_facing_t *facing,
+                     bslam_side_name_t name, bslam_real_t at, bslam_real_t from, bslam_real_t to,
+                     bslam_real_t pixel)
+{
+    begin(side, frame, name);
+    if (side->level) {
+        side->reach = (float)((side->backwards ? at : -at) / (2 * pixel));
+    }
+    for (int32_t i = 0; i < BSLAM_SIDE_SCANS; i++) {
+        const bslam_real_t part = (bslam_real_t)i / (BSLAM_SIDE_SCANS - 1);
+        const bslam_real_t along = from + (to - from) * (END_MARGIN + part * (1 - 2 * END_MARGIN));
+        const bslam_plane_point_t point = {side->level ? along : at, side->level ? at : along};
+        if (!add_scan(side, facing, point)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Places inwards that a body's stance moves its edge by on a scan line.
+///
+/// Along the front 1/x is linear, 1/x = (1 + turn across) / x0; along a flank it is proportional to turn -
+/// across.
+static float tilt_of(const bslam_side_t *side, int32_t index, const bslam_stance_t *stance)
+{
+    const float across = side->at[index];
+    const float corner = across > stance->left    ? stance->left
+                         : across < stance->right ? stance->right
+                                                  : across;
+    float near = 1.0f + stance->turn * corner;
+    if (corner != across) {
+        near *= (stance->turn - across) / (stance->turn - corner);
+    }
+    const float tilt = side->reach * (near - 1.0f);
+    const float most = (float)PLACES;
+    return tilt >= -most && tilt <= most ? tilt : most;  // out of the window, as is what has no place at all
+}
+
+/// Mean contrast along each of a stance's lines, as C / (C + HALF_CONTRAST), by shift + REACH_OUT; returns
+/// how far inwards of the shift the outermost end of these lines is.
+static float contrasts(const bslam_side_t *side, const bslam_stance_t *stance, float contrast[PLACES])
+{
+    int32_t sums[PLACES] = {0};
+    float outermost = 0;
+    for (int32_t i = 0; i < side->count; i++) {
+        const float tilt = tilt_of(side, i, stance);
+        const int32_t offset = (int32_t)(side->base[i] + tilt + (float)PLACES + 0.5f) - PLACES - REACH_OUT;
+        const int32_t from = offset < 0 ? -offset : 0;
+        const int32_t to = offset > 0 ? PLACES - offset : PLACES;
+        outermost = tilt < outermost ? tilt : outermost;
+        for (int32_t k = from; k < to; k++) {
+            sums[k] += side->steps[i][k + offset];
+        }
+    }
+    for (int32_t k = 0; k < PLACES; k++) {
+        const float sum = (float)sums[k];
+        contrast[k] = side->count > 0 ? sum / (sum + HALF_CONTRAST * (float)side->count) : 0.0f;
+    }
+    return outermost;
+}
+
+bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *stance)
+{
+    float contrast[PLACES];
+    float scores[PLACES];
+    const float outermost = contrasts(side, stance, contrast);
+    int32_t best = LINE_FIRST;
+    for (int32_t k = LINE_FIRST; k < LINE_END; k++) {
+        const float away = (float)(k - REACH_OUT) + outermost;
+        scores[k] = -ROUGH_COST * away * away;
+        for (int32_t t = 0; t < TAPS; t++) {
+            scores[k] += TAP[t] * contrast[k + t - TAPS_OUTSIDE];
+        }
+        best = scores[k] > scores[best] ? k : best;
+    }
+    float whole = 0.0f;
+    float first = 0.0f;
+    float second = 0.0f;
+    for (int32_t k = LINE_FIRST; k < LINE_END; k++) {
+        const float share = bslam_falling(scores[best] - scores[k]);
+        const float away =
+            magnitude(k - best) <= 1 ? 0.0f : (float)(k - best);  // neighbours are the same edge
+        whole += share;
+        first += share * away;
+        second += share * away * away;
+    }
+    const float mean = first / whole;
+    return (bslam_line_t){scores[best], (float)(best - REACH_OUT), mean, second / whole - mean * mean};
+}
+
+/// Place of the edge on a scan line, near `near_place`: the centroid of the changes over the three boundaries
+/// around it, each as far as it goes along the whole change. False where there is hardly any.
+static bool edge_place(const bslam_side_t *side, int32_t index, float near_place, bslam_real_t *place)
+{
+    const int32_t middle = (int32_t)(near_place + 0.5f);
+    if (middle < 1 || middle >= PLACES - 1) {
+        return false;
+    }
+    rgb_t pixels[4];
+    for (int32_t k = 0; k < 4; k++) {
+        pixels[k] = inside_of(side, index, middle + k - 2);
+    }
+    int32_t whole = 0;
+    int32_t moment = 0;
+    for (int32_t c = 0; c < CHANNELS; c++) {
+        const int32_t change = pixels[3].value[c] - pixels[0].value[c];
+        whole += change * change;
+        moment +=
+            change * (pixels[3].value[c] - pixels[2].value[c] - pixels[1].value[c] + pixels[0].value[c]);
+    }
+    if (whole < CHANGE_MIN || magnitude(moment) > whole) {
+        return false;
+    }
+    *place = (bslam_real_t)middle + (bslam_real_t)moment / (bslam_real_t)whole;
+    return true;
+}
+
+void bslam_side_trace(const bslam_side_t *side, const bslam_facing_t *facing, const bslam_line_t *line,
+                      const bslam_stance_t *stance, bslam_edge_t *edge)
+{
+    edge->count = 0;
+    edge->offset = (bslam_real_t)line->offset;
+    edge->variance = (bslam_real_t)line->variance;
+    for (int32_t i = 0; i < side->count; i++) {
+        const float near_place = side->base[i] + line->shift + tilt_of(side, i, stance);
+        bslam_real_t place;
+        if (edge_place(side, i, near_place, &place)) {
+            const bslam_real_t first = (bslam_real_t)side->first[i];
+            const bslam_real_t px = 2 * (side->backwards ? first - place : first + place) - BSLAM_R(0.5);
+            const bslam_real_t scan_px = 2 * (bslam_real_t)side->scan[i] + BSLAM_R(0.5);
+            const bool seen = bslam_facing_from_frame(facing, side->level ? scan_px : px,
+                                                      side->level ? px : scan_px, &edge->points[edge->count]);
+            edge->count += seen ? 1 : 0;
+        }
+    }
+}
