@@ -76,7 +76,7 @@
 
 /// Boxes of one image that are looked at more closely.
 #ifndef BSLAM_PROPOSALS_MAX
-#define BSLAM_PROPOSALS_MAX 96
+#define BSLAM_PROPOSALS_MAX 192
 #endif
 #if BSLAM_PROPOSALS_MAX < 8 || BSLAM_PROPOSALS_MAX > 255
 #error "BSLAM_PROPOSALS_MAX is 8 to 255"
@@ -88,6 +88,47 @@
 #endif
 #if BSLAM_CANDIDATES_MAX < 1 || BSLAM_CANDIDATES_MAX > 64
 #error "BSLAM_CANDIDATES_MAX is 1 to 64"
+#endif
+
+/// Machines that learn to tell a beacon by its signature: one a beacon. RAM is about 1.9 KB each.
+#ifndef BSLAM_LEARNER_SLOTS
+#define BSLAM_LEARNER_SLOTS BSLAM_BEACONS_MAX
+#endif
+#if BSLAM_LEARNER_SLOTS < 1 || BSLAM_LEARNER_SLOTS > 250
+#error "BSLAM_LEARNER_SLOTS is 1 to 250"
+#endif
+
+/// Signatures that a machine keeps of its beacon, 80 bytes each.
+#ifndef BSLAM_SAMPLES_PER_MACHINE
+#define BSLAM_SAMPLES_PER_MACHINE 16
+#endif
+#if BSLAM_SAMPLES_PER_MACHINE < 2 || BSLAM_SAMPLES_PER_MACHINE > 64
+#error "BSLAM_SAMPLES_PER_MACHINE is 2 to 64"
+#endif
+
+/// Signatures of other beacons that a training takes: the hardest. Must exceed the support vectors among them,
+/// 30 to 40, or training does not settle.
+#ifndef BSLAM_RIVALS_MAX
+#define BSLAM_RIVALS_MAX 96
+#endif
+#if BSLAM_RIVALS_MAX < 8 || BSLAM_RIVALS_MAX > 1024
+#error "BSLAM_RIVALS_MAX is 8 to 1024"
+#endif
+
+/// Dual steps after which a training ends, converged or not; the next one goes on from there.
+#ifndef BSLAM_LEARNER_STEPS_MAX
+#define BSLAM_LEARNER_STEPS_MAX 500
+#endif
+#if BSLAM_LEARNER_STEPS_MAX < 100 || BSLAM_LEARNER_STEPS_MAX > 100000
+#error "BSLAM_LEARNER_STEPS_MAX is 100 to 100000"
+#endif
+
+/// 0: samples have 8 bits a feature. 1: float32, four times the RAM.
+#ifndef BSLAM_SAMPLE_FLOAT
+#define BSLAM_SAMPLE_FLOAT 0
+#endif
+#if BSLAM_SAMPLE_FLOAT != 0 && BSLAM_SAMPLE_FLOAT != 1
+#error "BSLAM_SAMPLE_FLOAT is 0 or 1"
 #endif
 
 #endif
