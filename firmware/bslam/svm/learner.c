@@ -1,0 +1,181 @@
+#include "bslam/svm/internal.h"
+
+#include <string.h>
+
+static bool exists(const bslam_learner_t *learner, int32_t machine)
+{
+    return machine >= 0 && machine < BSLAM_LEARNER_SLOTS && learner->machines[machine].used;
+}
+
+// ---- machines
+// -------------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_learner_init(bslam_learner_t *learner, const bslam_sample_t *seeds, int32_t seed_count)
+{
+    if (seed_count < 0 || seed_count > BSLAM_SEEDS_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    memset(learner, 0, sizeof *learner);
+    learner->seeds = seeds;
+    learner->seed_count = seed_count;
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_learner_add(bslam_learner_t *learner, int32_t *machine)
+{
+    for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        if (!learner->machines[m].used) {
+            learner->machines[m].used = true;
+            *machine = m;
+            return BSLAM_OK;
+        }
+    }
+    learner->counters.refused_full++;
+    return BSLAM_E_MAP_FULL;
+}
+
+/// Takes samples that are gone out of a machine's list.
+static void strike(bslam_machine_t *machine, int32_t first, int32_t count)
+{
+    uint16_t kept = 0;
+    for (int32_t i = 0; i < machine->rivals; i++) {
+        const uint16_t sample = machine->rival[i];
+        if (sample < first || sample >= first + count) {
+            machine->rival[kept] = sample;
+            machine->rival_alpha[kept] = machine->rival_alpha[i];
+            kept++;
+        }
+    }
+    machine->rivals = kept;
+}
+
+bslam_status_t bslam_learner_remove(bslam_learner_t *learner, int32_t machine)
+{
+    if (!exists(learner, machine)) {
+        learner->counters.refused_no_machine++;
+        return BSLAM_E_NO_BEACON;
+    }
+    if (learner->training.machine == machine) {
+        bslam_training_pause(learner);
+    }
+    bslam_training_pause_if_used(learner, machine * BSLAM_PER_MACHINE, BSLAM_PER_MACHINE);
+    memset(&learner->machines[machine], 0, sizeof learner->machines[machine]);
+    for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        strike(&learner->machines[m], machine * BSLAM_PER_MACHINE, BSLAM_PER_MACHINE);
+    }
+    return BSLAM_OK;
+}
+
+// ---- samples
+// --------------------------------------------------------------------------------------------------
+
+/// Which of a full store matters least: the one with the smallest dual variable, of equals the nearest to the
+/// new sample.
+static int32_t least(const bslam_learner_t *learner, int32_t machine, const bslam_sample_t *fresh)
+{
+    const uint16_t *alpha = learner->machines[machine].own_alpha;
+    const bslam_sample_t *samples = &learner->samples[machine * BSLAM_PER_MACHINE];
+    uint16_t smallest = UINT16_MAX;
+    for (int32_t i = 0; i < BSLAM_PER_MACHINE; i++) {
+        smallest = alpha[i] < smallest ? alpha[i] : smallest;
+    }
+    int32_t best = -1;
+    float best_distance2 = 0.0f;
+    for (int32_t i = 0; i < BSLAM_PER_MACHINE; i++) {
+        if (alpha[i] == smallest) {
+            const float distance2 = bslam_sample_distance2(&samples[i], fresh);
+            if (best < 0 || distance2 < best_distance2) {
+                best = i;
+                best_distance2 = distance2;
+            }
+        }
+    }
+    return best;
+}
+
+/// Puts a sample on a machine's list, if there is room and it is not there.
+static void list_rival(bslam_machine_t *machine, int32_t sample)
+{
+    for (int32_t i = 0; i < machine->rivals; i++) {
+        if (machine->rival[i] == sample) {
+            return;
+        }
+    }
+    if (machine->rivals < BSLAM_RIVALS_MAX) {
+        machine->rival[machine->rivals] = (uint16_t)sample;
+        machine->rival_alpha[machine->rivals] = 0;
+        machine->rivals++;
+    }
+}
+
+/// Tells the other machines of a new sample: one that has it inside its margin will train with it, one that
+/// takes it for its own asks for a training.
+static void warn_others(bslam_learner_t *learner, int32_t machine, int32_t sample)
+{
+    for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        bslam_machine_t *other = &learner->machines[m];
+        if (m == machine || !other->trained) {
+            continue;
+        }
+        const float value = bslam_sample_decide(&other->weights, &learner->samples[sample]);
+        if (value > -1.0f) {
+            if (m == learner->training.machine) {
+                bslam_training_pause(learner);
+            }
+            list_rival(other, sample);
+            other->waiting = other->waiting || value > 0.0f;
+        }
+    }
+}
+
+bslam_status_t bslam_learner_show(bslam_learner_t *learner, int32_t machine,
+                                  const float signature[BSLAM_SAMPLE_FEATURES])
+{
+    if (!exists(learner, machine)) {
+        learner->counters.refused_no_machine++;
+        return BSLAM_E_NO_BEACON;
+    }
+    bslam_sample_t fresh;
+    const bslam_status_t status = bslam_sample_encode(signature, &fresh);
+    if (status != BSLAM_OK) {
+        learner->counters.refused_not_finite++;
+        return status;
+    }
+    bslam_machine_t *m = &learner->machines[machine];
+    int32_t place = m->samples;
+    if (place == BSLAM_PER_MACHINE) {
+        if (m->trained && bslam_sample_decide(&m->weights, &fresh) >= 1.0f) {
+            learner->counters.dropped++;
+            return BSLAM_OK;
+        }
+        place = least(learner, machine, &fresh);
+        bslam_training_pause_if_used(learner, machine * BSLAM_PER_MACHINE + place, 1);
+    } else {
+        m->samples++;
+    }
+    learner->samples[machine * BSLAM_PER_MACHINE + place] = fresh;
+    m->own_alpha[place] = 0;
+    m->waiting = true;
+    learner->counters.kept++;
+    warn_others(learner, machine, machine * BSLAM_PER_MACHINE + place);
+    return BSLAM_OK;
+}
+
+int32_t bslam_learner_samples(const bslam_learner_t *learner, int32_t machine)
+{
+    return exists(learner, machine) ? learner->machines[machine].samples : 0;
+}
+
+// ---- decisions
+// ------------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t machine, const bslam_sample_t *sample,
+                                    float *value)
+{
+    if (!exists(learner, machine)) {
+        learner->counters.refused_no_machine++;
+        return BSLAM_E_NO_BEACON;
+    }
+    *value = bslam_sample_decide(&learner->machines[machine].weights, sample);
+    return BSLAM_OK;
+}
