@@ -46,7 +46,7 @@ $(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/r
 	@mkdir -p $(@D) && touch $@
 
 $(CAMERA_STAMP): $(CAMERA_DIR)/build.py $(wildcard $(CAMERA_DIR)/*.[ch]) $(VENV)/run.stamp
-	@$(PYTHON) -m bslam.world.camera.build
+	@$(PYTHON) $(CAMERA_DIR)/build.py
 	@mkdir -p $(@D) && touch $@
 
 # --- The main job -------------------------------------------------------------------------------------------

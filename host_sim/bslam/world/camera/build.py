@@ -1,7 +1,7 @@
 """Builds the ray caster into a Python extension (cffi, API mode) beside this file.
 
-The declarations that cffi reads are the real header, run through the C preprocessor.
-`python -m bslam.world.camera.build` builds it.
+The declarations that cffi reads are the real header, run through the C preprocessor. Run it as a file,
+`python host_sim/bslam/world/camera/build.py`: the package cannot be imported before it is built.
 """
 
 import os

@@ -40,7 +40,10 @@ SURFACE = np.dtype(
         ("identity", "i4"),
     ]
 )
-TEXTURE = np.dtype([("first", "i4"), ("width_log2", "i4"), ("height_log2", "i4"), ("levels", "i4")])
+LEVELS_MAX = lib.RENDER_LEVELS_MAX
+TEXTURE = np.dtype(
+    [("first", "i4", LEVELS_MAX), ("width_log2", "i4"), ("height_log2", "i4"), ("levels", "i4")]
+)
 assert ffi.sizeof("render_surface_t") == SURFACE.itemsize
 assert ffi.sizeof("render_texture_t") == TEXTURE.itemsize
 
@@ -134,7 +137,7 @@ class Caster:
         self._list = ffi.new("int32_t[]", max(1, scene.surface_count))
         self._hits = np.empty((2 * height + 1, 2 * width + 1), dtype=np.int16)
         self._linear = np.empty((height, width, 3), dtype=np.float32)
-        self._scratch = np.empty_like(self._linear)
+        self._scratch = np.empty((height + 1, width, 3), dtype=np.float32)
         self._random = ffi.new("uint64_t *", seed)
         self._eye = ffi.new("render_eye_t *")
         self._light = ffi.new("render_light_t *")
@@ -189,7 +192,7 @@ class Caster:
         blur_row: list[float],
         blur_column: float,
     ) -> NDArray[np.uint8]:
-        """The picture (height, width, 3) as the sensor has it; once a trace. noise: shot, read."""
+        """The picture (height, width, 3) as the sensor has it. noise: shot, read."""
         rgb = np.empty(self._linear.shape, dtype=np.uint8)
         sensor = self._sensor
         sensor.gain, sensor.blur_row, sensor.blur_column = gain, blur_row, blur_column

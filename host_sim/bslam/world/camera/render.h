@@ -27,6 +27,7 @@ enum {
     RENDER_TILE = 32,       /* rays a side of a tile */
     RENDER_LIGHT_NODES = 8, /* of a surface's light map, each way */
     RENDER_BLUR_TAPS = 7,   /* of the blur along a row, the middle one at index 3 */
+    RENDER_LEVELS_MAX = 12, /* of a texture: 2048 texels a side */
     RENDER_NORMALS = 4096,  /* values in the table of normal deviates */
     RENDER_TONES = 4096,    /* steps of the tone curve */
     RENDER_NOTHING = -1,    /* in hits: the ray meets no surface */
@@ -49,9 +50,10 @@ typedef struct render_surface {
 } render_surface_t;
 
 /* Mip-mapped picture with sides that are powers of two. Texels are 0xAABBGGRR, the square roots of linear
- * colour; level 0 starts at texels[first], each further level follows with half the sides. */
+ * colour; level i starts at texels[first[i]] and has the sides halved i times, down to where one of them
+ * is 1. */
 typedef struct render_texture {
-    int32_t first;
+    int32_t first[RENDER_LEVELS_MAX];
     int32_t width_log2;
     int32_t height_log2;
     int32_t levels;
@@ -139,9 +141,10 @@ void render_shade(const render_scene_t *scene, const render_lens_t *lens, const 
 void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
                   const int16_t *hits, int16_t *identity, float *depth_m);
 
-/* Blurs `linear` (scratch: the same size) and turns it into 8 bits with noise; `random` is advanced.
- * normals[RENDER_NORMALS]: quantiles of the normal distribution; tones[RENDER_TONES]: the tone curve. */
+/* Blurs the light and turns it into 8 bits with noise, rgb [height][width][3]; `random` is advanced.
+ * normals[RENDER_NORMALS]: quantiles of the normal distribution; tones[RENDER_TONES]: the tone curve;
+ * scratch [height + 1][width][3]. */
 void render_expose(const render_lens_t *lens, const render_sensor_t *sensor, const float *normals,
-                   const uint8_t *tones, uint64_t *random, float *linear, float *scratch, uint8_t *rgb);
+                   const uint8_t *tones, uint64_t *random, const float *linear, float *scratch, uint8_t *rgb);
 
 #endif

@@ -23,7 +23,6 @@ CLUTTER = -2
 """Identities of what is no beacon: walls and the like, and things that a detector might take for one."""
 
 IDENTITY_MAX = 2**15 - 1
-_COARSEST_PX = 1
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ class SceneBuilder:
 
     def __init__(self) -> None:
         self._surfaces: list[tuple[Any, ...]] = []
-        self._textures: list[tuple[int, int, int, int]] = []
+        self._textures: list[tuple[Any, ...]] = []
         self._texels: list[NDArray[np.uint32]] = []
         self._texel_count = 0
 
@@ -146,13 +145,14 @@ class SceneBuilder:
         """
         height, width = picture.shape[:2]
         assert height & (height - 1) == 0 and width & (width - 1) == 0 and picture.shape[2] == 4
-        levels = _mip_levels(picture)
-        self._textures.append(
-            (self._texel_count, width.bit_length() - 1, height.bit_length() - 1, len(levels))
-        )
-        for level in levels:
+        first = []
+        for level in _mip_levels(picture):
+            first.append(self._texel_count)
             self._texels.append(np.ascontiguousarray(level).view(np.uint32).ravel())
             self._texel_count += self._texels[-1].size
+        unused = [0] * (raw.LEVELS_MAX - len(first))
+        sizes = (width.bit_length() - 1, height.bit_length() - 1, len(first))
+        self._textures.append(((*first, *unused), *sizes))
         return len(self._textures) - 1
 
     def rectangle(
@@ -197,13 +197,11 @@ class SceneBuilder:
 
 
 def _mip_levels(picture: Picture) -> list[Picture]:
-    """The picture and its halvings, down to one texel."""
+    """The picture and its halvings, until a side is one texel."""
     levels = [picture]
-    while max(levels[-1].shape[:2]) > _COARSEST_PX:
+    while min(levels[-1].shape[:2]) > 1:
         half = levels[-1].astype(np.uint16)
-        if half.shape[0] > 1:
-            half = (half[0::2] + half[1::2] + np.uint16(1)) >> np.uint16(1)
-        if half.shape[1] > 1:
-            half = (half[:, 0::2] + half[:, 1::2] + np.uint16(1)) >> np.uint16(1)
+        half = half[0::2] + half[1::2]
+        half = (half[:, 0::2] + half[:, 1::2] + np.uint16(2)) >> np.uint16(2)
         levels.append(half.astype(np.uint8))
     return levels

@@ -17,59 +17,68 @@ static uint64_t next(uint64_t *random)
     return x * 0x2545f4914f6cdd1du;
 }
 
-/* Rows of `from` into `to`; beyond the border the outermost pixel is repeated. */
-static void blur_rows(const render_lens_t *lens, const float *taps, const float *from, float *to)
+/* out += tap * in, where the compiler may use vectors. */
+static void add_scaled(float *restrict out, const float *restrict in, float tap, int32_t count)
 {
-    const int32_t width = lens->width_px, reach = RENDER_BLUR_TAPS / 2;
-    memset(to, 0, sizeof *to * 3 * (size_t)(width * lens->height_px));
-    for (int32_t y = 0; y < lens->height_px; y++) {
-        const float *row = &from[3 * y * width];
-        float *out = &to[3 * y * width];
-        for (int32_t tap = 0; tap < RENDER_BLUR_TAPS; tap++) {
-            const int32_t off = tap - reach;
-            const int32_t low = off < 0 ? -off : 0, high = off > 0 ? width - off : width;
-            if (taps[tap] == 0.0f)
-                continue;
-            for (int32_t i = 3 * low; i < 3 * high; i++)
-                out[i] += taps[tap] * row[i + 3 * off];
-            for (int32_t i = 0; i < 3 * low; i++)
-                out[i] += taps[tap] * row[i % 3];
-            for (int32_t i = 3 * high; i < 3 * width; i++)
-                out[i] += taps[tap] * row[3 * (width - 1) + i % 3];
-        }
+    for (int32_t i = 0; i < count; i++)
+        out[i] += tap * in[i];
+}
+
+/* Beyond the border the outermost pixel is repeated. */
+static void blur_row(const float *taps, int32_t width, const float *row, float *out)
+{
+    memset(out, 0, sizeof *out * 3 * (size_t)width);
+    for (int32_t tap = 0; tap < RENDER_BLUR_TAPS; tap++) {
+        if (taps[tap] == 0.0f)
+            continue;
+        const int32_t off = tap - RENDER_BLUR_TAPS / 2;
+        const int32_t low = off < 0 ? -off : 0, high = off > 0 ? width - off : width;
+        add_scaled(&out[3 * low], &row[3 * (low + off)], taps[tap], 3 * (high - low));
+        for (int32_t x = 0; x < low; x++)
+            add_scaled(&out[3 * x], row, taps[tap], 3);
+        for (int32_t x = high; x < width; x++)
+            add_scaled(&out[3 * x], &row[3 * (width - 1)], taps[tap], 3);
     }
 }
 
-static void blur_columns(const render_lens_t *lens, float share, const float *from, float *to)
+static void blur_column(float share, const float *restrict above, const float *restrict row,
+                        const float *restrict below, float *restrict out, int32_t count)
 {
-    const int32_t row_values = 3 * lens->width_px;
-    for (int32_t y = 0; y < lens->height_px; y++) {
-        const float *row = &from[y * row_values];
-        const float *above = y > 0 ? row - row_values : row;
-        const float *below = y + 1 < lens->height_px ? row + row_values : row;
-        for (int32_t i = 0; i < row_values; i++)
-            to[y * row_values + i] = (1.0f - 2.0f * share) * row[i] + share * (above[i] + below[i]);
+    const float own = 1.0f - 2.0f * share;
+    for (int32_t i = 0; i < count; i++)
+        out[i] = own * row[i] + share * (above[i] + below[i]);
+}
+
+/* A row of blurred light into bytes. */
+static void expose_row(const render_sensor_t *sensor, const float *normals, const uint8_t *tones,
+                       uint64_t *random, int32_t width, const float *light, uint8_t *rgb)
+{
+    const float top = (float)(RENDER_TONES - 1);
+    const float gain[3] = {top * sensor->gain[0], top * sensor->gain[1], top * sensor->gain[2]};
+    const float shot = sensor->shot * sensor->gain[1] / 3.0f, square = sensor->read * sensor->read;
+    for (int32_t at = 0; at < 3 * width; at += 3) {
+        const float sigma = top * sqrtf(shot * (light[at] + light[at + 1] + light[at + 2]) + square);
+        uint64_t bits = next(random);
+        for (int32_t i = 0; i < 3; i++) {
+            const float noisy = gain[i] * light[at + i] + sigma * normals[bits % RENDER_NORMALS];
+            bits /= RENDER_NORMALS;
+            const float clipped = noisy < 0.0f ? 0.0f : noisy > top ? top : noisy;
+            rgb[at + i] = tones[(int32_t)clipped];
+        }
     }
 }
 
 void render_expose(const render_lens_t *lens, const render_sensor_t *sensor, const float *normals,
-                   const uint8_t *tones, uint64_t *random, float *linear, float *scratch, uint8_t *rgb)
+                   const uint8_t *tones, uint64_t *random, const float *linear, float *scratch, uint8_t *rgb)
 {
-    blur_rows(lens, sensor->blur_row, linear, scratch);
-    blur_columns(lens, sensor->blur_column, scratch, linear);
-    const float square = sensor->read * sensor->read;
-    for (int32_t at = 0; at < lens->width_px * lens->height_px; at++) {
-        const float *light = &linear[3 * at];
-        const float middle = sensor->gain[1] * (light[0] + light[1] + light[2]) / 3.0f;
-        const float sigma = sqrtf(sensor->shot * middle + square) * (float)(RENDER_TONES - 1);
-        uint64_t bits = next(random);
-        for (int32_t i = 0; i < 3; i++) {
-            const float value = sensor->gain[i] * light[i] * (float)(RENDER_TONES - 1);
-            const float noisy = value + sigma * normals[bits % RENDER_NORMALS];
-            bits /= RENDER_NORMALS;
-            const int32_t tone =
-                noisy > 0.0f ? (noisy < (float)(RENDER_TONES - 1) ? (int32_t)noisy : RENDER_TONES - 1) : 0;
-            rgb[3 * at + i] = tones[tone];
-        }
+    const int32_t width = lens->width_px, values = 3 * width, last = lens->height_px - 1;
+    float *light = &scratch[lens->height_px * values];
+    for (int32_t y = 0; y <= last; y++)
+        blur_row(sensor->blur_row, width, &linear[y * values], &scratch[y * values]);
+    for (int32_t y = 0; y <= last; y++) {
+        const float *row = &scratch[y * values];
+        const float *above = y > 0 ? row - values : row, *below = y < last ? row + values : row;
+        blur_column(sensor->blur_column, above, row, below, light, values);
+        expose_row(sensor, normals, tones, random, width, light, &rgb[y * values]);
     }
 }

@@ -49,13 +49,13 @@ typedef struct spot {
 
 static level_t level_of(const render_scene_t *scene, const render_texture_t *texture, int32_t index)
 {
-    level_t level = {&scene->texels[texture->first], 1 << texture->width_log2, 1 << texture->height_log2};
-    for (int32_t i = 0; i < index; i++) {
-        level.texels += level.width * level.height;
-        level.width = level.width > 1 ? level.width / 2 : 1;
-        level.height = level.height > 1 ? level.height / 2 : 1;
-    }
-    return level;
+    return (level_t){&scene->texels[texture->first[index]], 1 << (texture->width_log2 - index),
+                     1 << (texture->height_log2 - index)};
+}
+
+static float larger(float a, float b)
+{
+    return a > b ? a : b;
 }
 
 static float within(float x, float highest)
@@ -86,19 +86,20 @@ static uint64_t fetch(const level_t *level, const spot_t *spot)
                  blend(lanes(row1[x0]), lanes(row1[x1]), share_x), share_y);
 }
 
-/* Trilinear. */
+/* Trilinear, but where one level would have less than an eighth of the say, the other has it all. */
 static uint64_t sample(const render_scene_t *scene, const render_texture_t *texture, const spot_t *spot,
                        float lod)
 {
+    const float eighth = 0.125f;
     const float clipped = within(lod, (float)(texture->levels - 1));
-    const int32_t index = (int32_t)clipped;
-    const uint32_t share = (uint32_t)((clipped - (float)index) * 256.0f);
+    const int32_t index = (int32_t)(clipped + eighth);
+    const float share = clipped - (float)index;
     level_t level = level_of(scene, texture, index);
     const uint64_t fine = fetch(&level, spot);
-    if (share == 0u || index + 1 >= texture->levels)
+    if (share < eighth || index + 1 >= texture->levels)
         return fine;
     level = level_of(scene, texture, index + 1);
-    return blend(fine, fetch(&level, spot), share);
+    return blend(fine, fetch(&level, spot), (uint32_t)(256.0f * share));
 }
 
 uint32_t texture_alpha(const render_scene_t *scene, int32_t texture, float u, float v, float pixel_u)
@@ -240,7 +241,7 @@ static uint64_t texture_over(const render_scene_t *scene, const render_texture_t
     const float major = by_row ? row : column, minor = by_row ? column : row;
     const int32_t count = major > 16.0f * minor ? 4 : major > 4.0f * minor ? 2 : 1;
     const float share = 1.0f / (float)count;
-    const float lod = 0.5f * rough_log2(fmaxf(fmaxf(minor, major * share * share), 1e-12f));
+    const float lod = 0.5f * rough_log2(larger(larger(minor, major * share * share), 1e-12f));
     if (count == 1)
         return sample(scene, texture, middle, lod);
     const float step_u =
@@ -347,7 +348,8 @@ static void mix(const render_scene_t *scene, const render_lens_t *lens, const re
 }
 
 static void shade_row(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                      const render_light_t *light, const int16_t *hits, int32_t row, float *linear)
+                      const render_light_t *light, const int16_t *hits, int32_t row, const float *vignette,
+                      float *linear)
 {
     const int32_t stride = rays_along(lens->width_px);
     int32_t centre = (2 * row + 1) * stride + 1;
@@ -361,6 +363,8 @@ static void shade_row(const render_scene_t *scene, const render_lens_t *lens, co
             mix(scene, lens, faces, light, hits, centre, steps, linear);
         else if (hit != RENDER_NOTHING)
             add_colour(scene, faces, light, hit, ray, steps, 1.0f, linear);
+        for (int32_t i = 0; i < 3; i++)
+            linear[i] *= vignette[column];
     }
 }
 
@@ -368,11 +372,8 @@ void render_shade(const render_scene_t *scene, const render_lens_t *lens, const 
                   const int16_t *hits, const render_light_t *light, const float *vignette, float *linear)
 {
     const int32_t width = lens->width_px;
-    for (int32_t row = 0; row < lens->height_px; row++) {
-        shade_row(scene, lens, faces, light, hits, row, &linear[3 * row * width]);
-        for (int32_t i = 0; i < 3 * width; i++)
-            linear[3 * row * width + i] *= vignette[row * width + i / 3];
-    }
+    for (int32_t row = 0; row < lens->height_px; row++)
+        shade_row(scene, lens, faces, light, hits, row, &vignette[row * width], &linear[3 * row * width]);
 }
 
 void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
