@@ -45,7 +45,7 @@ def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recognise
     cost, held_out = fit.choose_cost(samples.signatures, targets, balanced=True, groups=samples.pictures)
     labels, values = samples.labels[samples.counts], held_out[samples.counts]
     right = values.argmax(axis=1) == labels
-    margin, _ = fit.threshold_for_precision(values.max(axis=1), right, precision)
+    margin = reject_margin(values.max(axis=1), right, precision)
     counts = confusion(labels, values, margin)
     recognised, objects = int(np.trace(counts[:-1, :-1])), int(counts[:-1].sum())
     if recognised < LEAST_RECOGNISED * objects:
@@ -63,6 +63,16 @@ def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recognise
         "figures": figures(counts),
     }
     return Recogniser(machine.svm, folder.objects, margin, notes), counts
+
+
+def reject_margin(scores: NDArray[np.floating], right: NDArray[np.bool_], precision: float) -> float:
+    """Half way between the lowest score that is accepted for the precision and the next below it.
+
+    Where all are accepted, 0 or the lowest: few pictures do not show how low a right score can be.
+    """
+    lowest, _ = fit.threshold_for_precision(scores, right, precision)
+    below = scores[scores < lowest]
+    return float(0.5 * (lowest + below.max())) if len(below) else min(lowest, 0.0)
 
 
 def figures(counts: NDArray[np.int64]) -> str:

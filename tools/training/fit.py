@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import average_precision_score
-from sklearn.model_selection import StratifiedGroupKFold
+from sklearn.model_selection import LeaveOneGroupOut, StratifiedGroupKFold
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import LinearSVC
@@ -25,6 +25,8 @@ from bslam.modelfile import Svm
 
 COSTS = (0.01, 0.1, 1.0, 10.0)
 """Values of the SVM's C that cross-validation chooses from."""
+
+FOLDS = 5
 
 Matrix = NDArray[np.floating]
 Score = Callable[[NDArray[np.bool_], Matrix], float]
@@ -173,7 +175,10 @@ def quantised(svm: Svm) -> Svm:
 def _folds(
     targets: NDArray[np.bool_], groups: NDArray[np.integer] | None
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """At most five, each with its share of every kind of sample: of every combination of targets."""
+    """Five, each with its share of every kind of sample (of every combination of targets).
+
+    Where a kind is in fewer groups than that, each group in turn: what is left then still has every kind.
+    """
     kinds = np.unique(targets, axis=0, return_inverse=True)[1]
     groups = np.arange(len(targets)) if groups is None else groups
     occurrences = [len(np.unique(groups[kinds == kind])) for kind in range(kinds.max() + 1)]
@@ -181,8 +186,9 @@ def _folds(
         rows = np.flatnonzero(targets[kinds == int(np.argmin(occurrences))][0]).tolist()
         belonging = f"classes {rows}" if rows else "no class"
         raise BslamError(f"samples of {belonging} are all in one group; allowed: at least two groups of each")
-    folds = StratifiedGroupKFold(min(5, *occurrences), shuffle=True, random_state=0)
-    return folds.split(targets, kinds, groups)
+    if min(occurrences) < FOLDS:
+        return LeaveOneGroupOut().split(targets, kinds, groups)
+    return StratifiedGroupKFold(FOLDS, shuffle=True, random_state=0).split(targets, kinds, groups)
 
 
 def _check(x: Matrix, targets: NDArray[np.bool_]) -> None:

@@ -8,35 +8,28 @@ what is none of the objects.
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
 
-from bslam.core.vision import BeaconModel, Candidate, FrontEnd, frame_size_max
+from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.errors import BslamError
-from bslam.rig import Camera, Lens
+from bslam.experiment.pictures import Box, Scaled, camera_for, load_picture
 from training.folder import FILE, Folder, Label
 from training.truth import overlaps
 
 NONE = -1
 """The label of what is none of the objects."""
 
-CELL_PX = 4
-FIELD_OF_VIEW_RAD = math.radians(60.0)
 SAME_OVERLAP = 0.5  # intersection over union from which a candidate is of a box
 OTHER_OVERLAP = 0.1  # and up to which it is of none
 OTHERS_A_PICTURE = 20
 # A box drawn by hand is not the detector's: each is also taken with its sides moved by this share of it.
 SHAKES = 4
 SHAKE = 0.06
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -72,58 +65,6 @@ class _Collected:
             self.counts.append(counts)
 
 
-@dataclass(frozen=True)
-class Frame:
-    """A picture as the front end gets it, and how its pixels became the frame's."""
-
-    rgb: NDArray[np.uint8]  # (h, w, 3)
-    scale: float
-    left_px: float  # of the picture, cut off
-    top_px: float
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height."""
-        return self.rgb.shape[1], self.rgb.shape[0]
-
-    def box(self, label: Label) -> Box:
-        """A label in pixels of the frame, where pixel i covers [i - 0.5, i + 0.5]."""
-        across = ((edge - self.left_px) * self.scale - 0.5 for edge in (label.left_px, label.right_px))
-        down = ((edge - self.top_px) * self.scale - 0.5 for edge in (label.top_px, label.bottom_px))
-        (left, right), (top, bottom) = across, down
-        return left, top, right, bottom
-
-
-def load_frame(path: Path) -> Frame:
-    """A picture, upright, made as large as a frame may be but not enlarged; BslamError if it cannot be read.
-
-    Its sides become multiples of a cell: up to three pixels of the frame are cut off, half on each side.
-    """
-    try:
-        with Image.open(path) as opened:
-            picture = ImageOps.exif_transpose(opened).convert("RGB")
-    except (OSError, SyntaxError) as error:
-        raise BslamError(f"{path}: cannot be read: {error}; allowed: a picture (PNG, JPEG)") from error
-    most_px = frame_size_max()
-    scale = min(1.0, *(most / side for most, side in zip(most_px, picture.size, strict=True)))
-    width_px, height_px = (CELL_PX * int(side * scale / CELL_PX) for side in picture.size)
-    if min(width_px, height_px) < 4 * CELL_PX:
-        size = f"{picture.size[0]}x{picture.size[1]}"
-        raise BslamError(f"{path}: is {size}; allowed: sides from {4 * CELL_PX} px, not longer than 20:1")
-    left_px = 0.5 * (picture.size[0] - width_px / scale)
-    top_px = 0.5 * (picture.size[1] - height_px / scale)
-    cut = (left_px, top_px, picture.size[0] - left_px, picture.size[1] - top_px)
-    small = picture.resize((width_px, height_px), Image.Resampling.BOX, box=cut)
-    return Frame(np.array(small), scale, left_px, top_px)
-
-
-def camera_for(width_px: int, height_px: int) -> Camera:
-    """A stand-in for the camera that took a picture: 60 degrees across. Signatures hardly depend on it."""
-    focal_px = 0.5 * width_px / math.tan(0.5 * FIELD_OF_VIEW_RAD)
-    centre_px = (0.5 * (width_px - 1), 0.5 * (height_px - 1))
-    return Camera(Lens("pinhole", width_px, height_px, focal_px, focal_px, *centre_px))
-
-
 def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
     """The samples of all pictures; `model` finds candidates (the built-in one unless given).
 
@@ -131,7 +72,7 @@ def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
     end learns the room's colours, which signatures are measured against, as it does on a robot.
     BslamError if an object has no sample at all, or samples from one picture only.
     """
-    frames = [load_frame(picture.path) for picture in folder.pictures]
+    frames = [load_picture(picture.path) for picture in folder.pictures]
     front_ends = {size: FrontEnd([camera_for(*size)], model) for size in {frame.size_px for frame in frames}}
     for frame in frames:
         front_ends[frame.size_px].see(frame.rgb)
@@ -141,7 +82,7 @@ def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
         front_end = front_ends[frame.size_px]
         seeing = front_end.see(frame.rgb)
         if seeing.reason in ("seen", "nothing"):
-            boxes = [frame.box(label) for label in picture.labels]
+            boxes = [_in_frame(frame, label) for label in picture.labels]
             names = [label.name for label in picture.labels]
             view = _View(front_end, boxes, [_index_of(folder, name) for name in names], index)
             _add_boxes(collected, view)
@@ -171,6 +112,10 @@ class _View:
     boxes: list[Box]
     objects: list[int]
     picture: int
+
+
+def _in_frame(frame: Scaled, label: Label) -> Box:
+    return frame.box(label.left_px, label.top_px, label.right_px, label.bottom_px)
 
 
 def _index_of(folder: Folder, name: str) -> int:

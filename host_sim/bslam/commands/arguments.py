@@ -130,7 +130,11 @@ def add_batch_options(
         help=f"seeds from A up to and without B (default: {seeds})",
     )
     group.add_argument(
-        "--jobs", type=_count, default=joblib.cpu_count(), metavar="N", help="processes (default: cores)"
+        "--jobs",
+        type=positive_count,
+        default=joblib.cpu_count(),
+        metavar="N",
+        help="processes (default: cores)",
     )
     group.add_argument(
         "--out",
@@ -260,7 +264,8 @@ def _whole(text: str) -> int:
     return int(text)
 
 
-def _count(text: str) -> int:
+def positive_count(text: str) -> int:
+    """A whole number from 1, as an option's value."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number from 1")
     return int(text)

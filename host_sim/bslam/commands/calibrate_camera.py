@@ -65,7 +65,8 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute_camera(arguments: argparse.Namespace) -> int:
     """Run the calibration; the exit status."""
-    board = Board(*arguments.board, arguments.square)
+    across, down = arguments.board
+    board = Board(across, down, arguments.square)
     folder = Path(arguments.directory)
     calibration = calibrate_lens(find_boards(folder, board), board, arguments.lens)
     mounting = yaw = None

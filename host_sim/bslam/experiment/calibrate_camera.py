@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.experiment.calibrate import Estimate
+from bslam.experiment.pictures import SUFFIXES
 from bslam.rig import Camera, Lens
 
 try:
@@ -24,7 +25,6 @@ try:
 except ImportError:  # an extra
     cv2 = None  # type: ignore[assignment]
 
-PICTURES: Final = (".png", ".jpg", ".jpeg", ".bmp", ".ppm")
 _FEWEST_VIEWS: Final = 4
 # A view whose error is above both is not of the lens that the others show.
 _OUTLIER_PX: Final = 1.0
@@ -83,9 +83,9 @@ def find_boards(folder: Path, board: Board) -> Views:
     """
     if not folder.is_dir():
         raise BslamError(f"{folder}: no such folder; allowed: one with pictures of a checkerboard")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES)
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
     if not paths:
-        raise BslamError(f"{folder}: no picture in it; allowed: files named {', '.join(PICTURES)}")
+        raise BslamError(f"{folder}: no picture in it; allowed: files named {', '.join(SUFFIXES)}")
     opencv = _opencv()
     found: dict[str, NDArray[np.float32]] = {}
     size: tuple[int, int] | None = None

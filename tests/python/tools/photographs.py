@@ -13,7 +13,7 @@ from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, free_pose, make_world
 from training.folder import COLUMNS
 
-WORLD = 3
+WORLD = 1
 
 
 def name_of(seen: Seen) -> str:

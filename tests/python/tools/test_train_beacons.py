@@ -13,12 +13,12 @@ from PIL import Image
 
 import train_beacons
 from bslam.core.vision import FrontEnd
-from bslam.errors import BslamError
+from bslam.experiment.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools import photographs
 from tools.compiled import FIRMWARE
 from training import samples
-from training.folder import COLUMNS, Label, read_folder
+from training.folder import COLUMNS, read_folder
 
 SIGNATURE = 71
 
@@ -76,14 +76,14 @@ class Compiled:
 def boxes_of(folder):
     """(name, signature) of every box in a folder of pictures, by a front end that knows the room."""
     pictures = read_folder(folder).pictures
-    frames = [samples.load_frame(picture.path) for picture in pictures]
-    front_end = samples.FrontEnd([samples.camera_for(*frames[0].size_px)], None)
+    frames = [load_picture(picture.path) for picture in pictures]
+    front_end = samples.FrontEnd([camera_for(*frames[0].size_px)], None)
     for frame in frames:
         front_end.see(frame.rgb)
     for picture, frame in zip(pictures, frames, strict=True):
         front_end.see(frame.rgb)
         for label in picture.labels:
-            yield label.name, front_end.signature(frame.box(label))
+            yield label.name, front_end.signature(samples._in_frame(frame, label))
 
 
 def test_twenty_pictures_give_a_header_that_compiles_and_recognises(user, tmp_path):
@@ -142,55 +142,6 @@ def test_other_things_are_rejected(tmp_path):
     )[1]
     assert counts[2].sum() > 20 and counts[2, 2] > 0.9 * counts[2].sum()
     assert counts[0, 0] + counts[1, 1] > 0.8 * counts[:2].sum()
-
-
-# --- pictures -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("size", [(320, 240), (1280, 960), (641, 483), (200, 400), (64, 48)])
-def test_load_frame_keeps_boxes_on_what_they_were_drawn_round(tmp_path, size):
-    pixels = np.full((size[1], size[0], 3), 200, np.uint8)
-    left, top, right, bottom = (
-        int(share * side) for share, side in zip((0.3, 0.2, 0.6, 0.7), size * 2, strict=True)
-    )
-    pixels[top:bottom, left:right] = (250, 10, 10)
-    Image.fromarray(pixels).save(tmp_path / "a.png")
-    frame = samples.load_frame(tmp_path / "a.png")
-    height, width = frame.rgb.shape[:2]
-    assert width % 4 == 0 and height % 4 == 0 and width <= 320 and height <= 240
-    red = frame.rgb[:, :, 1] < 105  # more than half of the pixel
-    columns, rows = np.flatnonzero(red.any(axis=0)), np.flatnonzero(red.any(axis=1))
-    found = (columns[0] - 0.5, rows[0] - 0.5, columns[-1] + 0.5, rows[-1] + 0.5)
-    assert frame.box(Label("a", left, top, right, bottom)) == pytest.approx(
-        found, abs=0.6
-    )  # found to a pixel
-
-
-def test_load_frame_turns_a_picture_upright(tmp_path):
-    exif = Image.Exif()
-    exif[0x0112] = 6  # the camera lay on its right side
-    pixels = np.zeros((40, 80, 3), np.uint8)
-    pixels[:20] = 255
-    Image.fromarray(pixels).save(tmp_path / "a.png", exif=exif)
-    rgb = samples.load_frame(tmp_path / "a.png").rgb
-    assert rgb.shape == (80, 40, 3)
-    assert rgb[:, 30].min() == 255 and rgb[:, 5].max() == 0
-
-
-@pytest.mark.parametrize("size", [(12, 12), (4000, 16)])
-def test_load_frame_picture_of_no_use_is_refused(tmp_path, size):
-    Image.new("RGB", size).save(tmp_path / "a.png")
-    with pytest.raises(BslamError, match=rf"a\.png: is {size[0]}x{size[1]}; allowed: sides from 16 px"):
-        samples.load_frame(tmp_path / "a.png")
-
-
-def test_load_frame_truncated_picture_is_refused(tmp_path):
-    noise = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
-    Image.fromarray(noise).save(tmp_path / "a.png")
-    content = (tmp_path / "a.png").read_bytes()
-    (tmp_path / "a.png").write_bytes(content[: len(content) // 2])
-    with pytest.raises(BslamError, match=r"a\.png: cannot be read"):
-        samples.load_frame(tmp_path / "a.png")
 
 
 # --- what is refused ----------------------------------------------------------------------------------------
