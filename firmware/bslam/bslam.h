@@ -9,5 +9,6 @@
 #define BSLAM_VERSION_PATCH 0
 
 #include "bslam/slam/slam.h"
+#include "bslam/svm/learner.h"
 
 #endif

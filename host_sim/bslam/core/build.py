@@ -33,6 +33,7 @@ Macros = Sequence[tuple[str, str]]
 def _macros(real: str, beacons_max: int) -> Macros:
     return [
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
+        ("BSLAM_SAMPLE_FLOAT", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
         ("BSLAM_RAYS_MAX", str(beacons_max)),
         ("BSLAM_SIGHTINGS_MAX", str(max(64, beacons_max + 16))),  # every beacon at once, and some clutter
