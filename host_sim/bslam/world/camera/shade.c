@@ -217,11 +217,17 @@ typedef struct footprint {
     float row_u, row_v, column_u, column_v;
 } footprint_t;
 
-static footprint_t footprint_of(const render_face_t *face, const float s, const float u, const float v,
-                                const float steps[2][3], const float size[2])
+static footprint_t footprint_of(const render_scene_t *scene, const render_face_t *faces, int32_t index,
+                                const float ray[3], const float steps[2][3])
 {
+    const render_surface_t *surface = &scene->surfaces[index];
+    const render_texture_t *texture = &scene->textures[surface->texture];
+    const render_face_t *face = &faces[index];
+    const float inverse = 1.0f / dot3(face->s, ray);
+    const float u = dot3(face->a, ray) * inverse, v = dot3(face->b, ray) * inverse;
+    const float scale_u = inverse * surface->tiles_u * (float)(1 << texture->width_log2);
+    const float scale_v = inverse * surface->tiles_v * (float)(1 << texture->height_log2);
     const float row_s = dot3(face->s, steps[0]), column_s = dot3(face->s, steps[1]);
-    const float scale_u = size[0] / s, scale_v = size[1] / s;
     return (footprint_t){
         .row_u = scale_u * (dot3(face->a, steps[0]) - u * row_s),
         .row_v = scale_v * (dot3(face->b, steps[0]) - v * row_s),
@@ -263,19 +269,16 @@ static uint64_t texture_over(const render_scene_t *scene, const render_texture_t
 
 /* Adds `weight` times the colour of a surface where the ray meets it. */
 static void add_colour(const render_scene_t *scene, const render_face_t *faces, const render_light_t *light,
-                       int32_t index, const float ray[3], const float steps[2][3], float weight, float rgb[3])
+                       int32_t index, const float ray[3], const footprint_t *print, float weight,
+                       float rgb[3])
 {
     const render_surface_t *surface = &scene->surfaces[index];
     const render_face_t *face = &faces[index];
-    const render_texture_t *texture = &scene->textures[surface->texture];
-    const float s = dot3(face->s, ray);
-    const float u = dot3(face->a, ray) / s, v = dot3(face->b, ray) / s;
-    const float size[2] = {surface->tiles_u * (float)(1 << texture->width_log2),
-                           surface->tiles_v * (float)(1 << texture->height_log2)};
-    const footprint_t print = footprint_of(face, s, u, v, steps, size);
+    const float inverse = 1.0f / dot3(face->s, ray);
+    const float u = dot3(face->a, ray) * inverse, v = dot3(face->b, ray) * inverse;
     const spot_t spot = {u * surface->tiles_u, v * surface->tiles_v, surface->tiles_u == 1.0f,
                          surface->tiles_v == 1.0f};
-    const uint64_t texel = texture_over(scene, texture, &spot, &print);
+    const uint64_t texel = texture_over(scene, &scene->textures[surface->texture], &spot, print);
     float shares[2];
     light_at(&scene->light[index * 2 * RENDER_LIGHT_NODES * RENDER_LIGHT_NODES], u, v, shares);
     const float dark = surface->flags & RENDER_CUT_OUT ? 0.0f : 1.0f - (float)(texel >> 48) / 255.0f;
@@ -321,9 +324,10 @@ static void ray_steps(const render_lens_t *lens, int32_t centre, float steps[2][
 
 /* Each surface in the pixel counts by the weights of its rays, and is looked at in their mean direction. */
 static void mix(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                const render_light_t *light, const int16_t *hits, int32_t centre, const float steps[2][3],
-                float rgb[3])
+                const render_light_t *light, const int16_t *hits, int32_t centre, float rgb[3])
 {
+    float steps[2][3];
+    ray_steps(lens, centre, steps);
     const int32_t stride = rays_along(lens->width_px);
     int32_t at[9];
     for (int32_t i = 0; i < 9; i++)
@@ -343,26 +347,34 @@ static void mix(const render_scene_t *scene, const render_lens_t *lens, const re
             ray[1] += ray_weights[i] * lens->ray_y[at[i]];
             ray[2] += ray_weights[i] * lens->ray_z[at[i]];
         }
-        add_colour(scene, faces, light, hit, ray, steps, weight, rgb);
+        const footprint_t print = footprint_of(scene, faces, hit, ray, steps);
+        add_colour(scene, faces, light, hit, ray, &print, weight, rgb);
     }
 }
 
+/* A footprint changes slowly: it is worked out for every fourth pixel, and when the surface changes. */
 static void shade_row(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
                       const render_light_t *light, const int16_t *hits, int32_t row, const float *vignette,
                       float *linear)
 {
     const int32_t stride = rays_along(lens->width_px);
-    int32_t centre = (2 * row + 1) * stride + 1;
+    int32_t centre = (2 * row + 1) * stride + 1, last = RENDER_NOTHING;
+    footprint_t print = {0};
     for (int32_t column = 0; column < lens->width_px; column++, centre += 2, linear += 3) {
         const int16_t hit = hits[centre];
-        float ray[3], steps[2][3];
         linear[0] = linear[1] = linear[2] = 0.0f;
-        ray_at(lens, centre, ray);
-        ray_steps(lens, centre, steps);
-        if (is_mixed(&hits[centre], stride))
-            mix(scene, lens, faces, light, hits, centre, steps, linear);
-        else if (hit != RENDER_NOTHING)
-            add_colour(scene, faces, light, hit, ray, steps, 1.0f, linear);
+        if (is_mixed(&hits[centre], stride)) {
+            mix(scene, lens, faces, light, hits, centre, linear);
+        } else if (hit != RENDER_NOTHING) {
+            float ray[3], steps[2][3];
+            ray_at(lens, centre, ray);
+            if (hit != last || column % 4 == 0) {
+                ray_steps(lens, centre, steps);
+                print = footprint_of(scene, faces, hit, ray, steps);
+                last = hit;
+            }
+            add_colour(scene, faces, light, hit, ray, &print, 1.0f, linear);
+        }
         for (int32_t i = 0; i < 3; i++)
             linear[i] *= vignette[column];
     }
