@@ -119,7 +119,7 @@ def _prepare(jobs: Sequence[Job], processes: int) -> None:
 
 
 def _prepare_one(source: Source) -> None:
-    with contextlib.suppress(BslamError):
+    with contextlib.suppress(Exception):  # which its run meets again, and reports
         source.prepare()
 
 

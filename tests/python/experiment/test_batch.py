@@ -2,7 +2,7 @@
 
 import json
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,13 @@ class LogSource:
     name: str = "made"
     align: bool = False
     truth_kind: str = "simulated"
+    shared: str | None = None  # what is prepared once for all that share it
+    prepared: list[str] = field(default_factory=list)
+
+    def prepare(self):
+        self.prepared.append(self.shared)
+        if isinstance(self.log, BaseException):
+            raise self.log
 
     def load(self):
         if isinstance(self.log, BaseException):
@@ -60,6 +67,26 @@ def test_one_run_leaves_its_files_and_an_entry(made, tmp_path):
         False,
     )
     assert len(result.outcomes[0].time_s) == len(result.outcomes[0].error_m) == 21
+
+
+def test_what_runs_share_is_prepared_once_before_them(made, tmp_path):
+    prepared = []
+    sources = [
+        LogSource(made.circle_log(20), shared=name, prepared=prepared) for name in ("a", "a", "b", None)
+    ]
+    result = run_batch(
+        [Job(str(i), one, RunOptions()) for i, one in enumerate(sources)], tmp_path, processes=1
+    )
+    assert result.ok
+    assert prepared == ["a", "b"]
+
+
+@pytest.mark.parametrize("failure", [BslamError("no"), ZeroDivisionError("oh")])
+def test_a_preparation_that_fails_fails_its_run_alone(made, tmp_path, failure):
+    good, bad = LogSource(made.circle_log(20), shared="good"), LogSource(failure, shared="bad")
+    jobs = [Job("good", good, RunOptions()), Job("bad", bad, RunOptions())]
+    result = run_batch(jobs, tmp_path, processes=1)
+    assert [outcome.failed for outcome in result.outcomes] == [False, True]
 
 
 @pytest.mark.parametrize(
