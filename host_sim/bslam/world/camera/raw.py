@@ -138,6 +138,7 @@ class Caster:
         self._hits = np.empty((2 * height + 1, 2 * width + 1), dtype=np.int16)
         self._linear = np.empty((height, width, 3), dtype=np.float32)
         self._scratch = np.empty((height + 1, width, 3), dtype=np.float32)
+        self._counts = np.zeros(scene.surface_count, dtype=np.int32)
         self._random = ffi.new("uint64_t *", seed)
         self._eye = ffi.new("render_eye_t *")
         self._light = ffi.new("render_light_t *")
@@ -166,13 +167,19 @@ class Caster:
             _pointer(self._linear),
         )
         identity_c, depth_c = _pointer(identity, "int16_t *"), _pointer(depth_m)
-        lib.render_truth(scene, lens, self._faces, hits, identity_c, depth_c)
+        lib.render_truth(
+            scene, lens, self._faces, hits, identity_c, depth_c, _pointer(self._counts, "int32_t *")
+        )
         return identity, depth_m
 
     def brightness(self) -> float:
         """Mean light of the picture as traced, values beyond 4 times the mean held back."""
         every = self._linear[::4, ::4]
         return float(np.minimum(every, 4.0 * every.mean()).mean())
+
+    def visible_px(self, first: int, count: int) -> int:
+        """Pixel centres that some surfaces got in the picture as traced."""
+        return int(self._counts[first : first + count].sum())
 
     def own_px(self, first: int, count: int, box: tuple[float, float, float, float]) -> int:
         """Pixel centres that some surfaces would cover in the picture as traced, if nothing hid them.

@@ -137,9 +137,10 @@ int32_t render_own_px(const render_scene_t *scene, const render_lens_t *lens, co
 void render_shade(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
                   const int16_t *hits, const render_light_t *light, const float *vignette, float *linear);
 
-/* From hits to identity and distance along the ray in m (inf: nothing), [height][width]. */
+/* From hits to identity and distance along the ray in m (inf: nothing), [height][width], and how many pixel
+ * centres each surface got, counts[surface_count]. */
 void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                  const int16_t *hits, int16_t *identity, float *depth_m);
+                  const int16_t *hits, int16_t *identity, float *depth_m, int32_t *counts);
 
 /* Blurs the light and turns it into 8 bits with noise, rgb [height][width][3]; `random` is advanced.
  * normals[RENDER_NORMALS]: quantiles of the normal distribution; tones[RENDER_TONES]: the tone curve;

@@ -97,7 +97,7 @@ class Renderer:
         identity, depth_m = self._caster.trace(eye, (math.cos(yaw_rad), math.sin(yaw_rad)), lamp, sky)
         rgb = self._expose(time_s, yaw_rad)
         self._last = (time_s, yaw_rad)
-        return Frame(rgb, identity, depth_m, self._seen(identity, eye, yaw_rad, pose[2]))
+        return Frame(rgb, identity, depth_m, self._seen(eye, yaw_rad, pose[2]))
 
     def _eye(self, pose: Pose, pan_rad: float) -> tuple[tuple[float, float, float], float]:
         x_m, y_m, theta_rad = pose
@@ -125,13 +125,10 @@ class Renderer:
         noise = (self._shot * self._exposure, self._read * math.sqrt(self._exposure))
         return self._caster.expose(gain, noise, _blur(across_px, raw.BLUR_TAPS), _blur(self._blur_px, 3)[0])
 
-    def _seen(
-        self, identity: NDArray[np.int16], eye: tuple[float, float, float], yaw_rad: float, theta_rad: float
-    ) -> tuple[Seen, ...]:
-        counts = np.bincount(identity.ravel() + 2)[2:].tolist()
+    def _seen(self, eye: tuple[float, float, float], yaw_rad: float, theta_rad: float) -> tuple[Seen, ...]:
         seen = []
         for beacon, body in zip(self._scene.beacons, self._scene.bodies, strict=True):
-            visible_px = counts[beacon.beacon_id] if beacon.beacon_id < len(counts) else 0
+            visible_px = self._caster.visible_px(body.first, body.count)
             if visible_px:
                 seen.append(self._look(beacon, body, visible_px, eye, yaw_rad, theta_rad))
         return tuple(seen)

@@ -18,7 +18,8 @@ static uint64_t next(uint64_t *random)
 }
 
 /* out += tap * in, where the compiler may use vectors. */
-static void add_scaled(float *restrict out, const float *restrict in, float tap, int32_t count)
+RENDER_FOR_VECTORS static void add_scaled(float *restrict out, const float *restrict in, float tap,
+                                          int32_t count)
 {
     for (int32_t i = 0; i < count; i++)
         out[i] += tap * in[i];
@@ -41,8 +42,9 @@ static void blur_row(const float *taps, int32_t width, const float *row, float *
     }
 }
 
-static void blur_column(float share, const float *restrict above, const float *restrict row,
-                        const float *restrict below, float *restrict out, int32_t count)
+RENDER_FOR_VECTORS static void blur_column(float share, const float *restrict above,
+                                           const float *restrict row, const float *restrict below,
+                                           float *restrict out, int32_t count)
 {
     const float own = 1.0f - 2.0f * share;
     for (int32_t i = 0; i < count; i++)

@@ -281,7 +281,7 @@ static void add_colour(const render_scene_t *scene, const render_face_t *faces, 
     const uint64_t texel = texture_over(scene, &scene->textures[surface->texture], &spot, print);
     float shares[2];
     light_at(&scene->light[index * 2 * RENDER_LIGHT_NODES * RENDER_LIGHT_NODES], u, v, shares);
-    const float dark = surface->flags & RENDER_CUT_OUT ? 0.0f : 1.0f - (float)(texel >> 48) / 255.0f;
+    const float dark = surface->flags & RENDER_CUT_OUT ? 0.0f : 1.0f - (float)(texel >> 48) * (1.0f / 255.0f);
     const float lamp = shares[0] + dark * surface->glow_lamp, sky = shares[1] + dark * surface->glow_sky;
     const float roots[3] = {(float)(texel & 0xffu), (float)((texel >> 32) & 0xffu),
                             (float)((texel >> 16) & 0xffu)};
@@ -389,8 +389,9 @@ void render_shade(const render_scene_t *scene, const render_lens_t *lens, const 
 }
 
 void render_truth(const render_scene_t *scene, const render_lens_t *lens, const render_face_t *faces,
-                  const int16_t *hits, int16_t *identity, float *depth_m)
+                  const int16_t *hits, int16_t *identity, float *depth_m, int32_t *counts)
 {
+    memset(counts, 0, sizeof *counts * (size_t)scene->surface_count);
     for (int32_t row = 0; row < lens->height_px; row++) {
         int32_t centre = (2 * row + 1) * rays_along(lens->width_px) + 1;
         for (int32_t column = 0; column < lens->width_px; column++, centre += 2) {
@@ -399,6 +400,8 @@ void render_truth(const render_scene_t *scene, const render_lens_t *lens, const 
             ray_at(lens, centre, ray);
             *identity++ = hit == RENDER_NOTHING ? -1 : (int16_t)scene->surfaces[hit].identity;
             *depth_m++ = hit == RENDER_NOTHING ? INFINITY : 1.0f / dot3(faces[hit].s, ray);
+            if (hit != RENDER_NOTHING)
+                counts[hit]++;
         }
     }
 }

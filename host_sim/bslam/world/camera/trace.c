@@ -181,9 +181,10 @@ typedef struct cover {
 } cover_t;
 
 /* The hot loop: branch-free, so that the compiler makes it a vector loop. */
-static void cover_row(const render_face_t *face, int32_t index, int32_t count, const float *restrict x,
-                      const float *restrict y, const float *restrict z, float *restrict nearest,
-                      int32_t *restrict hit)
+RENDER_FOR_VECTORS static void cover_row(const render_face_t *face, int32_t index, int32_t count,
+                                         const float *restrict x, const float *restrict y,
+                                         const float *restrict z, float *restrict nearest,
+                                         int32_t *restrict hit)
 {
     const float s0 = face->s[0], s1 = face->s[1], s2 = face->s[2];
     const float a0 = face->a[0], a1 = face->a[1], a2 = face->a[2];
