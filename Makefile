@@ -40,7 +40,8 @@ CAMERA_STAMP := build/camera.stamp
 .PHONY: extension
 extension: $(EXTENSION_STAMP) $(CAMERA_STAMP)
 
-$(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(VENV)/run.stamp
+$(EXTENSION_STAMP): $(EXTENSION_BUILD) $(CORE_SOURCES) $(CORE_HEADERS) $(wildcard firmware/models/*.h) \
+    $(VENV)/run.stamp
 	@echo "setup: building the cffi extensions"
 	@$(PYTHON) -m bslam.core.build
 	@mkdir -p $(@D) && touch $@
@@ -68,6 +69,11 @@ endif
 .PHONY: tables
 tables: setup-run ## the tables of the paper, in our figures
 	$(BSLAM) tables --out out/tables
+
+.PHONY: train
+train: setup ## train the beacon detectors on rendered worlds, write firmware/models/beacons.h (about 25 min)
+	$(PYTHON) tools/train_detector.py
+	@$(MAKE) --silent extension
 
 # --- Testing ------------------------------------------------------------------------------------------------
 

@@ -6,19 +6,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
+from sklearn.svm import LinearSVC
 
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import Svm
 from training.detector_samples import CLUTTER, BoxSamples, CellSamples
-from training.fit import choose_cost, fit, quantised
+from training.fit import choose_cost, expand, fit, quantised
 from training.render_set import KINDS
 from training.truth import IGNORED, NOTHING
 
 CELLS_MAX = 200_000
 CELL_COSTS = (0.01, 0.1)
 KIND_COST = 0.003
+KIND_TOLERANCE = 0.01
+PROCESSES = 2
 SCREEN_COST = 0.01
 SCREEN_RECALL = 0.995
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
@@ -119,8 +123,17 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
 def _fit_kinds(
     samples: BoxSamples, detector: DetectorModel, targets: NDArray[np.bool_], chosen: NDArray[np.intp]
 ) -> Svm:
+    """As training.fit.fit does, the rows side by side and to a looser tolerance: minutes, not an hour."""
     x = normalised(samples.features[chosen], detector)
-    return fit(x, targets[chosen], KIND_COST, quadratic=True).svm
+    scaler = StandardScaler()
+    scaled = scaler.fit_transform(expand(x, quadratic=True))
+    machines = Parallel(n_jobs=PROCESSES, prefer="threads")(
+        delayed(LinearSVC(C=KIND_COST, dual=False, tol=KIND_TOLERANCE).fit)(scaled, column)
+        for column in targets[chosen].T
+    )
+    weights = np.stack([machine.coef_[0] / scaler.scale_ for machine in machines])
+    bias = np.array([machine.intercept_[0] for machine in machines]) - weights @ scaler.mean_
+    return Svm(x.shape[1], True, weights.astype(np.float32), bias.astype(np.float32))
 
 
 def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:

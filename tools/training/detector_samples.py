@@ -17,15 +17,17 @@ from bslam.modelfile import BeaconClass, Svm, weights_in_row
 from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners
 
-CLASSES = tuple(
-    BeaconClass(name, height_m, depth_m)
-    for name, height_m, depth_m in zip(
-        KINDS,
-        (0.60, 0.60, 2.00, 1.20, 0.84, 0.30, 1.80),
-        (0.0, 0.12, 0.035, 0.04, 0.015, 0.015, 0.30),  # an extinguisher is round and shows no flank
-        strict=True,
-    )
+CLASSES = (
+    BeaconClass("extinguisher", 0.60, 0.125),
+    BeaconClass("radiator", 0.60, 0.12),
+    BeaconClass("door", 2.00, 0.035),
+    BeaconClass("window", 1.20, 0.04),
+    BeaconClass("poster", 0.84, 0.015),
+    BeaconClass("sign", 0.30, 0.015),
+    BeaconClass("cabinet", 1.80, 0.375),
 )
+"""Whole heights and middling depths, in the order of KINDS."""
+
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""
 
@@ -141,7 +143,7 @@ def _label_boxes(
     owner, overlap = owners(boxes, seen)
     label = owner.copy()
     label[owner >= 0] = seen["kind"][owner[owner >= 0]]
-    is_clutter = (owner == NOTHING) & (_clutter_share(world.clutter[index], boxes) > 0.4)
+    is_clutter = (owner == NOTHING) & (clutter_share(world.clutter[index], boxes) > 0.4)
     label[is_clutter] = CLUTTER
     object_row = np.full(len(boxes), -1)
     object_row[owner >= 0] = rows[owner[owner >= 0]]
@@ -155,7 +157,7 @@ def _label_boxes(
     )
 
 
-def _clutter_share(clutter: NDArray[np.uint8], boxes: NDArray[np.float32]) -> NDArray[np.float64]:
+def clutter_share(clutter: NDArray[np.uint8], boxes: NDArray[np.float32]) -> NDArray[np.float64]:
     """Share of each box (n, 4) that clutter covers, to the cell."""
     total = np.zeros((clutter.shape[0] + 1, clutter.shape[1] + 1))
     total[1:, 1:] = clutter.cumsum(axis=0).cumsum(axis=1)

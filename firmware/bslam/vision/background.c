@@ -75,6 +75,11 @@ static int32_t row_looking(const bslam_camera_t *camera, bslam_real_t up_rad)
     return (int32_t)(v_px / BSLAM_CELL_PX);
 }
 
+bslam_real_t bslam_horizon_px(const bslam_camera_t *camera)
+{
+    return camera->cy_px - camera->fy_px * camera->pitch_rad;
+}
+
 int32_t bslam_horizon_row(const bslam_camera_t *camera)
 {
     return row_looking(camera, 0);
@@ -209,6 +214,7 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
             }
         }
         line->row[column] = (int16_t)(row - 1);
+        line->edge_px[column] = (int16_t)(row * BSLAM_CELL_PX);
         const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
         const bslam_real_t v_px = (bslam_real_t)(row * BSLAM_CELL_PX) - BSLAM_R(0.5);
         line->distance_m[column] = row < frame->rows ? floor_distance_m(camera, u_px, v_px) : 0;

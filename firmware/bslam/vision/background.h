@@ -49,6 +49,7 @@ typedef struct bslam_background {
 
 /// Where the floor ends in each column of cells, and how far away that is.
 typedef struct bslam_floor_line {
+    int16_t edge_px[BSLAM_COLUMNS_MAX];          ///< the uppermost pixel row of the floor
     int16_t row[BSLAM_COLUMNS_MAX];              ///< the lowest row of cells that is not floor
     bslam_real_t distance_m[BSLAM_COLUMNS_MAX];  ///< horizontal, from the camera; 0 where it cannot be told
 } bslam_floor_line_t;
@@ -61,6 +62,9 @@ void bslam_background_tones(const bslam_frame_t *frame, bslam_tone_t *tones);
 
 /// The row of cells that the horizon runs through in the middle of the frame; it may lie outside.
 int32_t bslam_horizon_row(const bslam_camera_t *camera);
+
+/// The same in pixels.
+bslam_real_t bslam_horizon_px(const bslam_camera_t *camera);
 
 /// Learns from a frame. Called for the first frame, and for those taken since the robot moved.
 void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,

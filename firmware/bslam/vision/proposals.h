@@ -19,8 +19,8 @@ typedef struct bslam_view {
     const bslam_background_t *background;
     const bslam_floor_line_t *floor_line;
     const bslam_tone_t *tones;  ///< [rows][columns], as all that follow
-    const uint8_t *step_x;      ///< tone distance to the cell on the left, at most 255; 0 in the first column
-    const uint8_t *step_y;      ///< to the cell above
+    const uint8_t *step_x;      ///< colour difference of the cells on the left and right, at most 255
+    const uint8_t *step_y;      ///< of those above and below
     const int8_t *values;       ///< decision value of each cell, in 1/BSLAM_CELL_VALUE_ONE
 } bslam_view_t;
 
@@ -30,6 +30,9 @@ typedef struct bslam_cell_machine {
     int16_t weights[BSLAM_CELL_FEATURES];
     int32_t bias;
 } bslam_cell_machine_t;
+
+/// Segmentations of a frame; boxes found otherwise have numbers from here on.
+#define BSLAM_SEGMENTATIONS 7
 
 /// A box in which there may be a beacon.
 typedef struct bslam_proposal {
@@ -43,11 +46,12 @@ typedef struct bslam_proposal {
 } bslam_proposal_t;
 
 /// Scratch for one segmentation.
-#define BSLAM_RUNS_MAX 1024
+#define BSLAM_RUNS_MAX 1536
 typedef struct bslam_run {
     uint16_t parent;
     uint16_t cells;
-    uint8_t first;  ///< the run's own columns: [first, end)
+    uint8_t row;  ///< the run's own: columns [first, end) of this row
+    uint8_t first;
     uint8_t end;
     uint8_t left;  ///< of all joined to it, if it is their root
     uint8_t top;
@@ -61,6 +65,7 @@ typedef struct bslam_proposals {
     uint32_t boxes_dropped;  ///< since init: BSLAM_PROPOSALS_MAX did not suffice
     bslam_proposal_t items[BSLAM_PROPOSALS_MAX];
     bslam_run_t runs[BSLAM_RUNS_MAX];
+    uint8_t mask[BSLAM_CELLS_MAX];  ///< 1: the present segmentation joins this cell
 } bslam_proposals_t;
 
 /// The machine of a model, rounded to whole numbers.
@@ -75,6 +80,9 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
 
 /// Fills the view's values, given as an array to write to.
 void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine, int8_t *values);
+
+/// Adds a box, unless it is known or there is no room.
+void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_proposal_t *proposal);
 
 /// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice.
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view);

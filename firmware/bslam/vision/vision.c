@@ -5,6 +5,7 @@
 
 #include "bslam/math/trig.h"
 #include "bslam/vision/measure.h"
+#include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
 
 /// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
@@ -214,6 +215,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     bslam_cells_step(&view, vision->step_x, vision->step_y);
     bslam_cells_decide(&view, &vision->machines[camera], vision->values);
     bslam_proposals_find(&vision->proposals, &view);
+    bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =
         bslam_detector_judge(detector, vision->model->class_count, &view, &vision->proposals,
                              vision->candidates, &vision->candidates_dropped);

@@ -1,0 +1,15 @@
+/// Boxes between two upright edges, as high as beacons are: what a component does not give where a beacon has
+/// the wall's colour.
+///
+/// The floor line is height 0 and the horizon the camera's height, so in each column a row is a height on the
+/// wall. Where the colour steps sideways along all of a kind's height there may be a side of it; two such
+/// columns a plausible width apart make a box.
+#ifndef BSLAM_VISION_UPRIGHTS_H
+#define BSLAM_VISION_UPRIGHTS_H
+
+#include "bslam/vision/proposals.h"
+
+/// Adds boxes to those known.
+void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view);
+
+#endif

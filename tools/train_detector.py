@@ -1,0 +1,73 @@
+"""Trains the beacon detectors on rendered worlds and writes firmware/models/beacons.h: `make train`.
+
+For each kind of lens: render, take the front end's cells and fit the cell machine; take its proposals with
+that and fit screen, kinds and fusion; choose the threshold on worlds left out. Rendered worlds are kept under
+build/training, so an interrupted run goes on where it was. Nothing here looks at the style "test".
+"""
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from bslam.core.vision import BeaconModel, DetectorModel
+from training.detector_export import beacons_header
+from training.detector_fit import fit_cells, fit_fusion, fit_kinds, fit_screen, normaliser, summary
+from training.detector_samples import CLASSES, blank_detector, gather_boxes, gather_cells
+from training.detector_score import look_at_worlds, score
+from training.export import write_header
+from training.render_set import FRAMES_A_WORLD, RIGS, render_set
+
+ROOT = Path(__file__).resolve().parent.parent
+HEADER = ROOT / "firmware" / "models" / "beacons.h"
+VALIDATION_FROM = 5000
+PRECISION = 0.95
+
+
+def train(folder: Path, lens: str, worlds: int, validation: int, processes: int) -> tuple[DetectorModel, str]:
+    """The detector for a kind of lens, and what it reaches on worlds left out."""
+    seeds, left_out = range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
+    started = time.monotonic()
+    for some in (seeds, left_out):
+        render_set(folder, lens, "train", some, processes)
+    detector = blank_detector()
+    detector = replace(detector, cell=fit_cells(gather_cells(folder, lens, "train", seeds, processes)))
+    boxes = gather_boxes(folder, lens, "train", seeds, detector, processes)
+    print(f"{lens}: {summary(boxes)}", flush=True)
+    offset, scale = normaliser(boxes.features)
+    detector = replace(detector, blob_offset=offset, blob_scale=scale)
+    for fit in (fit_screen, fit_kinds, fit_fusion):
+        detector = fit(boxes, detector)
+        print(f"{lens}: {fit.__name__} done, {time.monotonic() - started:.0f} s", flush=True)
+    seen = look_at_worlds(folder, lens, "train", left_out, replace(detector, threshold=-4.0), processes)
+    result = score(seen, PRECISION)
+    detector = replace(detector, threshold=result.threshold)
+    return detector, f"recall {result.recall:.3f} at precision {PRECISION} on {validation} worlds left out"
+
+
+def main() -> int:
+    """Trains a detector for each kind of lens and writes the header."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--worlds", type=int, default=528, help="to train on, a lens (default: 528)")
+    parser.add_argument("--validation", type=int, default=40, help="worlds left out (default: 40)")
+    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "training", help="rendered worlds")
+    parser.add_argument("--header", type=Path, default=HEADER, help="what to write")
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    detectors, notes = {}, {}
+    for lens in RIGS:
+        detectors[lens], notes[lens] = train(
+            options.folder, lens, options.worlds, options.validation, options.processes
+        )
+        print(f"{lens}: {notes[lens]}", flush=True)
+    training_set = (
+        f"rendered worlds, style train, seeds 0 to {options.worlds - 1}, {FRAMES_A_WORLD} frames each; "
+        f"thresholds from seeds {VALIDATION_FROM} to {VALIDATION_FROM + options.validation - 1}"
+    )
+    model = BeaconModel(CLASSES, detectors["pinhole"], detectors["wide"])
+    write_header(options.header, beacons_header(model, {"training set": training_set, **notes}))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,36 @@
+"""The C header of a trained beacon model: firmware/models/beacons.h."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bslam.core.vision import BeaconModel, DetectorModel
+from training.export import Header, c_float, initialiser
+
+
+def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:
+    """The header that holds `static const bslam_beacon_model_t bslam_beacons_model`."""
+    header = Header("BSLAM_MODELS_BEACONS_H", ["bslam/vision/beacon_model.h"], notes)
+    fields = {
+        "class_count": str(len(model.classes)),
+        "classes": header.classes("bslam_beacons_classes", model.classes),
+        "pinhole": _detector(header, "bslam_beacons_pinhole", model.pinhole),
+        "wide": _detector(header, "bslam_beacons_wide", model.wide),
+    }
+    header.constant("bslam_beacon_model_t", "bslam_beacons_model", initialiser(fields, indent="    "))
+    return header.text()
+
+
+def _detector(header: Header, name: str, detector: DetectorModel) -> str:
+    return initialiser(
+        {
+            "cell": header.svm(f"{name}_cell", detector.cell),
+            "blob_offset": header.array(f"{name}_offset", detector.blob_offset),
+            "blob_scale": header.array(f"{name}_scale", detector.blob_scale),
+            "screen": header.svm(f"{name}_screen", detector.screen),
+            "screen_threshold": c_float(detector.screen_threshold),
+            "kinds": header.svm(f"{name}_kinds", detector.kinds),
+            "fusion": header.svm(f"{name}_fusion", detector.fusion),
+            "threshold": c_float(detector.threshold),
+        }
+    )
