@@ -115,9 +115,9 @@
 #error "BSLAM_RIVALS_MAX is 8 to 1024"
 #endif
 
-/// Dual steps after which a training ends, converged or not; the next one goes on from there.
+/// Dual steps of one training. A machine that has not converged by then is trained again after the others.
 #ifndef BSLAM_LEARNER_STEPS_MAX
-#define BSLAM_LEARNER_STEPS_MAX 500
+#define BSLAM_LEARNER_STEPS_MAX 250
 #endif
 #if BSLAM_LEARNER_STEPS_MAX < 100 || BSLAM_LEARNER_STEPS_MAX > 100000
 #error "BSLAM_LEARNER_STEPS_MAX is 100 to 100000"

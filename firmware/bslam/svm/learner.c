@@ -2,6 +2,9 @@
 
 #include <string.h>
 
+// Trainings that a machine may ask for itself when BSLAM_LEARNER_STEPS_MAX did not suffice.
+enum { AGAIN = 16 };
+
 static bool exists(const bslam_learner_t *learner, int32_t machine)
 {
     return machine >= 0 && machine < BSLAM_LEARNER_SLOTS && learner->machines[machine].used;
@@ -108,6 +111,12 @@ static void list_rival(bslam_machine_t *machine, int32_t sample)
     }
 }
 
+static void ask_for_training(bslam_machine_t *machine)
+{
+    machine->waiting = true;
+    machine->again = AGAIN;
+}
+
 /// Tells the other machines of a new sample: one that has it inside its margin will train with it, one that
 /// takes it for its own asks for a training.
 static void warn_others(bslam_learner_t *learner, int32_t machine, int32_t sample)
@@ -123,7 +132,9 @@ static void warn_others(bslam_learner_t *learner, int32_t machine, int32_t sampl
                 bslam_training_pause(learner);
             }
             list_rival(other, sample);
-            other->waiting = other->waiting || value > 0.0f;
+            if (value > 0.0f) {
+                ask_for_training(other);
+            }
         }
     }
 }
@@ -155,7 +166,7 @@ bslam_status_t bslam_learner_show(bslam_learner_t *learner, int32_t machine,
     }
     learner->samples[machine * BSLAM_PER_MACHINE + place] = fresh;
     m->own_alpha[place] = 0;
-    m->waiting = true;
+    ask_for_training(m);
     learner->counters.kept++;
     warn_others(learner, machine, machine * BSLAM_PER_MACHINE + place);
     return BSLAM_OK;

@@ -32,7 +32,7 @@ typedef struct bslam_learner_counters {
     uint32_t dropped;      ///< samples that the full store of a machine has no use for
     uint32_t updates;      ///< trainings finished
     uint32_t steps;        ///< dual steps
-    uint32_t capped;       ///< trainings that ended at BSLAM_LEARNER_STEPS_MAX
+    uint32_t capped;       ///< of them: ended by BSLAM_LEARNER_STEPS_MAX
     uint32_t interrupted;  ///< trainings put off because a sample they use changed, or a rival came
     uint32_t refused_not_finite;
     uint32_t refused_no_machine;
@@ -44,6 +44,7 @@ typedef struct bslam_machine {
     bool used;
     bool trained;
     bool waiting;     ///< for a training
+    uint8_t again;    ///< how many more trainings it may ask for itself, if one does not converge
     uint8_t turn;     ///< which part of the other machines the next training looks through
     uint8_t samples;  ///< how many it keeps
     uint16_t rivals;  ///< length of rival[]
@@ -115,7 +116,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_learner_show(bslam_learner_t *learner, int
 
 /// Goes on with the training under way, or begins the next one asked for: at most `budget` pieces, of which
 /// each is a dual step, or a look at BSLAM_SAMPLES_PER_MACHINE samples. docs/EXPERIMENTS.md says what a piece
-/// takes. True if work is left.
+/// takes. A training ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it goes on
+/// after the others that wait, up to 16 times. True if work is left.
 bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 
 /// Decision value of a sample (bslam_sample_encode): above 0 is "this beacon", 1 and -1 are the margins. 0
