@@ -17,8 +17,10 @@
 #include "bslam/math/symmat.h"
 #include "bslam/model/observation.h"
 
+/// The robot's own values: pose, and v, omega or their scale factors.
+#define BSLAM_ROBOT_DIM_MAX 5
 /// The largest state: 5 for the robot, 2 a beacon, 2 more a ray.
-#define BSLAM_STATE_MAX (5 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
+#define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
 #define BSLAM_STATE_PADDED BSLAM_SYMMAT_PADDED(BSLAM_STATE_MAX)
 /// Scalars whose down-date waits for a common pass.
 #define BSLAM_PENDING_MAX 4
@@ -54,15 +56,6 @@ typedef struct bslam_beacon {
     uint8_t beacon_class;
 } bslam_beacon_t;
 
-/// What an image of the past needs beside the sensor's pose relative to the robot of now: with velocity
-/// states it is v and omega that took the robot from there to here, so the past pose depends on them. All 0
-/// for an image of now, and without velocity states, where the way since is taken as exact. MATH "Late
-/// sightings".
-typedef struct bslam_lag {
-    bslam_real_t mount_by_forward[2];  ///< d (x, y) of the past sensor on the robot of now / d v
-    bslam_real_t mount_by_turn[3];     ///< d (x, y, theta) of it / d omega
-} bslam_lag_t;
-
 /// All members are the filter's own; read them through the functions below.
 typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
@@ -73,7 +66,6 @@ typedef struct bslam_ekf {
     int32_t ray_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
-    bslam_lag_t lag;  ///< of the frame in hand; set by whoever feeds it, all 0 between frames
     // Scratch: holds nothing between calls.
     bslam_real_t pending[BSLAM_PENDING_MAX][BSLAM_STATE_PADDED];
     bslam_real_t pending_scale[BSLAM_PENDING_MAX];
@@ -89,12 +81,32 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
 
 // ---- time -------------------------------------------------------------------------------------------------
 
+/// BSLAM_E_SINGULAR: the motion's noise is not positive definite, which velocity states need.
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_check_motion(const bslam_params_t *params,
+                                                       const bslam_motion_t *motion);
+
 /// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states
-/// the increment is a measurement of v and omega instead, fused here. *moved is the motion that the filter
-/// took for the interval. BSLAM_E_SINGULAR: the motion noise is not positive definite, which velocity states
-/// need; nothing changes.
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params,
-                                                  const bslam_motion_t *motion, bslam_motion_t *moved);
+/// the increment is a measurement of v and omega instead, fused here; one that bslam_ekf_check_motion refuses
+/// measures nothing. *moved is the motion that the filter took for the interval.
+void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+                       bslam_motion_t *moved);
+
+/// The robot's own part of a state. It goes through odometry alone as it does with the map: neither motions
+/// nor speedometers look at a beacon.
+typedef struct bslam_robot {
+    bslam_real_t mean[BSLAM_ROBOT_DIM_MAX];
+    bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_ROBOT_DIM_MAX)];
+    int32_t dim;
+} bslam_robot_t;
+
+/// The robot as the filter has it.
+bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf);
+
+/// What bslam_ekf_predict does to the robot. O(1).
+void bslam_robot_predict(bslam_robot_t *robot, const bslam_params_t *params, const bslam_motion_t *motion,
+                         bslam_motion_t *moved);
+
+bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
 
 /// The robot may have moved unseen and stands still now: adds variance to its position (each axis) and
 /// heading, up to (30 m)² and (3.2 rad)² in all, beyond which it is lost anyway; velocity states become as at
@@ -106,7 +118,7 @@ void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real
 
 /// A row of H: not zero only at the robot's own values and at `dim` neighbouring state values from `at` on.
 typedef struct bslam_row {
-    bslam_real_t base[5];  ///< by x, y, theta and, with velocity states, v, omega; else the last two are 0
+    bslam_real_t base[5];  ///< by x, y, theta and, where a speedometer measures, v, omega; else those are 0
     bslam_real_t other[BSLAM_RAY_DIM];
     uint16_t at;
     uint16_t dim;

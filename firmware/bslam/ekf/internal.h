@@ -4,6 +4,8 @@
 
 #include "bslam/ekf/ekf.h"
 
+#define POSE_DIM 3
+
 /// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
 
@@ -12,11 +14,6 @@ static inline bool bslam_row_has_velocity(const bslam_row_t *row)
 {
     return row->base[3] != 0 || row->base[4] != 0;
 }
-
-/// Derivatives by (v, omega) of what is seen in an image of the past, from those by the sensor's position in
-/// the map and by its direction. (0, 0) if the image is of now.
-void bslam_lag_by_velocity(const bslam_ekf_t *ekf, bslam_real_t by_x, bslam_real_t by_y,
-                           bslam_real_t by_heading, bslam_real_t out[2]);
 
 /// row · vector.
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);

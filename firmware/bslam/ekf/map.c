@@ -32,36 +32,23 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
 
 // ---- growing ----------------------------------------------------------------------------------------------
 
-/// A new state value: its derivatives by the robot's own values, and the variance that the sighting adds.
+/// A new state value: its derivatives by the robot's pose, and the variance that the sighting adds.
 typedef struct new_value {
+    const bslam_real_t *by_pose;
     bslam_real_t mean;
-    bslam_real_t by_base[5];
     bslam_real_t own_var;
 } new_value_t;
-
-/// A value whose derivatives by the robot's pose and by the sensor's position and direction are given.
-static new_value_t new_value(const bslam_ekf_t *ekf, bslam_real_t mean, const bslam_real_t by_pose[3],
-                             bslam_real_t by_heading, bslam_real_t own_var)
-{
-    new_value_t value = {.mean = mean, .by_base = {by_pose[0], by_pose[1], by_pose[2]}, .own_var = own_var};
-    bslam_lag_by_velocity(ekf, by_pose[0], by_pose[1], by_heading, value.by_base + 3);
-    return value;
-}
 
 /// Writes the value and its row of P at the end of the state.
 static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
 {
     const int at = ekf->dim;
-    const bslam_real_t *by_base = value->by_base;
     bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
     memset(row, 0, (size_t)BSLAM_SYMMAT_PADDED(at + 1) * sizeof *row);
-    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, by_base, row);
-    if (by_base[3] != 0 || by_base[4] != 0) {
-        bslam_symmat_add_columns(ekf->covariance, at, BSLAM_STATE_FORWARD, 2, by_base + 3, row);
-    }
+    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, value->by_pose, row);
     bslam_real_t variance = value->own_var;
-    for (int k = 0; k < ekf->base_dim; k++) {
-        variance += by_base[k] * row[k];
+    for (int k = 0; k < 3; k++) {
+        variance += value->by_pose[k] * row[k];
     }
     row[at] = variance;
     ekf->mean[at] = value->mean;
@@ -84,8 +71,8 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
                             point.x_by_bearing * point.y_by_bearing * bearing_var;
     const bslam_real_t yy = point.y_by_range * point.y_by_range * range_var +
                             point.y_by_bearing * point.y_by_bearing * bearing_var;
-    const new_value_t x = new_value(ekf, point.x_m, x_by_pose, point.x_by_bearing, xx);
-    const new_value_t y = new_value(ekf, point.y_m, y_by_pose, point.y_by_bearing, yy);
+    const new_value_t x = {x_by_pose, point.x_m, xx};
+    const new_value_t y = {y_by_pose, point.y_m, yy};
     const int at = ekf->dim;
     append_value(ekf, &x);
     append_value(ekf, &y);
@@ -105,10 +92,10 @@ static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
     const bslam_real_t direction_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t sd = params->ray_inverse_distance_sd_per_m;
     const new_value_t values[BSLAM_RAY_DIM] = {
-        new_value(ekf, sensor.pose.x_m, x_by_pose, 0, 0),
-        new_value(ekf, sensor.pose.y_m, y_by_pose, 0, 0),
-        new_value(ekf, direction_rad, direction_by_pose, 1, direction_var),
-        new_value(ekf, params->ray_inverse_distance_per_m, distance_by_pose, 0, sd * sd),
+        {x_by_pose, sensor.pose.x_m, 0},
+        {y_by_pose, sensor.pose.y_m, 0},
+        {direction_by_pose, direction_rad, direction_var},
+        {distance_by_pose, params->ray_inverse_distance_per_m, sd * sd},
     };
     for (int k = 0; k < BSLAM_RAY_DIM; k++) {
         append_value(ekf, &values[k]);

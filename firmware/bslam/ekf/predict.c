@@ -1,17 +1,24 @@
 // Time: the state moves with odometry. MATH "Prediction".
 #include <stddef.h>
+#include <string.h>
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/internal.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/motion.h"
+#include "bslam/model/pose.h"
 
-#define POSE_DIM 3
-#define BASE_DIM_MAX 5
+/// A state that moves: that of the filter, or the robot's own part of it. The robot's values come first.
+typedef struct moving {
+    bslam_real_t *mean;
+    bslam_real_t *covariance;
+    int base_dim;
+    int dim;
+} moving_t;
 
 /// The new pose's derivative by the robot's own state values: 3 x base_dim.
 typedef struct transition {
-    bslam_real_t by[POSE_DIM][BASE_DIM_MAX];
+    bslam_real_t by[POSE_DIM][BSLAM_ROBOT_DIM_MAX];
 } transition_t;
 
 /// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
@@ -32,42 +39,47 @@ static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_
     transition->by[2][BSLAM_STATE_TURN] = turn_rate;
 }
 
-/// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows. Touches those rows only: O(n).
-static void move_covariance(bslam_ekf_t *ekf, const transition_t *transition)
+/// Row i of F times a vector of the robot's values.
+static bslam_real_t row_times(const transition_t *transition, int i, int base, const bslam_real_t *vector)
 {
-    const int base = ekf->base_dim;
-    bslam_real_t block[BASE_DIM_MAX][BASE_DIM_MAX];
-    bslam_real_t moved[POSE_DIM][BASE_DIM_MAX];
-    for (int i = 0; i < base; i++) {
-        for (int j = 0; j < base; j++) {
-            block[i][j] = bslam_symmat_get(ekf->covariance, i, j);
-        }
+    const bslam_real_t *by = transition->by[i];
+    bslam_real_t sum = vector[i];
+    if (i != BSLAM_STATE_THETA) {
+        sum += by[BSLAM_STATE_THETA] * vector[BSLAM_STATE_THETA];
     }
-    for (int i = 0; i < POSE_DIM; i++) {
-        for (int j = 0; j < base; j++) {
-            bslam_real_t sum = 0;
-            for (int k = 0; k < base; k++) {
-                sum += transition->by[i][k] * block[k][j];
-            }
-            moved[i][j] = sum;
+    if (base > POSE_DIM) {
+        sum += by[BSLAM_STATE_FORWARD] * vector[BSLAM_STATE_FORWARD];
+        sum += by[BSLAM_STATE_TURN] * vector[BSLAM_STATE_TURN];
+    }
+    return sum;
+}
+
+/// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows. Touches those rows only: O(n).
+static void move_covariance(const moving_t *state, const transition_t *transition)
+{
+    const int base = state->base_dim;
+    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
+    for (int j = 0; j < base; j++) {
+        bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
+        for (int i = 0; i < base; i++) {
+            column[i] = bslam_symmat_get(state->covariance, i, j);
+        }
+        for (int i = 0; i < POSE_DIM; i++) {
+            moved[i][j] = row_times(transition, i, base, column);
         }
     }
     for (int i = 0; i < POSE_DIM; i++) {
         for (int j = 0; j <= i; j++) {
-            bslam_real_t sum = 0;
-            for (int k = 0; k < base; k++) {
-                sum += moved[i][k] * transition->by[j][k];
-            }
-            bslam_symmat_set(ekf->covariance, i, j, sum);
+            bslam_symmat_set(state->covariance, i, j, row_times(transition, j, base, moved[i]));
         }
         for (int j = POSE_DIM; j < base; j++) {
-            bslam_symmat_set(ekf->covariance, i, j, moved[i][j]);
+            bslam_symmat_set(state->covariance, i, j, moved[i][j]);
         }
     }
     const transition_t f = *transition;
     const bool extended = base > POSE_DIM;
-    for (int i = base; i < ekf->dim; i++) {
-        bslam_real_t *row = ekf->covariance + bslam_symmat_row(i);
+    for (int i = base; i < state->dim; i++) {
+        bslam_real_t *row = state->covariance + bslam_symmat_row(i);
         row[0] += f.by[0][2] * row[2];
         row[1] += f.by[1][2] * row[2];
         if (extended) {
@@ -79,7 +91,7 @@ static void move_covariance(bslam_ekf_t *ekf, const transition_t *transition)
 }
 
 /// Adds the noise of the increment, mapped into the pose: Q of equation (5).
-static void add_motion_noise(bslam_ekf_t *ekf, const bslam_motion_jacobian_t *jacobian,
+static void add_motion_noise(const moving_t *state, const bslam_motion_jacobian_t *jacobian,
                              const bslam_motion_t *motion)
 {
     const bslam_real_t by_forward[POSE_DIM] = {jacobian->x_forward, jacobian->y_forward, 0};
@@ -87,108 +99,237 @@ static void add_motion_noise(bslam_ekf_t *ekf, const bslam_motion_jacobian_t *ja
     for (int i = 0; i < POSE_DIM; i++) {
         for (int j = 0; j <= i; j++) {
             const bslam_real_t cross = by_forward[i] * by_turn[j] + by_turn[i] * by_forward[j];
-            ekf->covariance[bslam_symmat_at(i, j)] += motion->forward_var_m2 * by_forward[i] * by_forward[j] +
-                                                      motion->turn_var_rad2 * by_turn[i] * by_turn[j] +
-                                                      motion->forward_turn_cov_mrad * cross;
+            state->covariance[bslam_symmat_at(i, j)] +=
+                motion->forward_var_m2 * by_forward[i] * by_forward[j] +
+                motion->turn_var_rad2 * by_turn[i] * by_turn[j] + motion->forward_turn_cov_mrad * cross;
         }
     }
 }
 
 /// One of the two further states forgets at `keep` a step and walks with variance `walk_var`.
-static void walk_state(bslam_ekf_t *ekf, int at, bslam_real_t keep, bslam_real_t walk_var)
+static void walk_state(const moving_t *state, int at, bslam_real_t keep, bslam_real_t walk_var)
 {
     if (keep < 1) {
-        ekf->mean[at] *= keep;
-        for (int i = 0; i < ekf->dim; i++) {
-            ekf->covariance[bslam_symmat_at(i, at)] *= keep;
+        state->mean[at] *= keep;
+        for (int i = 0; i < state->dim; i++) {
+            state->covariance[bslam_symmat_at(i, at)] *= keep;
         }
-        ekf->covariance[bslam_symmat_at(at, at)] *= keep;
+        state->covariance[bslam_symmat_at(at, at)] *= keep;
     }
-    ekf->covariance[bslam_symmat_at(at, at)] += walk_var;
+    state->covariance[bslam_symmat_at(at, at)] += walk_var;
 }
 
-static void step_pose(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t forward_m,
+static void step_pose(const moving_t *state, const bslam_params_t *params, bslam_real_t forward_m,
                       bslam_real_t turn_rad, bslam_motion_jacobian_t *jacobian)
 {
-    const bslam_pose_t before = bslam_ekf_pose(ekf);
+    const bslam_pose_t before = {state->mean[BSLAM_STATE_X], state->mean[BSLAM_STATE_Y],
+                                 state->mean[BSLAM_STATE_THETA]};
     const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
     const bslam_pose_t after = bslam_motion_step(kind, &before, forward_m, turn_rad, jacobian);
-    ekf->mean[BSLAM_STATE_X] = after.x_m;
-    ekf->mean[BSLAM_STATE_Y] = after.y_m;
-    ekf->mean[BSLAM_STATE_THETA] = after.theta_rad;
+    state->mean[BSLAM_STATE_X] = after.x_m;
+    state->mean[BSLAM_STATE_Y] = after.y_m;
+    state->mean[BSLAM_STATE_THETA] = after.theta_rad;
 }
 
-/// Fuses v = forward/dt and omega = turn/dt, whose errors L⁻¹ makes independent with variance 1.
-static void measure_velocity(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
-                             const bslam_lower2_t *noise)
-{
-    const bslam_real_t rate = 1 / motion->dt_s;
-    const bslam_real_t forward_weight = 1 / (noise->xx * rate);
-    const bslam_real_t turn_weight = 1 / (noise->yy * rate);
-    const bslam_real_t carried = -noise->yx / noise->xx * turn_weight;
-    const bslam_real_t forward_innovation = motion->forward_m * rate - ekf->mean[BSLAM_STATE_FORWARD];
-    const bslam_real_t turn_innovation = motion->turn_rad * rate - ekf->mean[BSLAM_STATE_TURN];
+// ---- the motion -------------------------------------------------------------------------------------------
 
-    const bslam_row_t forward_row = {.base = {0, 0, 0, forward_weight}};
-    const bslam_row_t turn_row = {.base = {0, 0, 0, carried, turn_weight}};
-    bslam_ekf_apply_scalar(ekf, &forward_row, forward_weight * forward_innovation, 1);
-    bslam_ekf_apply_scalar(ekf, &turn_row, carried * forward_innovation + turn_weight * turn_innovation, 1);
-    bslam_ekf_correct(ekf, params);
-}
-
-static bslam_status_t predict_with_velocity(bslam_ekf_t *ekf, const bslam_params_t *params,
-                                            const bslam_motion_t *motion, bslam_motion_t *moved)
+/// v and omega walk, and move the robot for dt_s.
+static void drive_by_velocity(const moving_t *state, const bslam_params_t *params, bslam_real_t dt_s)
 {
-    bslam_motion_t scaled = *motion;
-    scaled.forward_m *= params->forward_scale;
-    scaled.turn_rad *= params->turn_scale;
-    const bslam_sym2_t covariance = {motion->forward_var_m2, motion->forward_turn_cov_mrad,
-                                     motion->turn_var_rad2};
-    bslam_lower2_t noise;
-    const bslam_status_t status = bslam_sym2_cholesky(&covariance, &noise);
-    if (status != BSLAM_OK) {
-        return status;
-    }
-    const bslam_real_t dt = motion->dt_s;
     const bslam_real_t v_walk = params->velocity_walk_mps_sqrt_s;
     const bslam_real_t turn_walk = params->turn_rate_walk_radps_sqrt_s;
-    walk_state(ekf, BSLAM_STATE_FORWARD, 1 / (1 + dt / params->velocity_decay_s), v_walk * v_walk * dt);
-    walk_state(ekf, BSLAM_STATE_TURN, 1 / (1 + dt / params->turn_rate_decay_s), turn_walk * turn_walk * dt);
-
+    walk_state(state, BSLAM_STATE_FORWARD, 1 / (1 + dt_s / params->velocity_decay_s), v_walk * v_walk * dt_s);
+    walk_state(state, BSLAM_STATE_TURN, 1 / (1 + dt_s / params->turn_rate_decay_s),
+               turn_walk * turn_walk * dt_s);
     bslam_motion_jacobian_t jacobian;
     transition_t transition;
-    step_pose(ekf, params, ekf->mean[BSLAM_STATE_FORWARD] * dt, ekf->mean[BSLAM_STATE_TURN] * dt, &jacobian);
-    fill_transition(&jacobian, dt, dt, &transition);
-    move_covariance(ekf, &transition);
-    measure_velocity(ekf, params, &scaled, &noise);
-    moved->forward_m = ekf->mean[BSLAM_STATE_FORWARD] * dt;
-    moved->turn_rad = ekf->mean[BSLAM_STATE_TURN] * dt;
-    return BSLAM_OK;
+    step_pose(state, params, state->mean[BSLAM_STATE_FORWARD] * dt_s, state->mean[BSLAM_STATE_TURN] * dt_s,
+              &jacobian);
+    fill_transition(&jacobian, dt_s, dt_s, &transition);
+    move_covariance(state, &transition);
 }
 
-bslam_status_t bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
-                                 bslam_motion_t *moved)
+/// The increment moves the robot, times its scales. *moved is what moved it.
+static void drive_by_increment(const moving_t *state, const bslam_params_t *params,
+                               const bslam_motion_t *motion, bslam_motion_t *moved)
 {
-    *moved = *motion;
-    if (params->velocity_states != 0) {
-        return predict_with_velocity(ekf, params, motion, moved);
-    }
     const bool scales = params->scale_states != 0;
     if (scales) {
         const bslam_real_t walk_var = params->scale_walk_sqrt_s * params->scale_walk_sqrt_s * motion->dt_s;
-        walk_state(ekf, BSLAM_STATE_FORWARD, 1, walk_var);
-        walk_state(ekf, BSLAM_STATE_TURN, 1, walk_var);
+        walk_state(state, BSLAM_STATE_FORWARD, 1, walk_var);
+        walk_state(state, BSLAM_STATE_TURN, 1, walk_var);
     }
-    moved->forward_m *= scales ? ekf->mean[BSLAM_STATE_FORWARD] : params->forward_scale;
-    moved->turn_rad *= scales ? ekf->mean[BSLAM_STATE_TURN] : params->turn_scale;
+    moved->forward_m *= scales ? state->mean[BSLAM_STATE_FORWARD] : params->forward_scale;
+    moved->turn_rad *= scales ? state->mean[BSLAM_STATE_TURN] : params->turn_scale;
     bslam_motion_jacobian_t jacobian;
     transition_t transition;
-    step_pose(ekf, params, moved->forward_m, moved->turn_rad, &jacobian);
+    step_pose(state, params, moved->forward_m, moved->turn_rad, &jacobian);
     fill_transition(&jacobian, motion->forward_m, motion->turn_rad, &transition);
-    move_covariance(ekf, &transition);
-    add_motion_noise(ekf, &jacobian, motion);
-    return BSLAM_OK;
+    move_covariance(state, &transition);
+    add_motion_noise(state, &jacobian, motion);
 }
+
+// ---- speedometers -----------------------------------------------------------------------------------------
+
+/// An increment as two measurements of (v, omega) whose errors are independent with variance 1.
+typedef struct speeds {
+    bslam_real_t by_velocity[2][2];
+    bslam_real_t innovation[2];
+} speeds_t;
+
+static bslam_status_t noise_of_motion(const bslam_motion_t *motion, bslam_lower2_t *noise)
+{
+    const bslam_sym2_t covariance = {motion->forward_var_m2, motion->forward_turn_cov_mrad,
+                                     motion->turn_var_rad2};
+    return bslam_sym2_cholesky(&covariance, noise);
+}
+
+/// v = forward/dt and omega = turn/dt, whose errors L⁻¹ makes independent. False if it cannot.
+static bool read_speedometers(const bslam_real_t *mean, const bslam_params_t *params,
+                              const bslam_motion_t *motion, speeds_t *speeds)
+{
+    bslam_lower2_t noise;
+    if (noise_of_motion(motion, &noise) != BSLAM_OK) {
+        return false;
+    }
+    const bslam_real_t rate = 1 / motion->dt_s;
+    const bslam_real_t forward_weight = 1 / (noise.xx * rate);
+    const bslam_real_t turn_weight = 1 / (noise.yy * rate);
+    const bslam_real_t carried = -noise.yx / noise.xx * turn_weight;
+    const bslam_real_t forward = motion->forward_m * params->forward_scale * rate - mean[BSLAM_STATE_FORWARD];
+    const bslam_real_t turn = motion->turn_rad * params->turn_scale * rate - mean[BSLAM_STATE_TURN];
+    *speeds = (speeds_t){
+        .by_velocity = {{forward_weight, 0}, {carried, turn_weight}},
+        .innovation = {forward_weight * forward, carried * forward + turn_weight * turn},
+    };
+    return true;
+}
+
+static void measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const speeds_t *speeds)
+{
+    for (int k = 0; k < 2; k++) {
+        const bslam_real_t *by = speeds->by_velocity[k];
+        const bslam_row_t row = {.base = {0, 0, 0, by[0], by[1]}};
+        bslam_ekf_apply_scalar(ekf, &row, speeds->innovation[k], 1);
+    }
+    bslam_ekf_correct(ekf, params);
+}
+
+/// One of the two into the robot's covariance and its correction.
+static void apply_speed(bslam_robot_t *robot, const bslam_real_t by[2], bslam_real_t innovation,
+                        bslam_real_t *correction)
+{
+    bslam_real_t *p = robot->covariance;
+    bslam_real_t column[BSLAM_ROBOT_DIM_MAX];
+    for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+        column[i] = by[0] * bslam_symmat_get(p, i, BSLAM_STATE_FORWARD) +
+                    by[1] * bslam_symmat_get(p, i, BSLAM_STATE_TURN);
+    }
+    const bslam_real_t s = by[0] * column[BSLAM_STATE_FORWARD] + by[1] * column[BSLAM_STATE_TURN] + 1;
+    const bslam_real_t left =
+        innovation - by[0] * correction[BSLAM_STATE_FORWARD] - by[1] * correction[BSLAM_STATE_TURN];
+    for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+        const bslam_real_t gain = column[i] / s;
+        bslam_real_t *row = p + bslam_symmat_row(i);
+        correction[i] += gain * left;
+        for (int j = 0; j <= i; j++) {
+            row[j] -= gain * column[j];
+        }
+    }
+}
+
+/// measure_speeds without a map. The transport of the invariant form is what a motion by the correction does
+/// to the covariance.
+static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state, const bslam_params_t *params,
+                                  const speeds_t *speeds)
+{
+    bslam_real_t correction[BSLAM_ROBOT_DIM_MAX] = {0};
+    for (int k = 0; k < 2; k++) {
+        apply_speed(robot, speeds->by_velocity[k], speeds->innovation[k], correction);
+    }
+    if (params->filter != 0) {
+        bslam_pose_exp_translation(correction[BSLAM_STATE_THETA], &correction[BSLAM_STATE_X],
+                                   &correction[BSLAM_STATE_Y]);
+        const bslam_motion_jacobian_t shift = {.x_theta = -correction[BSLAM_STATE_Y],
+                                               .y_theta = correction[BSLAM_STATE_X]};
+        transition_t transition;
+        fill_transition(&shift, 0, 0, &transition);
+        move_covariance(state, &transition);
+    }
+    for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+        robot->mean[i] += correction[i];
+    }
+    robot->mean[BSLAM_STATE_THETA] = bslam_angle_wrap(robot->mean[BSLAM_STATE_THETA]);
+}
+
+// ---- prediction -------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_ekf_check_motion(const bslam_params_t *params, const bslam_motion_t *motion)
+{
+    bslam_lower2_t unused;
+    return params->velocity_states != 0 ? noise_of_motion(motion, &unused) : BSLAM_OK;
+}
+
+/// With velocity states the filter takes the interval for one at the speeds that it arrives at.
+static void note_velocity(const bslam_real_t *mean, bslam_motion_t *moved)
+{
+    moved->forward_m = mean[BSLAM_STATE_FORWARD] * moved->dt_s;
+    moved->turn_rad = mean[BSLAM_STATE_TURN] * moved->dt_s;
+}
+
+/// All but the measurement of the speeds. True if there is one.
+static bool drive(const moving_t *state, const bslam_params_t *params, const bslam_motion_t *motion,
+                  bslam_motion_t *moved, speeds_t *speeds)
+{
+    *moved = *motion;
+    if (params->velocity_states == 0) {
+        drive_by_increment(state, params, motion, moved);
+        return false;
+    }
+    drive_by_velocity(state, params, motion->dt_s);
+    note_velocity(state->mean, moved);
+    return read_speedometers(state->mean, params, motion, speeds);
+}
+
+void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+                       bslam_motion_t *moved)
+{
+    const moving_t state = {ekf->mean, ekf->covariance, ekf->base_dim, ekf->dim};
+    speeds_t speeds;
+    if (drive(&state, params, motion, moved, &speeds)) {
+        measure_speeds(ekf, params, &speeds);
+        note_velocity(ekf->mean, moved);
+    }
+}
+
+bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf)
+{
+    bslam_robot_t robot = {.dim = ekf->base_dim};
+    memcpy(robot.mean, ekf->mean, (size_t)robot.dim * sizeof robot.mean[0]);
+    const size_t length = (size_t)BSLAM_SYMMAT_LENGTH(robot.dim);
+    memcpy(robot.covariance, ekf->covariance, length * sizeof robot.covariance[0]);
+    return robot;
+}
+
+void bslam_robot_predict(bslam_robot_t *robot, const bslam_params_t *params, const bslam_motion_t *motion,
+                         bslam_motion_t *moved)
+{
+    const moving_t state = {robot->mean, robot->covariance, robot->dim, robot->dim};
+    speeds_t speeds;
+    if (drive(&state, params, motion, moved, &speeds)) {
+        measure_robots_speeds(robot, &state, params, &speeds);
+        note_velocity(robot->mean, moved);
+    }
+}
+
+bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot)
+{
+    const bslam_pose_t pose = {robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
+                               robot->mean[BSLAM_STATE_THETA]};
+    return pose;
+}
+
+// ---- after an interruption --------------------------------------------------------------------------------
 
 /// Adds to a variance, but not beyond `most`.
 static void add_variance(bslam_ekf_t *ekf, int at, bslam_real_t addition, bslam_real_t most)

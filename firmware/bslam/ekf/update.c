@@ -40,60 +40,38 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
     }
 }
 
-/// by_heading: the derivative by the sensor's own direction.
-static void fill_row(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
-                     bslam_real_t by_heading, const bslam_real_t *by_beacon, bslam_row_t *row)
+static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
+                     const bslam_real_t *by_beacon, bslam_row_t *row)
 {
     static const uint16_t dims[] = {
         [BSLAM_BEACON_POINT] = BSLAM_POINT_DIM, [BSLAM_BEACON_RAY] = BSLAM_RAY_DIM};
-    row->at = (uint16_t)beacon->at;
-    row->dim = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : dims[beacon->kind];
+    *row = (bslam_row_t){.at = (uint16_t)beacon->at,
+                         .dim = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : dims[beacon->kind]};
     memcpy(row->base, by_pose, 3 * sizeof row->base[0]);
     memcpy(row->other, by_beacon, sizeof row->other);
-    bslam_lag_by_velocity(ekf, by_pose[0], by_pose[1], by_heading, row->base + 3);
 }
 
-void bslam_lag_by_velocity(const bslam_ekf_t *ekf, bslam_real_t by_x, bslam_real_t by_y,
-                           bslam_real_t by_heading, bslam_real_t out[2])
+/// The state index of the k-th value of a sighting's row, the robot's pose first.
+static int row_index(const bslam_row_t *row, int k)
 {
-    const bslam_lag_t *lag = &ekf->lag;
-    out[0] = 0;
-    out[1] = 0;
-    if (lag->mount_by_turn[2] == 0) {
-        return;
-    }
-    bslam_real_t s;
-    bslam_real_t c;
-    bslam_sin_cos(ekf->mean[BSLAM_STATE_THETA], &s, &c);
-    const bslam_real_t by_ahead = c * by_x + s * by_y;
-    const bslam_real_t by_left = c * by_y - s * by_x;
-    out[0] = by_ahead * lag->mount_by_forward[0] + by_left * lag->mount_by_forward[1];
-    out[1] = by_ahead * lag->mount_by_turn[0] + by_left * lag->mount_by_turn[1] +
-             by_heading * lag->mount_by_turn[2];
+    return k < POSE_DIM ? k : row->at + k - POSE_DIM;
 }
 
-/// The state index of a row's k-th value, the robot's own first.
-static int row_index(const bslam_ekf_t *ekf, const bslam_row_t *row, int k)
+static bslam_real_t row_value(const bslam_row_t *row, int k)
 {
-    return k < ekf->base_dim ? k : row->at + k - ekf->base_dim;
-}
-
-static bslam_real_t row_value(const bslam_ekf_t *ekf, const bslam_row_t *row, int k)
-{
-    return k < ekf->base_dim ? row->base[k] : row->other[k - ekf->base_dim];
+    return k < POSE_DIM ? row->base[k] : row->other[k - POSE_DIM];
 }
 
 /// a P bᵀ for two rows of one sighting, from the covariance as it is stored.
 static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
     bslam_real_t sum = 0;
-    for (int i = 0; i < ekf->base_dim + a->dim; i++) {
+    for (int i = 0; i < POSE_DIM + a->dim; i++) {
         bslam_real_t inner = 0;
-        for (int j = 0; j < ekf->base_dim + b->dim; j++) {
-            inner += bslam_symmat_get(ekf->covariance, row_index(ekf, a, i), row_index(ekf, b, j)) *
-                     row_value(ekf, b, j);
+        for (int j = 0; j < POSE_DIM + b->dim; j++) {
+            inner += bslam_symmat_get(ekf->covariance, row_index(a, i), row_index(b, j)) * row_value(b, j);
         }
-        sum += row_value(ekf, a, i) * inner;
+        sum += row_value(a, i) * inner;
     }
     return sum;
 }
@@ -106,7 +84,7 @@ static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beaco
                                        const bslam_observation_t *seen, const bslam_row_t *bearing)
 {
     bslam_row_t stretch;
-    fill_row(ekf, beacon, seen->stretch_by_pose, 0, seen->stretch_by_beacon, &stretch);
+    fill_row(beacon, seen->stretch_by_pose, seen->stretch_by_beacon, &stretch);
     const bslam_real_t cross = quadratic(ekf, &stretch, bearing);
     return quadratic(ekf, &stretch, &stretch) * quadratic(ekf, bearing, bearing) + cross * cross;
 }
@@ -143,7 +121,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting);
-    fill_row(ekf, beacon, seen.bearing_by_pose, -1, seen.bearing_by_beacon, &innovation->bearing_row);
+    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
     if (!sighting->has_range) {
         innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
@@ -151,7 +129,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     if (sighting->has_range) {
         innovation->range_m = sighting->range_m - seen.range_m;
         innovation->range_var_m2 = bslam_range_variance_m2(params, sighting, seen.range_m);
-        fill_row(ekf, beacon, seen.range_by_pose, 0, seen.range_by_beacon, &innovation->range_row);
+        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
     }
     return BSLAM_OK;
 }

@@ -3,7 +3,6 @@
 #include "bslam/math/trig.h"
 #include "bslam/model/pose.h"
 
-static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
 static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
@@ -25,7 +24,34 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-// ---- odometry and the past --------------------------------------------------------------------------------
+// ---- odometry ---------------------------------------------------------------------------------------------
+
+/// The filter goes through one waiting motion, or its part before the moment until_us before the newest end.
+static void predict_step(bslam_slam_t *slam, int64_t until_us)
+{
+    bslam_history_place_t place = slam->history.filter;
+    const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+    bslam_motion_t moved;
+    bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
+    bslam_history_take(&slam->history, &place, &moved);
+}
+
+/// The filter goes on to the moment until_us before the newest odometry.
+static void predict_until(bslam_slam_t *slam, int64_t until_us)
+{
+    while (slam->history.filter.behind_us > until_us) {
+        predict_step(slam, until_us);
+    }
+}
+
+/// A motion waits until a frame shows what comes after it, or until the room is needed.
+static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_motion_t *motion)
+{
+    if (bslam_history_is_full(&slam->history)) {
+        predict_step(slam, 0);
+    }
+    bslam_history_add(&slam->history, duration_us, motion);
+}
 
 static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
 {
@@ -39,12 +65,11 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
         return status;
     }
     if (motion.dt_s > 0) {
-        bslam_motion_t moved;
-        status = bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
+        status = bslam_ekf_check_motion(&slam->params, &motion);
         if (status != BSLAM_OK) {
             return status;
         }
-        bslam_history_add(&slam->history, reading->time_us, &moved);
+        queue_motion(slam, (int32_t)(odometry.time_us - slam->odometry.time_us), &motion);
     }
     slam->odometry = odometry;
     return BSLAM_OK;
@@ -69,6 +94,7 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
         !bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD)) {
         return BSLAM_E_RANGE;
     }
+    predict_until(slam, 0);
     bslam_ekf_resume(&slam->ekf, &slam->params, position_sd_m * position_sd_m,
                      heading_sd_rad * heading_sd_rad);
     bslam_odometry_restart(&slam->odometry);
@@ -77,38 +103,29 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
     return BSLAM_OK;
 }
 
-/// The robot at time_us as seen from the robot now, where it started while no clock has.
-static bslam_status_t relative_pose(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *relative)
+/// How long before the newest odometry a moment is; 0 while no clock has started.
+static int64_t time_behind_us(const bslam_slam_t *slam, int64_t time_us)
 {
-    if (!slam->odometry.has_time) {
-        *relative = (bslam_pose_t){0, 0, 0};
-        return BSLAM_OK;
-    }
-    return bslam_history_relative_pose(&slam->history, &slam->params, slam->odometry.time_us, time_us,
-                                       relative);
+    return slam->odometry.has_time ? slam->odometry.time_us - time_us : 0;
 }
 
-/// How the sensor of an image of the past depends on v and omega. `relative` is the robot then, seen from the
-/// robot now, and `mount` the sensor then.
-static bslam_lag_t describe_lag(const bslam_slam_t *slam, int64_t taken_us, const bslam_pose_t *relative,
-                                const bslam_pose_t *mount)
+/// The robot of a moment that the filter has not passed, as it goes there from where it is known.
+static bslam_robot_t robot_at(const bslam_slam_t *slam, int64_t behind_us, bslam_pose_t *pose)
 {
-    bslam_lag_t lag = {{0, 0}, {0, 0, 0}};
-    if (slam->params.velocity_states == 0 || !slam->odometry.has_time) {
-        return lag;
+    bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
+    bslam_history_place_t place = slam->history.filter;
+    bslam_motion_t moved = bslam_history_newest(&slam->history);
+    const int64_t until_us = behind_us > 0 ? behind_us : 0;
+    while (place.behind_us > until_us) {
+        const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+        bslam_robot_predict(&robot, &slam->params, &motion, &moved);
     }
-    // v and omega took the robot from there to here: backwards along the chord, and half of the turn about
-    // it.
-    const bslam_real_t elapsed_s = (bslam_real_t)(slam->odometry.time_us - taken_us) * SECONDS_PER_US;
-    bslam_real_t s;
-    bslam_real_t c;
-    bslam_sin_cos(relative->theta_rad / 2, &s, &c);
-    lag.mount_by_forward[0] = -elapsed_s * c;
-    lag.mount_by_forward[1] = -elapsed_s * s;
-    lag.mount_by_turn[0] = elapsed_s * (mount->y_m - relative->y_m / 2);
-    lag.mount_by_turn[1] = -elapsed_s * (mount->x_m - relative->x_m / 2);
-    lag.mount_by_turn[2] = -elapsed_s;
-    return lag;
+    *pose = bslam_robot_pose(&robot);
+    if (behind_us < 0) {
+        const bslam_pose_t ahead = bslam_history_look_ahead(&slam->params, &moved, -behind_us);
+        *pose = bslam_pose_compose(pose, &ahead);
+    }
+    return robot;
 }
 
 // ---- sightings --------------------------------------------------------------------------------------------
@@ -134,9 +151,9 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
     return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
 }
 
-/// Checks a frame, and says where the sensor was relative to the robot's present pose.
+/// Checks a frame, and says how long before the newest odometry it was taken.
 static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                  int count, bslam_pose_t *mount, bslam_lag_t *lag)
+                                  int count, int64_t *behind_us)
 {
     slam->bad_sighting = -1;
     if (count < 0 || count > BSLAM_SIGHTINGS_MAX) {
@@ -152,16 +169,24 @@ static bslam_status_t check_frame(bslam_slam_t *slam, int64_t time_us, const bsl
             return status;
         }
     }
-    const int64_t taken_us = time_us - slam->params.sighting_delay_us;
-    bslam_pose_t relative;
-    const bslam_status_t status = relative_pose(slam, taken_us, &relative);
-    if (status == BSLAM_OK) {
-        const bslam_params_t *p = &slam->params;
-        const bslam_pose_t fixed = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
-        *mount = bslam_pose_compose(&relative, &fixed);
-        *lag = describe_lag(slam, taken_us, &relative, mount);
+    *behind_us = time_behind_us(slam, time_us - slam->params.sighting_delay_us);
+    const bool in_reach =
+        *behind_us <= slam->history.filter.behind_us && *behind_us >= -slam->params.ahead_max_us;
+    return in_reach ? BSLAM_OK : BSLAM_E_TIME;
+}
+
+/// Where the sensor of a frame is on the robot, which has come as far as odometry has: of a frame that is
+/// ahead of it, where it will be.
+static bslam_pose_t mount_of_frame(const bslam_slam_t *slam, int64_t behind_us)
+{
+    const bslam_params_t *p = &slam->params;
+    const bslam_pose_t mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
+    if (behind_us >= 0) {
+        return mount;
     }
-    return status;
+    const bslam_motion_t last = bslam_history_newest(&slam->history);
+    const bslam_pose_t ahead = bslam_history_look_ahead(p, &last, -behind_us);
+    return bslam_pose_compose(&ahead, &mount);
 }
 
 static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
@@ -323,20 +348,19 @@ static void count_accounts(bslam_slam_t *slam, int count)
 bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
                                     int count)
 {
-    bslam_pose_t mount;
-    bslam_lag_t lag;
-    const bslam_status_t status = check_frame(slam, time_us, sightings, count, &mount, &lag);
+    int64_t behind_us;
+    const bslam_status_t status = check_frame(slam, time_us, sightings, count, &behind_us);
     if (status != BSLAM_OK) {
         slam->counters.frames_refused++;
         return status;
     }
+    predict_until(slam, behind_us > 0 ? behind_us : 0);
+    const bslam_pose_t mount = mount_of_frame(slam, behind_us);
     const bslam_sighting_frame_t frame = {
         .ekf = &slam->ekf, .params = &slam->params, .mount = &mount, .sightings = sightings, .count = count};
     const bslam_associate_fn associate = bslam_associate_method(&slam->params);
-    slam->ekf.lag = lag;
     associate(&frame, slam->matches);
     use_matches(slam, time_us, &mount, sightings, count);
-    slam->ekf.lag = (bslam_lag_t){{0, 0}, {0, 0, 0}};
     tidy_map(slam, time_us, &mount);
     slam->last_frame_us = time_us;
     slam->has_frame = true;
@@ -385,7 +409,9 @@ bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam)
 {
-    return bslam_ekf_pose(&slam->ekf);
+    bslam_pose_t pose;
+    (void)robot_at(slam, 0, &pose);
+    return pose;
 }
 
 bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bslam_pose_t *pose)
@@ -393,21 +419,32 @@ bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bsl
     if (time_us < 0 || time_us > INT64_MAX / 2) {
         return BSLAM_E_TIME;
     }
+    const int64_t behind_us = time_behind_us(slam, time_us);
+    if (behind_us < -slam->params.ahead_max_us) {
+        return BSLAM_E_TIME;
+    }
+    const int64_t back_us = behind_us - slam->history.filter.behind_us;
+    if (back_us <= 0) {
+        (void)robot_at(slam, behind_us, pose);
+        return BSLAM_OK;
+    }
     bslam_pose_t relative;
-    const bslam_status_t status = relative_pose(slam, time_us, &relative);
+    const bslam_status_t status = bslam_history_look_back(&slam->history, &slam->params, back_us, &relative);
     if (status == BSLAM_OK) {
-        const bslam_pose_t now = bslam_ekf_pose(&slam->ekf);
-        *pose = bslam_pose_compose(&now, &relative);
+        const bslam_pose_t filter = bslam_ekf_pose(&slam->ekf);
+        *pose = bslam_pose_compose(&filter, &relative);
     }
     return status;
 }
 
 void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6])
 {
+    bslam_pose_t unused;
+    const bslam_robot_t robot = robot_at(slam, 0, &unused);
     int k = 0;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j <= i; j++) {
-            lower[k] = bslam_symmat_get(slam->ekf.covariance, i, j);
+            lower[k] = bslam_symmat_get(robot.covariance, i, j);
             k++;
         }
     }

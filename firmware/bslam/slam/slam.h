@@ -8,6 +8,10 @@
 ///     bslam_slam_sightings(&slam, time_us, seen, count); // each image
 ///     bslam_slam_pose(&slam);
 ///
+/// The filter stands at the moment that the last frame shows. Odometry since then waits, and the pose of now
+/// is the filter's, carried on through it: so a frame may come late, and nothing is approximated for it. What
+/// waits is BSLAM_HISTORY_MAX readings at most; then the filter goes on by one with each new reading.
+///
 /// The map's frame is the robot's pose at the start. On any status but BSLAM_OK nothing has changed but the
 /// counters and what bslam_slam_bad_sighting answers (and the tick reference, after BSLAM_E_JUMP).
 #ifndef BSLAM_SLAM_SLAM_H
@@ -79,27 +83,27 @@ typedef struct bslam_slam {
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
                                                 int *bad_id);
 
-/// One odometry reading: predicts. BSLAM_E_TIME, BSLAM_E_NOT_FINITE, BSLAM_E_RANGE, BSLAM_E_JUMP as
-/// bslam_odometry_read has them; BSLAM_E_SINGULAR as bslam_ekf_predict has it. O(n), or O(n²) with velocity
-/// states.
+/// One odometry reading, which waits until a frame shows a later moment. BSLAM_E_TIME, BSLAM_E_NOT_FINITE,
+/// BSLAM_E_RANGE, BSLAM_E_JUMP as bslam_odometry_read has them; BSLAM_E_SINGULAR as bslam_ekf_check_motion
+/// has it. O(1); where no more may wait one prediction, O(n), or O(n²) with velocity states.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
                                                     const bslam_odometry_reading_t *reading);
 
 /// After an interruption of odometry (an encoder reset, a pause of more than 4 s, the robot carried), at a
 /// standstill: the next reading starts the clock and the tick reference anew, at any time stamp, and the pose
 /// becomes as doubtful as the caller says the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m
-/// outside 0 to 30 or heading_sd_rad outside 0 to 3.2 (NaN is).
+/// outside 0 to 30 or heading_sd_rad outside 0 to 3.2 (NaN is). Predicts through all that waits.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
                                                            bslam_real_t heading_sd_rad);
 
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
-/// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²).
-/// Before the first odometry only frames
-/// within ahead_max_us of the first one are taken. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX.
-/// BSLAM_E_TIME: not after the last frame, older than the history reaches, or newer than the odometry by more
-/// than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a distance or its noise outside 1 mm to 10 km, a
-/// direction beyond ±2 pi or its noise outside 1e-5 to pi, a label below -1): bslam_slam_bad_sighting says
-/// which.
+/// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²), after a prediction for each reading that
+/// waited up to then: BSLAM_HISTORY_MAX of O(n), or of O(n²) with velocity states, after a long time without
+/// a frame. Before the first odometry only frames within ahead_max_us of the first one are taken.
+/// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than where the
+/// filter stands, or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a
+/// distance or its noise outside 1 mm to 10 km, a direction beyond ±2 pi or its noise outside 1e-5 to pi, a
+/// label below -1): bslam_slam_bad_sighting says which.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);
 
@@ -113,14 +117,15 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uin
 
 // ---- results ----------------------------------------------------------------------------------------------
 
+/// Where the newest odometry has the robot. O(readings that wait), like the two below.
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam);
 
-/// The robot's pose at a time within the history, or up to ahead_max_us after the last odometry, from the
-/// present estimate. BSLAM_E_TIME: outside that; *pose is unchanged.
+/// The robot's pose at a time within the last BSLAM_HISTORY_MAX readings, or up to ahead_max_us after them,
+/// from the present estimate. BSLAM_E_TIME: outside that; *pose is unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us,
                                                    bslam_pose_t *pose);
 
-/// Covariance of (x, y, theta): the lower triangle xx, yx, yy, tx, ty, tt in m², m rad, rad².
+/// Covariance of that pose (x, y, theta): the lower triangle xx, yx, yy, tx, ty, tt in m², m rad, rad².
 void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6]);
 
 /// The accounts of the last frame taken, one a sighting.
@@ -131,7 +136,7 @@ int bslam_slam_bad_sighting(const bslam_slam_t *slam);
 
 const bslam_counters_t *bslam_slam_counters(const bslam_slam_t *slam);
 
-/// A beacon as the map has it.
+/// A beacon as the map has it since the last frame.
 typedef struct bslam_beacon_view {
     uint32_t uid;
     int32_t label;

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from bslam.core import Slam
 from core import instance
-from reference.dense_ekf import DenseEkf, motion_of_wheels
+from reference.dense_ekf import DenseEkf, Motion, motion_of_wheels
 from reference.runs import STEP_S, Step, mount
 
 KINDS: list[dict[str, float]] = [
@@ -42,8 +42,14 @@ def feed_reference(reference: DenseEkf, step: Step) -> None:
     """One step of a run into the reference."""
     if step.time_us > 0:
         reference.predict(motion_of_wheels(reference.params, step.left_m, step.right_m, STEP_S))
-    late_s = min(reference.params["sighting_delay_us"], step.time_us) * 1e-6
-    reference.frame(step.sightings, mount(reference.params), late_s)
+    reference.frame(step.sightings, mount(reference.params))
+
+
+def part(motion: Motion, share: float) -> Motion:
+    """A share of a motion at constant speeds, whose errors in one share say nothing of those in another."""
+    return Motion(
+        motion.dt_s * share, motion.forward_m * share, motion.turn_rad * share, motion.covariance * share
+    )
 
 
 def difference(a: NDArray[np.float64], b: NDArray[np.float64], angles: list[int]) -> NDArray[np.float64]:

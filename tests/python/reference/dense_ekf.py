@@ -16,7 +16,7 @@ Coordinates of the error e of a state X, estimated as X̂:
 
 Conventions that the C core documents: all sightings of a frame are linearised at the estimate before the
 frame, and the estimate moves once at its end; then new beacons are added in the frame's order, and rays
-that are linear enough become points.
+that are linear enough become points. There is no delay here: what came late is fed in the order of time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Sensor = Callable[..., tuple[object, object, object]]
-"""State -> the sensor's pose (x, y, yaw) on the robot of now."""
+Pose = Sequence[float]
+"""x, y, yaw: m, rad."""
 
 X, Y, THETA, FORWARD, TURN = range(5)
 STEP = 1e-30
@@ -121,9 +121,6 @@ class DenseEkf:
         self.params = params
         self.invariant = params["filter"] == 1
         self.beacons: list[Beacon] = []
-        self.history: list[
-            tuple[float, float, float]
-        ] = []  # (dt_s, forward_m, turn_rad) as taken, oldest first
         extra: list[float] = []
         sds: list[float] = []
         if params["velocity_states"]:
@@ -250,11 +247,9 @@ class DenseEkf:
             )
             self._drive(lambda s, w: (s[FORWARD] * dt_s, s[TURN] * dt_s), NO_NOISE)
             self._measure_velocity(motion)
-            self.history.append((dt_s, self.mean[FORWARD] * dt_s, self.mean[TURN] * dt_s))
             return
         if p["scale_states"]:
             self._walk([1.0, 1.0], [p["scale_walk_sqrt_s"]] * 2, dt_s)
-            scales = self.mean[FORWARD], self.mean[TURN]
             self._drive(
                 lambda s, w: (s[FORWARD] * motion.forward_m + w[0], s[TURN] * motion.turn_rad + w[1]),
                 motion.covariance,
@@ -265,7 +260,6 @@ class DenseEkf:
                 lambda s, w: (scales[0] * motion.forward_m + w[0], scales[1] * motion.turn_rad + w[1]),
                 motion.covariance,
             )
-        self.history.append((dt_s, scales[0] * motion.forward_m, scales[1] * motion.turn_rad))
 
     def _walk(self, keep: Sequence[float], walk: Sequence[float], dt_s: float) -> None:
         """The two further states forget a share and take a random step."""
@@ -308,45 +302,6 @@ class DenseEkf:
             )
         )
 
-    # ---- the past ------------------------------------------------------------------------------------------
-
-    def look_back(self, late_s: float) -> tuple[float, float, float]:
-        """The robot late_s ago as seen from the robot of now: (x, y, theta)."""
-        x = y = theta = 0.0  # of the robot of now, seen from the one that the loop has come back to
-        for dt_s, forward_m, turn_rad in reversed(self.history):
-            share = min(1.0, late_s / dt_s)
-            c, s = (np.asarray(value).item() for value in self._way(0.0, share * turn_rad))
-            offset_x, offset_y = _turned(share * turn_rad, x, y)
-            x, y = share * forward_m * c + offset_x, share * forward_m * s + offset_y
-            theta += share * turn_rad
-            late_s -= share * dt_s
-            if late_s <= 0:
-                break
-        back_x, back_y = _turned(-theta, x, y)
-        return -float(back_x), -float(back_y), -theta
-
-    def _sensor(self, mount: Sequence[float], late_s: float) -> Sensor:
-        """The sensor late_s ago, on the robot of now.
-
-        Where that was is a number, but with velocity states it depends on v and omega, as if both had been
-        off by the same all the time since: then the way back is longer along its chord, and turned about
-        its middle.
-        """
-        x, y, theta = self.look_back(late_s)
-
-        def placed(state):  # type: ignore[no-untyped-def]
-            v_off, omega_off = 0.0, 0.0
-            if self.params["velocity_states"]:
-                v_off, omega_off = 1j * np.imag(state[FORWARD]), 1j * np.imag(state[TURN])
-            back_x, back_y = _turned(-omega_off * late_s / 2, x, y)
-            back_x = back_x - v_off * late_s * np.cos(theta / 2)
-            back_y = back_y - v_off * late_s * np.sin(theta / 2)
-            turn = theta - omega_off * late_s
-            mount_x, mount_y = _turned(turn, mount[0], mount[1])
-            return back_x + mount_x, back_y + mount_y, turn + mount[2]
-
-        return placed
-
     # ---- sightings -----------------------------------------------------------------------------------------
 
     def _update(self, rows: Matrix, innovation: Vector, noise: Matrix) -> Vector:
@@ -360,10 +315,10 @@ class DenseEkf:
         self.own_covariance = (kept + kept.T) / 2
         return gain @ innovation
 
-    def _seen(self, state, index: int, sensor: Sensor):  # type: ignore[no-untyped-def]
+    def _seen(self, state, index: int, mount: Pose):  # type: ignore[no-untyped-def]
         """How beacon `index` looks to the sensor: distance, direction, log of the length."""
         beacon, at = self.beacons[index], self.at(index)
-        mount_x, mount_y, yaw = sensor(state)
+        mount_x, mount_y, yaw = mount
         offset_x, offset_y = _turned(state[THETA], mount_x, mount_y)
         sensor_x, sensor_y = state[X] + offset_x, state[Y] + offset_y
         if beacon.kind == "ray":
@@ -382,11 +337,11 @@ class DenseEkf:
         return range_m, _direction(dx, dy) - state[THETA] - yaw, np.log(length)
 
     def measurement(
-        self, sighting: Sighting, index: int, sensor: Sensor
+        self, sighting: Sighting, index: int, mount: Pose
     ) -> tuple[list[Vector], list[float], list[float]]:
         """Rows of H, innovations and variances of one sighting, at the present estimate."""
         varied, _ = self._varied()
-        seen = self._seen(varied, index, sensor)
+        seen = self._seen(varied, index, mount)
         range_row, bearing_row, length_row = (np.imag(value) / STEP for value in seen)
         range_m, bearing_rad = float(np.real(seen[0][0])), float(np.real(seen[1][0]))
         p = self.params
@@ -410,26 +365,24 @@ class DenseEkf:
     def frame(
         self,
         sightings: Sequence[Sighting],
-        mount: Sequence[float] = (0.0, 0.0, 0.0),
-        late_s: float = 0.0,
+        mount: Pose = (0.0, 0.0, 0.0),
     ) -> None:
         """One image: fuses what the map holds as one batch, adds the rest, turns rays into points.
 
-        mount: the sensor's pose (x, y, yaw) on the robot. late_s: how long ago the image was taken.
+        mount: the sensor's pose on the robot.
         """
-        sensor = self._sensor(mount, late_s)
         measurements = []
         for sighting in sightings:
             index = self.find(sighting.label)
             if index is not None:
-                measurements.append(self.measurement(sighting, index, sensor))
+                measurements.append(self.measurement(sighting, index, mount))
         if measurements:
             self._move(self._update_all(measurements))
         for sighting in sightings:
             if self.find(sighting.label) is None:
-                self.add(sighting, sensor)
+                self.add(sighting, mount)
         for index in reversed(range(len(self.beacons))):
-            self._settle(index, sensor)
+            self._settle(index, mount)
 
     def _update_all(self, measurements: Sequence[tuple[list[Vector], list[float], list[float]]]) -> Vector:
         rows = np.array([row for rows, _, _ in measurements for row in rows])
@@ -443,12 +396,12 @@ class DenseEkf:
         """A beacon whose place is given: no part of the state."""
         self.beacons.append(Beacon(label, "known", (x_m, y_m)))
 
-    def add(self, sighting: Sighting, sensor: Sensor) -> None:
+    def add(self, sighting: Sighting, mount: Pose) -> None:
         """The augment step: a beacon is a function of the state and of its sighting's noise."""
         p = self.params
 
         def placed(state, noise):  # type: ignore[no-untyped-def]
-            mount_x, mount_y, yaw = sensor(state)
+            mount_x, mount_y, yaw = mount
             offset_x, offset_y = _turned(state[THETA], mount_x, mount_y)
             direction = state[THETA] + yaw + sighting.bearing_rad + noise[0]
             sensor_x, sensor_y = state[X] + offset_x, state[Y] + offset_y
@@ -472,10 +425,10 @@ class DenseEkf:
         others = [beacon for i, beacon in enumerate(self.beacons) if i != index]
         self._change(lambda state, noise: [*state[:at], *state[at + size :]], beacons=others)
 
-    def _settle(self, index: int, sensor: Sensor) -> None:
+    def _settle(self, index: int, mount: Pose) -> None:
         """A ray whose distance is known well enough becomes its point."""
         at = self.at(index)
-        if self.beacons[index].kind != "ray" or not self._is_linear(at, sensor):
+        if self.beacons[index].kind != "ray" or not self._is_linear(at, mount):
             return
 
         def settled(state, noise):  # type: ignore[no-untyped-def]
@@ -487,13 +440,13 @@ class DenseEkf:
         others[index] = Beacon(self.beacons[index].label, "point")
         self._change(settled, beacons=others)
 
-    def _is_linear(self, at: int, sensor: Sensor) -> bool:
+    def _is_linear(self, at: int, mount: Pose) -> bool:
         """Civera's index: 4 sd(distance) |cos(parallax)| / distance from the sensor, against its limit."""
         anchor_x, anchor_y, direction, inverse = self.mean[at : at + 4]
         variance = self.own_covariance[at + 3, at + 3]
         if not (inverse > 1e-3 and variance > 0):
             return False
-        mount_x, mount_y, _ = np.real(sensor(self.mean))
+        mount_x, mount_y, _ = mount
         offset_x, offset_y = _turned(self.mean[THETA], mount_x, mount_y)
         dx = anchor_x + np.cos(direction) / inverse - (self.mean[X] + offset_x)
         dy = anchor_y + np.sin(direction) / inverse - (self.mean[Y] + offset_y)

@@ -163,6 +163,10 @@ static void test_odometry_every_refusal_changes_nothing(void **state)
         .time_us = next_us, .source = BSLAM_ODOMETRY_TICKS, .left_ticks = UINT32_MAX};
     assert_odometry_refused(&slam, wide, BSLAM_E_RANGE);
     drive(&slam, next_us, 0.01, 0.01);
+    // And where no more may wait, so that the next reading makes the filter go on.
+    drive_circle(&slam, 12 * STEP_US, BSLAM_HISTORY_MAX);
+    assert_odometry_refused(&slam, wheels(next_us, 0, 0), BSLAM_E_TIME);
+    assert_odometry_refused(&slam, wheels((int64_t)(12 + BSLAM_HISTORY_MAX) * STEP_US, 100, 0), BSLAM_E_JUMP);
 }
 
 static void test_odometry_without_noise_for_velocity_states_is_refused_and_changes_nothing(void **state)
@@ -803,28 +807,90 @@ static void test_sightings_of_a_delayed_frame_before_the_clock_are_refused(void 
     assert_frame_refused(&slam, 0, &seen, 1, BSLAM_E_TIME, -1);
 }
 
-static void test_sightings_of_the_past_correct_the_present(void **state)
+/// Every form of the filter: 0 to 5.
+static bslam_params_t form(int kind)
 {
-    // The same sighting, taken in the past and handed over late, moves the robot as if it had come in time
-    // and the robot had driven on without noise.
     bslam_params_t params = unit_params();
     params.motion = 1;
-    params.left_speed_sd_mps = 0;
-    params.right_speed_sd_mps = 0;
-    bslam_slam_t in_time = started(params);
-    bslam_slam_t late = started(params);
-    const bslam_sighting_t first = unit_polar(0.5, 4, 1);
-    const bslam_sighting_t second = unit_polar(0.2, 3.8, 1);
-    see_one(&in_time, 0, first);
-    see_one(&late, 0, first);
-    drive_circle(&in_time, STEP_US, 5);
-    see_one(&in_time, 5 * STEP_US, second);
-    drive_circle(&in_time, 6 * STEP_US, 4);
-    drive_circle(&late, STEP_US, 9);
-    see_one(&late, 5 * STEP_US, second);
-    assert_pose(bslam_slam_pose(&late), bslam_slam_pose(&in_time));
-    assert_near(beacon(&late, 0).x_m, beacon(&in_time, 0).x_m, POSITION_ERROR);
-    assert_near(beacon(&late, 0).y_m, beacon(&in_time, 0).y_m, POSITION_ERROR);
+    params.filter = kind % 2;
+    params.velocity_states = kind / 2 == 1;
+    params.scale_states = kind / 2 == 2;
+    return params;
+}
+
+static void assert_same_estimate(const bslam_slam_t *a, const bslam_slam_t *b)
+{
+    assert_memory_equal(a->ekf.mean, b->ekf.mean, sizeof a->ekf.mean);
+    assert_memory_equal(a->ekf.covariance, b->ekf.covariance, sizeof a->ekf.covariance);
+    const bslam_pose_t pose_a = bslam_slam_pose(a);
+    const bslam_pose_t pose_b = bslam_slam_pose(b);
+    assert_memory_equal(&pose_a, &pose_b, sizeof pose_a);
+}
+
+static void test_sightings_that_come_late_count_as_if_they_had_come_in_time(void **state)
+{
+    // Taken at the end of a step and within one. To the bit, and whatever odometry's noise.
+    static const int64_t taken_us[] = {5 * STEP_US, 4 * STEP_US + 7000};
+    for (int i = 0; i < COUNT_OF(taken_us); i++) {
+        for (int kind = 0; kind < 6; kind++) {
+            bslam_slam_t in_time = started(form(kind));
+            bslam_slam_t late = started(form(kind));
+            bslam_slam_t with_delay = started(form(kind));
+            with_delay.params.sighting_delay_us = 100000;
+            const bslam_sighting_t first = unit_polar(0.5, 4, 1);
+            const bslam_sighting_t second[] = {unit_polar(0.2, 3.8, 1), unit_direction(1, 2)};
+            see_one(&in_time, 0, first);
+            see_one(&late, 0, first);
+            see_one(&with_delay, 0, first);
+            drive_circle(&in_time, STEP_US, 5);
+            see(&in_time, taken_us[i], second, 2);
+            drive_circle(&in_time, 6 * STEP_US, 4);
+            drive_circle(&late, STEP_US, 9);
+            see(&late, taken_us[i], second, 2);
+            drive_circle(&with_delay, STEP_US, 9);
+            see(&with_delay, taken_us[i] + 100000, second, 2);
+            assert_same_estimate(&late, &in_time);
+            assert_same_estimate(&with_delay, &in_time);
+        }
+    }
+}
+
+static void test_pose_and_covariance_between_frames_are_what_the_filter_arrives_at(void **state)
+{
+    for (int kind = 0; kind < 6; kind++) {
+        bslam_slam_t slam = running(form(kind));
+        drive_circle(&slam, 11 * STEP_US, 7);
+        // A frame within a step, so that the rest of one waits.
+        see_one(&slam, 13 * STEP_US + 9000, unit_polar(0.1, 4, 1));
+        const bslam_pose_t pose = bslam_slam_pose(&slam);
+        bslam_real_t before[6];
+        bslam_real_t after[6];
+        bslam_slam_pose_covariance(&slam, before);
+        see(&slam, 17 * STEP_US, NULL, 0);
+        bslam_slam_pose_covariance(&slam, after);
+        assert_pose(bslam_slam_pose(&slam), pose);
+        for (int k = 0; k < 6; k++) {
+            assert_near(before[k], after[k], 64 * UNIT_ROUNDING);
+        }
+    }
+}
+
+static void test_odometry_beyond_the_room_to_wait_is_predicted_in_order(void **state)
+{
+    // Empty frames at each step, or none: the same predictions in the same order.
+    for (int kind = 0; kind < 6; kind++) {
+        bslam_slam_t often = running(form(kind));
+        bslam_slam_t never = running(form(kind));
+        const int steps = 2 * BSLAM_HISTORY_MAX + 3;
+        for (int i = 11; i < 11 + steps; i++) {
+            drive_circle(&often, (int64_t)i * STEP_US, 1);
+            see(&often, (int64_t)i * STEP_US, NULL, 0);
+            drive_circle(&never, (int64_t)i * STEP_US, 1);
+            assert_pose(bslam_slam_pose(&never), bslam_slam_pose(&often));
+        }
+        see(&never, (int64_t)(10 + steps) * STEP_US, NULL, 0);
+        assert_same_estimate(&never, &often);
+    }
 }
 
 // ---- interruptions ----------------------------------------------------------------------------------------
@@ -1099,7 +1165,9 @@ int main(void)
         cmocka_unit_test(test_sightings_are_placed_from_where_the_robot_was),
         cmocka_unit_test(test_sightings_delay_shifts_where_they_are_placed_from),
         cmocka_unit_test(test_sightings_of_a_delayed_frame_before_the_clock_are_refused),
-        cmocka_unit_test(test_sightings_of_the_past_correct_the_present),
+        cmocka_unit_test(test_sightings_that_come_late_count_as_if_they_had_come_in_time),
+        cmocka_unit_test(test_pose_and_covariance_between_frames_are_what_the_filter_arrives_at),
+        cmocka_unit_test(test_odometry_beyond_the_room_to_wait_is_predicted_in_order),
 
         cmocka_unit_test(test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew),
         cmocka_unit_test(test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks),

@@ -126,7 +126,7 @@ static bslam_params_t params_of(int kind)
     params.velocity_states = kind / 4 == 1;
     params.scale_states = kind / 4 == 2;
     params.gate_d2 = 25;
-    // Half of them look back into the last step; the way since is below the sightings' noise.
+    // Half of them show the robot within the last step.
     params.sighting_delay_us = kind % 4 < 2 ? 0 : 30000;
     params.mount_x_m = BSLAM_R(0.05);
     return params;
