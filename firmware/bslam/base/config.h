@@ -42,8 +42,8 @@
 #error "BSLAM_SIGHTINGS_MAX is 1 to 250"
 #endif
 
-/// Odometry steps remembered, so that a sighting may be older than the pose (24 bytes each in float). At 25
-/// steps/s the default reaches 0.6 s back.
+/// Odometry readings that may wait for the next frame: so much older than the newest one a frame may be (24
+/// bytes each in float). At 25 readings/s the default reaches 0.6 s back.
 #ifndef BSLAM_HISTORY_MAX
 #define BSLAM_HISTORY_MAX 16
 #endif
