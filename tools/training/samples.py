@@ -1,8 +1,8 @@
 """Labelled pictures become training samples: signatures that the C core itself computes.
 
 A picture is scaled to a frame that the front end takes. What is in its boxes, and every candidate that lies
-on one, is an example of the box's class; candidates and other proposals that lie on no box are examples of
-what is none of the objects.
+on one, is an example of the box's class; candidates that lie on no box are examples of what is none of the
+objects.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.errors import BslamError
 from bslam.experiment.pictures import Box, Scaled, camera_for, load_picture
 from training.folder import FILE, Folder, Label
-from training.truth import overlaps
+from training.truth import areas, intersections, overlaps
 
 NONE = -1
 """The label of what is none of the objects."""
 
 SAME_OVERLAP = 0.5  # intersection over union from which a candidate is of a box
-OTHER_OVERLAP = 0.1  # and up to which it is of none
-OTHERS_A_PICTURE = 20
+TOUCH = 0.1  # share of a candidate on a box above which it is no example of something else
 # A box drawn by hand is not the detector's: each is also taken with its sides moved by this share of it.
 SHAKES = 4
 SHAKE = 0.06
@@ -88,7 +87,6 @@ def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
             _add_boxes(collected, view)
             owners = _add_candidates(collected, view, seeing.candidates)
             found.update(names[owner] for owner in owners)
-            _add_others(collected, view)
         else:
             useless[picture.path.name] = seeing.reason
     drawn = Counter(label.name for picture in folder.pictures for label in picture.labels)
@@ -133,21 +131,12 @@ def _add_boxes(collected: _Collected, view: _View) -> None:
 
 def _add_candidates(collected: _Collected, view: _View, candidates: Sequence[Candidate]) -> set[int]:
     """What the front end found by itself; the labelled boxes that are among it."""
-    owners = _owners([one.outline for one in candidates], view.boxes)
+    owners = _owners(candidates, view.boxes)
     for candidate, owner in zip(candidates, owners, strict=True):
         if owner is not None:
             label = NONE if owner == NONE else view.objects[owner]
             collected.add(candidate.signature, label, view.picture)
     return {owner for owner in owners if owner is not None and owner != NONE}
-
-
-def _add_others(collected: _Collected, view: _View) -> None:
-    """Proposals that lie on no box."""
-    boxes: list[Box] = [(a, b, c, d) for a, b, c, d in view.front_end.proposals().boxes.tolist()]
-    owners = _owners(boxes, view.boxes)
-    others = [box for box, owner in zip(boxes, owners, strict=True) if owner == NONE]
-    for box in others[:OTHERS_A_PICTURE]:
-        collected.add(view.front_end.signature(box), NONE, view.picture)
 
 
 def folder_sha256(folder: Folder) -> str:
@@ -158,18 +147,31 @@ def folder_sha256(folder: Folder) -> str:
     return digest.hexdigest()
 
 
-def _owners(boxes: list[Box], targets: list[Box]) -> list[int | None]:
-    """For each box the index of the target that it is of, NONE, or None where it is neither."""
-    if not boxes:
+def _owners(candidates: Sequence[Candidate], boxes: list[Box]) -> list[int | None]:
+    """For each candidate the index of the box that it is of, NONE, or None where it is neither.
+
+    One that is cut off by the frame or lies on a part of a box says nothing of either.
+    """
+    if not candidates:
         return []
-    if not targets:
-        return [NONE] * len(boxes)
-    overlap = overlaps(np.array(boxes), np.array(targets))
-    best = overlap.argmax(axis=1)
-    return [
-        int(target) if row[target] >= SAME_OVERLAP else NONE if row[target] <= OTHER_OVERLAP else None
-        for row, target in zip(overlap, best, strict=True)
-    ]
+    if not boxes:
+        return [None if _is_cut(one) else NONE for one in candidates]
+    outlines, targets = np.array([one.outline for one in candidates]), np.array(boxes)
+    overlap = overlaps(outlines, targets)
+    shares = intersections(outlines, targets) / areas(outlines)[:, None]
+    touches: NDArray[np.bool_] = np.any(shares > TOUCH, axis=1)
+    owners: list[int | None] = []
+    for one, row, touching in zip(candidates, overlap, touches, strict=True):
+        best = int(row.argmax())
+        if row[best] >= SAME_OVERLAP:
+            owners.append(best)
+        else:
+            owners.append(None if touching or _is_cut(one) else NONE)
+    return owners
+
+
+def _is_cut(candidate: Candidate) -> bool:
+    return any(mark.startswith("cut") for mark in candidate.marks)
 
 
 def _shaken(box: Box, random: np.random.Generator) -> list[Box]:

@@ -55,9 +55,7 @@ def simulated(scenario: Scenario, seed: int, rig: Rig, frames: int, every_s: flo
     """
     duration_s = scenario.steps * scenario.step_us * 1e-6
     if duration_s < every_s:
-        raise BslamError(
-            f"{scenario.name}: lasts {duration_s:g} s; allowed: frames as often, not {every_s:g} s"
-        )
+        raise BslamError(f"{scenario.name}: lasts {duration_s:g} s; allowed: an --every up to that")
     return Source(rig.cameras, _drive_shots(scenario, seed, rig, frames, every_s))
 
 

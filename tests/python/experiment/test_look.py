@@ -184,7 +184,7 @@ def test_every_reason_of_the_core_has_words():
             ["{folder}/../small", "--rig", "wide180"],
             "is 100x80; allowed: 320x240, its camera's frame, or larger",
         ),
-        (["paper_room", "--every", "3000"], "lasts 200 s; allowed: frames as often, not 3000 s"),
+        (["paper_room", "--every", "3000"], "lasts 200 s; allowed: an --every up to that"),
     ],
 )
 def test_look_bad_source_is_refused(seen, pictures, tmp_path, capsys, words, complaint):
