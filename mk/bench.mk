@@ -5,3 +5,8 @@
 bench: ## count the instructions of a filter step at several map sizes (valgrind)
 	@tools/setup.sh bench
 	@$(PYTHON) tools/bench.py
+
+.PHONY: bench-learner
+bench-learner: ## count the instructions of learning on the robot (valgrind); renders what is learned first
+	@tools/setup.sh bench
+	@$(PYTHON) tools/bench_learner.py

@@ -41,6 +41,6 @@ firmware-all: ## the same for every TARGET
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons
-	@$(PYTHON) tools/sizes.py --beacons 6 20 50 \
+	@$(PYTHON) tools/sizes.py --beacons 6 20 50 --learner 6 32 64 \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "$(TARGET)" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_$(TARGET))" $(ARM)nm
