@@ -1,7 +1,9 @@
 """What sets training and test worlds apart: palettes, patterns, layouts; and the artist who draws from them.
 
-The two styles share no list of colours and few layouts, and their random streams never meet, so nothing that
-a detector was trained on is seen in a test. Both are ordinary offices.
+Their random streams never meet, so no texture of a training world comes back in a test. Hues and woods are
+lists of their own, and so are most layouts, but not all: plain walls, brick, ribbed radiators and others are
+in both, as are the standard colours of signs, and an extinguisher is drawn the same way. Both are ordinary
+offices.
 """
 
 from __future__ import annotations
