@@ -3,6 +3,7 @@
 import csv
 import ctypes
 import os
+import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -11,23 +12,25 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import example_pictures
 import train_beacons
 from bslam.core.vision import FrontEnd
 from bslam.experiment.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
-from tools import photographs
+from tools.blind import blind_model
 from tools.compiled import FIRMWARE
 from training import samples
 from training.folder import COLUMNS, read_folder
 
 SIGNATURE = 71
+WORLD = 1
 
 
 @pytest.fixture(scope="module", autouse=True)
 def blind():
     """A detector that finds nothing stands in for the trained one."""
     patch = pytest.MonkeyPatch()
-    model = photographs.blind_model()
+    model = blind_model()
     patch.setattr(samples, "FrontEnd", lambda cameras, _: FrontEnd(cameras, model))
     yield
     patch.undo()
@@ -37,7 +40,7 @@ def blind():
 def user(tmp_path_factory):
     """A user's folder of twenty pictures, and what the training made of it."""
     folder = tmp_path_factory.mktemp("pictures")
-    photographs.take(folder, 20, seed=0)
+    example_pictures.take(folder, WORLD, 20, seed=0)
     out = tmp_path_factory.mktemp("models")
     assert train_beacons.main([str(folder), "--out", str(out / "my_beacons.h")]) == 0
     return folder, out
@@ -91,7 +94,7 @@ def test_twenty_pictures_give_a_header_that_compiles_and_recognises(user, tmp_pa
     known = {one.name for one in read_folder(folder).objects}
     library = Compiled(out / "my_beacons.h", tmp_path)
     assert library.check() == 0
-    photographs.take(tmp_path / "new", 25, seed=1)
+    example_pictures.take(tmp_path / "new", WORLD, 25, seed=1)
     answers = [(name, library.recognise(signature)) for name, signature in boxes_of(tmp_path / "new")]
     of_known = [(name, answer) for name, answer in answers if name in known]
     assert len(of_known) > 25
@@ -129,7 +132,7 @@ def test_training_twice_gives_the_same_files(user, tmp_path):
 
 def test_other_things_are_rejected(tmp_path):
     """Two of the objects are the user's, the others' boxes stand for what the detector finds besides."""
-    rows = photographs.take(tmp_path, 30, seed=2)
+    rows = example_pictures.take(tmp_path, WORLD, 30, seed=2)
     seen_in = {row[1]: len({one[0] for one in rows if one[1] == row[1]}) for row in rows if row[1]}
     write_labels(tmp_path, [row for row in rows if seen_in.get(row[1], 0) >= 2])
     folder = read_folder(tmp_path)
@@ -147,6 +150,20 @@ def test_other_things_are_rejected(tmp_path):
 # --- what is refused ----------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def taken(tmp_path_factory):
+    """Fourteen pictures, taken once."""
+    folder = tmp_path_factory.mktemp("taken")
+    return folder, example_pictures.take(folder, WORLD, 14, seed=3)
+
+
+@pytest.fixture
+def rows(taken, tmp_path):
+    """The rows of a labels file; its pictures are copied to tmp_path."""
+    shutil.copytree(taken[0], tmp_path, dirs_exist_ok=True)
+    return taken[1]
+
+
 def refusal(folder, capsys, *words):
     """What the command says, having written nothing."""
     out = folder / "out/my_beacons.h"
@@ -160,37 +177,33 @@ def write_labels(folder, rows):
         csv.writer(file).writerows([COLUMNS, *rows])
 
 
-def test_missing_picture_is_refused(tmp_path, capsys):
-    rows = photographs.take(tmp_path, 4, seed=3)
+def test_missing_picture_is_refused(rows, tmp_path, capsys):
     (tmp_path / rows[0][0]).unlink()
     error = refusal(tmp_path, capsys)
     assert f"line 2, column picture: '{rows[0][0]}' is not allowed" in error
 
 
-def test_class_of_one_picture_is_refused(tmp_path, capsys):
-    rows = photographs.take(tmp_path, 6, seed=3)
+def test_class_of_one_picture_is_refused(rows, tmp_path, capsys):
     write_labels(tmp_path, [*rows, [rows[0][0], "lamp", "10", "10", "60", "60", "", ""]])
     error = refusal(tmp_path, capsys)
     assert "class '" in error and "allowed: at least 2 pictures of each class" in error
 
 
-def test_class_without_any_signature_is_refused(tmp_path, capsys):
-    rows = photographs.take(tmp_path, 6, seed=3)
+def test_class_without_any_signature_is_refused(rows, tmp_path, capsys):
     tiny = [[row[0], "dot", "100", "100", "102", "102", "", ""] for row in rows[:3]]
     write_labels(tmp_path, tiny)
     assert "class 'dot': 3 boxes give signatures in 0 pictures" in refusal(tmp_path, capsys)
 
 
-def test_single_class_and_nothing_else_is_refused(tmp_path, capsys):
-    rows = photographs.take(tmp_path, 12, seed=3)
+def test_single_class_and_nothing_else_is_refused(rows, tmp_path, capsys):
     names = [row[1] for row in rows]
     most = max(set(names) - {""}, key=names.count)
     write_labels(tmp_path, [row for row in rows if row[1] == most])
     assert f"nothing but '{most}'; allowed: a second class" in refusal(tmp_path, capsys)
 
 
-def test_objects_that_cannot_be_told_apart_are_refused(tmp_path, capsys):
-    rows = [row for row in photographs.take(tmp_path, 14, seed=3) if row[1]]
+def test_objects_that_cannot_be_told_apart_are_refused(rows, tmp_path, capsys):
+    rows = [row for row in rows if row[1]]
     random = np.random.default_rng(1)
     write_labels(tmp_path, [[row[0], random.choice(["a", "b"]), *row[2:6], "", ""] for row in rows])
     assert "objects are recognised at precision 1; allowed: at least half" in refusal(
