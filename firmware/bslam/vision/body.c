@@ -75,16 +75,21 @@ static guess_t best_guess(const sides_t *sides, const bslam_body_t *body, bslam_
     const int32_t turns = turn_count(sides, body);
     float scores[2 * TURNS_MAX + 1];
     guess_t best = {.score = -1e9f};
+    int32_t best_k = 0;
     for (int32_t k = -turns; k <= turns; k++) {
         const guess_t guess = guess_at(sides, body, turn_at(k, turns));
         scores[k + turns] = guess.score;
-        best = guess.score > best.score ? guess : best;
+        if (guess.score > best.score) {
+            best = guess;
+            best_k = k;
+        }
     }
     float whole = 0.0f;
     float first = 0.0f;
     float second = 0.0f;
     for (int32_t k = -turns; k <= turns; k++) {
-        const float away = (float)turn_at(k, turns) - best.stance.turn;
+        const bool same = k - best_k >= -1 && k - best_k <= 1;  // the edges' slopes will tell more closely
+        const float away = same ? 0.0f : (float)turn_at(k - best_k, turns);
         const float share = bslam_falling(TURN_SHARPNESS * (best.score - scores[k + turns]));
         whole += share;
         first += share * away;

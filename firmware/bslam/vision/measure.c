@@ -17,8 +17,17 @@ static const bslam_real_t SIDE_MIN_PX = 5;
 static const bslam_real_t BEARING_FLOOR_RAD = BSLAM_R(0.0008);
 static const bslam_real_t RANGE_FLOOR = BSLAM_R(0.01);
 static const bslam_real_t POINT_SD_PX = BSLAM_R(0.3);
-static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.25);
+static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.3);
+// Of a wide object's width, for what is not flat or not level about it.
+static const bslam_real_t BEARING_BY_WIDTH = BSLAM_R(0.012);
+// So far from a lens' axis, radians, a bearing's variance is doubled: upright sides are bent into the scan
+// lines.
+static const bslam_real_t OFF_AXIS_RAD = BSLAM_R(1.05);
 static const bslam_real_t RANGE_DOUBT = 1;
+// A distance that is less certain than this, as a fraction, is none.
+static const bslam_real_t RANGE_SD_MAX = BSLAM_R(0.15);
+// Seen more obliquely than this, tangent, an object is marked and not measured.
+static const bslam_real_t TURN_MAX = BSLAM_R(1.75);
 
 static bool box_is_number(const bslam_box_t *box)
 {
@@ -50,13 +59,25 @@ static bslam_box_t box_around(const bslam_quad_t *quad)
                          .bottom_px = left_lower ? quad->bottom_left_px : quad->bottom_right_px};
 }
 
-/// What is left of a direction's and of a distance's error when the outline is known.
-static void measure_outline(const bslam_outline_t *o, bslam_real_t height_m, bslam_candidate_t *candidate)
+static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camera_t *camera,
+                                     bslam_real_t point_var)
+{
+    const bslam_real_t by_width = BEARING_BY_WIDTH * (o->left - o->right);
+    const bslam_real_t off_axis = bslam_angle_wrap(o->facing_rad - camera->yaw_rad) / OFF_AXIS_RAD;
+    const bslam_real_t square = off_axis * off_axis;
+    return (BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + point_var / 2 + by_width * by_width +
+            BEARING_DOUBT * o->middle_var) *
+           (1 + square * square * square);
+}
+
+/// Direction, and distance if the height is known, with what is left of their errors when the outline is
+/// known.
+static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, bslam_real_t height_m,
+                            bslam_candidate_t *candidate)
 {
     const bslam_real_t point_var = POINT_SD_PX * POINT_SD_PX * o->pixel * o->pixel;
     candidate->bearing_rad = bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1));
-    candidate->bearing_sd_rad =
-        bslam_sqrt(BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + point_var / 2 + BEARING_DOUBT * o->middle_var);
+    candidate->bearing_sd_rad = bslam_sqrt(bearing_variance(o, camera, point_var));
     candidate->has_bearing = true;
     if (height_m > 0) {
         const bslam_real_t tall = o->top - o->bottom;
@@ -65,7 +86,7 @@ static void measure_outline(const bslam_outline_t *o, bslam_real_t height_m, bsl
         const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + tall_var / (tall * tall);
         candidate->range_m = ahead_m * bslam_sqrt(1 + o->middle * o->middle);
         candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
-        candidate->has_range = true;
+        candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
     }
 }
 
@@ -84,13 +105,15 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
                            &outline) != BSLAM_OK) {
         return BSLAM_E_RANGE;
     }
-    const unsigned marks = marks_of(frame, rough);
-    const unsigned sideways = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL;
+    const bool slanted = bslam_abs(outline.turn) > TURN_MAX;
+    const unsigned marks = marks_of(frame, rough) | (slanted ? (unsigned)BSLAM_MARK_SLANTED : 0U);
+    const unsigned sideways =
+        BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
     candidate->has_bearing = false;
     candidate->has_range = false;
     if ((marks & sideways) == 0U) {
-        measure_outline(&outline, (marks & upright) == 0U ? size->height_m : 0, candidate);
+        measure_outline(&outline, camera, (marks & upright) == 0U ? size->height_m : 0, candidate);
     }
     candidate->marks = (uint16_t)marks;
     candidate->outline = box_around(&outline.quad);

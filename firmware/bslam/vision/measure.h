@@ -15,11 +15,16 @@ typedef struct bslam_size {
 /// margin and score stay as they are. Without a height there is no distance; without the right depth a body's
 /// flank is taken for a part of its front, and its middle is off by half of what the flank takes.
 ///
-/// A candidate without has_bearing must not be used, marks says why; one without has_range has only a
-/// direction. Signature values are 0 where none could be taken.
-/// BSLAM_E_NOT_FINITE: the box or the height. BSLAM_E_RANGE: the box is empty or lies outside the frame, or
-/// the height is outside 0 to 10 m. BSLAM_E_PARAMETER: the camera's frame has another size. *candidate is
-/// then unchanged. The camera has passed bslam_camera_check.
+/// Marked and not measured: what is cut off to the left or right, small (less than 5 px wide or 8 px high),
+/// or turned by more than 60 degrees. What is cut off above or below has a direction and no distance; nor has
+/// one whose distance would be less certain than 15 %. That something stands before an object is not noticed.
+/// A candidate without has_bearing must not be used. Signature values are 0 where none could be taken.
+///
+/// The standard deviations are those of the errors left, of which a large part repeats from frame to frame:
+/// they come from the object's looks, not from noise (docs/EXPERIMENTS.md). BSLAM_E_NOT_FINITE: the box or
+/// the size. BSLAM_E_RANGE: the box is empty or lies outside the frame, the size is outside 0 to 10 m or
+/// deeper than twice its height, or the lens sees no upright object there. BSLAM_E_PARAMETER: the camera's
+/// frame has another size. *candidate is then unchanged. The camera has passed bslam_camera_check.
 BSLAM_MUST_CHECK bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
                                               const bslam_box_t *rough, const bslam_size_t *size,
                                               bslam_candidate_t *candidate);

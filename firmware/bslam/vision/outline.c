@@ -34,6 +34,7 @@ typedef struct fit {
     bslam_real_t value;   ///< there
     bslam_real_t slope;   ///< of a level side; 0 for an upright one
     bslam_real_t spread;  ///< sum of squared distances from `at`
+    bslam_real_t square;  ///< sum of squared distances of the points from the line
 } fit_t;
 
 /// An edge point as a level side sees it: along is across the object and value up. An upright side's are
@@ -59,6 +60,11 @@ static fit_t fit_all(const bslam_edge_t *edge, bool level)
         mixed += (point.across - fit.at) * (point.up - fit.value);
     }
     fit.slope = fit.spread > 0 ? mixed / fit.spread : 0;
+    for (int32_t i = 0; i < edge->count; i++) {
+        const bslam_plane_point_t point = oriented(edge, i, level);
+        const bslam_real_t off = point.up - fit.value - fit.slope * (point.across - fit.at);
+        fit.square += off * off;
+    }
     return fit;
 }
 
@@ -117,9 +123,21 @@ static bool find_upright(const search_t *search, bslam_side_name_t name, bslam_r
 // --- Level sides
 // ---------------------------------------------------------------------------------------------
 
+/// How much the edges leave open which turn it is, 0 to 1: points that scatter about their lines, scan lines
+/// on which there is none.
+static bslam_real_t doubt_of(const fit_t *up, const fit_t *down, bslam_real_t pixel)
+{
+    const bslam_real_t scans = 2 * BSLAM_SIDE_SCANS;
+    const bslam_real_t found = (bslam_real_t)(up->count + down->count);
+    const bslam_real_t freedom = found > 5 ? found - 4 : 1;  // two lines take four of the points
+    const bslam_real_t scatter_px2 = (up->square + down->square) / (freedom * pixel * pixel);
+    const bslam_real_t doubt = scatter_px2 / (POINT_SD_PX * POINT_SD_PX) + (scans - found) / scans;
+    return doubt < 1 ? doubt : 1;
+}
+
 /// Upper and lower side and the turn, from the edge points on the front. up(across) = up(0) (1 + turn across)
-/// for both, and each weighs by how long it is and how sure.
-static void fit_level(const search_t *search, const bslam_body_t *body, const bslam_level_t *level)
+/// for both, and each weighs by how long it is and how sure. Returns what is left open: doubt_of.
+static bslam_real_t fit_level(const search_t *search, const bslam_body_t *body, const bslam_level_t *level)
 {
     bslam_outline_t *o = search->outline;
     const fit_t up = fit_edge(search, &level->top, true);
@@ -134,6 +152,7 @@ static void fit_level(const search_t *search, const bslam_body_t *body, const bs
     o->turn_var = 1 / known;
     o->top = top / (1 + o->turn * up.at);
     o->bottom = bottom / (1 + o->turn * down.at);
+    return doubt_of(&up, &down, o->pixel);
 }
 
 /// The front face from the edges of the whole body: the turn tells where it ends, its ends what belongs to
@@ -141,15 +160,16 @@ static void fit_level(const search_t *search, const bslam_body_t *body, const bs
 static void fit_front(const search_t *search, const bslam_body_t *body, const bslam_level_t *level)
 {
     bslam_outline_t *o = search->outline;
+    bslam_real_t doubt = 1;
     o->turn = level->turn;
     for (int32_t i = 0; i < (body->depth > 0 ? FRONT_STEPS : 1); i++) {
         const bslam_stance_t stance = bslam_body_stance(body, o->turn);
         o->left = (bslam_real_t)stance.left;
         o->right = (bslam_real_t)stance.right;
-        fit_level(search, body, level);
+        doubt = fit_level(search, body, level);
     }
-    o->turn += level->turn_offset;
-    o->turn_var += level->turn_var;
+    o->turn += doubt * level->turn_offset;
+    o->turn_var += doubt * level->turn_var;
     o->middle = bslam_body_middle(body, o->turn);
     const bslam_real_t turn_sd = bslam_sqrt(o->turn_var);
     const bslam_real_t by_turn =
@@ -168,6 +188,25 @@ static bool box_is_allowed(const bslam_frame_t *frame, const bslam_box_t *box)
            box->bottom_px <= (bslam_real_t)frame->height_px - BSLAM_R(0.5);
 }
 
+/// The innermost place across that an upright edge of the rough box has, over its ends and its middle: a lens
+/// that bends straight sides makes the box touch them at one point only. `inwards` is 1 to the left. False if
+/// the lens does not see it.
+static bool innermost(const bslam_facing_t *facing, bslam_real_t u_px, const bslam_box_t *box,
+                      bslam_real_t inwards, bslam_real_t *across)
+{
+    for (int32_t i = 0; i < 3; i++) {
+        const bslam_real_t v_px = box->top_px + (bslam_real_t)i / 2 * (box->bottom_px - box->top_px);
+        bslam_plane_point_t point;
+        if (!bslam_facing_from_frame(facing, u_px, v_px, &point)) {
+            return false;
+        }
+        if (i == 0 || inwards * (point.across - *across) > 0) {
+            *across = point.across;
+        }
+    }
+    return true;
+}
+
 /// The rough box in the plane that faces it.
 static bool begin(search_t *search, const bslam_box_t *rough)
 {
@@ -181,18 +220,14 @@ static bool begin(search_t *search, const bslam_box_t *rough)
     }
     o->facing_rad = bslam_direction_bearing_rad(&centre);
     bslam_sin_cos(o->facing_rad, &facing->sine, &facing->cosine);
-    bslam_plane_point_t left;
-    bslam_plane_point_t right;
     bslam_plane_point_t top;
     bslam_plane_point_t bottom;
-    if (!bslam_facing_from_frame(facing, rough->left_px, v, &left) ||
-        !bslam_facing_from_frame(facing, rough->right_px, v, &right) ||
+    if (!innermost(facing, rough->left_px, rough, -1, &o->left) ||
+        !innermost(facing, rough->right_px, rough, 1, &o->right) ||
         !bslam_facing_from_frame(facing, u, rough->top_px, &top) ||
         !bslam_facing_from_frame(facing, u, rough->bottom_px, &bottom)) {
         return false;
     }
-    o->left = left.across;
-    o->right = right.across;
     o->top = top.up;
     o->bottom = bottom.up;
     o->pixel = (o->top - o->bottom) / (rough->bottom_px - rough->top_px);

@@ -1,0 +1,216 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/vision/measure.h"
+#include "picture.h"
+
+static const double WALL[3] = {180, 175, 160};
+static const bslam_size_t POSTER_SIZE = {.height_m = BSLAM_R(0.8)};
+
+/// A poster 0.8 m high and 0.7 m wide, `range_m` away in direction `bearing_rad`, its front turned by
+/// `slant_rad`.
+static unit_panel_t poster(double range_m, double bearing_rad, double slant_rad)
+{
+    const double x = range_m * cos(bearing_rad), y = range_m * sin(bearing_rad);
+    const double along_x = -0.35 * sin(bearing_rad + slant_rad),
+                 along_y = 0.35 * cos(bearing_rad + slant_rad);
+    return (unit_panel_t){x + along_x, y + along_y, x - along_x, y - along_y, 0.7, 1.5, 60, 80, 150};
+}
+
+/// The box around a panel in the frame, 2 pixels larger.
+static bslam_box_t box_of(const bslam_camera_t *camera, const unit_panel_t *panel)
+{
+    double box[4] = {1e9, 1e9, -1e9, -1e9};
+    for (int i = 0; i < 4; i++) {
+        const double z = (i < 2 ? panel->high_m : panel->low_m) - (double)camera->z_m;
+        const bslam_direction_t corner = {real(i % 2 == 0 ? panel->x0_m : panel->x1_m),
+                                          real(i % 2 == 0 ? panel->y0_m : panel->y1_m), real(z)};
+        bslam_real_t u;
+        bslam_real_t v;
+        assert_int_equal(bslam_camera_project(camera, &corner, &u, &v), BSLAM_OK);
+        box[0] = fmin(box[0], (double)u);
+        box[1] = fmin(box[1], (double)v);
+        box[2] = fmax(box[2], (double)u);
+        box[3] = fmax(box[3], (double)v);
+    }
+    return (bslam_box_t){real(fmax(box[0] - 2, -0.5)), real(fmax(box[1] - 2, -0.5)),
+                         real(fmin(box[2] + 2, 319.5)), real(fmin(box[3] + 2, 239.5))};
+}
+
+static bslam_candidate_t measured(const bslam_camera_t *camera, const unit_panel_t *panel,
+                                  const bslam_size_t *size)
+{
+    static unit_picture_t picture;
+    unit_picture_draw(&picture, camera, WALL, panel, 1);
+    const bslam_box_t rough = box_of(camera, panel);
+    bslam_candidate_t candidate = {.beacon_class = 3, .class_margin = 0.5f, .score = 0.25f};
+    assert_int_equal(bslam_measure(&picture.frame, camera, &rough, size, &candidate), BSLAM_OK);
+    return candidate;
+}
+
+static void test_measure_tells_direction_and_distance_of_a_known_object(void **state)
+{
+    // Range, bearing, slant.
+    static const double cases[][3] = {{3, 0, 0}, {3, 0.2, 0}, {4, -0.25, 0.5}, {5, 0.1, -0.7}, {6, 0.3, 0.3}};
+    const bslam_camera_t camera = unit_pinhole();
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        const unit_panel_t panel = poster(cases[i][0], cases[i][1], cases[i][2]);
+        const bslam_candidate_t candidate = measured(&camera, &panel, &POSTER_SIZE);
+        assert_true(candidate.has_bearing && candidate.has_range);
+        assert_int_equal(candidate.marks, 0);
+        assert_near(candidate.bearing_rad, cases[i][1], 0.5 / 277);
+        // Half a pixel of the 35 to 75 that 0.8 m take.
+        assert_near(candidate.range_m / real(cases[i][0]), 1, 0.013);
+        assert_true(candidate.beacon_class == 3 && candidate.class_margin == 0.5f &&
+                    candidate.score == 0.25f);
+    }
+}
+
+static void test_measure_through_a_wide_turned_pitched_camera(void **state)
+{
+    bslam_camera_t camera = unit_equidistant();
+    camera.yaw_rad = real(1.2);
+    camera.pitch_rad = real(-0.15);
+    for (int i = 0; i < 5; i++) {
+        const double bearing_rad = 0.2 + 0.5 * i;
+        const unit_panel_t panel = poster(2.5, bearing_rad, 0.3);
+        const bslam_candidate_t candidate = measured(&camera, &panel, &POSTER_SIZE);
+        assert_true(candidate.has_bearing && candidate.has_range);
+        assert_near(candidate.bearing_rad, bearing_rad, 0.6 / 101.9);
+        assert_near(candidate.range_m / real(2.5), 1, 0.025);
+    }
+}
+
+static void test_measure_around_the_back_wraps_the_direction(void **state)
+{
+    bslam_camera_t camera = unit_pinhole();
+    camera.yaw_rad = real(3.1);
+    const unit_panel_t panel = poster(3, -3.0, 0);
+    const bslam_candidate_t candidate = measured(&camera, &panel, &POSTER_SIZE);
+    assert_near(candidate.bearing_rad, -3.0, 0.5 / 277);
+}
+
+static void test_measure_without_a_height_has_a_direction_only(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const bslam_size_t unknown = {0};
+    const unit_panel_t panel = poster(3, 0.1, 0.2);
+    const bslam_candidate_t candidate = measured(&camera, &panel, &unknown);
+    assert_true(candidate.has_bearing && !candidate.has_range);
+    assert_near(candidate.bearing_rad, 0.1, 0.5 / 277);
+}
+
+static void test_measure_is_less_sure_of_what_is_farther_or_fainter(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t near_panel = poster(2.5, 0, 0);
+    const unit_panel_t far_panel = poster(6, 0, 0);
+    unit_panel_t faint_panel = near_panel;
+    faint_panel.red = 172;
+    faint_panel.green = 168;
+    faint_panel.blue = 156;
+    const bslam_candidate_t sharp = measured(&camera, &near_panel, &POSTER_SIZE);
+    const bslam_candidate_t distant = measured(&camera, &far_panel, &POSTER_SIZE);
+    const bslam_candidate_t faint = measured(&camera, &faint_panel, &POSTER_SIZE);
+    assert_true(distant.range_sd_m / distant.range_m > 1.2f * (sharp.range_sd_m / sharp.range_m));
+    assert_true(faint.bearing_sd_rad > 1.5f * sharp.bearing_sd_rad);
+    assert_true(!faint.has_range || faint.range_sd_m > 1.5f * sharp.range_sd_m);
+}
+
+/// A picture of one panel, measured in a box given by hand.
+static bslam_candidate_t measured_in(const unit_panel_t *panel, bslam_box_t rough)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    unit_picture_draw(&picture, &camera, WALL, panel, 1);
+    bslam_candidate_t candidate;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &POSTER_SIZE, &candidate), BSLAM_OK);
+    return candidate;
+}
+
+static void test_measure_marks_what_is_cut_off(void **state)
+{
+    const unit_panel_t panel = poster(3, 0, 0);
+    const bslam_candidate_t left = measured_in(&panel, (bslam_box_t){-0.5f, 20, 190, 100});
+    const bslam_candidate_t right = measured_in(&panel, (bslam_box_t){130, 20, 319.5f, 100});
+    const bslam_candidate_t top = measured_in(&panel, (bslam_box_t){127, -0.5f, 192, 100});
+    const bslam_candidate_t bottom = measured_in(&panel, (bslam_box_t){127, 27, 192, 239.5f});
+    assert_int_equal(left.marks, BSLAM_MARK_CUT_LEFT);
+    assert_int_equal(right.marks, BSLAM_MARK_CUT_RIGHT);
+    assert_int_equal(top.marks, BSLAM_MARK_CUT_TOP);
+    assert_int_equal(bottom.marks, BSLAM_MARK_CUT_BOTTOM);
+    assert_true(!left.has_bearing && !left.has_range && !right.has_bearing && !right.has_range);
+    // Both upright sides are there: a direction, but no distance.
+    assert_true(top.has_bearing && !top.has_range && bottom.has_bearing && !bottom.has_range);
+}
+
+static void test_measure_marks_what_is_small(void **state)
+{
+    // 4.6 px wide and 46 px high; 69 px wide and 7.4 px high.
+    const unit_panel_t thin = {3, 0.025, 3, -0.025, 0.9, 1.4, 60, 80, 150};
+    const unit_panel_t flat = {3, 0.375, 3, -0.375, 0.9, 0.98, 60, 80, 150};
+    const bslam_candidate_t narrow = measured_in(&thin, (bslam_box_t){157.2f, 36.4f, 161.8f, 82.6f});
+    const bslam_candidate_t low = measured_in(&flat, (bslam_box_t){124.9f, 75.2f, 194.1f, 82.6f});
+    assert_true((narrow.marks & BSLAM_MARK_SMALL) != 0 && !narrow.has_bearing && !narrow.has_range);
+    assert_true((low.marks & BSLAM_MARK_SMALL) != 0 && !low.has_bearing && !low.has_range);
+}
+
+static void test_measure_marks_what_is_slanted(void **state)
+{
+    // A door-high panel seen at 70 degrees, large enough for its turn to be plain.
+    const bslam_camera_t camera = unit_pinhole();
+    const double x0 = 2.2, y0 = 0.7, x1 = 5.0, y1 = -0.32;
+    const unit_panel_t panel = {x0, y0, x1, y1, 0.05, 1.2, 60, 80, 150};
+    const bslam_size_t size = {.height_m = BSLAM_R(1.15)};
+    const bslam_candidate_t candidate = measured(&camera, &panel, &size);
+    assert_int_equal(candidate.marks, BSLAM_MARK_SLANTED);
+    assert_true(!candidate.has_bearing && !candidate.has_range);
+}
+
+static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state)
+{
+    static unit_picture_t picture;
+    bslam_camera_t camera = unit_pinhole();
+    unit_picture_fill(&picture, 120, 130, 140);
+    const bslam_box_t good = {100, 60, 160, 120};
+    const bslam_box_t bad = {100, 60, real(NAN), 120};
+    const bslam_box_t outside = {300, 60, 330, 120};
+    bslam_candidate_t candidate;
+    bslam_candidate_t before;
+    memset(&candidate, 0x5A, sizeof candidate);
+    memcpy(&before, &candidate, sizeof before);
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &bad, &POSTER_SIZE, &candidate),
+                     BSLAM_E_NOT_FINITE);
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &outside, &POSTER_SIZE, &candidate),
+                     BSLAM_E_RANGE);
+    const struct {
+        double height_m, depth_m;
+        bslam_status_t status;
+    } sizes[] = {{NAN, 0, BSLAM_E_NOT_FINITE}, {1, NAN, BSLAM_E_NOT_FINITE}, {-1, 0, BSLAM_E_RANGE},
+                 {11, 0, BSLAM_E_RANGE},       {1, -0.1, BSLAM_E_RANGE},     {1, 2.1, BSLAM_E_RANGE}};
+    for (int i = 0; i < COUNT_OF(sizes); i++) {
+        const bslam_size_t size = {real(sizes[i].height_m), real(sizes[i].depth_m)};
+        assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &size, &candidate), sizes[i].status);
+    }
+    camera.width_px = 160;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &POSTER_SIZE, &candidate),
+                     BSLAM_E_PARAMETER);
+    assert_memory_equal(&candidate, &before, sizeof before);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_measure_tells_direction_and_distance_of_a_known_object),
+        cmocka_unit_test(test_measure_through_a_wide_turned_pitched_camera),
+        cmocka_unit_test(test_measure_around_the_back_wraps_the_direction),
+        cmocka_unit_test(test_measure_without_a_height_has_a_direction_only),
+        cmocka_unit_test(test_measure_is_less_sure_of_what_is_farther_or_fainter),
+        cmocka_unit_test(test_measure_marks_what_is_cut_off),
+        cmocka_unit_test(test_measure_marks_what_is_small),
+        cmocka_unit_test(test_measure_marks_what_is_slanted),
+        cmocka_unit_test(test_measure_refuses_bad_input_and_leaves_the_candidate),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
