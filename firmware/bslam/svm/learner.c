@@ -96,19 +96,22 @@ static int32_t least(const bslam_learner_t *learner, int32_t machine, const bsla
     return best;
 }
 
-/// Puts a sample on a machine's list, if there is room and it is not there.
+/// Puts a sample on a machine's list, if it is not there; on a full one in place of what matters least.
 static void list_rival(bslam_machine_t *machine, int32_t sample)
 {
+    int32_t place = 0;
     for (int32_t i = 0; i < machine->rivals; i++) {
         if (machine->rival[i] == sample) {
             return;
         }
+        place = machine->rival_alpha[i] < machine->rival_alpha[place] ? i : place;
     }
     if (machine->rivals < BSLAM_RIVALS_MAX) {
-        machine->rival[machine->rivals] = (uint16_t)sample;
-        machine->rival_alpha[machine->rivals] = 0;
+        place = machine->rivals;
         machine->rivals++;
     }
+    machine->rival[place] = (uint16_t)sample;
+    machine->rival_alpha[place] = 0;
 }
 
 static void ask_for_training(bslam_machine_t *machine)

@@ -196,6 +196,34 @@ static void test_all_beacons_alike_stays_bounded(void **state)
     assert_true(value_of(0, 0, 0) > value_of(0, 500, 0));
 }
 
+static bool is_on_list(int32_t machine, int32_t sample)
+{
+    bool found = false;
+    for (int i = 0; i < learner.machines[machine].rivals; i++) {
+        found = found || learner.machines[machine].rival[i] == sample;
+    }
+    return found;
+}
+
+static void test_show_a_rival_gets_on_a_full_list(void **state)
+{
+    begin();
+    for (int m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        (void)add();
+    }
+    show(0, 0, 0);
+    train();
+    // Untrained and so without a voice: their samples only fill the first machine's list.
+    for (int k = 0; k < BSLAM_RIVALS_MAX; k++) {
+        show(1 + k / FULL, 0, 0);
+    }
+    assert_int_equal(learner.machines[0].rivals, BSLAM_RIVALS_MAX);
+    const int32_t last = BSLAM_LEARNER_SLOTS - 1;
+    show(last, 0, 0);
+    assert_int_equal(learner.machines[0].rivals, BSLAM_RIVALS_MAX);
+    assert_true(is_on_list(0, last * FULL));
+}
+
 // ---- the store
 // --------------------------------------------------------------------------------------------------
 
@@ -446,6 +474,7 @@ int main(void)
         cmocka_unit_test(test_show_trains_a_machine_that_takes_it_for_its_own),
         cmocka_unit_test(test_contradictory_labels_end_undecided),
         cmocka_unit_test(test_all_beacons_alike_stays_bounded),
+        cmocka_unit_test(test_show_a_rival_gets_on_a_full_list),
         cmocka_unit_test(test_show_full_store_keeps_its_size),
         cmocka_unit_test(test_show_beyond_the_margin_of_a_full_store_changes_nothing),
         cmocka_unit_test(test_show_inside_the_margin_replaces_what_matters_least),
