@@ -117,7 +117,7 @@
 
 /// Dual steps of one training. A machine that has not converged by then is trained again after the others.
 #ifndef BSLAM_LEARNER_STEPS_MAX
-#define BSLAM_LEARNER_STEPS_MAX 250
+#define BSLAM_LEARNER_STEPS_MAX 220
 #endif
 #if BSLAM_LEARNER_STEPS_MAX < 100 || BSLAM_LEARNER_STEPS_MAX > 100000
 #error "BSLAM_LEARNER_STEPS_MAX is 100 to 100000"

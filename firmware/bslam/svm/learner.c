@@ -3,7 +3,7 @@
 #include <string.h>
 
 // Trainings that a machine may ask for itself when BSLAM_LEARNER_STEPS_MAX did not suffice.
-enum { AGAIN = 16 };
+enum { AGAIN = 20 };
 
 static bool exists(const bslam_learner_t *learner, int32_t machine)
 {

@@ -117,7 +117,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_learner_show(bslam_learner_t *learner, int
 /// Goes on with the training under way, or begins the next one asked for: at most `budget` pieces, of which
 /// each is a dual step, or a look at BSLAM_SAMPLES_PER_MACHINE samples. docs/EXPERIMENTS.md says what a piece
 /// takes. A training ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it goes on
-/// after the others that wait, up to 16 times. True if work is left.
+/// after the others that wait, up to 20 times. True if work is left.
 bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 
 /// Decision value of a sample (bslam_sample_encode): above 0 is "this beacon", 1 and -1 are the margins. 0
