@@ -106,8 +106,8 @@
 #error "BSLAM_SAMPLES_PER_MACHINE is 2 to 64"
 #endif
 
-/// Signatures of other beacons that a training takes: the hardest. Must exceed the support vectors among them,
-/// 30 to 40, or training does not settle.
+/// Signatures of other beacons that a training takes: the hardest. Must exceed the support vectors among
+/// them, 30 to 40, or training does not settle.
 #ifndef BSLAM_RIVALS_MAX
 #define BSLAM_RIVALS_MAX 96
 #endif
