@@ -73,6 +73,8 @@
          "direction variance times this where no distance comes") \
     REAL(bearing_only_curvature_factor, 100.0, 0.0, 1e6, \
          "and plus this times the bend of the model, MATH 24") \
+    REAL(correlation_m, 0.0, 0.0, 100.0, \
+         "the errors of a beacon's sightings are alike until the robot has gone so far (0: they are not)") \
     REAL(gate_d2, 25.0, 0.0, 1e6, \
          "a sighting with a larger squared Mahalanobis distance is rejected (0: no gate)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \

@@ -52,6 +52,7 @@ typedef struct bslam_beacon {
     int64_t last_seen_us;
     uint32_t sightings;  ///< that were fused, the one that started it included
     uint32_t gated;      ///< sightings taken for it that its gate rejected
+    uint32_t way_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
     bool confirmed;
     uint8_t beacon_class;
 } bslam_beacon_t;

@@ -31,4 +31,17 @@ static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_params_t *par
     return sighting->has_range ? sd_rad * sd_rad : sd_rad * sd_rad * params->bearing_only_variance_factor;
 }
 
+/// By how much a sighting's variances grow because its error is much like that of the sighting of the same
+/// beacon before it, since when the robot went way_m; at most 100. MATH "Errors that stay alike".
+static inline bslam_real_t bslam_correlation_factor(const bslam_params_t *params, bslam_real_t way_m)
+{
+    const bslam_real_t length_m = params->correlation_m;
+    if (!(length_m > 0)) {
+        return 1;
+    }
+    const bslam_real_t least_m = length_m / 50;
+    const bslam_real_t ratio = 2 * length_m / (way_m > least_m ? way_m : least_m);
+    return bslam_sqrt(1 + ratio * ratio);
+}
+
 #endif

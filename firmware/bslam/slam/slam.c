@@ -1,10 +1,12 @@
 #include "bslam/slam/slam.h"
 
 #include "bslam/math/trig.h"
+#include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
@@ -34,6 +36,8 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     bslam_motion_t moved;
     bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
     bslam_history_take(&slam->history, &place, &moved);
+    const bslam_real_t way_m = moved.forward_m < 0 ? -moved.forward_m : moved.forward_m;
+    slam->way_um += (uint32_t)(way_m * MICROMETRES_PER_M);
 }
 
 /// The filter goes on to the moment until_us before the newest odometry.
@@ -218,8 +222,12 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
 
 /// Fuses a sighting with the beacon that association chose.
 static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beacon,
-                       const bslam_innovation_t *innovation, bslam_account_t *account)
+                       bslam_innovation_t *innovation, bslam_account_t *account)
 {
+    const bslam_real_t way_m = (bslam_real_t)(slam->way_um - beacon->way_um) / MICROMETRES_PER_M;
+    const bslam_real_t factor = bslam_correlation_factor(&slam->params, way_m);
+    innovation->range_var_m2 *= factor;
+    innovation->bearing_var_rad2 *= factor;
     bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
     const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->params, innovation, &fusion);
     if (status != BSLAM_OK) {
@@ -233,6 +241,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beac
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     beacon->sightings++;
+    beacon->way_um = slam->way_um;
     beacon->last_seen_us = time_us;
     beacon->confirmed = beacon->confirmed || beacon->sightings >= (uint32_t)slam->params.confirm_sightings;
 }
@@ -251,6 +260,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->first_seen_us = time_us;
     beacon->last_seen_us = time_us;
     beacon->sightings = 1;
+    beacon->way_um = slam->way_um;
     beacon->confirmed = slam->params.confirm_sightings <= 1;
     fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;

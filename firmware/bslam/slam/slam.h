@@ -67,6 +67,7 @@ typedef struct bslam_slam {
     bslam_ekf_t ekf;
     bslam_odometry_t odometry;
     bslam_history_t history;
+    uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
     bslam_counters_t counters;

@@ -401,6 +401,34 @@ static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicte
     assert_near(bslam_range_variance_m2(&params, &sighting, 8), 1, 0);
 }
 
+static void test_correlation_factor_without_a_length_is_one(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.correlation_m = 0;
+    assert_near(bslam_correlation_factor(&params, 0), 1, 0);
+    assert_near(bslam_correlation_factor(&params, 5), 1, 0);
+}
+
+/// Of errors e_k with correlation rho from one to the next, a sighting adds (1 - rho) / (1 + rho) of its
+/// information: that is tanh(way / (2 length)), which the factor follows within 9 %.
+static void test_correlation_factor_is_that_of_a_first_order_process(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.correlation_m = BSLAM_R(0.5);
+    for (double way_m = 0.02; way_m < 5; way_m *= 1.3) {
+        const double rho = exp(-way_m / 0.5);
+        const double exact = (1 + rho) / (1 - rho);
+        assert_near(bslam_correlation_factor(&params, (bslam_real_t)way_m) / exact, 1, 0.09);
+    }
+}
+
+static void test_correlation_factor_at_a_standstill_is_bounded(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.correlation_m = BSLAM_R(0.5);
+    assert_near(bslam_correlation_factor(&params, 0), 100.005, 1e-3);
+}
+
 static void test_bearing_variance_grows_by_its_factor_without_a_distance(void **state)
 {
     bslam_params_t params = unit_params();
@@ -433,6 +461,9 @@ int main(void)
 
         cmocka_unit_test(test_range_variance_is_the_sum_of_its_three_parts),
         cmocka_unit_test(test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance),
+        cmocka_unit_test(test_correlation_factor_without_a_length_is_one),
+        cmocka_unit_test(test_correlation_factor_is_that_of_a_first_order_process),
+        cmocka_unit_test(test_correlation_factor_at_a_standstill_is_bounded),
         cmocka_unit_test(test_bearing_variance_grows_by_its_factor_without_a_distance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
