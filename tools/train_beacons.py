@@ -19,9 +19,13 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.modelfile import Recogniser, write_recogniser
+from bslam.rig import load_rig
 from training import export, fit
 from training.folder import Folder, read_folder
 from training.samples import NONE, Samples, collect, folder_sha256
+
+NO_RIG = """no --rig: taken for pictures of a camera 60 degrees wide that looks straight ahead. One that does
+not has its horizon elsewhere, takes other colours for the wall's, and will recognise less."""
 
 LEAST_RECOGNISED = 0.5
 """Share of the objects below which a recogniser is of no use."""
@@ -94,7 +98,7 @@ def draw_confusion(path: Path, counts: NDArray[np.int64], names: list[str]) -> N
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
     for (row, column), count in np.ndenumerate(counts):
         colour = "white" if shares[row, column] > 0.5 else "black"
-        axes.text(column, row, str(count), ha="center", va="center", color=colour)
+        axes.text(column, row, str(count or ""), ha="center", va="center", color=colour)
     axes.set_xticks(range(len(names)), names, rotation=45, ha="right")
     axes.set_yticks(range(len(names)), names)
     axes.set_xlabel("taken for")
@@ -117,10 +121,10 @@ def report(samples: Samples, counts: NDArray[np.int64], names: list[str]) -> str
     return "\n".join(lines)
 
 
-def run(folder_path: Path, out: Path, precision: float) -> None:
+def run(folder_path: Path, out: Path, precision: float, rig: str | None) -> None:
     """From pictures to header, model file and matrix."""
     folder = read_folder(folder_path)
-    samples = collect(folder)
+    samples = collect(folder, None if rig is None else load_rig(rig).cameras[0])
     recogniser, counts = train(folder, samples, precision)
     header = export.recogniser_header(recogniser, out.stem)
     names = [*(one.name for one in folder.objects), "none"]
@@ -128,6 +132,8 @@ def run(folder_path: Path, out: Path, precision: float) -> None:
     write_recogniser(out.with_suffix(".json"), recogniser)
     draw_confusion(out.with_suffix(".png"), counts, names)
     print(report(samples, counts, names))
+    if rig is None:
+        print(NO_RIG)
     print(f"{recogniser.notes['figures']}; reject margin {recogniser.reject_margin:.3f}")
     print(f"written: {out}, {out.with_suffix('.json')}, {out.with_suffix('.png')}")
 
@@ -160,10 +166,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--precision", type=_precision, default=0.9, help="wanted of what is recognised (default: 0.9)"
     )
+    parser.add_argument(
+        "--rig", metavar="RIG", help="its first camera took the pictures: the one to recognise with"
+    )
     words = parser.parse_args(arguments)
     matplotlib.use("Agg")
     try:
-        run(words.folder, words.out, words.precision)
+        run(words.folder, words.out, words.precision, words.rig)
     except BslamError as error:
         print(f"train_beacons: error: {error}", file=sys.stderr)
         return 2

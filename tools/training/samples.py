@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.errors import BslamError
 from bslam.experiment.pictures import Box, Scaled, camera_for, load_picture
+from bslam.rig import Camera
 from training.folder import FILE, Folder, Label
 from training.truth import areas, intersections, overlaps
 
@@ -64,15 +65,17 @@ class _Collected:
             self.counts.append(counts)
 
 
-def collect(folder: Folder, model: BeaconModel | None = None) -> Samples:
-    """The samples of all pictures; `model` finds candidates (the built-in one unless given).
+def collect(folder: Folder, camera: Camera | None = None, model: BeaconModel | None = None) -> Samples:
+    """The samples of all pictures, taken by `camera`, or by one 60 degrees wide that looks straight ahead.
 
+    `model` finds candidates (the built-in one unless given).
     The pictures are taken for one room, and are looked at twice in the order of their names: first the front
     end learns the room's colours, which signatures are measured against, as it does on a robot.
     BslamError if an object has no sample at all, or samples from one picture only.
     """
-    frames = [load_picture(picture.path) for picture in folder.pictures]
-    front_ends = {size: FrontEnd([camera_for(*size)], model) for size in {frame.size_px for frame in frames}}
+    frames = [load_picture(picture.path, camera) for picture in folder.pictures]
+    sizes = {frame.size_px for frame in frames}
+    front_ends = {size: FrontEnd([camera or camera_for(*size)], model) for size in sizes}
     for frame in frames:
         front_ends[frame.size_px].see(frame.rgb)
     collected, found = _Collected(), Counter[str]()

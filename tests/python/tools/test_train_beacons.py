@@ -211,6 +211,14 @@ def test_objects_that_cannot_be_told_apart_are_refused(rows, tmp_path, capsys):
     )
 
 
+def test_pictures_of_another_camera_are_refused(rows, tmp_path, capsys):
+    Image.new("RGB", (400, 200)).save(tmp_path / rows[0][0])
+    write_labels(tmp_path, [[rows[0][0], *[""] * 7], *(row for row in rows if row[0] != rows[0][0])])
+    error = refusal(tmp_path, capsys, "--rig", "wide180")
+    assert f"{rows[0][0]}: is 400x200; allowed: 320x240, its camera's frame" in error
+    assert "rig 'nowhere': there is no such rig" in refusal(tmp_path, capsys, "--rig", "nowhere")
+
+
 @pytest.mark.parametrize(
     "words", [["--out", "My.h"], ["--out", "a.txt"], ["--precision", "0.2"], ["--precision", "x"]]
 )
