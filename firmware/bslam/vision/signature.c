@@ -2,164 +2,196 @@
 
 #include <string.h>
 
-enum { CHANNELS = 3, BINS = 4, BIN_STEPS = 16, PIXELS_MIN = 12, PIXELS_MAX = 1024 };
+// A pixel's three values, whole numbers from here to the end: light is the sum of its channels divided by the
+// wall's, red-green and yellow-blue are differences of them.
+enum { LIGHT, RED_GREEN, YELLOW_BLUE, VALUES };
+enum { LIGHT_BINS = 3, COLOUR_BINS = 4, BINS = LIGHT_BINS * COLOUR_BINS * COLOUR_BINS, BANDS = 6 };
+// Between the centres of two neighbouring bins a pixel is shared in this many steps.
+enum { BIN_STEPS = 16 };
+enum { PIXELS_MIN = 12, PIXELS_MAX = 768 };
+enum { ROWS_MAX = BSLAM_IMAGE_HEIGHT_MAX / 2 };
 
 static const float WALL_MIN = 4.0f;
-// Where the wall's own colour falls in the histogram's range, so that brighter things fit in it too.
+// A channel of WALL is the wall's; at most CHANNEL_MAX, four walls, so that sums of squares fit in 32 bits.
+enum { WALL = 256, CHANNEL_MAX = 1023 };
+// The wall's light as a part of the histogram's range, so that brighter things fit in it too.
 static const float WALL_LEVEL = 0.65f;
-// A colour of VALUE_ONE is the wall's; VALUE_MAX keeps sums of squares in 32 bits.
-static const float VALUE_ONE = 256.0f;
-static const float VALUE_MAX = 1023.0f;
-// Added to a mean that something is divided by: keeps what is almost black from looking rich in contrast.
-static const float MEAN_MARGIN = 0.1f;
-static const float EDGE_GAIN = 4.0f;
+// Red-green and yellow-blue as parts of the histogram's range: gains on the differences of channels.
+static const float RED_GREEN_GAIN = 1.2f;
+static const float YELLOW_BLUE_GAIN = 1.0f;
+// Weights of the aspect and of the texture's deviations and changes against histogram and bands.
+static const float ASPECT_GAIN = 0.5f;
+static const float DEVIATION_GAIN = 1.5f;
+static const float CHANGE_GAIN = 3.0f;
+// Added to the light that something is divided by: keeps what is almost black from looking rich in contrast.
+static const float LIGHT_MARGIN = 0.1f;
 
 /// What each value of a channel of RGB565 becomes, divided by the wall's: the 32 of red, then the 64 of
 /// green, then the 32 of blue.
 enum { RED_AT = 0, GREEN_AT = 32, BLUE_AT = 96, LEVELS = 128 };
-typedef struct levels {
-    uint16_t value[LEVELS];  ///< in VALUE_ONE
-    uint8_t place[LEVELS];   ///< BIN_STEPS times (lower bin + share of the one above)
-} levels_t;
 
-typedef struct sums {
-    uint32_t bins[BINS * BINS * BINS];
-    uint32_t value[CHANNELS];
-    uint32_t square[CHANNELS];
-    uint32_t change[CHANNELS];
+/// A value's place among its bins: (gain value + offset) / 65536, in 1 / BIN_STEPS of a bin.
+typedef struct axis {
+    int32_t gain;
+    int32_t offset;
+    int32_t bins;
+} axis_t;
+
+typedef struct band {
+    int32_t sums[VALUES];
     int32_t pixels;
-} sums_t;
+} band_t;
+
+typedef struct work {
+    uint16_t levels[LEVELS];
+    axis_t axes[VALUES];
+    uint32_t bins[BINS];
+    band_t bands[BANDS];
+    uint32_t light_squares;  ///< in 1/16
+    uint32_t colour_squares;
+    uint32_t changes_across;
+    uint32_t changes_down;
+    int32_t pairs_across;
+    int32_t pairs_down;
+} work_t;
 
 static float at_most(float x, float most)
 {
     return x < most ? x : most;
 }
 
-static void fill_levels(levels_t *levels, int32_t at, int32_t count, float wall)
+static float within_one(float x)
 {
-    const float top = (float)((BINS - 1) * BIN_STEPS);
+    return x < -1.0f ? -1.0f : at_most(x, 1.0f);
+}
+
+static void fill_levels(work_t *work, int32_t at, int32_t count, float wall)
+{
     for (int32_t i = 0; i < count; i++) {
         const float ratio = (float)i * (255.0f / (float)(count - 1)) / wall;
-        const float place = (ratio * WALL_LEVEL * (float)BINS - 0.5f) * (float)BIN_STEPS + 0.5f;
-        levels->value[at + i] = (uint16_t)at_most(ratio * VALUE_ONE + 0.5f, VALUE_MAX);
-        levels->place[at + i] = (uint8_t)(place < 0.0f ? 0.0f : at_most(place, top));
+        work->levels[at + i] = (uint16_t)at_most(ratio * (float)WALL + 0.5f, (float)CHANNEL_MAX);
     }
+}
+
+/// The axis on which `unit` of a value is the whole range of bins and 0 lies at `zero` of it.
+static axis_t axis_of(float unit, float zero, int32_t bins)
+{
+    const float steps = 65536.0f * (float)(bins * BIN_STEPS);
+    return (axis_t){.gain = (int32_t)(steps / unit),
+                    .offset = (int32_t)(steps * zero - 32768.0f * (float)BIN_STEPS) + 32768,
+                    .bins = bins};
+}
+
+static void begin(work_t *work, const bslam_rgb_t *wall)
+{
+    memset(work, 0, sizeof *work);
+    fill_levels(work, RED_AT, 32, wall->red);
+    fill_levels(work, GREEN_AT, 64, wall->green);
+    fill_levels(work, BLUE_AT, 32, wall->blue);
+    const float range = (float)WALL / WALL_LEVEL;
+    work->axes[LIGHT] = axis_of(3.0f * range, 0.0f, LIGHT_BINS);
+    work->axes[RED_GREEN] = axis_of(range / RED_GREEN_GAIN, 0.5f, COLOUR_BINS);
+    work->axes[YELLOW_BLUE] = axis_of(2.0f * range / YELLOW_BLUE_GAIN, 0.5f, COLOUR_BINS);
+}
+
+/// The lower of the two bins around a value, and the upper one's share.
+static uint32_t bin_of(const axis_t *axis, int32_t value, uint32_t *share)
+{
+    const int32_t scaled = value * axis->gain + axis->offset;
+    const int32_t top = (axis->bins - 1) * BIN_STEPS;
+    const int32_t place = scaled < 0 ? 0 : scaled >> 16 < top ? scaled >> 16 : top;
+    const int32_t lower = place / BIN_STEPS < axis->bins - 1 ? place / BIN_STEPS : axis->bins - 2;
+    *share = (uint32_t)(place - lower * BIN_STEPS);
+    return (uint32_t)lower;
 }
 
 /// Shares a pixel among the eight bins around its colour.
-static void add_to_bins(uint32_t *bins, uint32_t red, uint32_t green, uint32_t blue)
+static void add_to_bins(work_t *work, const int32_t values[VALUES])
 {
-    const uint32_t place[CHANNELS] = {red, green, blue};
-    uint32_t lower[CHANNELS];
-    uint32_t share[CHANNELS];
-    for (int32_t c = 0; c < CHANNELS; c++) {
-        lower[c] = place[c] / BIN_STEPS < BINS - 1 ? place[c] / BIN_STEPS : BINS - 2;
-        share[c] = place[c] - lower[c] * BIN_STEPS;
+    uint32_t light;
+    uint32_t red;
+    uint32_t yellow;
+    uint32_t *bin = work->bins;
+    bin += bin_of(&work->axes[LIGHT], values[LIGHT], &light) * (COLOUR_BINS * COLOUR_BINS);
+    bin += bin_of(&work->axes[RED_GREEN], values[RED_GREEN], &red) * COLOUR_BINS;
+    bin += bin_of(&work->axes[YELLOW_BLUE], values[YELLOW_BLUE], &yellow);
+    for (uint32_t upper = 0; upper < 2; upper++) {
+        const uint32_t by_light = upper == 1 ? light : BIN_STEPS - light;
+        const uint32_t low = by_light * (BIN_STEPS - red);
+        const uint32_t high = by_light * red;
+        bin[0] += low * (BIN_STEPS - yellow);
+        bin[1] += low * yellow;
+        bin[COLOUR_BINS] += high * (BIN_STEPS - yellow);
+        bin[COLOUR_BINS + 1] += high * yellow;
+        bin += COLOUR_BINS * COLOUR_BINS;
     }
-    uint32_t *corner = bins + (lower[0] * BINS + lower[1]) * BINS + lower[2];
-    for (uint32_t r = 0; r < 2; r++) {
-        const uint32_t by_red = r == 1 ? share[0] : BIN_STEPS - share[0];
-        for (uint32_t g = 0; g < 2; g++) {
-            const uint32_t by_green = by_red * (g == 1 ? share[1] : BIN_STEPS - share[1]);
-            uint32_t *pair = corner + (r * BINS + g) * BINS;
-            pair[0] += by_green * (BIN_STEPS - share[2]);
-            pair[1] += by_green * share[2];
+}
+
+static uint32_t square(int32_t x)
+{
+    return (uint32_t)(x * x);
+}
+
+static uint32_t difference(int32_t a, int32_t b)
+{
+    return (uint32_t)(a > b ? a - b : b - a);
+}
+
+/// Adds a pixel to all but the changes; returns its light.
+static int32_t add_pixel(work_t *work, band_t *band, uint16_t pixel)
+{
+    const int32_t red = work->levels[RED_AT + (pixel >> 11)];
+    const int32_t green = work->levels[GREEN_AT + ((pixel >> 5) & 63)];
+    const int32_t blue = work->levels[BLUE_AT + (pixel & 31)];
+    const int32_t values[VALUES] = {red + green + blue, red - green, red + green - 2 * blue};
+    add_to_bins(work, values);
+    for (int32_t v = 0; v < VALUES; v++) {
+        band->sums[v] += values[v];
+    }
+    band->pixels++;
+    work->light_squares += square(values[LIGHT]) / 16;
+    work->colour_squares += (square(values[RED_GREEN]) + square(values[YELLOW_BLUE])) / 16;
+    return values[LIGHT];
+}
+
+/// The light of the column before, by row; -1 where it has none inside.
+typedef struct column {
+    int16_t light[ROWS_MAX];
+} column_t;
+
+/// One column of the quad, from row `top` to before `end`.
+static void add_column(work_t *work, const uint16_t *pixels, int32_t stride, int32_t top, int32_t end,
+                       int32_t step, column_t *before)
+{
+    int32_t above = -1;
+    for (int32_t y = top; y < end; y += step) {
+        band_t *band = &work->bands[(y - top) * BANDS / (end - top)];
+        const int32_t light = add_pixel(work, band, pixels[y * stride]);
+        if (above >= 0) {
+            work->changes_down += difference(light, above);
+            work->pairs_down++;
         }
-    }
-}
-
-static uint32_t difference(uint32_t a, uint32_t b)
-{
-    return a > b ? a - b : b - a;
-}
-
-typedef struct colour {
-    uint32_t value[CHANNELS];
-} colour_t;
-
-static colour_t colour_of(const uint16_t value[LEVELS], uint16_t pixel)
-{
-    return (colour_t){{value[RED_AT + (pixel >> 11)], value[GREEN_AT + ((pixel >> 5) & 63)],
-                       value[BLUE_AT + (pixel & 31)]}};
-}
-
-static void add_pixel(sums_t *sums, const levels_t *levels, const uint16_t *at, int32_t stride)
-{
-    const uint16_t pixel = at[0];
-    const colour_t here = colour_of(levels->value, pixel);
-    const colour_t right = colour_of(levels->value, at[1]);
-    const colour_t below = colour_of(levels->value, at[stride]);
-    add_to_bins(sums->bins, levels->place[RED_AT + (pixel >> 11)],
-                levels->place[GREEN_AT + ((pixel >> 5) & 63)], levels->place[BLUE_AT + (pixel & 31)]);
-    for (int32_t c = 0; c < CHANNELS; c++) {
-        sums->value[c] += here.value[c];
-        sums->square[c] += here.value[c] * here.value[c];
-        sums->change[c] +=
-            difference(here.value[c], right.value[c]) + difference(here.value[c], below.value[c]);
-    }
-    sums->pixels++;
-}
-
-/// First whole pixel of the half-resolution copy at or beyond an edge of the whole frame.
-static int32_t first_inside(bslam_real_t edge_px)
-{
-    const bslam_real_t half = (edge_px + BSLAM_R(0.5)) / 2;
-    const int32_t below = (int32_t)half;
-    return below + (half > (bslam_real_t)below ? 1 : 0);
-}
-
-/// One past the last whole pixel before an edge.
-static int32_t end_inside(bslam_real_t edge_px)
-{
-    return (int32_t)((edge_px + BSLAM_R(0.5)) / 2);
-}
-
-/// Adds up every step-th pixel, both ways, of what the quad encloses, but for its last column and row: those
-/// are the neighbours of the others.
-static void add_quad(sums_t *sums, const levels_t *levels, const bslam_frame_t *frame,
-                     const bslam_quad_t *quad, int32_t step)
-{
-    const int32_t stride = frame->width_px / 2;
-    const int32_t end = end_inside(quad->right_px) - 1;
-    const bslam_real_t width = quad->right_px - quad->left_px;
-    for (int32_t x = first_inside(quad->left_px); x < end; x += step) {
-        const bslam_real_t right = (2 * (bslam_real_t)x + BSLAM_R(0.5) - quad->left_px) / width;
-        const bslam_real_t top = quad->top_left_px + right * (quad->top_right_px - quad->top_left_px);
-        const bslam_real_t bottom =
-            quad->bottom_left_px + right * (quad->bottom_right_px - quad->bottom_left_px);
-        const int32_t bottom_end = end_inside(bottom) - 1;
-        for (int32_t y = first_inside(top); y < bottom_end; y += step) {
-            add_pixel(sums, levels, frame->half + y * stride + x, stride);
+        if (before->light[y] >= 0) {
+            work->changes_across += difference(light, before->light[y]);
+            work->pairs_across++;
         }
+        before->light[y] = (int16_t)light;
+        above = light;
     }
 }
 
-static void finish(const sums_t *sums, const bslam_quad_t *quad, float *signature)
+/// First pixel of the half-resolution copy whose centre lies beyond an edge of the whole frame; the copy has
+/// `size`.
+static int32_t first_beyond(bslam_real_t edge_px, int32_t size)
 {
-    const float count = (float)sums->pixels;
-    const float whole = count * (float)(BIN_STEPS * BIN_STEPS * BIN_STEPS);
-    for (int32_t i = 0; i < BINS * BINS * BINS; i++) {
-        signature[BSLAM_SIGNATURE_COLOURS + i] = sqrtf((float)sums->bins[i] / whole);
-    }
-    const bslam_real_t width = quad->right_px - quad->left_px;
-    const bslam_real_t height =
-        (quad->bottom_left_px - quad->top_left_px + quad->bottom_right_px - quad->top_right_px) / 2;
-    signature[BSLAM_SIGNATURE_ASPECT] = (float)((height - width) / (height + width));
-    for (int32_t c = 0; c < CHANNELS; c++) {
-        const float mean = (float)sums->value[c] / (count * VALUE_ONE);
-        const float square = (float)sums->square[c] / (count * VALUE_ONE * VALUE_ONE) - mean * mean;
-        const float edge = (float)sums->change[c] / (2.0f * count * VALUE_ONE);
-        signature[BSLAM_SIGNATURE_CONTRAST + c] = sqrtf(square > 0.0f ? square : 0.0f) / (mean + MEAN_MARGIN);
-        signature[BSLAM_SIGNATURE_EDGES + c] = at_most(EDGE_GAIN * edge / (mean + MEAN_MARGIN), 1.0f);
-    }
+    const bslam_real_t place = edge_px / 2 + BSLAM_R(0.75);  // of its centre at 2 i + 0.5, rounded up below
+    return place <= 0 ? 0 : place < (bslam_real_t)size ? (int32_t)place : size;
 }
 
-/// Smallest step that leaves no more than PIXELS_MAX pixels of the quad's box.
-static int32_t step_of(const bslam_quad_t *quad)
+/// Smallest step, the same both ways, that takes no more than PIXELS_MAX pixels.
+static int32_t step_of(bslam_real_t width_px, bslam_real_t height_px)
 {
-    const bslam_real_t height =
-        (quad->bottom_left_px - quad->top_left_px + quad->bottom_right_px - quad->top_right_px) / 2;
-    const bslam_real_t pixels = (quad->right_px - quad->left_px) * height / 4;
+    const bslam_real_t pixels = width_px * height_px / 4;
     int32_t step = 1;
     while (pixels > (bslam_real_t)(step * step * PIXELS_MAX)) {
         step++;
@@ -167,23 +199,102 @@ static int32_t step_of(const bslam_quad_t *quad)
     return step;
 }
 
+static void add_quad(work_t *work, const bslam_frame_t *frame, const bslam_quad_t *quad, int32_t step)
+{
+    const int32_t stride = frame->width_px / 2;
+    const int32_t rows = frame->height_px / 2;
+    const int32_t end = first_beyond(quad->right_px, stride);
+    const bslam_real_t width = quad->right_px - quad->left_px;
+    column_t before;
+    memset(&before, 0xFF, sizeof before);
+    for (int32_t x = first_beyond(quad->left_px, stride); x < end; x += step) {
+        const bslam_real_t part = (2 * (bslam_real_t)x + BSLAM_R(0.5) - quad->left_px) / width;
+        const bslam_real_t top = quad->top_left_px + part * (quad->top_right_px - quad->top_left_px);
+        const bslam_real_t bottom =
+            quad->bottom_left_px + part * (quad->bottom_right_px - quad->bottom_left_px);
+        const int32_t first =
+            (first_beyond(top, rows) + step - 1) / step * step;  // the same rows in each column
+        add_column(work, frame->half + x, stride, first, first_beyond(bottom, rows), step, &before);
+    }
+}
+
+/// Standard deviation from a sum of squares in 1/16, a sum, and their count.
+static float deviation(float squares, float sum, float count)
+{
+    const float mean = sum / count;
+    const float variance = 16.0f * squares / count - mean * mean;
+    return variance > 0.0f ? sqrtf(variance) : 0.0f;
+}
+
+/// Sums over all bands.
+static band_t total_of(const work_t *work)
+{
+    band_t total = {.pixels = 0};
+    for (int32_t b = 0; b < BANDS; b++) {
+        total.pixels += work->bands[b].pixels;
+        for (int32_t v = 0; v < VALUES; v++) {
+            total.sums[v] += work->bands[b].sums[v];
+        }
+    }
+    return total;
+}
+
+/// Means of the bands; one without pixels has the whole object's.
+static void finish_bands(const work_t *work, const band_t *total, float *bands)
+{
+    static const float UNIT[VALUES] = {3.0f * (float)WALL, (float)WALL, 2.0f * (float)WALL};
+    for (int32_t b = 0; b < BANDS; b++) {
+        const band_t *band = work->bands[b].pixels > 0 ? &work->bands[b] : total;
+        for (int32_t v = 0; v < VALUES; v++) {
+            const float mean = (float)band->sums[v] / (float)band->pixels;
+            bands[b * VALUES + v] = within_one(WALL_LEVEL * mean / UNIT[v]);
+        }
+    }
+}
+
+static float mean_of(uint32_t sum, int32_t count)
+{
+    return count > 0 ? (float)sum / (float)count : 0.0f;
+}
+
+static void finish(const work_t *work, const band_t *total, float *signature)
+{
+    const float count = (float)total->pixels;
+    const float whole = count * (float)(BIN_STEPS * BIN_STEPS * BIN_STEPS);
+    for (int32_t i = 0; i < BINS; i++) {
+        signature[BSLAM_SIGNATURE_COLOURS + i] = sqrtf((float)work->bins[i] / whole);
+    }
+    finish_bands(work, total, signature + BSLAM_SIGNATURE_BANDS);
+    const float light = (float)total->sums[LIGHT] / count + 3.0f * (float)WALL * LIGHT_MARGIN / WALL_LEVEL;
+    const float colour = deviation((float)work->colour_squares, 0.0f, count);
+    float *texture = signature + BSLAM_SIGNATURE_TEXTURE;
+    const float contrast = deviation((float)work->light_squares, (float)total->sums[LIGHT], count);
+    texture[0] = within_one(DEVIATION_GAIN * contrast / light);
+    texture[1] = within_one(DEVIATION_GAIN * colour / light);
+    texture[2] = within_one(CHANGE_GAIN * mean_of(work->changes_across, work->pairs_across) / light);
+    texture[3] = within_one(CHANGE_GAIN * mean_of(work->changes_down, work->pairs_down) / light);
+}
+
 bslam_status_t bslam_signature(const bslam_frame_t *frame, const bslam_quad_t *quad,
                                float signature[BSLAM_SIGNATURE_SIZE])
 {
     const bslam_rgb_t *wall = &frame->surroundings->wall;
-    if (!(wall->red >= WALL_MIN && wall->green >= WALL_MIN && wall->blue >= WALL_MIN)) {
+    const bslam_real_t width = quad->right_px - quad->left_px;
+    const bslam_real_t height =
+        (quad->bottom_left_px - quad->top_left_px + quad->bottom_right_px - quad->top_right_px) / 2;
+    if (!(wall->red >= WALL_MIN && wall->green >= WALL_MIN && wall->blue >= WALL_MIN) ||
+        !bslam_in_range(width, 1, BSLAM_IMAGE_WIDTH_MAX) ||
+        !bslam_in_range(height, 1, BSLAM_IMAGE_HEIGHT_MAX)) {
         return BSLAM_E_RANGE;
     }
-    levels_t levels;
-    sums_t sums;
-    memset(&sums, 0, sizeof sums);
-    fill_levels(&levels, RED_AT, 32, wall->red);
-    fill_levels(&levels, GREEN_AT, 64, wall->green);
-    fill_levels(&levels, BLUE_AT, 32, wall->blue);
-    add_quad(&sums, &levels, frame, quad, step_of(quad));
-    if (sums.pixels < PIXELS_MIN) {
+    work_t work;
+    begin(&work, wall);
+    add_quad(&work, frame, quad, step_of(width, height));
+    const band_t total = total_of(&work);
+    if (total.pixels < PIXELS_MIN) {
         return BSLAM_E_RANGE;
     }
-    finish(&sums, quad, signature);
+    finish(&work, &total, signature);
+    signature[BSLAM_SIGNATURE_ASPECT] = ASPECT_GAIN * (float)((height - width) / (height + width));
     return BSLAM_OK;
 }

@@ -2,22 +2,30 @@
 /// MATH "Signature".
 ///
 /// Taken from the half-resolution copy inside the outline. Colours are divided by the running colour of the
-/// wall, so that neither the light's strength nor its colour, nor the camera's exposure, changes them.
+/// wall, so that neither the light's strength nor its colour, nor the camera's exposure, changes them; then
+/// split into light, red against green, and yellow against blue.
 #ifndef BSLAM_VISION_SIGNATURE_H
 #define BSLAM_VISION_SIGNATURE_H
 
 #include "bslam/vision/outline.h"
 
-/// Where the parts of a signature start.
+/// Where the parts of a signature start:
+/// 48 colours: square root of the share of pixels in each of 3 (light) x 4 (red-green) x 4 (yellow-blue)
+/// bins;
+///    a pixel is shared among the eight bins around its colour.
+/// 18 bands: mean light, red-green and yellow-blue in each sixth of the height, from above.
+/// 1 aspect: half of (height - width) / (height + width).
+/// 4 texture: deviation of light, and of colour; mean change of light from one pixel to the next across, and
+///    down; all against the mean light.
 enum {
-    BSLAM_SIGNATURE_COLOURS = 0,    ///< 64: square root of the share of pixels in each of 4x4x4 colour bins
-    BSLAM_SIGNATURE_ASPECT = 64,    ///< (height - width) / (height + width)
-    BSLAM_SIGNATURE_CONTRAST = 65,  ///< 3: how much red, green and blue vary over the object
-    BSLAM_SIGNATURE_EDGES = 68      ///< 3: how much they vary from one pixel to the next
+    BSLAM_SIGNATURE_COLOURS = 0,
+    BSLAM_SIGNATURE_BANDS = 48,
+    BSLAM_SIGNATURE_ASPECT = 66,
+    BSLAM_SIGNATURE_TEXTURE = 67
 };
 
-/// The signature of what `quad` encloses. BSLAM_E_RANGE, and nothing written, if that is fewer than 12 pixels
-/// of the half-resolution copy, or the wall is black (a channel below 4 of 255).
+/// The signature of what `quad` encloses: values from -1 to 1. BSLAM_E_RANGE, and nothing written, if that is
+/// fewer than 12 pixels of the half-resolution copy, or the wall is black (a channel below 4 of 255).
 BSLAM_MUST_CHECK bslam_status_t bslam_signature(const bslam_frame_t *frame, const bslam_quad_t *quad,
                                                 float signature[BSLAM_SIGNATURE_SIZE]);
 
