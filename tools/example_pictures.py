@@ -1,7 +1,7 @@
 """Takes pictures of a rendered room and labels them: to try tools/train_beacons.py without a camera.
 
 Writes --count pictures and labels.csv into FOLDER. Every beacon that is whole and well seen has a box and a
-name of its own, unless it is in one picture only. Another --seed takes other pictures of the same room.
+name of its own, unless it is in one or two pictures only. Another --seed takes other pictures of that room.
 `.venv/bin/python tools/example_pictures.py FOLDER [--world 1] [--count 20] [--seed 0]`
 """
 
@@ -19,9 +19,10 @@ from bslam.world.camera import Renderer, Scene, Seen, free_pose, make_world
 from training.folder import COLUMNS
 
 BETWEEN_S = 10.0  # light and white balance change from picture to picture
-SLANT_RAD_MAX = math.radians(60.0)
-VISIBLE_PX_MIN = 200
-HIDDEN_MAX = 0.1
+SLANT_RAD_MAX = math.radians(75.0)
+VISIBLE_PX_MIN = 100
+HIDDEN_MAX = 0.4
+PICTURES_MIN = 3
 
 
 def name_of(seen: Seen) -> str:
@@ -53,7 +54,7 @@ def take(folder: Path, world: int, count: int, seed: int) -> list[list[str]]:
     often = Counter(one.beacon_id for seen in views.values() for one in seen)
     rows = []
     for name, seen in views.items():
-        boxes = [_row(name, one, scene) for one in seen if often[one.beacon_id] > 1]
+        boxes = [_row(name, one, scene) for one in seen if often[one.beacon_id] >= PICTURES_MIN]
         rows += boxes or [[name, *[""] * (len(COLUMNS) - 1)]]
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([COLUMNS, *rows])

@@ -8,6 +8,7 @@ cross-validation. docs/RETRAIN.md is the guide, tools/training/folder.py describ
 """
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -43,21 +44,20 @@ def confusion(labels: NDArray[np.integer], values: NDArray[np.floating], margin:
 def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recogniser, NDArray[np.int64]]:
     """The recogniser, and its confusion matrix on pictures left out.
 
-    BslamError if the reject margin that gives the precision rejects most objects.
+    BslamError if less than half of the objects get their own name.
     """
     targets = fit.one_vs_rest(samples.labels, len(folder.objects))
     cost, held_out = fit.choose_cost(samples.signatures, targets, balanced=True, groups=samples.pictures)
     labels, values = samples.labels[samples.counts], held_out[samples.counts]
     right = values.argmax(axis=1) == labels
-    margin = reject_margin(values.max(axis=1), right, precision)
-    counts = confusion(labels, values, margin)
-    recognised, objects = int(np.trace(counts[:-1, :-1])), int(counts[:-1].sum())
-    if recognised < LEAST_RECOGNISED * objects:
+    objects = int(np.sum(labels != NONE))
+    margin = reject_margin(values.max(axis=1), right, precision, math.ceil(LEAST_RECOGNISED * objects))
+    if margin is None:
         raise BslamError(
-            f"{folder.path}: on pictures left out only {recognised} of {objects} objects are recognised at "
-            f"precision {precision:g}; allowed: at least half, by more pictures, objects that look less "
-            "alike, or a lower --precision"
+            f"{folder.path}: on pictures left out only {right.sum()} of {objects} objects get their own "
+            "name; allowed: at least half, by more pictures, or objects that look less alike"
         )
+    counts = confusion(labels, values, margin)
     machine = fit.fit(samples.signatures, targets, cost, balanced=True)
     notes = {
         "training set": f"{len(folder.pictures)} pictures, {sum(samples.boxes.values())} boxes, "
@@ -69,14 +69,27 @@ def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recognise
     return Recogniser(machine.svm, folder.objects, margin, notes), counts
 
 
-def reject_margin(scores: NDArray[np.floating], right: NDArray[np.bool_], precision: float) -> float:
-    """Half way between the lowest score that is accepted for the precision and the next below it.
+def reject_margin(
+    scores: NDArray[np.floating], right: NDArray[np.bool_], precision: float, least: int
+) -> float | None:
+    """The lowest margin of which at least `least` right samples are above, and the wanted share of all above.
 
-    Where all are accepted, 0 or the lowest: few pictures do not show how low a right score can be.
+    Where none gives that share, the one that gives most; where fewer are right at all, None. Half way to the
+    next score below; where there is none 0, or the lowest: few pictures do not show how low a right score can
+    be.
     """
-    lowest, _ = fit.threshold_for_precision(scores, right, precision)
-    below = scores[scores < lowest]
-    return float(0.5 * (lowest + below.max())) if len(below) else min(lowest, 0.0)
+    order = np.argsort(-scores, kind="stable")
+    hits = np.cumsum(right[order])
+    shares = hits / np.arange(1, len(hits) + 1)
+    enough = np.flatnonzero(hits >= least)
+    if len(enough) == 0:
+        return None
+    good = enough[shares[enough] >= precision]
+    last = int(good[-1]) if len(good) else int(enough[shares[enough].argmax()])
+    lowest = float(scores[order][last])
+    if last + 1 == len(scores):
+        return min(lowest, 0.0)
+    return 0.5 * (lowest + float(scores[order][last + 1]))
 
 
 def figures(counts: NDArray[np.int64]) -> str:
@@ -87,6 +100,11 @@ def figures(counts: NDArray[np.int64]) -> str:
         f"on pictures left out {right} of {objects} objects recognised, {named - right} of {named} names "
         f"wrong, {int(counts[-1, -1])} of {others} other things rejected"
     )
+
+
+def reached(counts: NDArray[np.int64]) -> float:
+    """The share of right names among all."""
+    return float(np.trace(counts[:-1, :-1]) / max(int(counts[:, :-1].sum()), 1))
 
 
 def draw_confusion(path: Path, counts: NDArray[np.int64], names: list[str]) -> None:
@@ -134,6 +152,8 @@ def run(folder_path: Path, out: Path, precision: float, rig: str | None) -> None
     print(report(samples, counts, names))
     if rig is None:
         print(NO_RIG)
+    if reached(counts) < precision:
+        print(f"precision {precision:g} is not reached: of what is recognised {reached(counts):.2f} is right")
     print(f"{recogniser.notes['figures']}; reject margin {recogniser.reject_margin:.3f}")
     print(f"written: {out}, {out.with_suffix('.json')}, {out.with_suffix('.png')}")
 

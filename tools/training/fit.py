@@ -181,11 +181,14 @@ def _folds(
     """
     kinds = np.unique(targets, axis=0, return_inverse=True)[1]
     groups = np.arange(len(targets)) if groups is None else groups
-    occurrences = [len(np.unique(groups[kinds == kind])) for kind in range(kinds.max() + 1)]
+    # Samples of no class may be missing in a fold.
+    wanted = [kind for kind in range(kinds.max() + 1) if targets[kinds == kind][0].any()]
+    occurrences = [len(np.unique(groups[kinds == kind])) for kind in wanted]
     if min(occurrences) < 2:
-        rows = np.flatnonzero(targets[kinds == int(np.argmin(occurrences))][0]).tolist()
-        belonging = f"classes {rows}" if rows else "no class"
-        raise BslamError(f"samples of {belonging} are all in one group; allowed: at least two groups of each")
+        rows = np.flatnonzero(targets[kinds == wanted[int(np.argmin(occurrences))]][0]).tolist()
+        raise BslamError(
+            f"samples of classes {rows} are all in one group; allowed: at least two groups of each"
+        )
     if min(occurrences) < FOLDS:
         return LeaveOneGroupOut().split(targets, kinds, groups)
     return StratifiedGroupKFold(FOLDS, shuffle=True, random_state=0).split(targets, kinds, groups)

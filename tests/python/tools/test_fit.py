@@ -104,6 +104,14 @@ def test_choose_cost_class_in_one_group_only_is_refused() -> None:
         fit.choose_cost(x, fit.one_vs_rest(labels, 2), groups=groups)
 
 
+def test_choose_cost_samples_of_no_class_may_be_in_one_group() -> None:
+    x, labels = blobs(3, 60, seed=10)
+    groups = np.where(labels == 2, 0, np.arange(60) % 4)
+    held_out = fit.choose_cost(x, fit.one_vs_rest(labels, 2), groups=groups)[1]
+    known = labels < 2  # the others are all in the group that is left out
+    assert np.mean((held_out > 0)[known] == fit.one_vs_rest(labels, 2)[known]) > 0.9
+
+
 def test_threshold_for_precision_by_hand() -> None:
     scores = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
     right = np.array([True, True, False, True, False])

@@ -3,6 +3,7 @@
 import csv
 import ctypes
 import os
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -205,10 +206,30 @@ def test_single_class_and_nothing_else_is_refused(rows, tmp_path, capsys):
 def test_objects_that_cannot_be_told_apart_are_refused(rows, tmp_path, capsys):
     rows = [row for row in rows if row[1]]
     random = np.random.default_rng(1)
-    write_labels(tmp_path, [[row[0], random.choice(["a", "b"]), *row[2:6], "", ""] for row in rows])
-    assert "objects are recognised at precision 1; allowed: at least half" in refusal(
-        tmp_path, capsys, "--precision", "1"
+    write_labels(tmp_path, [[row[0], random.choice(list("abcd")), *row[2:6], "", ""] for row in rows])
+    assert re.search(
+        r"only \d+ of \d+ objects get their own name; allowed: at least half", refusal(tmp_path, capsys)
     )
+
+
+@pytest.mark.parametrize(
+    ("right", "precision", "least", "margin"),
+    [
+        ("rrrrr", 0.9, 1, 0.0),  # nothing to reject: the machine's own boundary
+        ("rrrrw", 0.9, 1, 1.5),
+        ("rrwrr", 0.9, 1, 3.5),
+        ("rrwrr", 0.8, 1, 0.0),
+        ("rrwrr", 0.9, 3, 0.0),  # not reached: as good as it gets with three right ones
+        ("wrrww", 0.9, 2, 2.5),
+        ("wwwwr", 0.9, 2, None),
+    ],
+)
+def test_reject_margin_by_hand(right, precision, least, margin):
+    scores = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
+    flags = np.array([letter == "r" for letter in right])
+    assert train_beacons.reject_margin(scores, flags, precision, least) == margin
+    shuffled = np.array([2, 0, 4, 1, 3])
+    assert train_beacons.reject_margin(scores[shuffled], flags[shuffled], precision, least) == margin
 
 
 def test_pictures_of_another_camera_are_refused(rows, tmp_path, capsys):
