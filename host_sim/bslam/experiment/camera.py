@@ -29,6 +29,9 @@ from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
+# The front end errs the same way again until the robot has gone about so far: measured on training worlds,
+# docs/EXPERIMENTS.md.
+CORRELATION_M = 0.3
 NO_BEACON = -1  # identity of a sighting whose box no beacon fills
 _COVER = 0.3  # a beacon that fills less of a box than this is not what the box shows
 _BEARING_SD_MIN_RAD, _RANGE_SD_MIN_M = 1e-5, 1e-3  # the least that the core takes
@@ -102,7 +105,12 @@ def camera_log(
     drive = store.drive(scenario, seed, rig)
     log = simulate(replace(scenario, arena=drive.arena(scenario.arena)), seed)
     robot = replace(
-        log.robot, sensor_x_m=first.x_m, sensor_y_m=first.y_m, sensor_yaw_rad=0.0, sighting_delay_us=0
+        log.robot,
+        sensor_x_m=first.x_m,
+        sensor_y_m=first.y_m,
+        sensor_yaw_rad=0.0,  # bearings are in the robot's frame already
+        sighting_delay_us=0,
+        sighting_correlation_m=CORRELATION_M,
     )
     return replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
 
