@@ -1,7 +1,7 @@
 #include "bslam/vision/body.h"
 
 enum {
-    TURNS_MAX = 6,    // turns tried to either side
+    TURNS_MAX = 5,    // turns tried to either side
     CORNER_STEPS = 3  // a flank's width depends on where its near corner is: rounds
 };
 
@@ -39,23 +39,6 @@ typedef struct sides {
     bslam_side_t bottom;
 } sides_t;
 
-/// Both sides in one stance.
-typedef struct guess {
-    float score;
-    bslam_stance_t stance;
-    bslam_line_t top;
-    bslam_line_t bottom;
-} guess_t;
-
-static guess_t guess_at(const sides_t *sides, const bslam_body_t *body, bslam_real_t turn)
-{
-    guess_t guess = {.stance = bslam_body_stance(body, turn)};
-    guess.top = bslam_side_line(&sides->top, &guess.stance);
-    guess.bottom = bslam_side_line(&sides->bottom, &guess.stance);
-    guess.score = guess.top.score + guess.bottom.score - TURN_COST * guess.stance.turn * guess.stance.turn;
-    return guess;
-}
-
 /// How many turns to either side make a difference of a place at the ends of a side.
 static int32_t turn_count(const sides_t *sides, const bslam_body_t *body)
 {
@@ -70,36 +53,34 @@ static bslam_real_t turn_at(int32_t k, int32_t turns)
     return turns > 0 ? TURN_MAX * (bslam_real_t)k / (bslam_real_t)turns : 0;
 }
 
-static guess_t best_guess(const sides_t *sides, const bslam_body_t *body, bslam_level_t *level)
+/// The stance at which both sides are likeliest; what the others leave open goes into *level.
+static bslam_stance_t best_stance(const sides_t *sides, const bslam_body_t *body, bslam_level_t *level)
 {
     const int32_t turns = turn_count(sides, body);
     float scores[2 * TURNS_MAX + 1];
-    guess_t best = {.score = -1e9f};
-    int32_t best_k = 0;
-    for (int32_t k = -turns; k <= turns; k++) {
-        const guess_t guess = guess_at(sides, body, turn_at(k, turns));
-        scores[k + turns] = guess.score;
-        if (guess.score > best.score) {
-            best = guess;
-            best_k = k;
-        }
+    int32_t best = 0;
+    for (int32_t k = 0; k <= 2 * turns; k++) {
+        const bslam_stance_t stance = bslam_body_stance(body, turn_at(k - turns, turns));
+        scores[k] = bslam_side_score(&sides->top, &stance) + bslam_side_score(&sides->bottom, &stance) -
+                    TURN_COST * stance.turn * stance.turn;
+        best = scores[k] > scores[best] ? k : best;
     }
     float whole = 0.0f;
     float first = 0.0f;
     float second = 0.0f;
-    for (int32_t k = -turns; k <= turns; k++) {
-        const bool same = k - best_k >= -1 && k - best_k <= 1;  // the edges' slopes will tell more closely
-        const float away = same ? 0.0f : (float)turn_at(k - best_k, turns);
-        const float share = bslam_falling(TURN_SHARPNESS * (best.score - scores[k + turns]));
+    for (int32_t k = 0; k <= 2 * turns; k++) {
+        const bool same = k - best >= -1 && k - best <= 1;  // the edges' slopes will tell more closely
+        const float away = same ? 0.0f : (float)turn_at(k - best, turns);
+        const float share = bslam_falling(TURN_SHARPNESS * (scores[best] - scores[k]));
         whole += share;
         first += share * away;
         second += share * away * away;
     }
     const float mean = first / whole;
-    level->turn = (bslam_real_t)best.stance.turn;
+    level->turn = turn_at(best - turns, turns);
     level->turn_offset = (bslam_real_t)mean;
     level->turn_var = (bslam_real_t)(second / whole - mean * mean);
-    return best;
+    return bslam_body_stance(body, level->turn);
 }
 
 bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
@@ -112,8 +93,10 @@ bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, cons
                          body->right, body->pixel)) {
         return false;
     }
-    const guess_t best = best_guess(&sides, body, level);
-    bslam_side_trace(&sides.top, facing, &best.top, &best.stance, &level->top);
-    bslam_side_trace(&sides.bottom, facing, &best.bottom, &best.stance, &level->bottom);
+    const bslam_stance_t stance = best_stance(&sides, body, level);
+    const bslam_line_t top = bslam_side_line(&sides.top, &stance);
+    const bslam_line_t bottom = bslam_side_line(&sides.bottom, &stance);
+    bslam_side_trace(&sides.top, facing, &top, &stance, &level->top);
+    bslam_side_trace(&sides.bottom, facing, &bottom, &stance, &level->bottom);
     return true;
 }

@@ -27,7 +27,7 @@ static const bslam_real_t RANGE_DOUBT = 1;
 // A distance that is less certain than this, as a fraction, is none.
 static const bslam_real_t RANGE_SD_MAX = BSLAM_R(0.15);
 // Seen more obliquely than this, tangent, an object is marked and not measured.
-static const bslam_real_t TURN_MAX = BSLAM_R(1.75);
+static const bslam_real_t TURN_MAX = BSLAM_R(1.5);
 
 static bool box_is_number(const bslam_box_t *box)
 {

@@ -3,12 +3,14 @@
 #include <string.h>
 
 enum { CHANNELS = 3, STEP_MAX = 255, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
+// Places for a side that does not turn away from the rough box.
+enum { STRAIGHT_PLACES = 15 };
 
 // Which line is the side: weights of the contrast along it and next to it, from three places outside to one
 // inside. The contrast is C / (C + HALF_CONTRAST). The weights are a multinomial logistic regression's over
 // training worlds: beyond the side the wall is quiet, within it the object has edges of its own. MATH
 // "Outline".
-enum { TAPS = 5, TAPS_OUTSIDE = 3, LINE_FIRST = TAPS_OUTSIDE, LINE_END = PLACES - TAPS + TAPS_OUTSIDE };
+enum { TAPS = 5, TAPS_OUTSIDE = 3 };
 static const float TAP[TAPS] = {-2.2f, -2.6f, 2.6f, 5.0f, 2.1f};
 static const float HALF_CONTRAST = 20.0f;
 // The same for the square of the distance from the rough box, half-resolution pixels.
@@ -63,42 +65,64 @@ static void begin(bslam_side_t *side, const bslam_frame_t *frame, bslam_side_nam
     side->lines = side->level ? width : height;
 }
 
-typedef struct rgb {
-    int32_t value[CHANNELS];
-} rgb_t;
-
-/// The pixel that lies just inside a place, in 1/63 of each channel's range; beyond the frame, its last one.
-static rgb_t inside_of(const bslam_side_t *side, int32_t index, int32_t place)
-{
-    const int32_t first = side->first[index];
-    const int32_t pixel = side->backwards ? first - 1 - place : first + place;
-    const int32_t last = side->size - 1;
-    const int32_t inside = pixel < 0 ? 0 : pixel > last ? last : pixel;
-    const uint16_t value = side->half[side->scan[index] * side->along + inside * side->across];
-    return (rgb_t){{(value >> 11) * 2, (value >> 5) & 63, (value & 31) * 2}};
-}
-
 static int32_t magnitude(int32_t x)
 {
     return x < 0 ? -x : x;
 }
 
+// A colour in one word: channels of 6 bits each, 1/63 of their range, FIELD_BITS apart, so that two of them
+// add without meeting; BIAS keeps the differences of such sums positive.
+enum { FIELD_BITS = 10 };
+#define FIELD_MASK 1023U
+#define BIAS (512U | 512U << FIELD_BITS | 512U << 2 * FIELD_BITS)
+
+static uint32_t packed(uint16_t pixel)
+{
+    return (uint32_t)(pixel >> 11) << 1 | (uint32_t)((pixel >> 5) & 63) << FIELD_BITS |
+           (uint32_t)(pixel & 31) << (2 * FIELD_BITS + 1);
+}
+
+/// A channel of the difference of two words, or of two sums of two.
+static int32_t channel_of(uint32_t difference_and_bias, int32_t channel)
+{
+    return (int32_t)(difference_and_bias >> channel * FIELD_BITS & FIELD_MASK) - 512;
+}
+
+/// Reads `count` pixels inwards from `offset` inside place 0; beyond the frame, its last one is repeated.
+static void read_strip(const bslam_side_t *side, int32_t index, int32_t offset, int32_t count,
+                       uint32_t *strip)
+{
+    const int32_t inwards = side->backwards ? -1 : 1;
+    const int32_t last = side->size - 1;
+    const uint16_t *line = side->half + side->scan[index] * side->along;
+    int32_t pixel = side->first[index] + (side->backwards ? -1 - offset : offset);
+    const int32_t far_end = pixel + inwards * (count - 1);
+    if (pixel >= 0 && pixel <= last && far_end >= 0 && far_end <= last) {
+        const int32_t step = inwards * side->across;
+        const int32_t start = pixel * side->across;
+        for (int32_t k = 0; k < count; k++) {
+            strip[k] = packed(line[start + k * step]);
+        }
+        return;
+    }
+    for (int32_t k = 0; k < count; k++) {
+        const int32_t inside = pixel < 0 ? 0 : pixel > last ? last : pixel;
+        strip[k] = packed(line[inside * side->across]);
+        pixel += inwards;
+    }
+}
+
 /// Contrast at each place: the two pixels inside against the two outside.
 static void fill_steps(bslam_side_t *side, int32_t index)
 {
-    rgb_t a = inside_of(side, index, -2);
-    rgb_t b = inside_of(side, index, -1);
-    rgb_t c = inside_of(side, index, 0);
-    for (int32_t place = 0; place < PLACES; place++) {
-        const rgb_t d = inside_of(side, index, place + 1);
-        int32_t sum = 0;
-        for (int32_t k = 0; k < CHANNELS; k++) {
-            sum += magnitude(c.value[k] + d.value[k] - a.value[k] - b.value[k]);
-        }
+    uint32_t strip[PLACES + 3];
+    read_strip(side, index, -2, side->places + 3, strip);
+    for (int32_t place = 0; place < side->places; place++) {
+        const uint32_t *at = strip + place;
+        const uint32_t step = at[2] + at[3] + BIAS - at[0] - at[1];
+        const int32_t sum =
+            magnitude(channel_of(step, 0)) + magnitude(channel_of(step, 1)) + magnitude(channel_of(step, 2));
         side->steps[index][place] = (uint8_t)(sum > STEP_MAX ? STEP_MAX : sum);
-        a = b;
-        b = c;
-        c = d;
     }
 }
 
@@ -138,8 +162,12 @@ bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam
                      bslam_real_t pixel)
 {
     begin(side, frame, name);
+    side->places = STRAIGHT_PLACES;
     if (side->level) {
         side->reach = (float)((side->backwards ? at : -at) / (2 * pixel));
+        const bslam_real_t ends =
+            bslam_abs((bslam_real_t)side->reach * (to - from));  // apart, for a turn of 1
+        side->places = ends < PLACES - STRAIGHT_PLACES ? STRAIGHT_PLACES + (int32_t)ends : PLACES;
     }
     for (int32_t i = 0; i < BSLAM_SIDE_SCANS; i++) {
         const bslam_real_t part = (bslam_real_t)i / (BSLAM_SIDE_SCANS - 1);
@@ -171,47 +199,70 @@ static float tilt_of(const bslam_side_t *side, int32_t index, const bslam_stance
     return tilt >= -most && tilt <= most ? tilt : most;  // out of the window, as is what has no place at all
 }
 
+/// One past the last line whose taps all lie in the window.
+static int32_t lines_end(const bslam_side_t *side)
+{
+    return side->places - TAPS + TAPS_OUTSIDE;
+}
+
 /// Mean contrast along each of a stance's lines, as C / (C + HALF_CONTRAST), by shift + REACH_OUT; returns
 /// how far inwards of the shift the outermost end of these lines is.
 static float contrasts(const bslam_side_t *side, const bslam_stance_t *stance, float contrast[PLACES])
 {
+    const int32_t places = side->places;
     int32_t sums[PLACES] = {0};
     float outermost = 0;
     for (int32_t i = 0; i < side->count; i++) {
         const float tilt = tilt_of(side, i, stance);
         const int32_t offset = (int32_t)(side->base[i] + tilt + (float)PLACES + 0.5f) - PLACES - REACH_OUT;
         const int32_t from = offset < 0 ? -offset : 0;
-        const int32_t to = offset > 0 ? PLACES - offset : PLACES;
+        const int32_t to = offset > 0 ? places - offset : places;
         outermost = tilt < outermost ? tilt : outermost;
         for (int32_t k = from; k < to; k++) {
             sums[k] += side->steps[i][k + offset];
         }
     }
-    for (int32_t k = 0; k < PLACES; k++) {
+    const float half = HALF_CONTRAST * (float)(side->count > 0 ? side->count : 1);
+    for (int32_t k = 0; k < places; k++) {
         const float sum = (float)sums[k];
-        contrast[k] = side->count > 0 ? sum / (sum + HALF_CONTRAST * (float)side->count) : 0.0f;
+        contrast[k] = sum / (sum + half);
     }
     return outermost;
 }
 
-bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *stance)
+/// Scores of a stance's lines by shift + REACH_OUT, from TAPS_OUTSIDE to before lines_end; returns the best
+/// one.
+static int32_t fill_scores(const bslam_side_t *side, const bslam_stance_t *stance, float scores[PLACES])
 {
     float contrast[PLACES];
-    float scores[PLACES];
     const float outermost = contrasts(side, stance, contrast);
-    int32_t best = LINE_FIRST;
-    for (int32_t k = LINE_FIRST; k < LINE_END; k++) {
+    const int32_t end = lines_end(side);
+    int32_t best = TAPS_OUTSIDE;
+    for (int32_t k = TAPS_OUTSIDE; k < end; k++) {
         const float away = (float)(k - REACH_OUT) + outermost;
-        scores[k] = -ROUGH_COST * away * away;
-        for (int32_t t = 0; t < TAPS; t++) {
-            scores[k] += TAP[t] * contrast[k + t - TAPS_OUTSIDE];
-        }
+        const float *taps = contrast + k - TAPS_OUTSIDE;
+        scores[k] = TAP[0] * taps[0] + TAP[1] * taps[1] + TAP[2] * taps[2] + TAP[3] * taps[3] +
+                    TAP[4] * taps[4] - ROUGH_COST * away * away;
         best = scores[k] > scores[best] ? k : best;
     }
+    return best;
+}
+
+float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance)
+{
+    float scores[PLACES];
+    return scores[fill_scores(side, stance, scores)];
+}
+
+bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *stance)
+{
+    float scores[PLACES];
+    const int32_t best = fill_scores(side, stance, scores);
+    const int32_t end = lines_end(side);
     float whole = 0.0f;
     float first = 0.0f;
     float second = 0.0f;
-    for (int32_t k = LINE_FIRST; k < LINE_END; k++) {
+    for (int32_t k = TAPS_OUTSIDE; k < end; k++) {
         const float share = bslam_falling(scores[best] - scores[k]);
         const float away =
             magnitude(k - best) <= 1 ? 0.0f : (float)(k - best);  // neighbours are the same edge
@@ -220,7 +271,7 @@ bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *sta
         second += share * away * away;
     }
     const float mean = first / whole;
-    return (bslam_line_t){scores[best], (float)(best - REACH_OUT), mean, second / whole - mean * mean};
+    return (bslam_line_t){(float)(best - REACH_OUT), mean, second / whole - mean * mean};
 }
 
 /// Place of the edge on a scan line, near `near_place`: the centroid of the changes over the three boundaries
@@ -228,20 +279,18 @@ bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *sta
 static bool edge_place(const bslam_side_t *side, int32_t index, float near_place, bslam_real_t *place)
 {
     const int32_t middle = (int32_t)(near_place + 0.5f);
-    if (middle < 1 || middle >= PLACES - 1) {
+    if (middle < 1 || middle >= side->places - 1) {
         return false;
     }
-    rgb_t pixels[4];
-    for (int32_t k = 0; k < 4; k++) {
-        pixels[k] = inside_of(side, index, middle + k - 2);
-    }
+    uint32_t pixels[4];
+    read_strip(side, index, middle - 2, 4, pixels);
+    const uint32_t change = pixels[3] + BIAS - pixels[0];
+    const uint32_t shift = pixels[3] + pixels[0] + BIAS - pixels[2] - pixels[1];
     int32_t whole = 0;
     int32_t moment = 0;
     for (int32_t c = 0; c < CHANNELS; c++) {
-        const int32_t change = pixels[3].value[c] - pixels[0].value[c];
-        whole += change * change;
-        moment +=
-            change * (pixels[3].value[c] - pixels[2].value[c] - pixels[1].value[c] + pixels[0].value[c]);
+        whole += channel_of(change, c) * channel_of(change, c);
+        moment += channel_of(change, c) * channel_of(shift, c);
     }
     if (whole < CHANGE_MIN || magnitude(moment) > whole) {
         return false;

@@ -12,8 +12,8 @@
 #include "bslam/vision/lens.h"
 
 enum {
-    BSLAM_SIDE_SCANS = 9,      ///< scan lines across a side, at most
-    BSLAM_SIDE_PLACES = 24,    ///< boundaries looked at on each,
+    BSLAM_SIDE_SCANS = 7,      ///< scan lines across a side, at most
+    BSLAM_SIDE_PLACES = 24,    ///< boundaries looked at on each, at most,
     BSLAM_SIDE_REACH_OUT = 6,  ///< and how many of them lie outside the rough box
 };
 
@@ -58,6 +58,7 @@ typedef struct bslam_side {
     const uint16_t *half;
     int32_t across;  ///< elements of `half` from a pixel to the next along a scan line
     int32_t along;   ///< and to the next scan line
+    int32_t places;  ///< boundaries looked at on each line
     int32_t size;    ///< pixels of a scan line
     int32_t lines;   ///< scan lines of the frame
     bool level;      ///< an upper or lower side: scan lines are columns
@@ -81,13 +82,15 @@ bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam
 
 /// A line that lies `shift` places inwards of the rough side.
 typedef struct bslam_line {
-    float score;  ///< larger is likelier: the logarithm of its odds, but for a constant
     float shift;
     float offset;    ///< mean shift of all lines, by their probabilities, less this one's,
     float variance;  ///< and these shifts' variance, 0 if no other edge comes into question
 } bslam_line_t;
 
-/// The likeliest of the lines of one stance.
+/// How likely the likeliest line of a stance is: the logarithm of its odds, but for a constant.
+float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance);
+
+/// That line.
 bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *stance);
 
 /// Points of the plane on an edge.

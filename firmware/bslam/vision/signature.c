@@ -8,7 +8,7 @@ enum { LIGHT, RED_GREEN, YELLOW_BLUE, VALUES };
 enum { LIGHT_BINS = 3, COLOUR_BINS = 4, BINS = LIGHT_BINS * COLOUR_BINS * COLOUR_BINS, BANDS = 6 };
 // Between the centres of two neighbouring bins a pixel is shared in this many steps.
 enum { BIN_STEPS = 16 };
-enum { PIXELS_MIN = 12, PIXELS_MAX = 768 };
+enum { PIXELS_MIN = 12, PIXELS_MAX = 400 };
 enum { ROWS_MAX = BSLAM_IMAGE_HEIGHT_MAX / 2 };
 
 static const float WALL_MIN = 4.0f;
