@@ -234,7 +234,7 @@ static float contrasts(const bslam_side_t *side, const bslam_stance_t *stance, f
 /// one.
 static int32_t fill_scores(const bslam_side_t *side, const bslam_stance_t *stance, float scores[PLACES])
 {
-    float contrast[PLACES];
+    float contrast[PLACES] = {0};
     const float outermost = contrasts(side, stance, contrast);
     const int32_t end = lines_end(side);
     int32_t best = TAPS_OUTSIDE;
