@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "bslam/math/trig.h"
-#include "bslam/vision/measure.h"
 #include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
 
@@ -266,9 +265,8 @@ void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32
 }
 
 bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_box_t *rough,
-                                    bslam_real_t height_m, bslam_candidate_t *candidate)
+                                    const bslam_size_t *size, bslam_candidate_t *candidate)
 {
     const bslam_frame_t frame = finished_frame(vision);
-    const bslam_size_t size = {.height_m = height_m};
-    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, &size, candidate);
+    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, size, candidate);
 }

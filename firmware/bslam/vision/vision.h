@@ -13,6 +13,7 @@
 #define BSLAM_VISION_VISION_H
 
 #include "bslam/vision/detector.h"
+#include "bslam/vision/measure.h"
 #include "bslam/vision/thumbnail.h"
 
 /// What came of the last frame.
@@ -88,6 +89,6 @@ void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32
 
 /// For training: what bslam_measure says of a box in the last finished frame; its statuses.
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_box_t *rough,
-                                                     bslam_real_t height_m, bslam_candidate_t *candidate);
+                                                     const bslam_size_t *size, bslam_candidate_t *candidate);
 
 #endif

@@ -139,14 +139,29 @@ class FrontEnd:
 
         None: none can be taken there, the box is too small, dark or outside.
         """
+        found = self._measured(box, 0.0, 0.0)
+        if found is None:
+            return None
+        signature = self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32)
+        return signature if signature.any() else None
+
+    def measure(
+        self, box: tuple[float, float, float, float], height_m: float = 0.0, depth_m: float = 0.0
+    ) -> Candidate | None:
+        """What is measured of a rough box (left, top, right, bottom, px) in the last frame, of an object of
+        known height and depth (0: not known). It has no class. None: nothing can be measured there.
+        """
+        found = self._measured(box, height_m, depth_m)
+        return None if found is None else self._candidate(found)
+
+    def _measured(self, box: tuple[float, float, float, float], height_m: float, depth_m: float) -> Any:
         library = self._library
         sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))
         rough = library.new_filled("bslam_box_t", **sides)
-        found = library.ffi.new("bslam_candidate_t *")
-        if library.lib.bslam_vision_measure(self._vision, rough, 0.0, found) != library.lib.BSLAM_OK:
-            return None
-        signature = library.copy_of(found.signature, len(found.signature), np.float32)
-        return signature if signature.any() else None
+        size = library.new_filled("bslam_size_t", height_m=height_m, depth_m=depth_m)
+        found = library.new_filled("bslam_candidate_t", object=-1)
+        status = library.lib.bslam_vision_measure(self._vision, rough, size, found)
+        return found if status == library.lib.BSLAM_OK else None
 
     def point(self, camera: int, yaw_rad: float) -> None:
         """Turns a camera on a pan unit. BslamError: no such camera, or |yaw| above pi."""
@@ -216,7 +231,9 @@ class FrontEnd:
 
     def _candidate(self, found: Any) -> Candidate:
         box = found.outline
-        name = self._library.ffi.string(self._model.classes[found.beacon_class - 1].name).decode()
+        name = ""
+        if found.beacon_class > 0:
+            name = self._library.ffi.string(self._model.classes[found.beacon_class - 1].name).decode()
         return Candidate(
             outline=(box.left_px, box.top_px, box.right_px, box.bottom_px),
             bearing_rad=found.bearing_rad if found.has_bearing else None,
