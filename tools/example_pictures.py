@@ -37,8 +37,11 @@ def is_well_seen(seen: Seen) -> bool:
     return whole and seen.visible_px >= VISIBLE_PX_MIN and seen.slant_rad < SLANT_RAD_MAX
 
 
-def take(folder: Path, world: int, count: int, seed: int) -> list[list[str]]:
-    """Take `count` pictures into a folder; the rows of its labels.csv."""
+def take(folder: Path, world: int, count: int, seed: int, least: int = PICTURES_MIN) -> list[list[str]]:
+    """Take `count` pictures into a folder; the rows of its labels.csv.
+
+    Objects in fewer than `least` pictures get no box.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     scene = make_world(world, "test")
     renderer = Renderer(scene, load_rig("three60").cameras[1], [world, seed])
@@ -54,7 +57,7 @@ def take(folder: Path, world: int, count: int, seed: int) -> list[list[str]]:
     often = Counter(one.beacon_id for seen in views.values() for one in seen)
     rows = []
     for name, seen in views.items():
-        boxes = [_row(name, one, scene) for one in seen if often[one.beacon_id] >= PICTURES_MIN]
+        boxes = [_row(name, one, scene) for one in seen if often[one.beacon_id] >= least]
         rows += boxes or [[name, *[""] * (len(COLUMNS) - 1)]]
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([COLUMNS, *rows])

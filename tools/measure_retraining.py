@@ -7,9 +7,8 @@ from other places in other light. Counts boxes of objects that were trained: rec
 
 import argparse
 import tempfile
+from dataclasses import astuple, dataclass
 from pathlib import Path
-
-import numpy as np
 
 from bslam.core.vision import FrontEnd
 from bslam.errors import BslamError
@@ -24,36 +23,49 @@ from training.samples import collect
 CAMERA = load_rig("three60").cameras[0]
 
 
-def ask(folder: Folder, recogniser: Recogniser) -> tuple[int, int, int]:
-    """Boxes of trained objects in a folder: how many, how many get a name, how many the right one."""
+@dataclass
+class Counts:
+    """Boxes in new pictures: of trained objects, those with a name, with the right one; of others."""
+
+    boxes: int = 0
+    named: int = 0
+    right: int = 0
+    others: int = 0
+    others_named: int = 0
+
+
+def ask(folder: Folder, recogniser: Recogniser, counts: Counts) -> None:
+    """Count what the recogniser says of the boxes in a folder."""
     names = [one.name for one in recogniser.objects]
     frames = [load_picture(picture.path, CAMERA) for picture in folder.pictures]
     front_end = FrontEnd([CAMERA])
     for frame in frames:
         front_end.see(frame.rgb)
-    boxes = named = right = 0
     for picture, frame in zip(folder.pictures, frames, strict=True):
         front_end.see(frame.rgb)
         for label in picture.labels:
             edges = (label.left_px, label.top_px, label.right_px, label.bottom_px)
             signature = front_end.signature(frame.box(*edges))
-            if label.name not in names or signature is None:
+            if signature is None:
                 continue
             values = recogniser.svm.weights @ signature + recogniser.svm.bias
-            boxes += 1
-            if values.max() >= recogniser.reject_margin:
-                named += 1
-                right += names[int(values.argmax())] == label.name
-    return boxes, named, right
+            has_name = bool(values.max() >= recogniser.reject_margin)
+            if label.name in names:
+                counts.boxes += 1
+                counts.named += has_name
+                counts.right += has_name and names[int(values.argmax())] == label.name
+            else:
+                counts.others += 1
+                counts.others_named += has_name
 
 
-def measure(world: int, pictures: int, folder: Path) -> tuple[int, int, int]:
-    """The same for a world, training included. BslamError as training has it."""
+def measure(world: int, pictures: int, folder: Path, counts: Counts) -> None:
+    """Train on a world as a user would, and ask. BslamError as training has it."""
     take(folder / "old", world, pictures, seed=0)
-    take(folder / "new", world, pictures, seed=1)
+    take(folder / "new", world, pictures, seed=1, least=1)
     old = read_folder(folder / "old")
     recogniser, _ = train(old, collect(old, CAMERA), precision=0.9)
-    return ask(read_folder(folder / "new"), recogniser)
+    ask(read_folder(folder / "new"), recogniser, counts)
 
 
 def main() -> None:
@@ -64,20 +76,23 @@ def main() -> None:
     parser.add_argument("--worlds", default="0:20", metavar="A:B", help="worlds A to B - 1 (default: 0:20)")
     parser.add_argument("--pictures", type=int, default=20, help="to train on, and to ask (default: 20)")
     words = parser.parse_args()
-    counts = []
+    total, trained = Counts(), 0
     first, end = map(int, words.worlds.split(":"))
     for world in range(first, end):
+        counts = Counts()
         with tempfile.TemporaryDirectory() as folder:
             try:
-                counts.append(measure(world, words.pictures, Path(folder)))
+                measure(world, words.pictures, Path(folder), counts)
             except BslamError as error:
                 print(f"world {world}: {str(error).split(': ', 1)[-1]}", flush=True)
                 continue
-        boxes, named, right = counts[-1]
-        print(f"world {world}: {boxes} boxes, {named} recognised, {right} right", flush=True)
-    boxes, named, right = np.sum(counts, axis=0)
-    shares = f"{100 * named / boxes:.1f} % recognised, {100 * right / named:.1f} % of these right"
-    print(f"{len(counts)} of {end - first} worlds trained; {boxes} boxes in new pictures: {shares}")
+        trained += 1
+        print(f"world {world}: {counts}", flush=True)
+        total = Counts(*(a + b for a, b in zip(astuple(total), astuple(counts), strict=True)))
+    print(f"{trained} of {end - first} worlds trained: {total}")
+    print(f"{100 * total.named / total.boxes:.1f} % of trained objects recognised, ", end="")
+    print(f"{100 * total.right / total.named:.1f} % of these right, ", end="")
+    print(f"{100 * total.others_named / total.others:.1f} % of other objects given a name")
 
 
 if __name__ == "__main__":

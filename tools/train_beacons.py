@@ -61,7 +61,8 @@ def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recognise
     machine = fit.fit(samples.signatures, targets, cost, balanced=True)
     notes = {
         "training set": f"{len(folder.pictures)} pictures, {sum(samples.boxes.values())} boxes, "
-        f"{len(samples.labels)} signatures; sha256 {folder_sha256(folder)}",
+        f"{len(samples.labels)} signatures with shaken boxes and generic seeds; "
+        f"sha256 {folder_sha256(folder)}",
         "settings": f"scikit-learn {sklearn.__version__} LinearSVC, one against the rest, C {cost:g} of "
         f"{', '.join(f'{one:g}' for one in fit.COSTS)} by cross-validation, precision {precision:g}",
         "figures": figures(counts),
