@@ -1,0 +1,226 @@
+"""How well direction and distance are measured, and whether the variances that come with them hold.
+
+Walks through rendered worlds; of every whole object of 150 px or more that is seen at less than 60 degrees
+from its front and at most a tenth hidden, takes the error of direction and of distance. `--boxes rough`
+(default) measures the true box with each edge moved by up to `--jitter` px, evenly; `--boxes detected` what
+the detector finds of it. Columns: n; of how many percent it is measured; rms and 1.4826 median |error|; mean
+square of error over standard deviation. `--correlation` prints besides how alike an object's errors are in
+two frames of a walk, by how far the robot moved between them.
+`.venv/bin/python tools/measure_outline.py [--rig wide180] [--boxes detected] [--style train]`
+"""
+
+import argparse
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from bslam.core.vision import Candidate, FrontEnd
+from bslam.rig import load_rig
+from bslam.world.camera import Frame, Renderer, Seen, make_world, walk
+from training.detector_samples import CLASSES
+
+FRAMES_A_WORLD = 25
+WALK_HZ = 5.0
+VISIBLE_PX_MIN = 150
+HIDDEN_MAX = 0.1
+SLANT_RAD_MAX = np.radians(60.0)
+OVERLAP_MIN = 0.5
+DISTANCES_M = ((1.5, 2.5), (2.5, 3.5), (3.5, 5.0), (5.0, 7.0), (7.0, 12.0))
+MOVED_M = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.5)
+SURE = (0.0, 0.015, 0.02, 0.03, 0.04, 0.06, 0.10, 0.15)
+
+ERROR = np.dtype(
+    [
+        ("world", np.int32),
+        ("frame", np.int32),
+        ("beacon_id", np.int32),
+        ("kind", "U14"),
+        ("distance_m", np.float64),
+        ("pose", np.float64, 2),
+        ("bearing", np.float64),  # error, degrees; NaN: not measured
+        ("bearing_sd", np.float64),
+        ("range", np.float64),  # error, a fraction of the distance; NaN: not measured
+        ("range_sd", np.float64),
+    ]
+)
+Errors = NDArray[np.void]
+Box = tuple[float, float, float, float]
+
+
+def is_counted(seen: Seen) -> bool:
+    """Whether an object is one of those that must be measured well."""
+    hidden = 1.0 - seen.visible_px / max(seen.own_px, 1)
+    whole = not seen.cut and seen.visible_px >= VISIBLE_PX_MIN
+    return whole and hidden <= HIDDEN_MAX and seen.slant_rad < SLANT_RAD_MAX
+
+
+def overlap(a: Box, b: Box) -> float:
+    """Intersection over union of two boxes."""
+    width = min(a[2], b[2]) - max(a[0], b[0])
+    height = min(a[3], b[3]) - max(a[1], b[1])
+    both = max(width, 0.0) * max(height, 0.0)
+    return both / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - both)
+
+
+def rough_box(seen: Seen, frame: Frame, jitter_px: float, random: np.random.Generator) -> Box:
+    """The true box, each edge moved by up to jitter_px, within the frame."""
+    height, width = frame.rgb.shape[:2]
+    moved = np.array(seen.box) + random.uniform(-jitter_px, jitter_px, 4)
+    left, top, right, bottom = np.clip(moved, -0.5, [width - 0.5, height - 0.5] * 2).tolist()
+    return left, top, right, bottom
+
+
+def measured(
+    front_end: FrontEnd,
+    frame: Frame,
+    found: tuple[Candidate, ...],
+    jitter_px: float,
+    random: np.random.Generator,
+) -> Iterator[tuple[Seen, Candidate | None]]:
+    """Each counted object with what is measured of it. jitter_px negative: among the detected ones, and only
+    those that were."""
+    by_name = {one.name: one for one in CLASSES}
+    for seen in filter(is_counted, frame.seen):
+        if jitter_px >= 0.0:
+            size = by_name[seen.kind]
+            yield (
+                seen,
+                front_end.measure(rough_box(seen, frame, jitter_px, random), size.height_m, size.depth_m),
+            )
+            continue
+        near = [one for one in found if overlap(one.outline, seen.box) >= OVERLAP_MIN]
+        if near:
+            yield seen, max(near, key=lambda one: overlap(one.outline, seen.box))
+
+
+def errors_of_world(seed: int, rig: str, style: str, jitter_px: float) -> Errors:
+    """Walks through one world with one camera of the rig."""
+    cameras = load_rig(rig).cameras
+    camera = cameras[seed % len(cameras)]
+    scene = make_world(seed, style)
+    renderer = Renderer(scene, camera, [seed, 0])
+    front_end = FrontEnd([camera])
+    random = np.random.default_rng([seed, 1])
+    rows = []
+    for step, (x_m, y_m, theta_rad) in enumerate(walk(scene, random, FRAMES_A_WORLD, WALK_HZ).tolist()):
+        frame = renderer.render((x_m, y_m, theta_rad), step / WALK_HZ)
+        found = front_end.see(frame.rgb).candidates
+        for seen, candidate in measured(front_end, frame, found, jitter_px, random):
+            bearing = bearing_sd = distance = distance_sd = np.nan
+            if (
+                candidate is not None
+                and candidate.bearing_rad is not None
+                and candidate.bearing_sd_rad is not None
+            ):
+                bearing = np.degrees(np.angle(np.exp(1j * (candidate.bearing_rad - seen.bearing_rad))))
+                bearing_sd = np.degrees(candidate.bearing_sd_rad)
+            if candidate is not None and candidate.range_m is not None and candidate.range_sd_m is not None:
+                distance = candidate.range_m / seen.range_m - 1.0
+                distance_sd = candidate.range_sd_m / seen.range_m
+            row = (seed, step, seen.beacon_id, seen.kind, seen.range_m, (x_m, y_m))
+            rows.append((*row, bearing, bearing_sd, distance, distance_sd))
+    return np.array(rows, ERROR)
+
+
+def spread(errors: NDArray[np.floating]) -> str:
+    """rms and 1.4826 median |error|, of those that were measured."""
+    known = errors[np.isfinite(errors)]
+    if not len(known):
+        return "     -      -"
+    return f"{np.sqrt(np.mean(known**2)):6.2f} {1.4826 * np.median(np.abs(known)):6.2f}"
+
+
+def honesty(errors: NDArray[np.floating], sd: NDArray[np.floating]) -> str:
+    """Mean square of error over standard deviation: 1 if that holds."""
+    known = np.isfinite(errors)
+    return f"{np.mean((errors[known] / sd[known]) ** 2):5.2f}" if known.any() else "    -"
+
+
+def print_line(name: str, errors: Errors) -> None:
+    has_bearing, has_range = np.isfinite(errors["bearing"]), np.isfinite(errors["range"])
+    print(
+        f"{name:13s}{len(errors):6d}   {100 * has_bearing.mean() if len(errors) else 0:4.0f} "
+        f"{spread(errors['bearing'])} {honesty(errors['bearing'], errors['bearing_sd'])}   "
+        f"{100 * has_range.mean() if len(errors) else 0:4.0f} {spread(100 * errors['range'])} "
+        f"{honesty(errors['range'], errors['range_sd'])}"
+    )
+
+
+def print_tables(errors: Errors) -> None:
+    print("                   n   direction, deg            distance, %")
+    print("                       has    rms  median  (e/sd)2  has    rms  median  (e/sd)2")
+    for low, high in DISTANCES_M:
+        print_line(f"{low}-{high} m", errors[(errors["distance_m"] >= low) & (errors["distance_m"] < high)])
+    middle = errors[(errors["distance_m"] >= 2.5) & (errors["distance_m"] < 7.0)]
+    print_line("2.5-7 m", middle)
+    for kind in sorted(set(middle["kind"].tolist())):
+        print_line(kind, middle[middle["kind"] == kind])
+    print("2.5-7 m, by the standard deviation that is given for the distance:")
+    for low, high in pairwise(SURE):
+        print_line(
+            f"{100 * low:g}-{100 * high:g} %",
+            middle[(middle["range_sd"] >= low) & (middle["range_sd"] < high)],
+        )
+
+
+def correlations(errors: Errors, what: str) -> list[tuple[int, float]]:
+    """Pairs of frames of one object, and the correlation of their errors over their standard deviations, by
+    how far the robot moved between them."""
+    known = errors[np.isfinite(errors[what])]
+    scaled = np.clip(known[what] / known[f"{what}_sd"], -3.0, 3.0)  # a few wild ones would decide alone
+    variance = np.mean(scaled**2)
+    products: list[list[float]] = [[] for _ in MOVED_M[1:]]
+    keys = known["world"].astype(np.int64) * 1000 + known["beacon_id"]
+    for key in np.unique(keys):
+        of_one = np.flatnonzero(keys == key)
+        for i, a in enumerate(of_one):
+            for b in of_one[i + 1 :]:
+                moved_m = float(np.hypot(*(known["pose"][a] - known["pose"][b])))
+                bin_index = int(np.searchsorted(MOVED_M, moved_m, side="right")) - 1
+                if bin_index < len(products):
+                    products[bin_index].append(float(scaled[a] * scaled[b]))
+    return [(len(pairs), float(np.mean(pairs) / variance) if pairs else np.nan) for pairs in products]
+
+
+def print_correlations(errors: Errors) -> None:
+    middle = errors[(errors["distance_m"] >= 1.5) & (errors["distance_m"] < 7.0)]
+    print("moved, m       pairs   direction      pairs    distance")
+    by_what = [correlations(middle, what) for what in ("bearing", "range")]
+    for low, high, bearing, distance in zip(MOVED_M[:-1], MOVED_M[1:], *by_what, strict=True):
+        print(
+            f"{low:.1f}-{high:.1f}     {bearing[0]:9d}   {bearing[1]:9.2f}  {distance[0]:9d}"
+            f"   {distance[1]:9.2f}"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--rig", default="three60", help="whose cameras, one a world (default three60)")
+    parser.add_argument("--style", default="test", choices=("train", "test"))
+    parser.add_argument("--worlds", default="0:60", help="seeds FIRST:END (default 0:60)")
+    parser.add_argument("--boxes", default="rough", choices=("rough", "detected"))
+    parser.add_argument("--jitter", type=float, default=3.0, help="of rough boxes, px (default 3)")
+    parser.add_argument("--correlation", action="store_true")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    arguments = parser.parse_args()
+    first, end = (int(part) for part in arguments.worlds.split(":"))
+    jitter_px = arguments.jitter if arguments.boxes == "rough" else -1.0
+    work = partial(errors_of_world, rig=arguments.rig, style=arguments.style, jitter_px=jitter_px)
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        errors = np.concatenate(
+            list(tqdm(pool.map(work, range(first, end)), total=end - first, disable=None))
+        )
+    print_tables(errors)
+    if arguments.correlation:
+        print_correlations(errors)
+
+
+if __name__ == "__main__":
+    main()
