@@ -1,7 +1,7 @@
 """Takes pictures of a rendered room and labels them: to try tools/train_beacons.py without a camera.
 
 Writes --count pictures and labels.csv into FOLDER. Every beacon that is whole and well seen has a box and a
-name of its own, unless it is in one or two pictures only. Another --seed takes other pictures of that room.
+name of its own, unless it is in one picture only. Another --seed takes other pictures of that room.
 `.venv/bin/python tools/example_pictures.py FOLDER [--world 1] [--count 20] [--seed 0]`
 """
 
@@ -22,7 +22,7 @@ BETWEEN_S = 10.0  # light and white balance change from picture to picture
 SLANT_RAD_MAX = math.radians(75.0)
 VISIBLE_PX_MIN = 100
 HIDDEN_MAX = 0.4
-PICTURES_MIN = 3
+PICTURES_MIN = 2
 
 
 def name_of(seen: Seen) -> str:

@@ -61,10 +61,10 @@ def ask(folder: Folder, recogniser: Recogniser, counts: Counts) -> None:
 
 def measure(world: int, pictures: int, folder: Path, counts: Counts) -> None:
     """Train on a world as a user would, and ask. BslamError as training has it."""
-    take(folder / "old", world, pictures, seed=0)
+    take(folder / "old", world, pictures, seed=0, least=3)
     take(folder / "new", world, pictures, seed=1, least=1)
     old = read_folder(folder / "old")
-    recogniser, _ = train(old, collect(old, CAMERA), precision=0.9)
+    recogniser, _, _ = train(old, collect(old, CAMERA), precision=0.9)
     ask(read_folder(folder / "new"), recogniser, counts)
 
 

@@ -22,6 +22,7 @@ from bslam.errors import BslamError
 from bslam.modelfile import Recogniser, write_recogniser
 from bslam.rig import load_rig
 from training import export, fit
+from training.compiled import TOLERANCE, CompiledSvm, worst_difference
 from training.folder import Folder, read_folder
 from training.samples import NONE, Samples, collect, folder_sha256
 
@@ -41,8 +42,10 @@ def confusion(labels: NDArray[np.integer], values: NDArray[np.floating], margin:
     return counts
 
 
-def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recogniser, NDArray[np.int64]]:
-    """The recogniser, and its confusion matrix on pictures left out.
+def train(
+    folder: Folder, samples: Samples, precision: float
+) -> tuple[Recogniser, fit.Machine, NDArray[np.int64]]:
+    """The recogniser, scikit-learn's machines behind it, and its confusion matrix on pictures left out.
 
     BslamError if less than half of the objects get their own name.
     """
@@ -67,7 +70,15 @@ def train(folder: Folder, samples: Samples, precision: float) -> tuple[Recognise
         f"{', '.join(f'{one:g}' for one in fit.COSTS)} by cross-validation, precision {precision:g}",
         "figures": figures(counts),
     }
-    return Recogniser(machine.svm, folder.objects, margin, notes), counts
+    return Recogniser(machine.svm, folder.objects, margin, notes), machine, counts
+
+
+def check_header(header: str, svm: str, x: NDArray[np.float32], machine: fit.Machine) -> None:
+    """Compile the header and compare: it must decide as scikit-learn does, on every sample."""
+    difference = worst_difference(CompiledSvm(header, svm), x, machine.decide(x))
+    if not difference <= TOLERANCE:
+        raise AssertionError(f"the header is off by {difference:g}; allowed: {TOLERANCE:g}")
+    print(f"compiled, the header decides as scikit-learn on all {len(x)} samples, to {difference:.1g}")
 
 
 def reject_margin(
@@ -144,8 +155,9 @@ def run(folder_path: Path, out: Path, precision: float, rig: str | None) -> None
     """From pictures to header, model file and matrix."""
     folder = read_folder(folder_path)
     samples = collect(folder, None if rig is None else load_rig(rig).cameras[0])
-    recogniser, counts = train(folder, samples, precision)
+    recogniser, machine, counts = train(folder, samples, precision)
     header = export.recogniser_header(recogniser, out.stem)
+    check_header(header, f"bslam_{out.stem}.svm", samples.signatures, machine)
     names = [*(one.name for one in folder.objects), "none"]
     export.write_header(out, header)
     write_recogniser(out.with_suffix(".json"), recogniser)

@@ -1,6 +1,7 @@
 """tools/training/export.py: headers that compile and decide as scikit-learn does."""
 
 import ctypes
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
-from tools.compiled import CompiledSvm, compile_library
 from training import export, fit
+from training.compiled import TOLERANCE, CompiledSvm, compile_library, worst_difference
 
 
 def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -22,40 +23,46 @@ def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.b
     return x.astype(np.float32), x @ direction + noise > [0, 1, 2]
 
 
-def compiled(folder: Path, svm: fit.Svm) -> CompiledSvm:
+def compiled(svm: fit.Svm) -> CompiledSvm:
     """`svm` by way of its header."""
     header = export.Header("MACHINE_H", ["bslam/svm/svm.h"], {})
     header.constant("bslam_svm_t", "machine", header.svm("table", svm))
-    export.write_header(folder / "machine.h", header.text())
-    return CompiledSvm(folder, "machine.h", "machine")
+    return CompiledSvm(header.text(), "machine")
 
 
 @pytest.mark.parametrize(("features", "quadratic"), [(71, False), (60, True), (1, True)])
-def test_header_float_decides_as_scikit_learn_on_every_sample(
-    tmp_path: Path, features: int, quadratic: bool
-) -> None:
+def test_header_float_decides_as_scikit_learn_on_every_sample(features: int, quadratic: bool) -> None:
     x, targets = samples(features, seed=1)
     machine = fit.fit(x[:400], targets[:400], 0.01, quadratic)
-    library = compiled(tmp_path, machine.svm)
+    library = compiled(machine.svm)
     assert library.check(features) == 0 and library.check(features + 1) != 0
-    magnitude = 1.0 + fit.expand(np.abs(x), quadratic) @ np.abs(machine.svm.weights).T.astype(np.float64)
-    difference = np.abs(library.decide(x, 3) - machine.decide(x))
-    assert np.all(difference <= 1e-5 * magnitude)
+    assert library.weights().tobytes() == machine.svm.weights.tobytes()
+    assert worst_difference(library, x, machine.decide(x)) <= TOLERANCE
     # Half as many digits in the header would show.
-    coarse = machine.svm.weights.astype(np.float16).astype(np.float64)
-    assert np.any(np.abs(fit.expand(x, quadratic) @ (coarse - machine.svm.weights).T) > 1e-5 * magnitude)
+    coarse = replace(machine.svm, weights=machine.svm.weights.astype(np.float16).astype(np.float32))
+    assert worst_difference(compiled(coarse), x, machine.decide(x)) > TOLERANCE
 
 
-def test_header_bytes_decide_as_the_quantised_machine(tmp_path: Path) -> None:
+def test_header_bytes_decide_as_the_quantised_machine() -> None:
     x, targets = samples(20, seed=2)
     machine = fit.fit(x, targets, 1.0, quadratic=True)
     small = fit.quantised(machine.svm)
     assert small.byte_scale is not None
-    weights = small.weights.astype(np.float64) * small.byte_scale[:, None]
-    magnitude = 1.0 + fit.expand(np.abs(x), True) @ np.abs(weights).T
-    values = compiled(tmp_path, small).decide(x, 3)
-    assert np.all(np.abs(values - (fit.expand(x, True) @ weights.T + small.bias)) <= 1e-5 * magnitude)
-    assert np.mean((values > 0) == (machine.decide(x) > 0)) > 0.97
+    library = compiled(small)
+    wanted = fit.expand(x, True) @ library.weights().T.astype(np.float64) + small.bias
+    assert worst_difference(library, x, wanted) <= TOLERANCE
+    assert np.mean((library.decide(x) > 0) == (machine.decide(x) > 0)) > 0.97
+
+
+@pytest.mark.parametrize("lens", ["pinhole", "wide"])
+@pytest.mark.parametrize("part", ["cell", "screen", "kinds", "fusion"])
+def test_machines_that_come_with_the_library_decide_by_their_tables(lens: str, part: str) -> None:
+    machine = CompiledSvm('#include "models/beacons.h"\n', f"bslam_beacons_model.{lens}.{part}")
+    assert machine.check(machine.features) == 0
+    x = np.random.default_rng(5).standard_normal((200, machine.features)).astype(np.float32)
+    zero = machine.decide(np.zeros((1, machine.features), np.float32))
+    wanted = fit.expand(x, machine.quadratic) @ machine.weights().T.astype(np.float64) + zero
+    assert worst_difference(machine, x, wanted) <= TOLERANCE
 
 
 def recogniser(seed: int = 3) -> Recogniser:

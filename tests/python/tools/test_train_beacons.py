@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,8 +20,8 @@ from bslam.core.vision import FrontEnd
 from bslam.experiment.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools.blind import blind_model
-from tools.compiled import FIRMWARE
 from training import samples
+from training.compiled import FIRMWARE, CompiledSvm
 from training.folder import COLUMNS, read_folder
 
 SIGNATURE = 71
@@ -134,6 +135,17 @@ def test_model_file_recognises_as_the_header(user, tmp_path):
         assert library.recognise(signature) == wanted
 
 
+def test_header_that_decides_otherwise_than_scikit_learn_is_not_let_through(user):
+    folder, out = user
+    x = samples.collect(read_folder(folder)).signatures
+    header = (out / "my_beacons.h").read_text()
+    values = CompiledSvm(header, "bslam_my_beacons.svm").decide(x)
+    same, other = (SimpleNamespace(decide=lambda x, off=off: values + off) for off in (0.0, 1e-2))
+    train_beacons.check_header(header, "bslam_my_beacons.svm", x, same)
+    with pytest.raises(AssertionError, match=r"the header is off by .*; allowed: 1e-05"):
+        train_beacons.check_header(header, "bslam_my_beacons.svm", x, other)
+
+
 def test_training_leaves_a_picture_of_the_confusion_and_says_where_it_comes_from(user):
     _, out = user
     with Image.open(out / "my_beacons.png") as picture:
@@ -162,7 +174,7 @@ def test_other_things_are_rejected(tmp_path):
     objects = tuple(folder.objects[one] for one in mine)
     counts = train_beacons.train(
         replace(folder, objects=objects), replace(collected, labels=labels), precision=0.9
-    )[1]
+    )[2]
     assert counts[2].sum() > 20 and counts[2, 2] > 0.9 * counts[2].sum()
     assert counts[0, 0] + counts[1, 1] > 0.8 * counts[:2].sum()
 
@@ -172,7 +184,7 @@ def test_one_object_alone_is_told_from_the_generic_seeds(rows, tmp_path):
     most = max(set(names) - {""}, key=names.count)
     write_labels(tmp_path, [row for row in rows if row[1] == most])
     folder = read_folder(tmp_path)
-    counts = train_beacons.train(folder, samples.collect(folder), precision=0.9)[1]
+    counts = train_beacons.train(folder, samples.collect(folder), precision=0.9)[2]
     assert counts[0, 0] >= 0.8 * counts[0].sum()
     assert counts[1].sum() >= 64 and counts[1, 1] >= 0.9 * counts[1].sum()
 
