@@ -23,6 +23,7 @@ from tools.blind import blind_model
 from training import samples
 from training.compiled import FIRMWARE, CompiledSvm
 from training.folder import COLUMNS, read_folder
+from training.truth import overlaps
 
 SIGNATURE = 71
 WORLD = 1
@@ -133,6 +134,26 @@ def test_model_file_recognises_as_the_header(user, tmp_path):
         best = int(values.argmax())
         wanted = recogniser.objects[best].name if values[best] >= recogniser.reject_margin else None
         assert library.recognise(signature) == wanted
+
+
+def test_front_end_with_the_model_file_names_what_it_finds(user, tmp_path):
+    _, out = user
+    example_pictures.take(tmp_path, WORLD, 25, seed=1)
+    folder = read_folder(tmp_path)
+    frames = [load_picture(picture.path) for picture in folder.pictures]
+    recogniser = read_recogniser(out / "my_beacons.json", SIGNATURE)
+    front_end = FrontEnd([camera_for(*frames[0].size_px)], recogniser=recogniser)
+    for frame in frames:
+        front_end.see(frame.rgb)
+    right = []
+    for picture, frame in zip(folder.pictures, frames, strict=True):
+        boxes = np.array([samples._in_frame(frame, label) for label in picture.labels])
+        for one in front_end.see(frame.rgb).candidates:
+            share = overlaps(np.array([one.outline]), boxes)[0] if len(boxes) else np.zeros(1)
+            if one.object is not None and share.max() > 0.5:
+                right.append(one.object == picture.labels[int(share.argmax())].name)
+                assert one.object_margin >= recogniser.reject_margin
+    assert len(right) >= 8 and np.mean(right) > 0.85
 
 
 def test_header_that_decides_otherwise_than_scikit_learn_is_not_let_through(user):
