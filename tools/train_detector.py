@@ -39,7 +39,7 @@ def train(folder: Path, lens: str, worlds: int, validation: int, processes: int)
     for fit in (fit_screen, fit_kinds, fit_fusion):
         detector = fit(boxes, detector)
         print(f"{lens}: {fit.__name__} done, {time.monotonic() - started:.0f} s", flush=True)
-    seen = look_at_worlds(folder, lens, "train", left_out, replace(detector, threshold=-4.0), processes)
+    seen = look_at_worlds(folder, lens, "train", left_out, detector, processes)
     result = score(seen, PRECISION)
     detector = replace(detector, threshold=result.threshold)
     return detector, f"recall {result.recall:.3f} at precision {PRECISION} on {validation} worlds left out"

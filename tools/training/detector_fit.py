@@ -6,31 +6,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
-from sklearn.svm import LinearSVC
 
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import Svm
 from training.detector_samples import CLUTTER, BoxSamples, CellSamples
-from training.fit import choose_cost, expand, fit, quantised
+from training.fit import choose_cost, fit, quantised
 from training.render_set import KINDS
+from training.together import fit_together
 from training.truth import IGNORED, NOTHING
 
 CELLS_MAX = 200_000
 CELL_COSTS = (0.01, 0.1)
-KIND_COST = 0.003
-KIND_TOLERANCE = 0.01
-PROCESSES = 2
+KIND_COST = 0.001
+FUSION_COST = 0.001
 SCREEN_COST = 0.01
 SCREEN_RECALL = 0.995
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
-OVERLAP_SURE = 0.5
-OVERLAP_NEGATIVE = 0.4
-POSITIVES_MAX = 15_000
-NEGATIVES_FIRST = 12_000
-NEGATIVES_HARD = 12_000
+OVERLAP_SURE = 0.6
+OVERLAP_NEGATIVE = 0.45
+POSITIVES_MAX = 16_000
+NEGATIVES_FIRST = 14_000
+NEGATIVES_HARD = 14_000
+FUSION_LIMIT = 4.0  # as BSLAM_FUSION_LIMIT
 FUSION_SHARE = 5  # every so many worlds are kept for the fusion
 
 
@@ -111,40 +110,27 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     negatives = random.permutation(fits[~is_beacon])
     chosen = np.concatenate([positives, negatives[:NEGATIVES_FIRST]])
     rest = negatives[NEGATIVES_FIRST:]
-    machine = _fit_kinds(samples, detector, targets, chosen)
+    machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
     if len(rest):
         worst = decide(machine, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
         order = np.argsort(-worst)[:NEGATIVES_HARD]
         hard = rest[order[worst[order] > -1.0]]
-        machine = _fit_kinds(samples, detector, targets, np.concatenate([chosen, hard]))
+        chosen = np.concatenate([chosen, hard])
+        machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
     return replace(detector, kinds=quantised(machine))
 
 
-def _fit_kinds(
-    samples: BoxSamples, detector: DetectorModel, targets: NDArray[np.bool_], chosen: NDArray[np.intp]
-) -> Svm:
-    """As training.fit.fit does, the rows side by side and to a looser tolerance: minutes, not an hour."""
-    x = normalised(samples.features[chosen], detector)
-    scaler = StandardScaler()
-    scaled = scaler.fit_transform(expand(x, quadratic=True))
-    machines = Parallel(n_jobs=PROCESSES, prefer="threads")(
-        delayed(LinearSVC(C=KIND_COST, dual=False, tol=KIND_TOLERANCE).fit)(scaled, column)
-        for column in targets[chosen].T
-    )
-    weights = np.stack([machine.coef_[0] / scaler.scale_ for machine in machines])
-    bias = np.array([machine.intercept_[0] for machine in machines]) - weights @ scaler.mean_
-    return Svm(x.shape[1], True, weights.astype(np.float32), bias.astype(np.float32))
-
-
 def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
-    """The linear machine on all machines' values, from worlds that the kinds were not fitted to."""
+    """The quadratic machine on all machines' values, from worlds that the kinds were not fitted to."""
     chosen = np.flatnonzero(usable(samples) & (samples.world % FUSION_SHARE == 0))
     x = normalised(samples.features[chosen], detector)
     screened = decide(detector.screen, x)
     passed = screened[:, 0] >= detector.screen_threshold
     values = np.hstack([decide(detector.kinds, x), screened])[passed]
-    svm = fit(values, kind_targets(samples)[chosen][passed][:, :1], 1.0).svm
-    return replace(detector, fusion=svm)
+    is_beacon = kind_targets(samples)[chosen][passed][:, :1]
+    svm = fit_together(np.clip(values, -FUSION_LIMIT, FUSION_LIMIT), is_beacon, FUSION_COST, 150)
+    any_threshold = float(np.quantile(values[is_beacon[:, 0], 0], 1 - SCREEN_RECALL))
+    return replace(detector, fusion=svm, any_threshold=any_threshold)
 
 
 def summary(samples: BoxSamples) -> str:

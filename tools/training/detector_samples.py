@@ -15,7 +15,7 @@ from tqdm import tqdm
 from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, feature_counts
 from bslam.modelfile import BeaconClass, Svm, weights_in_row
 from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
-from training.truth import NOTHING, areas, owners
+from training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
     BeaconClass("extinguisher", 0.60, 0.0),  # round: it shows no flank
@@ -71,8 +71,9 @@ def blank_detector() -> DetectorModel:
         blob_scale=np.ones(blobs, np.float32),
         screen=blank_svm(1, blobs),
         screen_threshold=1.0,
+        any_threshold=1.0,
         kinds=blank_svm(len(KINDS) + 2, blobs, quadratic=True),
-        fusion=blank_svm(1, len(KINDS) + 3),
+        fusion=blank_svm(1, len(KINDS) + 3, quadratic=True),
         threshold=1.0,
     )
 
@@ -140,7 +141,7 @@ def _label_boxes(
 ) -> BoxSamples:
     rows = np.flatnonzero(world.seen["frame"] == index)
     seen = world.seen[rows]
-    owner, overlap = owners(boxes, seen)
+    owner, overlap = owners(boxes, seen, teaches(seen, world.pictures.shape[2]))
     label = owner.copy()
     label[owner >= 0] = seen["kind"][owner[owner >= 0]]
     is_clutter = (owner == NOTHING) & (clutter_share(world.clutter[index], boxes) > 0.4)

@@ -20,6 +20,7 @@ from training.truth import NOTHING, counts, owners
 DUPLICATE = -3
 """A second detection of an object: false."""
 CLUTTER_SHARE = 0.4
+SCORE_MIN = -4.0
 
 DETECTION = np.dtype(
     [
@@ -82,9 +83,10 @@ class Score:
 
 
 def look_at_worlds(
-    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel, processes: int
+    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel | None, processes: int
 ) -> Sightings:
-    """What the front end says of the worlds' frames, with this detector; its threshold should be low."""
+    """What the front end says of the worlds' frames, with this detector or the built-in one. All boxes are
+    taken whose score is at least SCORE_MIN, whatever the detector's own threshold."""
     seeds = list(seeds)
     work = partial(_look_at_world, folder, lens, style, detector)
     with ProcessPoolExecutor(processes) as pool:
@@ -119,16 +121,17 @@ def is_found(objects: NDArray[np.void], accepted: NDArray[np.void]) -> NDArray[n
 
 
 def _look_at_world(
-    folder: Path, lens: str, style: str, detector: DetectorModel, seed: int
+    folder: Path, lens: str, style: str, detector: DetectorModel | None, seed: int
 ) -> tuple[NDArray[np.void], NDArray[np.void]]:
     world = read_world(folder, lens, style, seed)
-    front_end = FrontEnd([camera_of(lens, seed)], model_of(detector))
+    model = None if detector is None else model_of(detector)
+    front_end = FrontEnd([camera_of(lens, seed)], model, threshold=SCORE_MIN)
     detections = []
     for frame, picture in enumerate(world.pictures):
         candidates = front_end.see(picture).candidates
         rows = np.flatnonzero(world.seen["frame"] == frame)
         boxes = np.array([one.outline for one in candidates], np.float32).reshape(-1, 4)
-        owner, overlap = owners(boxes, world.seen[rows])
+        owner, overlap = owners(boxes, world.seen[rows], counts(world.seen[rows]))
         on_clutter = clutter_share(world.clutter[frame], boxes) > CLUTTER_SHARE
         for i, one in enumerate(candidates):
             row = int(rows[owner[i]]) if owner[i] >= 0 else int(owner[i])

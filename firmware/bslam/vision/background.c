@@ -36,11 +36,6 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high)
     return value < low ? low : value > high ? high : value;
 }
 
-static int32_t magnitude(int32_t value)
-{
-    return value < 0 ? -value : value;
-}
-
 void bslam_background_init(bslam_background_t *background)
 {
     memset(background, 0, sizeof *background);
@@ -97,20 +92,6 @@ static bslam_zone_rows_t zone_rows(const bslam_camera_t *camera, int32_t rows, b
         span.end = clamp(row_looking(camera, -WALL_BELOW_RAD), span.first + 1, rows);
     }
     return span;
-}
-
-int32_t bslam_tone_bin(bslam_tone_t tone)
-{
-    const int32_t light = tone.light / 12 > 15 ? 15 : tone.light / 12;
-    const int32_t reddish = clamp(tone.reddish / 8 + 4, 0, 7);
-    const int32_t bluish = clamp(tone.bluish / 8 + 4, 0, 7);
-    return light << 6 | reddish << 3 | bluish;
-}
-
-int32_t bslam_tone_distance(bslam_tone_t a, bslam_tone_t b)
-{
-    return magnitude(a.light - b.light) + 2 * magnitude(a.reddish - b.reddish) +
-           2 * magnitude(a.bluish - b.bluish);
 }
 
 static void count_tones(uint8_t *counts, bslam_zone_rows_t span, int32_t columns, const bslam_tone_t *tones,

@@ -28,7 +28,7 @@ typedef enum bslam_zone {
     BSLAM_ZONE_WALL = 0,
     BSLAM_ZONE_FLOOR = 1,
     BSLAM_ZONE_CEILING = 2,
-    BSLAM_ZONE_COUNT
+    BSLAM_ZONE_COUNT = 3
 } bslam_zone_t;
 
 /// Histogram bins: 16 of light, 8 of each chroma.
@@ -70,11 +70,23 @@ bslam_real_t bslam_horizon_px(const bslam_camera_t *camera);
 void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,
                             const bslam_camera_t *camera, const bslam_tone_t *tones);
 
-/// Histogram bin of a tone.
-int32_t bslam_tone_bin(bslam_tone_t tone);
+/// Histogram bin of a tone: 16 of light, 12 steps each; 8 of each chroma, 8 steps each but for the middle
+/// one, which has the greys on both sides of 0, and those at the ends, which are open.
+static inline int32_t bslam_tone_bin(bslam_tone_t tone)
+{
+    const int32_t light = tone.light < 192 ? tone.light * 171 >> 11 : 15;  // a twelfth, exact up to 192
+    const int32_t reddish = tone.reddish <= -32 ? 0 : tone.reddish >= 24 ? 7 : tone.reddish / 8 + 4;
+    const int32_t bluish = tone.bluish <= -32 ? 0 : tone.bluish >= 24 ? 7 : tone.bluish / 8 + 4;
+    return light << 6 | reddish << 3 | bluish;
+}
 
 /// Distance of two tones: chroma counts twice.
-int32_t bslam_tone_distance(bslam_tone_t a, bslam_tone_t b);
+static inline int32_t bslam_tone_distance(bslam_tone_t a, bslam_tone_t b)
+{
+    const int32_t light = a.light - b.light, reddish = a.reddish - b.reddish, bluish = a.bluish - b.bluish;
+    return (light < 0 ? -light : light) + 2 * (reddish < 0 ? -reddish : reddish) +
+           2 * (bluish < 0 ? -bluish : bluish);
+}
 
 /// Follows each column from below for as long as it looks like floor.
 void bslam_background_floor_line(const bslam_background_t *background, const bslam_frame_t *frame,

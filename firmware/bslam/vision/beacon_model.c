@@ -41,8 +41,8 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
             return status;
         }
     }
-    const float limits[] = {detector->screen_threshold, detector->threshold};
-    if (!are_numbers(limits, 2) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
+    const float limits[] = {detector->screen_threshold, detector->any_threshold, detector->threshold};
+    if (!are_numbers(limits, 3) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
         !are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
         return BSLAM_E_NOT_FINITE;
     }

@@ -10,7 +10,7 @@
 /// so that Python sees them.
 enum {
     BSLAM_CELL_FEATURES = 22,
-    BSLAM_BLOB_FEATURES = 61,
+    BSLAM_BLOB_FEATURES = 80,
 };
 
 #define BSLAM_CLASSES_MAX 16
@@ -32,8 +32,9 @@ typedef struct bslam_detector_model {
     const float *blob_scale;   ///< [BSLAM_BLOB_FEATURES], which is then multiplied by it: about unit range
     bslam_svm_t screen;        ///< 1 row, linear, BSLAM_BLOB_FEATURES
     float screen_threshold;    ///< a proposal below it is dropped before the quadratic machines
+    float any_threshold;       ///< and one whose first row is below this before the other rows
     bslam_svm_t kinds;         ///< class_count + 2 rows, quadratic, BSLAM_BLOB_FEATURES
-    bslam_svm_t fusion;        ///< 1 row, linear, class_count + 3 inputs
+    bslam_svm_t fusion;        ///< 1 row, linear or quadratic, class_count + 3 inputs
     float threshold;           ///< a proposal whose fusion value is below it is no candidate
 } bslam_detector_model_t;
 

@@ -1,5 +1,6 @@
 #include "bslam/vision/detector.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "bslam/base/types.h"
@@ -9,14 +10,19 @@
 #define OVERLAP_MAX BSLAM_R(0.3)
 #define WITHIN_MAX BSLAM_R(0.7)
 
+static void clamp_all(float *values, int32_t count, float limit)
+{
+    for (int32_t i = 0; i < count; i++) {
+        values[i] = values[i] < -limit ? -limit : values[i] > limit ? limit : values[i];
+    }
+}
+
 void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES])
 {
     for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
-        const float x = (features[i] - model->blob_offset[i]) * model->blob_scale[i];
-        features[i] = x < -BSLAM_FEATURE_LIMIT  ? -BSLAM_FEATURE_LIMIT
-                      : x > BSLAM_FEATURE_LIMIT ? BSLAM_FEATURE_LIMIT
-                                                : x;
+        features[i] = (features[i] - model->blob_offset[i]) * model->blob_scale[i];
     }
+    clamp_all(features, BSLAM_BLOB_FEATURES, BSLAM_FEATURE_LIMIT);
 }
 
 /// The kind whose machine is surest, and by how much.
@@ -36,6 +42,19 @@ static void choose_class(const float *kinds, int32_t class_count, bslam_candidat
     candidate->class_margin = kinds[best] - second;
 }
 
+/// A view of the rows [first, end) of a machine.
+static bslam_svm_t rows_of(const bslam_svm_t *svm, int32_t first, int32_t end)
+{
+    const int32_t skipped = first * BSLAM_SVM_WEIGHTS(svm->features, svm->quadratic);
+    bslam_svm_t rows = *svm;
+    rows.rows = end - first;
+    rows.weights = svm->weights != NULL ? svm->weights + skipped : NULL;
+    rows.bytes = svm->bytes != NULL ? svm->bytes + skipped : NULL;
+    rows.byte_scale = svm->byte_scale != NULL ? svm->byte_scale + first : NULL;
+    rows.bias = svm->bias + first;
+    return rows;
+}
+
 /// True if the proposal is a candidate: its score, class and outline are then written.
 static bool judge_one(const bslam_detector_model_t *model, int32_t class_count, const bslam_view_t *view,
                       const bslam_proposal_t *proposal, bslam_candidate_t *candidate)
@@ -49,8 +68,15 @@ static bool judge_one(const bslam_detector_model_t *model, int32_t class_count, 
     if (!(*screen >= model->screen_threshold)) {
         return false;
     }
+    const bslam_svm_t any = rows_of(&model->kinds, 0, 1);
+    bslam_svm_decide(&any, features, values);
+    if (!(values[0] >= model->any_threshold)) {
+        return false;
+    }
     float score;
-    bslam_svm_decide(&model->kinds, features, values);
+    const bslam_svm_t others = rows_of(&model->kinds, 1, model->kinds.rows);
+    bslam_svm_decide(&others, features, values + 1);
+    clamp_all(values, class_count + 3, BSLAM_FUSION_LIMIT);
     bslam_svm_decide(&model->fusion, values, &score);
     if (!(score >= model->threshold)) {
         return false;

@@ -1,5 +1,5 @@
 /// Which of the proposed boxes are beacons, and of which kind: a linear machine screens them, quadratic ones
-/// judge what is left, a last linear one weighs their answers; overlapping boxes give way to the best.
+/// judge what is left, a last quadratic one weighs their answers; overlapping boxes give way to the best.
 #ifndef BSLAM_VISION_DETECTOR_H
 #define BSLAM_VISION_DETECTOR_H
 
@@ -13,6 +13,8 @@ int32_t bslam_detector_judge(const bslam_detector_model_t *model, int32_t class_
 
 /// Features minus offset, times scale, within +-BSLAM_FEATURE_LIMIT.
 #define BSLAM_FEATURE_LIMIT 3.0f
+/// Values of the machines, within this, go to the fusion.
+#define BSLAM_FUSION_LIMIT 4.0f
 void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES]);
 
 #endif

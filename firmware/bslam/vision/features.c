@@ -3,6 +3,8 @@
 /// Columns or rows of cells beside a box that count as its surroundings.
 #define STRIP 2
 #define ZONES 3
+#define CELLS_ENOUGH 16
+#define CONTRAST_FEATURES 6
 
 static int32_t least(int32_t a, int32_t b)
 {
@@ -57,7 +59,9 @@ static void add_cell(sums_t *sums, const bslam_view_t *view, int32_t i)
 static sums_t sum_area(const bslam_view_t *view, area_t area)
 {
     sums_t sums = {0};
-    for (int32_t row = most(area.top, 0); row < least(area.bottom, view->frame->rows); row++) {
+    // Means of every other row of a large area are as good.
+    const int32_t stride = (area.right - area.left) * (area.bottom - area.top) > CELLS_ENOUGH ? 2 : 1;
+    for (int32_t row = most(area.top, 0); row < least(area.bottom, view->frame->rows); row += stride) {
         for (int32_t column = most(area.left, 0); column < least(area.right, view->frame->columns);
              column++) {
             add_cell(&sums, view, row * view->frame->columns + column);
@@ -176,22 +180,61 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     *x++ = known ? 1.0f / wall_m : 0.0f;
     *x++ = share;
     *x++ = known ? log_of(base_m / wall_m) : 0.0f;
-    *x++ = left_m > 0 && right_m > 0 ? log_of(left_m / right_m) : 0.0f;
+    const float turn = left_m > 0 && right_m > 0 ? log_of(left_m / right_m) : 0.0f;
+    *x++ = turn < 0 ? -turn : turn;
     *x++ = (top.slope + bottom.slope) / 2;
     return x;
 }
 
-/// How the box differs from a strip beside it. 4 features: light, chroma, the cells' values, spread.
-static float *contrast_features(const bslam_view_t *view, const sums_t *inside, area_t strip, float *x)
+/// How the box differs from a strip beside it. 6 features: light, chroma, the cells' values, spread, and how
+/// much the strip looks like wall and floor.
+static float *contrast_features(const sums_t *inside, const sums_t *beside, float *x)
 {
-    const sums_t beside = sum_area(view, strip);
-    const bool seen = beside.cells > 0;
-    const float reddish = mean(inside, inside->reddish) - mean(&beside, beside.reddish);
-    const float bluish = mean(inside, inside->bluish) - mean(&beside, beside.bluish);
-    *x++ = seen ? mean(inside, inside->light) - mean(&beside, beside.light) : 0.0f;
+    const bool seen = beside->cells > 0;
+    const float reddish = mean(inside, inside->reddish) - mean(beside, beside->reddish);
+    const float bluish = mean(inside, inside->bluish) - mean(beside, beside->bluish);
+    *x++ = seen ? mean(inside, inside->light) - mean(beside, beside->light) : 0.0f;
     *x++ = seen ? sqrtf(reddish * reddish + bluish * bluish) : 0.0f;
-    *x++ = seen ? mean(&beside, beside.value) : 0.0f;
-    *x++ = seen ? mean(&beside, beside.spread) : 0.0f;
+    *x++ = mean(beside, beside->value);
+    *x++ = mean(beside, beside->spread);
+    *x++ = mean(beside, beside->wall);
+    *x++ = mean(beside, beside->floor);
+    return x;
+}
+
+/// A room has no left and right: of features of both sides, `count` each, their mean and how they differ, so
+/// that a machine need not learn everything twice.
+static void fold(float *left, float *right, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++) {
+        const float difference = left[i] - right[i];
+        left[i] = 0.5f * (left[i] + right[i]);
+        right[i] = difference < 0 ? -difference : difference;
+    }
+}
+
+/// Whether what is on both sides is the same. 2 features: light, chroma.
+static float *likeness_features(const sums_t *a, const sums_t *b, float *x)
+{
+    const bool seen = a->cells > 0 && b->cells > 0;
+    const float light = mean(a, a->light) - mean(b, b->light);
+    const float reddish = mean(a, a->reddish) - mean(b, b->reddish);
+    const float bluish = mean(a, a->bluish) - mean(b, b->bluish);
+    *x++ = seen ? (light < 0 ? -light : light) : 0.0f;
+    *x++ = seen ? sqrtf(reddish * reddish + bluish * bluish) : 0.0f;
+    return x;
+}
+
+/// How sharp the sides are. 2 features a side: mean step, share of it that steps.
+static float *edge_features(const bslam_view_t *view, const bslam_proposal_t *p, float *x)
+{
+    const int32_t lines[BSLAM_SIDES] = {p->left, p->right - 1, p->top, p->bottom - 1};
+    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
+        const bslam_edge_t edge = bslam_edge_along(view, p, (bslam_side_t)side, lines[side]);
+        *x++ = edge.step;
+        *x++ = edge.share;
+    }
+    fold(x - 2 * BSLAM_SIDES, x - 2 * BSLAM_SIDES + 2, 2);
     return x;
 }
 
@@ -221,12 +264,16 @@ static float *texture_features(const bslam_view_t *view, const sums_t *inside, f
 /// How the zones of the box differ from its mean. 2 features a zone: light, chroma.
 static float *zone_features(const sums_t zones[ZONES * ZONES], const sums_t *inside, float *x)
 {
+    float *row = x;
     for (int32_t z = 0; z < ZONES * ZONES; z++) {
         const sums_t *zone = zones[z].cells > 0 ? &zones[z] : inside;
         const float reddish = mean(zone, zone->reddish) - mean(inside, inside->reddish);
         const float bluish = mean(zone, zone->bluish) - mean(inside, inside->bluish);
         *x++ = mean(zone, zone->light) - mean(inside, inside->light);
         *x++ = sqrtf(reddish * reddish + bluish * bluish);
+    }
+    for (; row < x; row += 2 * ZONES) {
+        fold(row, row + 2 * (ZONES - 1), 2);
     }
     return x;
 }
@@ -245,16 +292,25 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
         zones[z] = sum_area(view, area);
         merge(&inside, &zones[z]);
     }
-    const area_t sides[4] = {
+    const area_t sides[BSLAM_SIDES] = {
         {p->left - STRIP, p->top, p->left, p->bottom},
         {p->right, p->top, p->right + STRIP, p->bottom},
         {p->left, p->top - STRIP, p->right, p->top},
         {p->left, p->bottom, p->right, p->bottom + STRIP},
     };
     float *x = place_features(view, p, features);
-    for (int32_t side = 0; side < 4; side++) {
-        x = contrast_features(view, &inside, sides[side], x);
+    const sums_t left = sum_area(view, sides[BSLAM_SIDE_LEFT]),
+                 right = sum_area(view, sides[BSLAM_SIDE_RIGHT]);
+    x = contrast_features(&inside, &left, x);
+    x = contrast_features(&inside, &right, x);
+    fold(x - 2 * CONTRAST_FEATURES, x - CONTRAST_FEATURES, CONTRAST_FEATURES);
+    for (int32_t side = BSLAM_SIDE_TOP; side < BSLAM_SIDES; side++) {
+        const sums_t beside = sum_area(view, sides[side]);
+        x = contrast_features(&inside, &beside, x);
     }
+    x = likeness_features(&left, &right, x);
+    x = edge_features(view, p, x);
+    *x++ = p->segmentation >= BSLAM_SEGMENTATIONS ? 1.0f : 0.0f;
     x = texture_features(view, &inside, x);
     (void)zone_features(zones, &inside, x);
 }

@@ -20,8 +20,10 @@ typedef struct pass {
 } pass_t;
 
 static const pass_t passes[] = {
-    {LIKELY, 0, false, 0},    {LIKELY, 24, false, 0},  {LIKELY, 0, true, 1},   {STANDING, 20, true, 1},
-    {STANDING, 40, false, 0}, {STANDING, 40, true, 1}, {SMOOTH, 40, false, 1},
+    {LIKELY, 0, false, 0},
+    {LIKELY, 24, false, 0},
+    {LIKELY, 0, true, 1},
+    {STANDING, 40, true, 1},
 };
 #define PASSES ((int32_t)(sizeof passes / sizeof passes[0]))
 _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one number a segmentation");
@@ -34,6 +36,12 @@ _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one num
 #define SIDE_MIN 2
 /// Wider than this part of the frame, it is a wall.
 #define SIDE_MAX_PERCENT 75
+/// A cell's step counts so much at most along an edge; above the other it is clearly one.
+#define EDGE_STEP_MAX 60
+#define EDGE_STEP_MIN 8
+#define SNAP_SIDE_MIN 6
+/// How often a box is snapped: a side may move by so many cells.
+#define SNAPS 2
 /// Boxes that overlap more than this are the same.
 #define SAME_OVERLAP BSLAM_R(0.85)
 
@@ -50,105 +58,6 @@ static int32_t most(int32_t a, int32_t b)
 static int32_t clamp(int32_t value, int32_t low, int32_t high)
 {
     return most(low, least(value, high));
-}
-
-static int32_t magnitude(int32_t value)
-{
-    return value < 0 ? -value : value;
-}
-
-bslam_cell_machine_t bslam_cell_machine(const bslam_svm_t *svm)
-{
-    bslam_cell_machine_t machine = {0};
-    const float scale = (float)(BSLAM_CELL_VALUE_ONE << BSLAM_CELL_WEIGHT_SHIFT);
-    for (int32_t i = 0; i < BSLAM_CELL_FEATURES; i++) {
-        const float weight = svm->bytes != NULL ? (float)svm->bytes[i] * svm->byte_scale[0] : svm->weights[i];
-        machine.weights[i] = (int16_t)clamp((int32_t)(weight * scale), -32767, 32767);
-    }
-    machine.bias = (int32_t)(svm->bias[0] * scale);
-    return machine;
-}
-
-/// Difference of two cells' colours; green counts twice.
-static uint8_t colour_step(bslam_cell_t a, bslam_cell_t b)
-{
-    const int32_t step =
-        magnitude(a.red - b.red) + 2 * magnitude(a.green - b.green) + magnitude(a.blue - b.blue);
-    return (uint8_t)least(step, 255);
-}
-
-void bslam_cells_step(const bslam_view_t *view, uint8_t *step_x, uint8_t *step_y)
-{
-    const int32_t columns = view->frame->columns, rows = view->frame->rows;
-    const bslam_cell_t *cells = view->frame->cells;
-    for (int32_t row = 0; row < rows; row++) {
-        const int32_t up = row > 0 ? columns : 0, down = row + 1 < rows ? columns : 0;
-        for (int32_t column = 0; column < columns; column++) {
-            const int32_t i = row * columns + column;
-            const int32_t left = column > 0 ? 1 : 0, right = column + 1 < columns ? 1 : 0;
-            step_x[i] = colour_step(cells[i - left], cells[i + right]);
-            step_y[i] = colour_step(cells[i - up], cells[i + down]);
-        }
-    }
-}
-
-void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
-                         int16_t features[BSLAM_CELL_FEATURES])
-{
-    const int32_t columns = view->frame->columns;
-    const int32_t i = row * columns + column;
-    const bslam_tone_t tone = view->tones[i];
-    const bslam_background_t *background = view->background;
-    const bslam_tone_t wall = background->tone[BSLAM_ZONE_WALL];
-    const bslam_tone_t floor = background->tone[BSLAM_ZONE_FLOOR];
-    const bslam_tone_t ceiling = background->tone[BSLAM_ZONE_CEILING];
-    const int32_t bin = bslam_tone_bin(tone);
-    const int32_t wall_distance = bslam_tone_distance(tone, wall);
-    const int32_t floor_distance = bslam_tone_distance(tone, floor);
-    const int32_t ceiling_distance = bslam_tone_distance(tone, ceiling);
-    const int32_t above_floor = view->floor_line->row[column] - row;
-    const int32_t above_horizon = bslam_horizon_row(view->camera) - row;
-    int16_t *x = features;
-
-    *x++ = (int16_t)clamp(tone.light - wall.light, -96, 96);
-    *x++ = (int16_t)clamp(magnitude(tone.light - wall.light), 0, 96);
-    *x++ = (int16_t)clamp(magnitude(tone.reddish - wall.reddish), 0, 64);
-    *x++ = (int16_t)clamp(magnitude(tone.bluish - wall.bluish), 0, 64);
-    *x++ = (int16_t)clamp(floor_distance, 0, 128);
-    *x++ = (int16_t)clamp(ceiling_distance, 0, 128);
-    *x++ = (int16_t)clamp(least(wall_distance, least(floor_distance, ceiling_distance)), 0, 128);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_WALL][bin], 32);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_WALL][bin], 6);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_FLOOR][bin], 32);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_FLOOR][bin], 6);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_CEILING][bin], 32);
-    *x++ = (int16_t)clamp(tone.spread, 0, 64);
-    *x++ = (int16_t)least(view->step_x[i], 128);
-    *x++ = (int16_t)least(view->step_y[i], 128);
-    *x++ = (int16_t)least(magnitude(tone.reddish) + magnitude(tone.bluish), 128);
-    *x++ = (int16_t)clamp(above_floor, -8, 40);
-    *x++ = (int16_t)clamp(above_floor, -3, 3);
-    *x++ = (int16_t)clamp(above_horizon, -30, 30);
-    *x++ = (int16_t)most(clamp(above_horizon, -30, 30), 0);
-    *x++ = (int16_t)(above_floor >= 0 ? least(wall_distance, 128) : 0);
-    *x++ = (int16_t)(above_floor >= 0 ? clamp(tone.light - wall.light, -96, 0) : 0);
-}
-
-void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine, int8_t *values)
-{
-    const int32_t columns = view->frame->columns, rows = view->frame->rows;
-    for (int32_t row = 0; row < rows; row++) {
-        for (int32_t column = 0; column < columns; column++) {
-            int16_t x[BSLAM_CELL_FEATURES];
-            bslam_cell_features(view, row, column, x);
-            int32_t sum = machine->bias;
-            for (int32_t k = 0; k < BSLAM_CELL_FEATURES; k++) {
-                sum += machine->weights[k] * x[k];
-            }
-            const int32_t value = sum / (1 << BSLAM_CELL_WEIGHT_SHIFT);
-            values[row * columns + column] = (int8_t)clamp(value, -127, 127);
-        }
-    }
 }
 
 static int32_t root_of(bslam_run_t *runs, int32_t run)
@@ -176,6 +85,16 @@ static void join(bslam_run_t *runs, int32_t a, int32_t b)
     into->cells = (uint16_t)(into->cells + from->cells);
 }
 
+#define WORD ((int32_t)sizeof(uint32_t))
+
+/// Four cells of a mask at once.
+static uint32_t word_of(const uint8_t *mask)
+{
+    uint32_t word;
+    memcpy(&word, mask, sizeof word);
+    return word;
+}
+
 /// Appends the runs of a row; returns how many runs there are then.
 static int32_t find_runs(bslam_proposals_t *proposals, const uint8_t *mask, int32_t columns, int32_t row,
                          int32_t count)
@@ -183,7 +102,7 @@ static int32_t find_runs(bslam_proposals_t *proposals, const uint8_t *mask, int3
     int32_t column = 0;
     while (column < columns) {
         if (mask[column] == 0) {
-            column++;
+            column += column + WORD <= columns && word_of(mask + column) == 0 ? WORD : 1;
             continue;
         }
         const int32_t first = column++;
@@ -251,21 +170,108 @@ static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
     return false;
 }
 
-void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_proposal_t *proposal)
+bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+                              int32_t line)
 {
-    if (is_known(proposals, &proposal->box)) {
+    const int32_t columns = view->frame->columns, rows = view->frame->rows;
+    const bool upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    const int32_t first = upright ? box->top : box->left, end = upright ? box->bottom : box->right;
+    bslam_edge_t edge = {0, 0};
+    if (line < 0 || line >= (upright ? columns : rows) || first >= end) {
+        return edge;
+    }
+    const uint8_t *step =
+        upright ? view->step_x + first * columns + line : view->step_y + line * columns + first;
+    const int32_t stride = upright ? columns : 1;
+    int32_t sum = 0, clear = 0;
+    for (int32_t i = 0; i < end - first; i++) {
+        const int32_t here = step[i * stride];
+        sum += least(here, EDGE_STEP_MAX);
+        clear += here > EDGE_STEP_MIN ? 1 : 0;
+    }
+    edge.step = (float)sum / (float)(end - first);
+    edge.share = (float)clear / (float)(end - first);
+    return edge;
+}
+
+/// Where an edge lies between the cells `line` - 1 and `line` + 1, in cells from `line`: the top of a
+/// parabola.
+static float peak_of(float before, float here, float after)
+{
+    const float bend = 2 * here - before - after;
+    const float shift = bend > 1e-3f ? 0.5f * (after - before) / bend : 0.0f;
+    return shift < -0.5f ? -0.5f : shift > 0.5f ? 0.5f : shift;
+}
+
+/// The line of cells at `line`, or the next one outside, that has the stronger edge; the next one inside only
+/// where both have none, since what is inside has edges of its own. *shift is where in it, in cells.
+static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+                         int32_t line, float *shift)
+{
+    const int32_t outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
+    float steps[5];
+    for (int32_t i = 0; i < 5; i++) {
+        steps[i] = bslam_edge_along(view, box, side, line - 2 + i).step;
+    }
+    int32_t best = steps[2 + outside] > steps[2] ? 2 + outside : 2;
+    if (steps[best] < (float)EDGE_STEP_MIN && steps[2 - outside] > steps[best]) {
+        best = 2 - outside;
+    }
+    *shift = peak_of(steps[best - 1], steps[best], steps[best + 1]);
+    return line - 2 + best;
+}
+
+static bslam_proposal_t snapped(const bslam_view_t *view, const bslam_proposal_t *rough)
+{
+    const int32_t lines[BSLAM_SIDES] = {rough->left, rough->right - 1, rough->top, rough->bottom - 1};
+    const int32_t ends[BSLAM_SIDES] = {view->frame->columns, view->frame->columns, view->frame->rows,
+                                       view->frame->rows};
+    int32_t cells[BSLAM_SIDES];
+    bslam_real_t edges_px[BSLAM_SIDES];
+    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
+        float shift = 0;
+        const int32_t line = snap_side(view, rough, (bslam_side_t)side, lines[side], &shift);
+        cells[side] = clamp(line, 0, ends[side] - 1);
+        edges_px[side] = ((bslam_real_t)cells[side] + (bslam_real_t)shift) * BSLAM_CELL_PX + BSLAM_R(1.5);
+    }
+    bslam_proposal_t box = *rough;
+    if (cells[BSLAM_SIDE_RIGHT] <= cells[BSLAM_SIDE_LEFT] ||
+        cells[BSLAM_SIDE_BOTTOM] <= cells[BSLAM_SIDE_TOP]) {
+        return box;
+    }
+    box.left = (int16_t)cells[BSLAM_SIDE_LEFT];
+    box.right = (int16_t)(cells[BSLAM_SIDE_RIGHT] + 1);
+    box.top = (int16_t)cells[BSLAM_SIDE_TOP];
+    box.bottom = (int16_t)(cells[BSLAM_SIDE_BOTTOM] + 1);
+    box.box = (bslam_box_t){edges_px[BSLAM_SIDE_LEFT], edges_px[BSLAM_SIDE_TOP], edges_px[BSLAM_SIDE_RIGHT],
+                            edges_px[BSLAM_SIDE_BOTTOM]};
+    return box;
+}
+
+void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
+                         const bslam_proposal_t *proposal)
+{
+    // In a small box a side would snap to the opposite one.
+    const bool small =
+        proposal->right - proposal->left < SNAP_SIDE_MIN || proposal->bottom - proposal->top < SNAP_SIDE_MIN;
+    bslam_proposal_t box = *proposal;
+    for (int32_t i = 0; i < SNAPS && !small; i++) {
+        box = snapped(view, &box);
+    }
+    if (is_known(proposals, &box.box)) {
         return;
     }
     if (proposals->count == BSLAM_PROPOSALS_MAX) {
         proposals->boxes_dropped++;
         return;
     }
-    proposals->items[proposals->count++] = *proposal;
+    proposals->items[proposals->count++] = box;
 }
 
-static void propose(bslam_proposals_t *proposals, const bslam_frame_t *frame, const bslam_run_t *root,
+static void propose(bslam_proposals_t *proposals, const bslam_view_t *view, const bslam_run_t *root,
                     int32_t pass)
 {
+    const bslam_frame_t *frame = view->frame;
     const int32_t grow = passes[pass].grow;
     const int32_t left = most(root->left - grow, 0), right = least(root->right + grow, frame->columns);
     const int32_t top = most(root->top - grow, 0), bottom = least(root->bottom + grow, frame->rows);
@@ -285,7 +291,7 @@ static void propose(bslam_proposals_t *proposals, const bslam_frame_t *frame, co
         .box = {(bslam_real_t)left * cell_px - edge_px, (bslam_real_t)top * cell_px - edge_px,
                 (bslam_real_t)right * cell_px - edge_px, (bslam_real_t)bottom * cell_px - edge_px},
     };
-    bslam_proposals_add(proposals, &proposal);
+    bslam_proposals_add(proposals, view, &proposal);
 }
 
 /// Finds the components of the mask; returns how many runs they have.
@@ -302,29 +308,35 @@ static int32_t find_components(bslam_proposals_t *proposals, const bslam_frame_t
     return middle;
 }
 
-static void propose_components(bslam_proposals_t *proposals, const bslam_frame_t *frame, int32_t runs,
+static void propose_components(bslam_proposals_t *proposals, const bslam_view_t *view, int32_t runs,
                                int32_t pass)
 {
     for (int32_t run = 0; run < runs; run++) {
         if (proposals->runs[run].parent == run) {
-            propose(proposals, frame, &proposals->runs[run], pass);
+            propose(proposals, view, &proposals->runs[run], pass);
         }
     }
 }
 
-static void mask_likely(uint8_t *mask, const bslam_view_t *view, int32_t level)
+/// Whole steps of BSLAM_CELL_STEP cells, so that a compiler can use vector instructions; the tables have
+/// room.
+static void mask_likely(uint8_t *restrict mask, const int8_t *restrict values, int32_t cells, int8_t level)
 {
-    const int32_t cells = view->frame->rows * view->frame->columns;
-    for (int32_t i = 0; i < cells; i++) {
-        mask[i] = view->values[i] > level ? 1 : 0;
+    for (int32_t i = 0; i < cells; i += BSLAM_CELL_STEP) {
+        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
+            mask[k] = values[k] > level ? 1 : 0;
+        }
     }
 }
 
-static void mask_smooth(uint8_t *mask, const bslam_view_t *view, int32_t level)
+static void mask_smooth(uint8_t *restrict mask, const uint8_t *restrict step_x,
+                        const uint8_t *restrict step_y, int32_t cells, uint8_t level)
 {
-    const int32_t cells = view->frame->rows * view->frame->columns;
-    for (int32_t i = 0; i < cells; i++) {
-        mask[i] = view->step_x[i] <= level && view->step_y[i] <= level ? 1 : 0;
+    for (int32_t i = 0; i < cells; i += BSLAM_CELL_STEP) {
+        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
+            const uint8_t step = step_x[k] > step_y[k] ? step_x[k] : step_y[k];
+            mask[k] = step <= level ? 1 : 0;
+        }
     }
 }
 
@@ -340,9 +352,7 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
 {
     const bslam_frame_t *frame = view->frame;
     uint8_t *mask = proposals->mask;
-    for (int32_t i = 0; i < frame->rows * frame->columns; i++) {
-        mask[i] = 1;
-    }
+    memset(mask, 1, (size_t)frame->rows * (size_t)frame->columns);
     for (int32_t i = 0; i < runs; i++) {
         const bslam_run_t *run = &proposals->runs[i];
         if (is_room(&proposals->runs[root_of(proposals->runs, i)], frame)) {
@@ -356,27 +366,27 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
     }
 }
 
-/// Leaves only the cells whose eight neighbours are in the mask too.
+/// Leaves only the cells whose eight neighbours are in the mask too: rows, then columns.
 static void shrink_mask(uint8_t *mask, int32_t columns, int32_t rows)
 {
+    uint8_t above[BSLAM_COLUMNS_MAX] = {0};
     for (int32_t row = 0; row < rows; row++) {
         uint8_t *line = mask + row * columns;
         uint8_t before = 0;
-        for (int32_t column = 0; column < columns; column++) {
+        for (int32_t column = 0; column + 1 < columns; column++) {
             const uint8_t here = line[column];
-            const uint8_t after = column + 1 < columns ? line[column + 1] : 0;
-            line[column] = before & here & after;
+            line[column] = before & here & line[column + 1];
             before = here;
         }
+        line[columns - 1] = 0;
     }
-    for (int32_t column = 0; column < columns; column++) {
-        uint8_t before = 0;
-        for (int32_t row = 0; row < rows; row++) {
-            uint8_t *cell = mask + row * columns + column;
-            const uint8_t here = *cell;
-            const uint8_t after = row + 1 < rows ? cell[columns] : 0;
-            *cell = before & here & after;
-            before = here;
+    for (int32_t row = 0; row < rows; row++) {
+        uint8_t *line = mask + row * columns;
+        for (int32_t column = 0; column < columns; column++) {
+            const uint8_t here = line[column];
+            const uint8_t below = row + 1 < rows ? line[column + columns] : 0;
+            line[column] = above[column] & here & below;
+            above[column] = here;
         }
     }
 }
@@ -385,10 +395,11 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
 {
     const pass_t *p = &passes[pass];
     const bslam_frame_t *frame = view->frame;
+    const int32_t cells = frame->rows * frame->columns;
     if (p->source == LIKELY) {
-        mask_likely(proposals->mask, view, p->level);
+        mask_likely(proposals->mask, view->values, cells, (int8_t)p->level);
     } else {
-        mask_smooth(proposals->mask, view, p->level);
+        mask_smooth(proposals->mask, view->step_x, view->step_y, cells, (uint8_t)p->level);
     }
     if (p->source == STANDING) {
         mask_standing(proposals, view, find_components(proposals, frame));
@@ -396,7 +407,7 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
     if (p->shrink) {
         shrink_mask(proposals->mask, frame->columns, frame->rows);
     }
-    propose_components(proposals, frame, find_components(proposals, frame), pass);
+    propose_components(proposals, view, find_components(proposals, frame), pass);
 }
 
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view)

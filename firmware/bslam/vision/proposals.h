@@ -1,42 +1,19 @@
-/// Where a beacon may be: each cell is judged by a linear SVM, then cells that hang together become boxes.
+/// Where a beacon may be: cells that hang together become boxes.
 ///
 /// One segmentation misses much: an object whose middle looks like wall falls apart at a high threshold, two
-/// neighbours run together at a low one. So five run over the same values, at different thresholds and with
-/// different limits on how far the tone may step inside one component.
+/// neighbours run together at a low one. So several run over the same cells: by the cell machine's values at
+/// different levels, and by where the colour steps.
 #ifndef BSLAM_VISION_PROPOSALS_H
 #define BSLAM_VISION_PROPOSALS_H
 
-#include "bslam/vision/background.h"
-#include "bslam/vision/beacon_model.h"
-
-/// Steps of a cell's value for a decision value of 1.
-#define BSLAM_CELL_VALUE_ONE 32
-
-/// What is known of a frame before its boxes are.
-typedef struct bslam_view {
-    const bslam_frame_t *frame;
-    const bslam_camera_t *camera;
-    const bslam_background_t *background;
-    const bslam_floor_line_t *floor_line;
-    const bslam_tone_t *tones;  ///< [rows][columns], as all that follow
-    const uint8_t *step_x;      ///< colour difference of the cells on the left and right, at most 255
-    const uint8_t *step_y;      ///< of those above and below
-    const int8_t *values;       ///< decision value of each cell, in 1/BSLAM_CELL_VALUE_ONE
-} bslam_view_t;
-
-/// The cell SVM in whole numbers: value = (sum of weight x feature + bias) >> BSLAM_CELL_WEIGHT_SHIFT.
-#define BSLAM_CELL_WEIGHT_SHIFT 10
-typedef struct bslam_cell_machine {
-    int16_t weights[BSLAM_CELL_FEATURES];
-    int32_t bias;
-} bslam_cell_machine_t;
+#include "bslam/vision/cells.h"
 
 /// Segmentations of a frame; boxes found otherwise have numbers from here on.
-#define BSLAM_SEGMENTATIONS 7
+#define BSLAM_SEGMENTATIONS 4
 
 /// A box in which there may be a beacon.
 typedef struct bslam_proposal {
-    int16_t left;  ///< in cells: [left, right) by [top, bottom)
+    int16_t left;  ///< in cells: [left, right) by [top, bottom); the outermost ones hold its edges
     int16_t top;
     int16_t right;
     int16_t bottom;
@@ -65,24 +42,33 @@ typedef struct bslam_proposals {
     uint32_t boxes_dropped;  ///< since init: BSLAM_PROPOSALS_MAX did not suffice
     bslam_proposal_t items[BSLAM_PROPOSALS_MAX];
     bslam_run_t runs[BSLAM_RUNS_MAX];
-    uint8_t mask[BSLAM_CELLS_MAX];  ///< 1: the present segmentation joins this cell
+    uint8_t mask[BSLAM_CELLS_ROOM];  ///< 1: the present segmentation joins this cell
 } bslam_proposals_t;
 
-/// The machine of a model, rounded to whole numbers.
-bslam_cell_machine_t bslam_cell_machine(const bslam_svm_t *svm);
+/// Moves each side of a box by up to a cell to where the colour steps most along it, then adds the box,
+/// unless it is known or there is no room.
+void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
+                         const bslam_proposal_t *proposal);
 
-/// Fills the view's step_x and step_y, given as arrays to write to.
-void bslam_cells_step(const bslam_view_t *view, uint8_t *step_x, uint8_t *step_y);
+/// Sides of a box.
+typedef enum bslam_side {
+    BSLAM_SIDE_LEFT = 0,
+    BSLAM_SIDE_RIGHT = 1,
+    BSLAM_SIDE_TOP = 2,
+    BSLAM_SIDE_BOTTOM = 3,
+    BSLAM_SIDES = 4
+} bslam_side_t;
 
-/// The features of one cell, in steps of tones and rows.
-void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
-                         int16_t features[BSLAM_CELL_FEATURES]);
+/// How the colour steps across a line of cells.
+typedef struct bslam_edge {
+    float step;   ///< mean over the line; a cell counts 60 at most
+    float share;  ///< of the cells that step by more than 8
+} bslam_edge_t;
 
-/// Fills the view's values, given as an array to write to.
-void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine, int8_t *values);
-
-/// Adds a box, unless it is known or there is no room.
-void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_proposal_t *proposal);
+/// The edge along a column (sides left, right) or row (top, bottom) of cells, between the box's other sides.
+/// All zero outside the frame.
+bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+                              int32_t line);
 
 /// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice.
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view);

@@ -84,31 +84,59 @@ static bslam_cell_t cell_of_sum(uint32_t sum, uint32_t spread)
     return cell;
 }
 
+/// A row of the half-resolution copy, and the brightness of its pixels.
+static void reduce_quads(const uint32_t *restrict sums, uint16_t *restrict half, uint16_t *restrict lumas,
+                         int32_t pairs)
+{
+    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
+        for (int32_t k = i; k < i + PAIRS_A_STEP; k++) {
+            half[k] = mean_565(sums[k]);
+            lumas[k] = (uint16_t)luma(sums[k]);
+        }
+    }
+}
+
+static uint16_t darker(uint16_t a, uint16_t b)
+{
+    return a < b ? a : b;
+}
+
+static uint16_t brighter(uint16_t a, uint16_t b)
+{
+    return a > b ? a : b;
+}
+
+/// Keeps the upper half of a row of cells.
+static void begin_cells(bslam_thumbnail_t *t, int32_t columns)
+{
+    for (int32_t c = 0; c < columns; c++) {
+        t->cell_sums[c] = t->pair_sums[2 * c] + t->pair_sums[2 * c + 1];
+        t->darkest[c] = darker(t->lumas[2 * c], t->lumas[2 * c + 1]);
+        t->brightest[c] = brighter(t->lumas[2 * c], t->lumas[2 * c + 1]);
+    }
+}
+
+/// Adds the lower half to it.
+static void finish_cells(bslam_thumbnail_t *t, int32_t columns, bslam_cell_t *cells)
+{
+    for (int32_t c = 0; c < columns; c++) {
+        const uint32_t sum = t->cell_sums[c] + t->pair_sums[2 * c] + t->pair_sums[2 * c + 1];
+        const uint16_t low = darker(t->darkest[c], darker(t->lumas[2 * c], t->lumas[2 * c + 1]));
+        const uint16_t high = brighter(t->brightest[c], brighter(t->lumas[2 * c], t->lumas[2 * c + 1]));
+        cells[c] = cell_of_sum(sum, (uint32_t)(high - low));
+    }
+}
+
 /// Turns two summed rows into a row of the half-resolution copy and the upper or lower half of a row of
 /// cells.
 static void reduce_two_rows(bslam_thumbnail_t *t)
 {
-    const int32_t columns = t->width_px / BSLAM_CELL_PX;
-    uint16_t *half = t->half + t->rows_seen / 2 * (t->width_px / 2);
-    bslam_cell_t *cells = t->cells + t->rows_seen / BSLAM_CELL_PX * columns;
-    const bool is_lower = t->rows_seen % BSLAM_CELL_PX == 3;
-
-    for (int32_t c = 0; c < columns; c++) {
-        const uint32_t left = t->pair_sums[2 * c], right = t->pair_sums[2 * c + 1];
-        const uint32_t left_luma = luma(left), right_luma = luma(right);
-        uint32_t low = left_luma < right_luma ? left_luma : right_luma;
-        uint32_t high = left_luma < right_luma ? right_luma : left_luma;
-        half[2 * c] = mean_565(left);
-        half[2 * c + 1] = mean_565(right);
-        if (is_lower) {
-            low = low < t->darkest[c] ? low : t->darkest[c];
-            high = high > t->brightest[c] ? high : t->brightest[c];
-            cells[c] = cell_of_sum(t->cell_sums[c] + left + right, high - low);
-        } else {
-            t->cell_sums[c] = left + right;
-            t->darkest[c] = (uint16_t)low;
-            t->brightest[c] = (uint16_t)high;
-        }
+    const int32_t columns = t->width_px / BSLAM_CELL_PX, pairs = t->width_px / 2;
+    reduce_quads(t->pair_sums, t->half + t->rows_seen / 2 * pairs, t->lumas, pairs);
+    if (t->rows_seen % BSLAM_CELL_PX == 3) {
+        finish_cells(t, columns, t->cells + t->rows_seen / BSLAM_CELL_PX * columns);
+    } else {
+        begin_cells(t, columns);
     }
 }
 

@@ -24,6 +24,7 @@ typedef struct bslam_thumbnail {
     int32_t rows_seen;  ///< of the frame that is streaming in
     uint32_t pair_sums[BSLAM_IMAGE_WIDTH_MAX / 2];
     uint32_t cell_sums[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
+    uint16_t lumas[BSLAM_IMAGE_WIDTH_MAX / 2];
     uint16_t darkest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
     uint16_t brightest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
     bslam_cell_t cells[BSLAM_CELLS_MAX];

@@ -22,19 +22,20 @@ static const upright_t uprights[] = {
 /// Sides of a kind in a frame, and boxes that come of them.
 #define SIDES_MAX 14
 #define BOXES_MAX 8
-/// A side is one whose mean step is at least this; a cell counts at most STEP_MAX.
-#define STEP_MEAN_MIN 7
+/// A side is one whose mean step is at least this, in quarters; a cell counts at most STEP_MAX.
+#define STEP_MEAN_MIN (4 * 7)
 #define STEP_MAX 60
 
-/// A column where there may be a side: rows [top, bottom) of the kind there, pixels of a metre, mean step.
+/// A column where there may be a side: rows [top, bottom) of the kind there, pixels of a metre, mean step in
+/// quarters.
 typedef struct side {
     int16_t column, top, bottom;
     float metre_px;
     float step;
 } side_t;
 
-/// Mean of the sideways steps in a column between two rows.
-static float mean_step(const bslam_view_t *view, int32_t column, int32_t top, int32_t bottom)
+/// Mean of the sideways steps in a column between two rows, in quarters.
+static uint8_t mean_step(const bslam_view_t *view, int32_t column, int32_t top, int32_t bottom)
 {
     const int32_t columns = view->frame->columns;
     int32_t sum = 0;
@@ -42,7 +43,7 @@ static float mean_step(const bslam_view_t *view, int32_t column, int32_t top, in
         const int32_t step = view->step_x[row * columns + column];
         sum += step < STEP_MAX ? step : STEP_MAX;
     }
-    return (float)sum / (float)(bottom - top);
+    return (uint8_t)(4 * sum / (bottom - top));
 }
 
 /// Where the kind would stand in a column. False: it would leave the frame, or the floor line is not known.
@@ -71,17 +72,16 @@ static bool place(const bslam_view_t *view, const upright_t *kind, int32_t colum
 /// The strongest sides of a kind, at most SIDES_MAX, in order of columns.
 static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_t sides[SIDES_MAX])
 {
-    float steps[BSLAM_COLUMNS_MAX];
-    side_t places[BSLAM_COLUMNS_MAX];
+    uint8_t steps[BSLAM_COLUMNS_MAX];
     const int32_t columns = view->frame->columns;
+    side_t side = {0};
     for (int32_t column = 0; column < columns; column++) {
-        steps[column] = place(view, kind, column, &places[column])
-                            ? mean_step(view, column, places[column].top, places[column].bottom)
-                            : 0.0f;
+        const bool stands = place(view, kind, column, &side);
+        steps[column] = stands ? mean_step(view, column, side.top, side.bottom) : 0;
     }
     int32_t count = 0;
     for (int32_t column = 1; column + 1 < columns; column++) {
-        const float step = steps[column];
+        const uint8_t step = steps[column];
         if (step < STEP_MEAN_MIN || step < steps[column - 1] || step <= steps[column + 1]) {
             continue;
         }
@@ -90,14 +90,14 @@ static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_
             for (int32_t i = 0; i < count; i++) {
                 at = at == SIDES_MAX || sides[i].step < sides[at].step ? i : at;
             }
-            if (sides[at].step >= step) {
+            if (sides[at].step >= (float)step) {
                 continue;
             }
             memmove(&sides[at], &sides[at + 1], (size_t)(count - 1 - at) * sizeof sides[0]);
             at = --count;
         }
-        sides[at] = places[column];
-        sides[at].step = step;
+        (void)place(view, kind, column, &sides[at]);
+        sides[at].step = (float)step;
         count++;
     }
     return count;
@@ -132,7 +132,8 @@ static bslam_proposal_t box_of(const side_t *left, const side_t *right, int32_t 
 }
 
 /// Proposes the best pairs of a kind's sides.
-static void propose_pairs(bslam_proposals_t *proposals, const side_t *sides, int32_t count, int32_t kind)
+static void propose_pairs(bslam_proposals_t *proposals, const bslam_view_t *view, const side_t *sides,
+                          int32_t count, int32_t kind)
 {
     float limit = 1e9f;
     for (int32_t box = 0; box < BOXES_MAX; box++) {
@@ -156,15 +157,15 @@ static void propose_pairs(bslam_proposals_t *proposals, const side_t *sides, int
         }
         limit = best;
         const bslam_proposal_t proposal = box_of(&sides[best_left], &sides[best_right], kind);
-        bslam_proposals_add(proposals, &proposal);
+        bslam_proposals_add(proposals, view, &proposal);
     }
 }
 
 void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view)
 {
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-        side_t sides[SIDES_MAX];
+        side_t sides[SIDES_MAX] = {0};
         const int32_t count = find_sides(view, &uprights[kind], sides);
-        propose_pairs(proposals, sides, count, kind);
+        propose_pairs(proposals, view, sides, count, kind);
     }
 }

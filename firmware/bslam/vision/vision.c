@@ -186,13 +186,17 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
     return bslam_measure(frame, camera, &rough, &own_size, candidate);
 }
 
-/// Measures the candidates; one that has no outline is of no use.
+/// Measures the candidates; one that has no outline is of no use. Through a wide lens a thing's sides are
+/// bent, and the box around the straight ones that measuring finds is too narrow: there the detector's stays.
 static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
 {
+    const bool is_wide = vision->cameras[vision->camera].lens == BSLAM_LENS_EQUIDISTANT;
     int32_t kept = 0;
     for (int32_t i = 0; i < vision->candidate_count; i++) {
         bslam_candidate_t candidate = vision->candidates[i];
+        const bslam_box_t found = candidate.outline;
         if (measure_one(vision, frame, &candidate) == BSLAM_OK) {
+            candidate.outline = is_wide ? found : candidate.outline;
             vision->candidates[kept++] = candidate;
         }
     }
@@ -212,7 +216,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     }
     bslam_background_floor_line(background, frame, view.camera, vision->tones, &vision->floor_line);
     bslam_cells_step(&view, vision->step_x, vision->step_y);
-    bslam_cells_decide(&view, &vision->machines[camera], vision->values);
+    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->values);
     bslam_proposals_find(&vision->proposals, &view);
     bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =

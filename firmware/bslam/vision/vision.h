@@ -42,10 +42,11 @@ typedef struct bslam_vision {
     bslam_thumbnail_t thumbnail;
     bslam_proposals_t proposals;
     bslam_floor_line_t floor_line;
+    bslam_cell_tables_t cell_tables;
     bslam_tone_t tones[BSLAM_CELLS_MAX];
-    uint8_t step_x[BSLAM_CELLS_MAX];
-    uint8_t step_y[BSLAM_CELLS_MAX];
-    int8_t values[BSLAM_CELLS_MAX];
+    uint8_t step_x[BSLAM_CELLS_ROOM];
+    uint8_t step_y[BSLAM_CELLS_ROOM];
+    int8_t values[BSLAM_CELLS_ROOM];
 } bslam_vision_t;
 
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are

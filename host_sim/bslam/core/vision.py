@@ -32,6 +32,7 @@ class DetectorModel:
     blob_scale: NDArray[np.float32]
     screen: Svm
     screen_threshold: float
+    any_threshold: float
     kinds: Svm
     fusion: Svm
     threshold: float
@@ -90,8 +91,10 @@ class FrontEnd:
         cameras: Sequence[Camera],
         model: BeaconModel | None = None,
         recogniser: Recogniser | None = None,
+        threshold: float | None = None,
     ) -> None:
-        """`model`: the built-in one unless given; `recogniser`: of a user's own objects, besides.
+        """`model`: the built-in one unless given; `recogniser`: of a user's own objects, besides;
+        `threshold`: of a candidate's score, in place of the model's.
 
         BslamError if the library refuses model, recogniser or cameras.
         """
@@ -103,9 +106,11 @@ class FrontEnd:
         if self._model == ffi.NULL:
             raise BslamError("no built-in model: run `make train`, or give one")
         self._objects = () if recogniser is None else recogniser.objects
+        self._model = ffi.new("bslam_beacon_model_t *", self._model[0])
         if recogniser is not None:
-            self._model = ffi.new("bslam_beacon_model_t *", self._model[0])
             self._model.recogniser = self._recogniser(recogniser)
+        if threshold is not None:
+            self._model.pinhole.threshold = self._model.wide.threshold = threshold
         self._vision = ffi.new("bslam_vision_t *")
         array = ffi.new("bslam_camera_t[]", [self._camera(camera)[0] for camera in cameras])
         self._library.ensure(
@@ -162,6 +167,11 @@ class FrontEnd:
         found = library.new_filled("bslam_candidate_t", object=-1)
         status = library.lib.bslam_vision_measure(self._vision, rough, size, found)
         return found if status == library.lib.BSLAM_OK else None
+
+    def threshold(self, camera: int = 0) -> float:
+        """The score from which on a box in a camera's pictures is a candidate."""
+        model, kind = self._model, self._cameras[camera].lens.kind
+        return float((model.pinhole if kind == "pinhole" else model.wide).threshold)
 
     def point(self, camera: int, yaw_rad: float) -> None:
         """Turns a camera on a pan unit. BslamError: no such camera, or |yaw| above pi."""
@@ -302,6 +312,7 @@ class FrontEnd:
             blob_scale=library.table("float", model.blob_scale, keep),
             screen=library.svm(model.screen, keep),
             screen_threshold=model.screen_threshold,
+            any_threshold=model.any_threshold,
             kinds=library.svm(model.kinds, keep),
             fusion=library.svm(model.fusion, keep),
             threshold=model.threshold,

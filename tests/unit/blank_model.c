@@ -1,0 +1,39 @@
+#include "blank_model.h"
+
+#include <string.h>
+
+static const bslam_beacon_class_t classes[UNIT_MODEL_CLASSES] = {
+    {"tall", 2.0f, 0.0f},
+    {"small", 0.3f, 0.0f},
+};
+
+static bslam_svm_t machine(int32_t rows, int32_t features, bool quadratic, const float *weights,
+                           const float *bias)
+{
+    const bslam_svm_t svm = {
+        .rows = rows, .features = features, .quadratic = quadratic, .weights = weights, .bias = bias};
+    return svm;
+}
+
+bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
+{
+    unit_detector_t *d = detector;
+    memset(d, 0, sizeof *d);
+    for (int i = 0; i < BSLAM_BLOB_FEATURES; i++) {
+        d->blob_scale[i] = 1;
+    }
+    const bslam_detector_model_t views = {
+        .cell = machine(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
+        .blob_offset = d->blob_offset,
+        .blob_scale = d->blob_scale,
+        .screen = machine(1, BSLAM_BLOB_FEATURES, false, d->screen_weights, &d->screen_bias),
+        .screen_threshold = -1e6f,
+        .any_threshold = -1e6f,
+        .kinds = machine(UNIT_MODEL_CLASSES + 2, BSLAM_BLOB_FEATURES, true, d->kind_weights, d->kind_bias),
+        .fusion = machine(1, UNIT_MODEL_CLASSES + 3, false, d->fusion_weights, &d->fusion_bias),
+        .threshold = 0,
+    };
+    const bslam_beacon_model_t model = {
+        .class_count = UNIT_MODEL_CLASSES, .classes = classes, .pinhole = views, .wide = views};
+    return model;
+}

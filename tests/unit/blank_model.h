@@ -1,0 +1,24 @@
+/// A beacon model that a test fills in: machines of the right sizes that decide 0.
+#ifndef UNIT_BLANK_MODEL_H
+#define UNIT_BLANK_MODEL_H
+
+#include "bslam/vision/beacon_model.h"
+
+#define UNIT_MODEL_CLASSES 2
+
+typedef struct unit_detector {
+    float cell_weights[BSLAM_CELL_FEATURES];
+    float blob_offset[BSLAM_BLOB_FEATURES];
+    float blob_scale[BSLAM_BLOB_FEATURES];
+    float screen_weights[BSLAM_BLOB_FEATURES];
+    float kind_weights[(UNIT_MODEL_CLASSES + 2) * BSLAM_SVM_WEIGHTS(BSLAM_BLOB_FEATURES, true)];
+    float kind_bias[UNIT_MODEL_CLASSES + 2];
+    float fusion_weights[UNIT_MODEL_CLASSES + 3];
+    float cell_bias, screen_bias, fusion_bias;
+} unit_detector_t;
+
+/// Machines that view the tables of `detector`, which are set to 0, scales to 1; both lenses share it.
+/// Everything passes the screen, and the threshold is 0.
+bslam_beacon_model_t unit_blank_model(unit_detector_t *detector);
+
+#endif

@@ -1,0 +1,406 @@
+#include "support.h"
+
+#include "blank_model.h"
+
+#include "bslam/math/trig.h"
+#include "bslam/vision/vision.h"
+
+#define WIDTH 320
+#define HEIGHT 240
+#define HORIZON 120
+
+static unit_detector_t detector;
+static bslam_beacon_model_t model;
+static bslam_vision_t vision;
+static bslam_vision_t before;
+static uint8_t picture[HEIGHT][WIDTH][3];
+
+static bslam_camera_t camera_at(double yaw_rad)
+{
+    const bslam_camera_t camera = {
+        .lens = BSLAM_LENS_PINHOLE,
+        .width_px = WIDTH,
+        .height_px = HEIGHT,
+        .fx_px = BSLAM_R(277.1),
+        .fy_px = BSLAM_R(277.1),
+        .cx_px = BSLAM_R(159.5),
+        .cy_px = BSLAM_R(HORIZON - 0.5),
+        .yaw_rad = real(yaw_rad),
+        .z_m = BSLAM_R(0.5),
+    };
+    return camera;
+}
+
+static int start(void **state)
+{
+    const bslam_camera_t cameras[2] = {camera_at(0.5), camera_at(-0.5)};
+    model = unit_blank_model(&detector);
+    // A cell is a beacon's if it differs from wall, floor and ceiling by more than 40 steps.
+    detector.cell_weights[6] = 0.1f;
+    detector.cell_bias = -4.0f;
+    memset(&vision, 0, sizeof vision);
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 2), BSLAM_OK);
+    return 0;
+}
+
+static void paint(int left, int top, int right, int bottom, int red, int green, int blue)
+{
+    for (int row = top; row < bottom; row++) {
+        for (int column = left; column < right; column++) {
+            picture[row][column][0] = (uint8_t)red;
+            picture[row][column][1] = (uint8_t)green;
+            picture[row][column][2] = (uint8_t)blue;
+        }
+    }
+}
+
+/// Wall to row 180, floor below: 0.5 m below the camera, the floor ends 0.5 x 277.1 / 60.5 m away.
+static void paint_room(void)
+{
+    paint(0, 0, WIDTH, 180, 160, 160, 150);
+    paint(0, 180, WIDTH, HEIGHT, 90, 70, 60);
+}
+
+static bslam_status_t show(int camera, bool moved)
+{
+    assert_int_equal(bslam_vision_begin(&vision, camera, BSLAM_PIXELS_RGB888, WIDTH, HEIGHT), BSLAM_OK);
+    for (int row = 0; row < HEIGHT; row++) {
+        assert_int_equal(bslam_vision_row(&vision, picture[row]), BSLAM_OK);
+    }
+    return bslam_vision_end(&vision, moved);
+}
+
+static int candidate_count(void)
+{
+    int32_t count = -1;
+    (void)bslam_vision_candidates(&vision, &count);
+    return count;
+}
+
+// ---- refusals
+// ----------------------------------------------------------------------------------------------
+
+static void test_init_bad_count_camera_or_model_is_refused_and_nothing_changes(void **state)
+{
+    bslam_camera_t cameras[BSLAM_CAMERAS_MAX + 1];
+    for (int i = 0; i <= BSLAM_CAMERAS_MAX; i++) {
+        cameras[i] = camera_at(0);
+    }
+    before = vision;
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 0), BSLAM_E_COUNT);
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, BSLAM_CAMERAS_MAX + 1), BSLAM_E_COUNT);
+    cameras[1].fx_px = 0;
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 2), BSLAM_E_PARAMETER);
+    model.class_count = 0;
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 1), BSLAM_E_COUNT);
+    assert_memory_equal(&vision, &before, sizeof vision);
+}
+
+static void test_begin_other_camera_or_size_is_refused_and_nothing_changes(void **state)
+{
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    before = vision;
+    assert_int_equal(bslam_vision_begin(&vision, -1, BSLAM_PIXELS_RGB565, WIDTH, HEIGHT), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_begin(&vision, 2, BSLAM_PIXELS_RGB565, WIDTH, HEIGHT), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_begin(&vision, 0, BSLAM_PIXELS_RGB565, 160, 120), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_begin(&vision, 0, (bslam_pixel_format_t)7, WIDTH, HEIGHT), BSLAM_E_RANGE);
+    assert_memory_equal(&vision, &before, sizeof vision);
+}
+
+static void test_end_of_a_truncated_frame_is_refused_and_nothing_is_learned(void **state)
+{
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    paint(0, 0, WIDTH, HEIGHT, 200, 30, 30);
+    assert_int_equal(bslam_vision_begin(&vision, 0, BSLAM_PIXELS_RGB888, WIDTH, HEIGHT), BSLAM_OK);
+    for (int row = 0; row < HEIGHT - 1; row++) {
+        assert_int_equal(bslam_vision_row(&vision, picture[row]), BSLAM_OK);
+    }
+    before = vision;
+    assert_int_equal(bslam_vision_end(&vision, true), BSLAM_E_COUNT);
+    assert_memory_equal(&vision, &before, sizeof vision);
+    assert_int_equal(bslam_vision_reason(&vision), BSLAM_VISION_UNFINISHED);
+    assert_int_equal(candidate_count(), 0);
+
+    // The next frame gives it up, and counts it.
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(vision.frames[BSLAM_VISION_UNFINISHED], 1);
+}
+
+static void test_end_without_a_frame_or_twice_is_refused(void **state)
+{
+    assert_int_equal(bslam_vision_end(&vision, true), BSLAM_E_COUNT);
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(bslam_vision_end(&vision, true), BSLAM_E_COUNT);
+    assert_int_equal(bslam_vision_row(&vision, picture[0]), BSLAM_E_COUNT);
+}
+
+static void test_point_wrong_camera_or_angle_is_refused(void **state)
+{
+    before = vision;
+    assert_int_equal(bslam_vision_point(&vision, 2, 0), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_point(&vision, 0, BSLAM_R(3.2)), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_point(&vision, 0, real(NAN)), BSLAM_E_RANGE);
+    assert_memory_equal(&vision, &before, sizeof vision);
+    assert_int_equal(bslam_vision_point(&vision, 1, BSLAM_R(1.25)), BSLAM_OK);
+    assert_near(vision.cameras[1].yaw_rad, 1.25, 0);
+}
+
+// ---- frames that show nothing
+// ------------------------------------------------------------------------------
+
+static void check_unusable(bslam_vision_reason_t reason)
+{
+    static bslam_background_t background;
+    background = vision.backgrounds[0];
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(bslam_vision_reason(&vision), reason);
+    assert_int_equal(vision.frames[reason], 1);
+    assert_int_equal(candidate_count(), 0);
+    assert_memory_equal(&vision.backgrounds[0], &background, sizeof background);
+}
+
+static void test_end_black_frame_shows_nothing_and_says_so(void **state)
+{
+    paint(0, 0, WIDTH, HEIGHT, 3, 3, 3);
+    paint(10, 10, 20, 20, 255, 255, 255);
+    check_unusable(BSLAM_VISION_BLACK);
+}
+
+static void test_end_overexposed_frame_shows_nothing_and_says_so(void **state)
+{
+    paint_room();
+    paint(0, 0, WIDTH, 160, 255, 255, 255);
+    check_unusable(BSLAM_VISION_OVEREXPOSED);
+}
+
+static void test_end_frame_of_one_colour_shows_nothing_and_says_so(void **state)
+{
+    paint(0, 0, WIDTH, HEIGHT, 180, 40, 60);
+    check_unusable(BSLAM_VISION_FLAT);
+}
+
+static void test_end_empty_room_shows_nothing(void **state)
+{
+    detector.fusion_bias = -1;
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(bslam_vision_reason(&vision), BSLAM_VISION_NOTHING);
+    assert_int_equal(vision.frames[BSLAM_VISION_NOTHING], 1);
+}
+
+static void test_reason_name_every_reason_has_its_own(void **state)
+{
+    for (int a = 0; a < BSLAM_VISION_REASON_COUNT; a++) {
+        for (int b = 0; b < a; b++) {
+            assert_string_not_equal(bslam_vision_reason_name((bslam_vision_reason_t)a),
+                                    bslam_vision_reason_name((bslam_vision_reason_t)b));
+        }
+    }
+    assert_string_equal(bslam_vision_reason_name(BSLAM_VISION_REASON_COUNT), "unknown reason");
+}
+
+// ---- the room and what stands out of it
+// --------------------------------------------------------------------
+
+static void test_end_learns_the_colours_of_wall_and_floor(void **state)
+{
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    const bslam_surroundings_t *room = &vision.backgrounds[0].surroundings;
+    assert_true(room->known);
+    assert_near(room->wall.red, 160, 1);
+    assert_near(room->wall.green, 160, 1);
+    assert_near(room->floor.red, 90, 2);  // five bits of red: steps of 8
+    assert_near(room->floor.green, 70, 2);
+}
+
+static void test_end_floor_line_is_where_the_floor_ends(void **state)
+{
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    for (int column = 0; column < WIDTH / 4; column++) {
+        assert_int_equal(vision.floor_line.row[column], 180 / 4 - 1);
+    }
+    // In the middle the floor's edge, row 179.5, lies 60 px below the axis.
+    assert_near(vision.floor_line.distance_m[WIDTH / 8], 0.5 * 277.1 / 60.0, 0.01);
+}
+
+static void test_end_unmoved_robot_learns_nothing_but_in_the_first_frame(void **state)
+{
+    static bslam_background_t background;
+    paint_room();
+    assert_int_equal(show(0, false), BSLAM_OK);
+    assert_true(vision.backgrounds[0].surroundings.known);
+    background = vision.backgrounds[0];
+    paint(0, 0, WIDTH, 180, 60, 90, 160);
+    assert_int_equal(show(0, false), BSLAM_OK);
+    assert_memory_equal(&vision.backgrounds[0], &background, sizeof background);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_memory_not_equal(&vision.backgrounds[0], &background, sizeof background);
+}
+
+static void test_end_each_camera_remembers_its_own_view(void **state)
+{
+    static bslam_background_t background;
+    paint_room();
+    assert_int_equal(show(0, true), BSLAM_OK);
+    background = vision.backgrounds[0];
+    paint(0, 0, WIDTH, 180, 60, 90, 160);
+    assert_int_equal(show(1, true), BSLAM_OK);
+    assert_memory_equal(&vision.backgrounds[0], &background, sizeof background);
+    assert_near(vision.backgrounds[1].surroundings.wall.blue, 160, 1);
+}
+
+static bslam_real_t best_overlap(double left, double top, double right, double bottom)
+{
+    const bslam_box_t truth = {real(left), real(top), real(right), real(bottom)};
+    bslam_real_t best = 0;
+    for (int i = 0; i < vision.proposals.count; i++) {
+        const bslam_real_t overlap = bslam_box_overlap(&vision.proposals.items[i].box, &truth);
+        best = overlap > best ? overlap : best;
+    }
+    return best;
+}
+
+static void test_end_coloured_rectangle_on_a_wall_is_proposed(void **state)
+{
+    paint_room();
+    paint(100, 60, 140, 100, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_true(best_overlap(99.5, 59.5, 139.5, 99.5) > BSLAM_R(0.9));
+}
+
+static void test_end_rectangle_off_the_grid_of_cells_is_proposed_to_the_pixel(void **state)
+{
+    paint_room();
+    paint(102, 61, 145, 103, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_true(best_overlap(101.5, 60.5, 144.5, 102.5) > BSLAM_R(0.85));
+}
+
+static void test_end_rectangle_moved_by_cells_moves_its_box(void **state)
+{
+    paint_room();
+    paint(100, 60, 140, 100, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    const bslam_real_t first = best_overlap(99.5, 59.5, 139.5, 99.5);
+    paint_room();
+    paint(148, 44, 188, 84, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_near(best_overlap(147.5, 43.5, 187.5, 83.5), first, 0.02);
+}
+
+static void test_end_brighter_light_gives_the_same_boxes(void **state)
+{
+    paint(0, 0, WIDTH, 180, 112, 112, 104);
+    paint(0, 180, WIDTH, HEIGHT, 64, 48, 40);
+    paint(100, 60, 140, 100, 120, 24, 24);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    const bslam_real_t dim = best_overlap(99.5, 59.5, 139.5, 99.5);
+    assert_true(dim > BSLAM_R(0.9));
+    paint(0, 0, WIDTH, 180, 224, 224, 208);
+    paint(0, 180, WIDTH, HEIGHT, 128, 96, 80);
+    paint(100, 60, 140, 100, 240, 48, 48);
+    assert_int_equal(show(1, true), BSLAM_OK);
+    assert_near(best_overlap(99.5, 59.5, 139.5, 99.5), dim, 0.02);
+}
+
+static void test_end_candidates_come_surest_first(void **state)
+{
+    detector.fusion_weights[UNIT_MODEL_CLASSES + 2] = 1;  // the screen's value
+    detector.screen_weights[5] = 1;                       // log of the area: the largest box is the surest
+    paint_room();
+    paint(100, 60, 140, 100, 200, 30, 30);
+    paint(220, 60, 260, 110, 30, 160, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    int32_t count = 0;
+    const bslam_candidate_t *found = bslam_vision_candidates(&vision, &count);
+    assert_true(count >= 1 && count <= BSLAM_CANDIDATES_MAX);
+    assert_int_equal(bslam_vision_reason(&vision), BSLAM_VISION_SEEN);
+    for (int i = 0; i < count; i++) {
+        assert_true(i == 0 || found[i].score <= found[i - 1].score);
+        assert_in_range(found[i].beacon_class, 1, UNIT_MODEL_CLASSES);
+    }
+}
+
+static void test_end_same_frames_give_the_same_state(void **state)
+{
+    paint_room();
+    paint(100, 60, 140, 100, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    before = vision;
+    (void)start(state);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_memory_equal(vision.values, before.values, sizeof vision.values);
+    assert_int_equal(vision.proposals.count, before.proposals.count);
+    for (int i = 0; i < vision.proposals.count; i++) {
+        const bslam_box_t *box = &vision.proposals.items[i].box, *other = &before.proposals.items[i].box;
+        assert_memory_equal(box, other, sizeof *box);
+    }
+}
+
+static void test_end_noise_keeps_within_all_bounds(void **state)
+{
+    unit_random_t random = {5};
+    for (int frame = 0; frame < 3; frame++) {
+        for (int row = 0; row < HEIGHT; row++) {
+            for (int column = 0; column < WIDTH; column++) {
+                for (int channel = 0; channel < 3; channel++) {
+                    picture[row][column][channel] = (uint8_t)unit_random(&random, 0, 256);
+                }
+            }
+        }
+        // Blocks of noise, so that cells differ as much as they can.
+        for (int row = 0; row < HEIGHT; row++) {
+            for (int column = 0; column < WIDTH; column++) {
+                memcpy(picture[row][column], picture[row / 4 * 4][column / 4 * 4], 3);
+            }
+        }
+        assert_int_equal(show(frame % 2, true), BSLAM_OK);
+        assert_in_range(vision.proposals.count, 0, BSLAM_PROPOSALS_MAX);
+        assert_in_range(candidate_count(), 0, BSLAM_CANDIDATES_MAX);
+        for (int i = 0; i < vision.proposals.count; i++) {
+            float features[BSLAM_BLOB_FEATURES];
+            bslam_vision_blob_features(&vision, i, features);
+            for (int k = 0; k < BSLAM_BLOB_FEATURES; k++) {
+                assert_true(features[k] > -1e6f && features[k] < 1e6f);
+            }
+        }
+    }
+}
+
+#define TEST(name) cmocka_unit_test_setup(name, start)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(test_init_bad_count_camera_or_model_is_refused_and_nothing_changes),
+        TEST(test_begin_other_camera_or_size_is_refused_and_nothing_changes),
+        TEST(test_end_of_a_truncated_frame_is_refused_and_nothing_is_learned),
+        TEST(test_end_without_a_frame_or_twice_is_refused),
+        TEST(test_point_wrong_camera_or_angle_is_refused),
+        TEST(test_end_black_frame_shows_nothing_and_says_so),
+        TEST(test_end_overexposed_frame_shows_nothing_and_says_so),
+        TEST(test_end_frame_of_one_colour_shows_nothing_and_says_so),
+        TEST(test_end_empty_room_shows_nothing),
+        TEST(test_reason_name_every_reason_has_its_own),
+        TEST(test_end_learns_the_colours_of_wall_and_floor),
+        TEST(test_end_floor_line_is_where_the_floor_ends),
+        TEST(test_end_unmoved_robot_learns_nothing_but_in_the_first_frame),
+        TEST(test_end_each_camera_remembers_its_own_view),
+        TEST(test_end_coloured_rectangle_on_a_wall_is_proposed),
+        TEST(test_end_rectangle_off_the_grid_of_cells_is_proposed_to_the_pixel),
+        TEST(test_end_rectangle_moved_by_cells_moves_its_box),
+        TEST(test_end_brighter_light_gives_the_same_boxes),
+        TEST(test_end_candidates_come_surest_first),
+        TEST(test_end_same_frames_give_the_same_state),
+        TEST(test_end_noise_keeps_within_all_bounds),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
