@@ -19,7 +19,8 @@ static const float WALL_LEVEL = 0.65f;
 // Red-green and yellow-blue as parts of the histogram's range: gains on the differences of channels.
 static const float RED_GREEN_GAIN = 1.2f;
 static const float YELLOW_BLUE_GAIN = 1.0f;
-// Weights of the aspect and of the texture's deviations and changes against histogram and bands.
+// Weights of the histogram, of the aspect and of the texture's deviations and changes against the bands.
+static const float COLOUR_GAIN = 1.4f;
 static const float ASPECT_GAIN = 0.5f;
 static const float DEVIATION_GAIN = 1.5f;
 static const float CHANGE_GAIN = 3.0f;
@@ -262,7 +263,8 @@ static void finish(const work_t *work, const band_t *total, float *signature)
     const float count = (float)total->pixels;
     const float whole = count * (float)(BIN_STEPS * BIN_STEPS * BIN_STEPS);
     for (int32_t i = 0; i < BINS; i++) {
-        signature[BSLAM_SIGNATURE_COLOURS + i] = sqrtf((float)work->bins[i] / whole);
+        const float share = (float)work->bins[i] / whole;
+        signature[BSLAM_SIGNATURE_COLOURS + i] = within_one(COLOUR_GAIN * sqrtf(share));
     }
     finish_bands(work, total, signature + BSLAM_SIGNATURE_BANDS);
     const float light = (float)total->sums[LIGHT] / count + 3.0f * (float)WALL * LIGHT_MARGIN / WALL_LEVEL;

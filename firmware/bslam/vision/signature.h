@@ -9,14 +9,13 @@
 
 #include "bslam/vision/outline.h"
 
-/// Where the parts of a signature start:
-/// 48 colours: square root of the share of pixels in each of 3 (light) x 4 (red-green) x 4 (yellow-blue)
-/// bins;
-///    a pixel is shared among the eight bins around its colour.
-/// 18 bands: mean light, red-green and yellow-blue in each sixth of the height, from above.
-/// 1 aspect: half of (height - width) / (height + width).
-/// 4 texture: deviation of light, and of colour; mean change of light from one pixel to the next across, and
-///    down; all against the mean light.
+/// Where the parts of a signature start.
+/// COLOURS, 48: 1.4 times the square root of the share of pixels in each of 3 (light) x 4 (red-green) x 4
+/// (yellow-blue) bins; a pixel is shared among the eight bins around its colour.
+/// BANDS, 18: mean light, red-green and yellow-blue in each sixth of the height, from above.
+/// ASPECT, 1: half of (height - width) / (height + width).
+/// TEXTURE, 4: deviation of light, and of colour; mean change of light from one pixel to the next across, and
+/// down; all against the mean light.
 enum {
     BSLAM_SIGNATURE_COLOURS = 0,
     BSLAM_SIGNATURE_BANDS = 48,
