@@ -16,7 +16,6 @@ import argparse
 import io
 import os
 import tarfile
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +40,7 @@ TURN_RAD = (0.6, 0.4, 0.2, 0.1, 0.0)  # the camera turns towards a beacon before
 JITTER_PX = 2.0
 TRIES_A_VIEW = 12
 OTHER_LIGHT = 1000
-DEVICE_COST = 10.0
+ROBOT_COST = 10.0
 
 ETH80 = Path("eth80/eth80_half_64px_rgba.tar")
 APART_RAD = np.radians(20.0)
@@ -56,19 +55,27 @@ Signatures = dict[int, list[NDArray[np.float32]]]
 # --- Telling apart
 
 
-def share_right(train: Signatures, test: Signatures) -> tuple[float, float]:
-    """Share of test signatures that get the right name: by machines as on a robot, and as trained offline."""
-    names = sorted(train)
-    x = np.array([one for name in names for one in train[name]], np.float64)
-    y = np.array([name for name in names for _ in train[name]])
-    x_test = np.array([one for name in names for one in test[name]], np.float64)
-    y_test = np.array([name for name in names for _ in test[name]])
-    device = LinearSVC(C=DEVICE_COST, dual=False, max_iter=20000).fit(x, y)
-    targets = one_vs_rest(np.searchsorted(names, y), len(names))
-    cost, _ = choose_cost(x, targets)
-    offline = fit(x, targets, cost)
-    named = np.array(names)[offline.decide(x_test).argmax(axis=1)]
-    return float(np.mean(device.predict(x_test) == y_test)), float(np.mean(named == y_test))
+def tabled(signatures: Signatures) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Signatures (n, 71), and whose they are (n,): an index into the sorted names."""
+    x = [one for name in sorted(signatures) for one in signatures[name]]
+    y = [index for index, name in enumerate(sorted(signatures)) for _ in signatures[name]]
+    return np.array(x, np.float64), np.array(y)
+
+
+def share_on_robot(train: Signatures, test: Signatures) -> float:
+    """Share of test signatures that get the right name by machines as a robot learns them."""
+    x_test, y_test = tabled(test)
+    machines = LinearSVC(C=ROBOT_COST, dual=False, max_iter=20000).fit(*tabled(train))
+    return float(np.mean(machines.predict(x_test) == y_test))
+
+
+def share_offline(train: Signatures, test: Signatures) -> float:
+    """The same by machines as `train_beacons.py` fits them."""
+    x, y = tabled(train)
+    x_test, y_test = tabled(test)
+    targets = one_vs_rest(y, len(train))
+    machine = fit(x, targets, choose_cost(x, targets)[0])
+    return float(np.mean(machine.decide(x_test).argmax(axis=1) == y_test))
 
 
 # --- Rendered
@@ -120,10 +127,11 @@ def measure_scene(name: str, seed: int, views: int) -> None:
     train = take_signatures(scene, seed, 0, views)
     test = take_signatures(other, seed, 1, TEST_VIEWS)
     kept = [one for one in train if len(train[one]) >= views and test[one]]
-    device, offline = share_right({one: train[one] for one in kept}, {one: test[one] for one in kept})
+    parts = {one: train[one] for one in kept}, {one: test[one] for one in kept}
+    robot, offline = share_on_robot(*parts), share_offline(*parts)
     count = sum(len(test[one]) for one in kept)
     print(
-        f"{name}:{seed}  {len(kept)} beacons, {count} views   {100 * device:6.2f} {100 * offline:6.2f}",
+        f"{name}:{seed}  {len(kept)} beacons, {count} views   {100 * robot:6.2f} {100 * offline:6.2f}",
         flush=True,
     )
 
@@ -192,22 +200,34 @@ def split_views(directions: Sequence[tuple[int, int]], count: int, seed: int) ->
     return train, [i for i in range(len(directions)) if angles[train, i].min() >= APART_RAD]
 
 
-def measure_photographs(views: Views, count: int, own_ground: bool) -> tuple[float, float]:
-    """Shares right, on the device and offline, over SPLITS choices of training views."""
+def photographed_all(views: Views, own_ground: bool) -> dict[tuple[str, int, int], NDArray[np.float32]]:
+    """The signature of every photograph."""
     front_end = FrontEnd([load_rig("three60").cameras[1]])
-    signatures = {key: photographed(front_end, picture, own_ground) for key, picture in views.items()}
-    objects = sorted({name for name, _, _ in views})
-    directions = sorted({(polar, azimuth) for _, polar, azimuth in views})
-    results = []
-    for seed in range(SPLITS):
-        train, test = split_views(directions, count, seed)
-        parts = [
-            {i: [signatures[name, *directions[k]] for k in part] for i, name in enumerate(objects)}
-            for part in (train, test)
-        ]
-        results.append(share_right(parts[0], parts[1]))
-    device, offline = np.mean(results, axis=0)
-    return float(device), float(offline)
+    return {key: photographed(front_end, picture, own_ground) for key, picture in views.items()}
+
+
+def parted(
+    signatures: dict[tuple[str, int, int], NDArray[np.float32]], count: int, seed: int
+) -> tuple[Signatures, Signatures]:
+    """Signatures of photographs to train and to test with, by object."""
+    objects = sorted({name for name, _, _ in signatures})
+    directions = sorted({(polar, azimuth) for _, polar, azimuth in signatures})
+    train, test = (
+        {i: [signatures[name, *directions[k]] for k in part] for i, name in enumerate(objects)}
+        for part in split_views(directions, count, seed)
+    )
+    return train, test
+
+
+def measure_photographs(views: Views, count: int, own_ground: bool) -> None:
+    """Prints the line of one ground: means over SPLITS choices of training views."""
+    signatures = photographed_all(views, own_ground)
+    parts = [parted(signatures, count, seed) for seed in range(SPLITS)]
+    robot = np.mean([share_on_robot(*part) for part in parts])
+    offline = np.mean([share_offline(*part) for part in parts])
+    objects = len({name for name, _, _ in views})
+    where = "own blue ground" if own_ground else "grey wall"
+    print(f"ETH-80, {objects} objects, {where}   {100 * robot:6.2f} {100 * offline:6.2f}", flush=True)
 
 
 def main() -> None:
@@ -229,13 +249,8 @@ def main() -> None:
                 f"no {path}: get ETH-80 from its authors and let BSLAM_DATA name the directory of eth80/"
             )
         views = read_photographs(path)
-        objects = len(Counter(name for name, _, _ in views))
-        for ground in (False, True):
-            device, offline = measure_photographs(views, arguments.views, ground)
-            where = "own blue ground" if ground else "grey wall"
-            print(
-                f"ETH-80, {objects} objects, {where}   {100 * device:6.2f} {100 * offline:6.2f}", flush=True
-            )
+        for own_ground in (False, True):
+            measure_photographs(views, arguments.views, own_ground)
 
 
 if __name__ == "__main__":

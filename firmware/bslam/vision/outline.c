@@ -25,7 +25,6 @@ typedef struct search {
 } search_t;
 
 // --- Straight lines through edge points
-// ----------------------------------------------------------------------
 
 /// By least squares: value at the mean place along, and slope.
 typedef struct fit {
@@ -102,7 +101,6 @@ static bslam_real_t place_of(const search_t *search, const bslam_edge_t *edge, c
 }
 
 // --- Upright sides
-// -------------------------------------------------------------------------------------------
 
 static bool find_upright(const search_t *search, bslam_side_name_t name, bslam_real_t *across,
                          bslam_real_t *variance)
@@ -121,7 +119,6 @@ static bool find_upright(const search_t *search, bslam_side_name_t name, bslam_r
 }
 
 // --- Level sides
-// ---------------------------------------------------------------------------------------------
 
 /// How much the edges leave open which turn it is, 0 to 1: points that scatter about their lines, scan lines
 /// on which there is none.
@@ -178,7 +175,6 @@ static void fit_front(const search_t *search, const bslam_body_t *body, const bs
 }
 
 // --- The whole
-// -----------------------------------------------------------------------------------------------
 
 static bool box_is_allowed(const bslam_frame_t *frame, const bslam_box_t *box)
 {
