@@ -109,6 +109,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
     params |= _robot_params(log.robot, log.odometry.kind)
     if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
+    if options.sensor == "camera":
+        params |= defaults.CAMERA
     if log.collection == "mrclam":
         params |= defaults.REAL_LOG
         if options.association != "known":

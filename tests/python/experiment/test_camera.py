@@ -72,8 +72,8 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     assert seen.time_us.tolist() == [step * short.step_us for step in range(8) for _ in range(2)]
     assert seen.bearing_rad.tolist() == [0.1] * 16
     np.testing.assert_array_equal(seen.range_m, [2.0, math.nan] * 8)
-    assert seen.bearing_sd_rad.tolist() == [0.01] * 16
-    assert seen.range_sd_m.tolist() == [0.05, 0.0] * 8
+    np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.005))
+    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.05, 0.6), 0.0] * 8)
     assert log.robot.wheel_speed_sigma_mps == 0.6
 
 
