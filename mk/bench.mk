@@ -6,6 +6,11 @@ bench: ## count the instructions of a filter step at several map sizes (valgrind
 	@tools/setup.sh bench
 	@$(PYTHON) tools/bench.py
 
+.PHONY: bench-vision
+bench-vision: ## count the instructions a pixel of the vision front end (valgrind); renders what it looks at
+	@tools/setup.sh bench
+	@$(PYTHON) tools/bench_vision.py
+
 .PHONY: bench-learner
 bench-learner: ## count the instructions of learning on the robot (valgrind); renders what is learned first
 	@tools/setup.sh bench

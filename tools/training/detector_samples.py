@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
@@ -31,6 +31,8 @@ CLASSES = (
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""
 
+SWAPPED = 100_000
+
 CELLS_A_FRAME = 80
 CELL_FRAMES_STEP = 3
 
@@ -54,6 +56,11 @@ class BoxSamples:
     object_row: NDArray[np.int64]  # of the world's `seen`, or -1
     frame: NDArray[np.int32]
     world: NDArray[np.int32]
+
+
+def swap_red_and_blue(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Of a picture in RGB565."""
+    return picture & 0x07E0 | picture >> 11 | picture << 11
 
 
 def blank_svm(rows: int, features: int, quadratic: bool = False) -> Svm:
@@ -92,7 +99,13 @@ def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], proc
 def gather_boxes(
     folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel, processes: int
 ) -> BoxSamples:
-    """Proposals of the worlds' frames."""
+    """Proposals of the worlds' frames, each looked at twice: as it is, and with red and blue exchanged.
+
+    The second look has SWAPPED added to its world's number. What is a beacon hangs on shape, size and place
+    more than on its colour: a detector that has seen red signs and no other red things takes those for signs.
+    """
+    seeds = list(seeds)
+    seeds += [seed + SWAPPED for seed in seeds]
     work = partial(_boxes_of_world, folder, lens, style, model_of(detector))
     return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
@@ -124,11 +137,11 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
 
 
 def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> BoxSamples:
-    world = read_world(folder, lens, style, seed)
-    front_end = FrontEnd([camera_of(lens, seed)], model)
+    world = replace(read_world(folder, lens, style, seed % SWAPPED), seed=seed)
+    front_end = FrontEnd([camera_of(lens, seed % SWAPPED)], model)
     parts = []
     for index, picture in enumerate(world.pictures):
-        front_end.see(picture)
+        front_end.see(picture if seed < SWAPPED else swap_red_and_blue(picture))
         found = front_end.proposals()
         parts.append(_label_boxes(world, index, found.boxes, found.features))
     return BoxSamples(

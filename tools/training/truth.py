@@ -17,6 +17,9 @@ OVERLAP_MIN = 0.5
 IGNORED_SHARE = 0.5
 """A box with this share of it on a beacon that does not count is not counted either."""
 
+EDGE_PX = 1.5
+"""A box that comes this near to the frame's edge may go on outside."""
+
 Boxes = NDArray[np.floating]
 
 NOTHING = -1
@@ -32,6 +35,16 @@ def counts(seen: NDArray[np.void]) -> NDArray[np.bool_]:
         & (seen["slant_rad"] < SLANT_RAD_MAX)
         & (hidden <= HIDDEN_MAX)
     )
+
+
+def teaches(seen: NDArray[np.void], width_px: int) -> NDArray[np.bool_]:
+    """Which of them a detector learns from: also those that the frame cuts above or below, which still have
+    a direction, and that a robot near a wall sees most of."""
+    left, right = seen["box"][:, 0], seen["box"][:, 2]
+    upright = (left > EDGE_PX) & (right < width_px - 1 - EDGE_PX)
+    whole = seen.copy()
+    whole["cut"] &= ~upright
+    return counts(whole)
 
 
 def intersections(boxes: Boxes, others: Boxes) -> NDArray[np.float64]:
@@ -52,14 +65,15 @@ def overlaps(boxes: Boxes, others: Boxes) -> NDArray[np.float64]:
     return both / np.maximum(areas(boxes)[:, None] + areas(others)[None, :] - both, 1e-9)
 
 
-def owners(boxes: Boxes, seen: NDArray[np.void]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def owners(
+    boxes: Boxes, seen: NDArray[np.void], good: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """For each box (n, 4) of a picture the row of `seen` it is of, NOTHING or IGNORED; and its best overlap
-    with an object that counts."""
+    with an object of those that are `good`."""
     if len(boxes) == 0:
         return np.zeros(0, np.int64), np.zeros(0)
     if len(seen) == 0:
         return np.full(len(boxes), NOTHING), np.zeros(len(boxes))
-    good = counts(seen)
     overlap = overlaps(boxes, seen["box"])
     share = intersections(boxes, seen["box"]) / np.maximum(areas(boxes)[:, None], 1e-9)
     countable = np.where(good[None, :], overlap, 0.0)

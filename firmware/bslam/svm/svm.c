@@ -48,20 +48,54 @@ bslam_status_t bslam_svm_check(const bslam_svm_t *svm, int32_t features)
     return BSLAM_OK;
 }
 
+/// Partial sums of a dot product, so that a compiler can use vector instructions where there are any.
+#define LANES 8
+
+/// The sum of w[i] x[i] over the bytes w.
+static float dot_bytes(const int8_t *restrict w, const float *restrict x, int32_t count)
+{
+    float lanes[LANES] = {0};
+    float sum = 0;
+    int32_t i = 0;
+    for (; i + LANES <= count; i += LANES) {
+        for (int32_t k = 0; k < LANES; k++) {
+            lanes[k] += (float)w[i + k] * x[i + k];
+        }
+    }
+    for (; i < count; i++) {
+        sum += (float)w[i] * x[i];
+    }
+    for (int32_t k = 0; k < LANES; k++) {
+        sum += lanes[k];
+    }
+    return sum;
+}
+
+/// The same over floats.
+static float dot_floats(const float *restrict w, const float *restrict x, int32_t count)
+{
+    float lanes[LANES] = {0};
+    float sum = 0;
+    int32_t i = 0;
+    for (; i + LANES <= count; i += LANES) {
+        for (int32_t k = 0; k < LANES; k++) {
+            lanes[k] += w[i + k] * x[i + k];
+        }
+    }
+    for (; i < count; i++) {
+        sum += w[i] * x[i];
+    }
+    for (int32_t k = 0; k < LANES; k++) {
+        sum += lanes[k];
+    }
+    return sum;
+}
+
 /// The sum of w[first + i] x[i], the weights as they are stored.
 static float dot(const bslam_svm_t *svm, int32_t first, const float *x, int32_t count)
 {
-    float sum = 0;
-    if (svm->bytes != NULL) {
-        for (int32_t i = 0; i < count; i++) {
-            sum += (float)svm->bytes[first + i] * x[i];
-        }
-    } else {
-        for (int32_t i = 0; i < count; i++) {
-            sum += svm->weights[first + i] * x[i];
-        }
-    }
-    return sum;
+    return svm->bytes != NULL ? dot_bytes(svm->bytes + first, x, count)
+                              : dot_floats(svm->weights + first, x, count);
 }
 
 void bslam_svm_decide(const bslam_svm_t *svm, const float *x, float *values)

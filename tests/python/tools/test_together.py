@@ -19,11 +19,3 @@ def test_fit_together_decides_as_linear_svc_does() -> None:
     # LIBLINEAR stops at a gradient 1e-4 of the first one.
     assert np.abs(found - expected).max() < 5e-3
     assert np.abs(expected).max() > 1.0
-
-
-def test_fit_together_early_end_regularises() -> None:
-    random = np.random.default_rng(4)
-    x = random.normal(size=(200, 4))
-    targets = (x[:, :1] + random.normal(size=(200, 1)) > 0.0).astype(np.bool_)
-    few, many = (fit_together(x, targets, 1.0, iterations) for iterations in (2, 100))
-    assert np.square(few.weights).sum() < np.square(many.weights).sum()

@@ -1,0 +1,106 @@
+"""The front end through its Python binding: what it refuses, what it says of pictures that show nothing, and
+that it finds beacons in a rendered world."""
+
+import numpy as np
+import pytest
+
+from bslam.core import CoreError
+from bslam.core.vision import FrontEnd
+from bslam.errors import BslamError
+from bslam.rig import Camera, load_rig
+from bslam.world.camera import Renderer, make_world, walk
+
+
+@pytest.fixture
+def camera() -> Camera:
+    return load_rig("three60").cameras[1]
+
+
+def plain(level: int) -> np.ndarray:
+    return np.full((240, 320, 3), level, np.uint8)
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        np.zeros((120, 160, 3), np.uint8),
+        np.zeros((240, 320, 4), np.uint8),
+        np.zeros((240, 320, 3), np.float32),
+        np.zeros((240, 640, 3), np.uint8)[:, ::2],
+        np.zeros((240, 320), np.uint8),
+    ],
+)
+def test_see_picture_of_another_kind_is_refused_with_what_is_allowed(
+    camera: Camera, picture: np.ndarray
+) -> None:
+    front_end = FrontEnd([camera])
+    with pytest.raises(BslamError, match=r"\(240, 320, 3\) uint8"):
+        front_end.see(picture)
+    assert sum(front_end.counts().values()) == 0
+
+
+def test_see_camera_that_is_not_there_is_refused(camera: Camera) -> None:
+    with pytest.raises(BslamError, match="0 to 0"):
+        FrontEnd([camera]).see(plain(0), camera=1)
+
+
+def test_front_end_without_cameras_is_refused() -> None:
+    with pytest.raises(CoreError):
+        FrontEnd([])
+
+
+def test_point_beyond_half_a_turn_is_refused(camera: Camera) -> None:
+    with pytest.raises(CoreError):
+        FrontEnd([camera]).point(0, 4.0)
+
+
+@pytest.mark.parametrize(("level", "reason"), [(0, "black"), (255, "overexposed"), (120, "flat")])
+def test_see_picture_of_one_colour_shows_nothing_and_says_why(
+    camera: Camera, level: int, reason: str
+) -> None:
+    front_end = FrontEnd([camera])
+    seeing = front_end.see(plain(level))
+    assert seeing.candidates == ()
+    assert seeing.reason == reason
+    assert front_end.counts()[reason] == 1
+
+
+def test_see_packed_picture_is_as_the_unpacked_one(camera: Camera) -> None:
+    random = np.random.default_rng(0)
+    packed = random.integers(0, 2**16, (240, 320), dtype=np.uint16)
+    rgb = np.stack([(packed >> 11) << 3, (packed >> 5 & 63) << 2, (packed & 31) << 3], axis=-1)
+    values = []
+    for picture in (packed, rgb.astype(np.uint8)):
+        front_end = FrontEnd([camera])
+        front_end.see(picture)
+        values.append(front_end.cell_values())
+    assert np.array_equal(*values)
+
+
+def test_see_finds_beacons_of_a_rendered_world_where_they_are(camera: Camera) -> None:
+    found, hits = 0, 0
+    for seed in (11, 12, 13):
+        scene = make_world(seed, "train")
+        renderer = Renderer(scene, camera, seed)
+        front_end = FrontEnd([camera])
+        for index, pose in enumerate(walk(scene, np.random.default_rng(seed), 10, hz=5)):
+            picture = renderer.render(pose, index / 5)
+            for candidate in front_end.see(picture.rgb).candidates:
+                left, top, right, bottom = (round(edge) for edge in candidate.outline)
+                inside = picture.identity[max(top, 0) : bottom, max(left, 0) : right]
+                found += 1
+                hits += (inside >= 0).mean() > 0.4
+                assert candidate.range_m is None or candidate.range_m > 0.0
+    # Worlds of the training set: nearly everything said is on a beacon.
+    assert found >= 15
+    assert hits >= 0.85 * found
+
+
+def test_threshold_decides_how_much_is_a_candidate(camera: Camera) -> None:
+    scene = make_world(14, "train")
+    picture = Renderer(scene, camera, 14).render(walk(scene, np.random.default_rng(14), 1, hz=5)[0], 0.0)
+    counts = []
+    for threshold in (-4.0, FrontEnd([camera]).threshold(), 50.0):
+        counts.append(len(FrontEnd([camera], threshold=threshold).see(picture.rgb).candidates))
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] == 0
