@@ -18,8 +18,9 @@ static const bslam_real_t BEARING_FLOOR_RAD = BSLAM_R(0.0008);
 static const bslam_real_t RANGE_FLOOR = BSLAM_R(0.01);
 static const bslam_real_t POINT_SD_PX = BSLAM_R(0.3);
 static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.3);
-// Of a wide object's width, for what is not flat or not level about it.
-static const bslam_real_t BEARING_BY_WIDTH = BSLAM_R(0.012);
+// Of a wide object's width, for what is not flat or not level about it; and pixels by its square, for turns.
+static const bslam_real_t BEARING_BY_WIDTH = BSLAM_R(0.008);
+static const bslam_real_t BEARING_BY_WIDTH2_PX = 8;
 // So far from a lens' axis, radians, a bearing's variance is doubled: upright sides are bent into the scan
 // lines.
 static const bslam_real_t OFF_AXIS_RAD = BSLAM_R(1.05);
@@ -62,7 +63,8 @@ static bslam_box_t box_around(const bslam_quad_t *quad)
 static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camera_t *camera,
                                      bslam_real_t point_var)
 {
-    const bslam_real_t by_width = BEARING_BY_WIDTH * (o->left - o->right);
+    const bslam_real_t width = o->left - o->right;
+    const bslam_real_t by_width = width * (BEARING_BY_WIDTH + width * BEARING_BY_WIDTH2_PX * o->pixel);
     const bslam_real_t off_axis = bslam_angle_wrap(o->facing_rad - camera->yaw_rad) / OFF_AXIS_RAD;
     const bslam_real_t square = off_axis * off_axis;
     return (BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + point_var / 2 + by_width * by_width +
