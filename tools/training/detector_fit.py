@@ -29,9 +29,6 @@ OVERLAP_NEGATIVE = 0.45
 POSITIVES_MAX = 22_000
 NEGATIVES_FIRST = 16_000
 NEGATIVES_HARD = 20_000
-RESIZED = 7_000
-RESIZE_LOG = (0.65, 1.2)  # natural logarithm of the factor, either way
-CAMERA_M = 0.5  # height of the cameras that the worlds are seen by
 FUSION_LIMIT = 4.0  # as BSLAM_FUSION_LIMIT
 FUSION_SHARE = 5  # every so many worlds are kept for the fusion
 
@@ -101,35 +98,8 @@ def fit_screen(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     )
 
 
-def resized(features: NDArray[np.float32], random: np.random.Generator) -> NDArray[np.float32]:
-    """What the features (n, ...) of beacons would be were the things about a third or thrice as large.
-
-    Half of them in the same place; half farther away or nearer, which moves them up or down too. A picture of
-    the size of a stamp is no poster, and the worlds hold too few of such things to learn it from.
-    """
-    made = features.copy()
-    factor = np.exp(random.uniform(*RESIZE_LOG, len(made)) * random.choice((-1.0, 1.0), len(made)))
-    log_width, log_height, bottom, top, log_area, per_m, log_base = (
-        made[:, i] for i in (0, 1, 2, 3, 5, 7, 9)
-    )
-    log_width += np.log(factor)
-    log_height += np.log(factor)
-    in_place = random.random(len(made)) < 0.5
-    top[in_place] = (bottom + factor * (top - bottom))[in_place]
-    log_area[in_place] += 2.0 * np.log(factor[in_place])
-    moved = ~in_place
-    for height in (bottom, top):
-        height[moved] = (CAMERA_M + factor * (height - CAMERA_M))[moved]
-    per_m[moved] /= factor[moved]
-    log_base[moved] -= np.log(factor[moved])
-    return made
-
-
 def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
-    """The quadratic machines, with the hardest negatives found in a second round; int8 weights.
-
-    Beacons of the wrong size (`resized`) are negatives too.
-    """
+    """The quadratic machines, with the hardest negatives found in a second round; int8 weights."""
     random = np.random.default_rng(1)
     fits = np.flatnonzero(usable(samples) & (samples.world % FUSION_SHARE != 0))
     screened = decide(detector.screen, normalised(samples.features[fits], detector))[:, 0]
@@ -140,28 +110,14 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     negatives = random.permutation(fits[~is_beacon])
     chosen = np.concatenate([positives, negatives[:NEGATIVES_FIRST]])
     rest = negatives[NEGATIVES_FIRST:]
-    known = positives[samples.features[positives, 7] > 0.0]  # a distance
-    strange = resized(samples.features[random.permutation(known)[:RESIZED]], random)
-    machine = _fit_chosen(samples, detector, chosen, strange)
+    machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
     if len(rest):
         worst = decide(machine, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
         order = np.argsort(-worst)[:NEGATIVES_HARD]
         hard = rest[order[worst[order] > -1.0]]
         chosen = np.concatenate([chosen, hard])
-        machine = _fit_chosen(samples, detector, chosen, strange)
+        machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
     return replace(detector, kinds=quantised(machine))
-
-
-def _fit_chosen(
-    samples: BoxSamples,
-    detector: DetectorModel,
-    chosen: NDArray[np.intp],
-    strange: NDArray[np.float32],
-) -> Svm:
-    targets = kind_targets(samples)[chosen]
-    none = np.zeros((len(strange), targets.shape[1]), np.bool_)
-    x = normalised(np.concatenate([samples.features[chosen], strange]), detector)
-    return fit_together(x, np.concatenate([targets, none]), KIND_COST)
 
 
 def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:

@@ -60,7 +60,7 @@ class BoxSamples:
 
 def swap_red_and_blue(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Of a picture in RGB565."""
-    return picture & 0x07E0 | picture >> 11 | picture << 11
+    return (picture & 0x07E0 | picture >> 11 | picture << 11).astype(np.uint16)
 
 
 def blank_svm(rows: int, features: int, quadratic: bool = False) -> Svm:

@@ -4,7 +4,7 @@
 /// A tone is a logarithmic colour, so that more light shifts it and does not stretch it. Each camera has a
 /// decaying histogram of tones for each of three zones of its frame (upper rows, rows above the horizon,
 /// lower rows): a cell whose tone is frequent there is probably no beacon. The histograms advance only while
-/// the robot moves: one that stands would otherwise learn the beacon before it. MATH "Surroundings".
+/// the robot moves: one that stands would otherwise learn the beacon before it.
 #ifndef BSLAM_VISION_BACKGROUND_H
 #define BSLAM_VISION_BACKGROUND_H
 

@@ -9,6 +9,8 @@
 /// one stays.
 #define OVERLAP_MAX BSLAM_R(0.3)
 #define WITHIN_MAX BSLAM_R(0.7)
+/// Natural logarithm of how many times too high or too low a candidate may be; the floor line errs too.
+#define LOG_SIZE_MAX 0.65f
 
 static void clamp_all(float *values, int32_t count, float limit)
 {
@@ -42,6 +44,19 @@ static void choose_class(const float *kinds, int32_t class_count, bslam_candidat
     candidate->class_margin = kinds[best] - second;
 }
 
+/// True if the box is far from as high as its kind is, where the floor line tells; a box at the upper or
+/// lower edge of the frame may be the part of something.
+static bool is_of_another_size(const bslam_view_t *view, const bslam_proposal_t *proposal, float log_height,
+                               float per_metre, float height_m)
+{
+    if (view->camera->lens != BSLAM_LENS_PINHOLE || !(per_metre > 0) || !(height_m > 0) ||
+        proposal->top <= 0 || proposal->bottom >= view->frame->rows) {
+        return false;
+    }
+    const float excess = log_height - bslam_log(height_m);
+    return excess > LOG_SIZE_MAX || excess < -LOG_SIZE_MAX;
+}
+
 /// A view of the rows [first, end) of a machine.
 static bslam_svm_t rows_of(const bslam_svm_t *svm, int32_t first, int32_t end)
 {
@@ -56,12 +71,14 @@ static bslam_svm_t rows_of(const bslam_svm_t *svm, int32_t first, int32_t end)
 }
 
 /// True if the proposal is a candidate: its score, class and outline are then written.
-static bool judge_one(const bslam_detector_model_t *model, int32_t class_count, const bslam_view_t *view,
-                      const bslam_proposal_t *proposal, bslam_candidate_t *candidate)
+static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
+                      int32_t class_count, const bslam_view_t *view, const bslam_proposal_t *proposal,
+                      bslam_candidate_t *candidate)
 {
     float features[BSLAM_BLOB_FEATURES];
     float values[BSLAM_CLASSES_MAX + 3];
     bslam_blob_features(view, proposal, features);
+    const float log_height = features[BSLAM_BLOB_LOG_HEIGHT], per_metre = features[BSLAM_BLOB_PER_METRE];
     bslam_detector_normalise(model, features);
     float *screen = &values[class_count + 2];
     bslam_svm_decide(&model->screen, features, screen);
@@ -85,7 +102,8 @@ static bool judge_one(const bslam_detector_model_t *model, int32_t class_count, 
     candidate->outline = proposal->box;
     candidate->score = score;
     choose_class(values + 1, class_count, candidate);
-    return true;
+    const float height_m = classes[candidate->beacon_class - 1].height_m;
+    return !is_of_another_size(view, proposal, log_height, per_metre, height_m);
 }
 
 static bslam_real_t area_px2(const bslam_box_t *box)
@@ -132,14 +150,15 @@ static int32_t insert(bslam_candidate_t *candidates, int32_t count, const bslam_
     return kept;
 }
 
-int32_t bslam_detector_judge(const bslam_detector_model_t *model, int32_t class_count,
-                             const bslam_view_t *view, const bslam_proposals_t *proposals,
-                             bslam_candidate_t *candidates, uint32_t *dropped)
+int32_t bslam_detector_judge(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
+                             int32_t class_count, const bslam_view_t *view,
+                             const bslam_proposals_t *proposals, bslam_candidate_t *candidates,
+                             uint32_t *dropped)
 {
     int32_t count = 0;
     for (int32_t i = 0; i < proposals->count; i++) {
         bslam_candidate_t candidate;
-        if (judge_one(model, class_count, view, &proposals->items[i], &candidate)) {
+        if (judge_one(model, classes, class_count, view, &proposals->items[i], &candidate)) {
             count = insert(candidates, count, &candidate, dropped);
         }
     }

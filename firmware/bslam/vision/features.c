@@ -115,8 +115,8 @@ static ray_t ray_at(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_
     return ray;
 }
 
-/// Natural logarithm to 0.01, without libm: exponent by halving, then a parabola.
-static float log_of(float x)
+/// Without libm: exponent by halving, then a parabola.
+float bslam_log(float x)
 {
     float halvings = 0;
     x = clampf(x, 1e-4f, 1e4f);
@@ -170,17 +170,17 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     const float width_px = (float)(p->box.right_px - p->box.left_px);
     const float height_px = (float)(p->box.bottom_px - p->box.top_px);
 
-    *x++ = log_of(wall_m * chord);
-    *x++ = log_of(wall_m * (top.slope - bottom.slope));
+    *x++ = bslam_log(wall_m * chord);
+    *x++ = bslam_log(wall_m * (top.slope - bottom.slope));
     *x++ = clampf(height_m + wall_m * bottom.slope, -1.0f, 3.0f);
     *x++ = clampf(height_m + wall_m * top.slope, -1.0f, 4.0f);
-    *x++ = log_of(height_px / width_px);
-    *x++ = log_of(height_px * width_px);
+    *x++ = bslam_log(height_px / width_px);
+    *x++ = bslam_log(height_px * width_px);
     *x++ = (float)p->cells / (float)((p->right - p->left) * (p->bottom - p->top));
     *x++ = known ? 1.0f / wall_m : 0.0f;
     *x++ = share;
-    *x++ = known ? log_of(base_m / wall_m) : 0.0f;
-    const float turn = left_m > 0 && right_m > 0 ? log_of(left_m / right_m) : 0.0f;
+    *x++ = known ? bslam_log(base_m / wall_m) : 0.0f;
+    const float turn = left_m > 0 && right_m > 0 ? bslam_log(left_m / right_m) : 0.0f;
     *x++ = turn < 0 ? -turn : turn;
     *x++ = (top.slope + bottom.slope) / 2;
     return x;

@@ -23,7 +23,7 @@ typedef struct bslam_proposal {
 } bslam_proposal_t;
 
 /// Scratch for one segmentation.
-#define BSLAM_RUNS_MAX 1536
+#define BSLAM_RUNS_MAX 1024
 typedef struct bslam_run {
     uint16_t parent;
     uint16_t cells;

@@ -1,7 +1,7 @@
 /// Reduces a frame while its rows stream in: cells, half-resolution copy, brightness. No frame is kept.
 ///
 /// Everything is summed in one word a pixel pair: the three channels of RGB565, spread so that 16 of them add
-/// without meeting (docs/MATH.md "Cells").
+/// without meeting.
 #ifndef BSLAM_VISION_THUMBNAIL_H
 #define BSLAM_VISION_THUMBNAIL_H
 

@@ -220,8 +220,8 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     bslam_proposals_find(&vision->proposals, &view);
     bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =
-        bslam_detector_judge(detector, vision->model->class_count, &view, &vision->proposals,
-                             vision->candidates, &vision->candidates_dropped);
+        bslam_detector_judge(detector, vision->model->classes, vision->model->class_count, &view,
+                             &vision->proposals, vision->candidates, &vision->candidates_dropped);
     measure(vision, frame);
 }
 
