@@ -4,7 +4,8 @@ Walks through rendered worlds; of every whole object of 150 px or more that is s
 from its front and at most a tenth hidden, takes the error of direction and of distance. `--boxes rough`
 (default) measures the true box with each edge moved by up to `--jitter` px, evenly; `--boxes detected` what
 the detector finds of it. Columns: n; of how many percent it is measured; rms and 1.4826 median |error|; mean
-square of error over standard deviation. `--correlation` prints besides how alike an object's errors are in
+square of error over standard deviation, and percent beyond three of these. A distance by the height of a kind
+that it is not does not count. `--correlation` prints besides how alike an object's errors are in
 two frames of a walk, by how far the robot moved between them.
 `.venv/bin/python tools/measure_outline.py [--rig wide180] [--boxes detected] [--style train]`
 """
@@ -119,7 +120,12 @@ def errors_of_world(seed: int, rig: str, style: str, jitter_px: float) -> Errors
             ):
                 bearing = np.degrees(np.angle(np.exp(1j * (candidate.bearing_rad - seen.bearing_rad))))
                 bearing_sd = np.degrees(candidate.bearing_sd_rad)
-            if candidate is not None and candidate.range_m is not None and candidate.range_sd_m is not None:
+            if (
+                candidate is not None
+                and candidate.kind in ("", seen.kind)
+                and candidate.range_m is not None
+                and candidate.range_sd_m is not None
+            ):
                 distance = candidate.range_m / seen.range_m - 1.0
                 distance_sd = candidate.range_sd_m / seen.range_m
             row = (seed, step, seen.beacon_id, seen.kind, seen.range_m, (x_m, y_m))
@@ -136,9 +142,12 @@ def spread(errors: NDArray[np.floating]) -> str:
 
 
 def honesty(errors: NDArray[np.floating], sd: NDArray[np.floating]) -> str:
-    """Mean square of error over standard deviation: 1 if that holds."""
+    """Mean square of error over standard deviation, 1 if that holds; and percent beyond three of them."""
     known = np.isfinite(errors)
-    return f"{np.mean((errors[known] / sd[known]) ** 2):5.2f}" if known.any() else "    -"
+    if not known.any():
+        return "     -    -"
+    square = (errors[known] / sd[known]) ** 2
+    return f"{np.mean(square):6.2f} {100 * np.mean(square > 9.0):4.1f}"
 
 
 def print_line(name: str, errors: Errors) -> None:
@@ -152,8 +161,8 @@ def print_line(name: str, errors: Errors) -> None:
 
 
 def print_tables(errors: Errors) -> None:
-    print("                   n   direction, deg            distance, %")
-    print("                       has    rms  median  (e/sd)2  has    rms  median  (e/sd)2")
+    print("                   n   direction, deg                  distance, %")
+    print("                       has    rms median (e/sd)2 >3sd   has    rms median (e/sd)2 >3sd")
     for low, high in DISTANCES_M:
         print_line(f"{low}-{high} m", errors[(errors["distance_m"] >= low) & (errors["distance_m"] < high)])
     middle = errors[(errors["distance_m"] >= 2.5) & (errors["distance_m"] < 7.0)]
