@@ -29,9 +29,9 @@ from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
-# The front end errs the same way again until the robot has gone about so far: measured on training worlds,
-# docs/EXPERIMENTS.md.
-CORRELATION_M = 0.3
+# What the front end gets wrong of an object comes from its looks, and stays alike for two or three metres of
+# way: tools/measure_outline.py --correlation.
+CORRELATION_M = 3.0
 # What a beacon's sightings have in common for a whole drive, and no front end can know: its distance is
 # biased by its looks (a pale rim taken for wall), its kind may be mistaken. Added to the front end's own
 # noise; tried on paper_room, seeds 0:4.
