@@ -1,6 +1,7 @@
 /// bslam: simultaneous localisation and mapping with beacons, in fixed memory.
 ///
-/// Includes the whole library. Start at slam/slam.h. Sizes: base/config.h. Parameters: base/params.h.
+/// Start at slam/slam.h. Sizes: base/config.h. Parameters: base/params.h. The vision front end, which a robot
+/// with a detector of its own does without, is apart: vision/vision.h.
 #ifndef BSLAM_H
 #define BSLAM_H
 

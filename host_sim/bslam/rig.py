@@ -18,12 +18,14 @@ from bslam.parsing.settings import (
     POSITIVE,
     Rule,
     check_keys,
+    find_toml,
     integer,
     load_toml,
     number,
     one_of,
     parse_table,
     setting,
+    toml_names,
 )
 
 LENS_KINDS = ("pinhole", "equidistant")
@@ -127,16 +129,12 @@ class _PanTable:
 
 def rig_names() -> list[str]:
     """Names of the rigs that come with the package."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    return toml_names(_FOLDER)
 
 
 def load_rig(name_or_path: str | Path) -> Rig:
     """A rig by its name or from a path that ends in .toml; BslamError if it is missing or wrong."""
-    text = str(name_or_path)
-    path = Path(text) if text.endswith(".toml") else _FOLDER / f"{text}.toml"
-    if not path.is_file():
-        allowed = f"{', '.join(rig_names())}, or a path that ends in .toml"
-        raise BslamError(f"rig {text!r}: there is no such rig or file; allowed: {allowed}")
+    path = find_toml("rig", name_or_path, _FOLDER)
     return _parse_rig(load_toml(path), path)
 
 

@@ -6,6 +6,7 @@
 
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
+static const bslam_real_t WAY_MAX_M = BSLAM_R(1000.0);
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
@@ -28,6 +29,15 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
 
 // ---- odometry ---------------------------------------------------------------------------------------------
 
+/// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
+/// filter's own speed has no bound that would keep the conversion defined.
+static uint32_t whole_micrometres(bslam_real_t forward_m)
+{
+    return bslam_in_range(forward_m, -WAY_MAX_M, WAY_MAX_M)
+               ? (uint32_t)(bslam_abs(forward_m) * MICROMETRES_PER_M)
+               : (uint32_t)(WAY_MAX_M * MICROMETRES_PER_M);
+}
+
 /// The filter goes through one waiting motion, or its part before the moment until_us before the newest end.
 static void predict_step(bslam_slam_t *slam, int64_t until_us)
 {
@@ -36,8 +46,7 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     bslam_motion_t moved;
     bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
     bslam_history_take(&slam->history, &place, &moved);
-    const bslam_real_t way_m = moved.forward_m < 0 ? -moved.forward_m : moved.forward_m;
-    slam->way_um += (uint32_t)(way_m * MICROMETRES_PER_M);
+    slam->way_um += whole_micrometres(moved.forward_m);
 }
 
 /// The filter goes on to the moment until_us before the newest odometry.

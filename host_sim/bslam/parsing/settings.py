@@ -70,6 +70,24 @@ def setting(rule: Rule, default: Any = MISSING) -> Any:
     return field(default=default, metadata={"rule": rule})
 
 
+def toml_names(folder: Path) -> list[str]:
+    """Names of the TOML files that come with the package in a folder of it."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def find_toml(what: str, name_or_path: str | Path, folder: Path) -> Path:
+    """The file of a name in the folder, or of a path that ends in .toml; BslamError if it is missing.
+
+    `what` it is of, "scenario" say, is for the message.
+    """
+    text = str(name_or_path)
+    path = Path(text) if text.endswith(".toml") else folder / f"{text}.toml"
+    if not path.is_file():
+        allowed = f"{', '.join(toml_names(folder))}, or a path that ends in .toml"
+        raise BslamError(f"{what} {text!r}: there is no such {what} or file; allowed: {allowed}")
+    return path
+
+
 def load_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file; BslamError if it cannot be read or is not TOML."""
     try:

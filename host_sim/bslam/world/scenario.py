@@ -35,12 +35,14 @@ from bslam.parsing.settings import (
     SHARE,
     Rule,
     check_keys,
+    find_toml,
     integer,
     load_toml,
     number,
     one_of,
     parse_table,
     setting,
+    toml_names,
 )
 from bslam.world.arena import Arena, Beacon, Point, Wall
 from bslam.world.planner import grid_size
@@ -211,16 +213,12 @@ _LISTS: dict[str, type] = {"walls": _WallTable, "beacons": _BeaconTable, "areas"
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that come with the package."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    return toml_names(_FOLDER)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
     """A scenario by its name or from a path that ends in .toml; BslamError if it is missing or wrong."""
-    text = str(name_or_path)
-    path = Path(text) if text.endswith(".toml") else _FOLDER / f"{text}.toml"
-    if not path.is_file():
-        allowed = f"{', '.join(scenario_names())}, or a path that ends in .toml"
-        raise BslamError(f"scenario {text!r}: there is no such scenario or file; allowed: {allowed}")
+    path = find_toml("scenario", name_or_path, _FOLDER)
     return _parse_scenario(load_toml(path), path)
 
 

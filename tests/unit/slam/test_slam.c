@@ -895,6 +895,24 @@ static void test_odometry_beyond_the_room_to_wait_is_predicted_in_order(void **s
 
 // ---- interruptions ----------------------------------------------------------------------------------------
 
+/// The way that errors stay alike over is kept in a 32-bit counter: under the sanitizers, the largest
+/// motions.
+static void test_odometry_largest_motion_does_not_overflow_the_way(void **state)
+{
+    for (int kind = 0; kind < 6; kind++) {
+        bslam_params_t params = form(kind);
+        params.speed_max_mps = 1000;
+        bslam_slam_t slam = running(params);
+        for (int i = 1; i <= 4; i++) {
+            const int64_t time_us = 10 * STEP_US + (int64_t)i * 4000000;
+            const bslam_odometry_reading_t reading = {
+                .time_us = time_us, .source = BSLAM_ODOMETRY_VELOCITY, .v_mps = i % 2 == 0 ? -999 : 999};
+            assert_int_equal(bslam_slam_odometry(&slam, &reading), BSLAM_OK);
+            see(&slam, time_us, NULL, 0);
+        }
+    }
+}
+
 static void test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew(void **state)
 {
     bslam_slam_t slam = running(unit_params());
@@ -1169,6 +1187,7 @@ int main(void)
         cmocka_unit_test(test_pose_and_covariance_between_frames_are_what_the_filter_arrives_at),
         cmocka_unit_test(test_odometry_beyond_the_room_to_wait_is_predicted_in_order),
 
+        cmocka_unit_test(test_odometry_largest_motion_does_not_overflow_the_way),
         cmocka_unit_test(test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew),
         cmocka_unit_test(test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks),
         cmocka_unit_test(test_resume_odometry_forgets_the_past_before_it),
