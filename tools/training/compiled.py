@@ -92,5 +92,15 @@ def worst_difference(machine: CompiledSvm, x: NDArray[np.float32], wanted: Matri
     return float(np.max(np.abs(machine.decide(x) - wanted) / magnitude))
 
 
+def worst_byte_difference(machine: CompiledSvm, x: NDArray[np.float32], wanted: Matrix) -> float:
+    """The same of a quadratic machine with byte weights, in its own roundings: what svm.h says of bytes.
+
+    One is a step of its whole numbers on every weight; 1.1 is allowed.
+    """
+    largest = np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True)).astype(np.float64)
+    step = largest**2 / 16383 * np.abs(machine.weights().astype(np.float64)).sum(axis=1)
+    return float(np.max(np.abs(machine.decide(x) - wanted) / (step + 1e-30)))
+
+
 def _pointer(array: NDArray[np.float32]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)

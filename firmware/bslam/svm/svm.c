@@ -1,6 +1,7 @@
 #include "bslam/svm/svm.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "bslam/base/real.h"
 
@@ -51,28 +52,8 @@ bslam_status_t bslam_svm_check(const bslam_svm_t *svm, int32_t features)
 /// Partial sums of a dot product, so that a compiler can use vector instructions where there are any.
 #define LANES 8
 
-/// The sum of w[i] x[i] over the bytes w.
-static float dot_bytes(const int8_t *restrict w, const float *restrict x, int32_t count)
-{
-    float lanes[LANES] = {0};
-    float sum = 0;
-    int32_t i = 0;
-    for (; i + LANES <= count; i += LANES) {
-        for (int32_t k = 0; k < LANES; k++) {
-            lanes[k] += (float)w[i + k] * x[i + k];
-        }
-    }
-    for (; i < count; i++) {
-        sum += (float)w[i] * x[i];
-    }
-    for (int32_t k = 0; k < LANES; k++) {
-        sum += lanes[k];
-    }
-    return sum;
-}
-
-/// The same over floats.
-static float dot_floats(const float *restrict w, const float *restrict x, int32_t count)
+/// The sum of w[i] x[i].
+static float dot(const float *restrict w, const float *restrict x, int32_t count)
 {
     float lanes[LANES] = {0};
     float sum = 0;
@@ -91,25 +72,161 @@ static float dot_floats(const float *restrict w, const float *restrict x, int32_
     return sum;
 }
 
-/// The sum of w[first + i] x[i], the weights as they are stored.
-static float dot(const bslam_svm_t *svm, int32_t first, const float *x, int32_t count)
+static void decide_by_floats(const bslam_svm_t *svm, const float *x, float *values)
 {
-    return svm->bytes != NULL ? dot_bytes(svm->bytes + first, x, count)
-                              : dot_floats(svm->weights + first, x, count);
+    const int32_t n = svm->features;
+    for (int32_t r = 0; r < svm->rows; r++) {
+        const float *w = svm->weights + r * weights_in_row(svm);
+        float sum = dot(w, x, n);
+        w += n;
+        // x_i is taken out of the products of row i: fewer multiplications, and short sums round less.
+        for (int32_t i = 0; svm->quadratic && i < n; i++) {
+            sum += x[i] * dot(w, x + i, n - i);
+            w += n - i;
+        }
+        values[r] = svm->bias[r] + sum;
+    }
+}
+
+// --- Bytes: whole numbers all the way
+//
+// The values of phi are formed a block at a time, once for all rows: whole numbers to +-X_ONE stand for x_i,
+// and the upper half of the product of two of them for phi, so at most 16384.
+
+#define X_ONE 32767
+/// Values of phi in a block: the sum of as many products with bytes fits in 32 bits by far.
+#define BLOCK 160
+/// So many at a time, constants, so that a compiler can use vector instructions.
+#define STEP 8
+#define STRIDE 16
+
+/// Where the expansion goes on. There is room beyond the features for a whole step.
+typedef struct expansion {
+    const bslam_svm_t *svm;
+    const float *x;
+    float unit;  ///< what 1 of phi's whole numbers stands for
+    int16_t whole[BSLAM_SVM_FEATURES_MAX + STEP];
+    int32_t first, second;  ///< the next product; first is -1 while phi is x itself
+} expansion_t;
+
+static float largest(const float *x, int32_t count)
+{
+    float most = 1.0f;
+    for (int32_t i = 0; i < count; i++) {
+        most = x[i] > most ? x[i] : -x[i] > most ? -x[i] : most;
+    }
+    return most;
+}
+
+static int16_t rounded(float x)
+{
+    return (int16_t)(x < 0 ? x - 0.5f : x + 0.5f);
+}
+
+static void begin_expansion(expansion_t *e, const bslam_svm_t *svm, const float *x)
+{
+    const float most = largest(x, svm->features);
+    e->svm = svm;
+    e->x = x;
+    e->unit = most / (float)X_ONE;
+    e->unit *= svm->quadratic ? e->unit * 65536.0f : 1.0f;
+    e->first = -1;
+    e->second = 0;
+    for (int32_t i = 0; i < svm->features; i++) {
+        e->whole[i] = rounded(x[i] * ((float)X_ONE / most));
+    }
+    memset(e->whole + svm->features, 0, STEP * sizeof e->whole[0]);
+}
+
+/// Products of x_i with values from `x` on: whole steps, so up to STEP - 1 more than `count`.
+static void multiply(int16_t *restrict phi, const int16_t *restrict x, int32_t x_i, int32_t count)
+{
+    for (int32_t i = 0; i < count; i += STEP) {
+        for (int32_t k = i; k < i + STEP; k++) {
+            phi[k] = (int16_t)(x_i * x[k] >> 16);
+        }
+    }
+}
+
+/// The next values of phi, at most BLOCK; returns how many.
+static int32_t expand(expansion_t *e, int16_t phi[BLOCK + STEP])
+{
+    const int32_t n = e->svm->features;
+    int32_t count = 0;
+    for (; e->first < 0 && e->second < n && count < BLOCK; count++) {
+        phi[count] = rounded(e->x[e->second++] / e->unit);
+    }
+    int32_t first = e->first, second = e->second;
+    while (count < BLOCK && first < n) {
+        if (second == n) {
+            first = e->svm->quadratic ? first + 1 : n;
+            second = first;
+            continue;
+        }
+        const int32_t left = n - second, room = BLOCK - count;
+        const int32_t now = left < room ? left : room;
+        multiply(phi + count, e->whole + second, e->whole[first], now);
+        count += now;
+        second += now;
+    }
+    e->first = first;
+    e->second = second;
+    return count;
+}
+
+/// The sum of w[i] phi[i] over a whole block.
+static int32_t dot_block(const int8_t *restrict w, const int16_t *restrict phi)
+{
+    int32_t sum = 0;
+    for (int32_t i = 0; i < BLOCK; i++) {
+        sum += w[i] * phi[i];
+    }
+    return sum;
+}
+
+/// The same over what is left at the end.
+static int32_t dot_rest(const int8_t *restrict w, const int16_t *restrict phi, int32_t count)
+{
+    int32_t sum = 0;
+    int32_t i = 0;
+    for (; i + STRIDE <= count; i += STRIDE) {
+        for (int32_t k = 0; k < STRIDE; k++) {
+            sum += w[i + k] * phi[i + k];
+        }
+    }
+    for (; i < count; i++) {
+        sum += w[i] * phi[i];
+    }
+    return sum;
+}
+
+static void decide_by_bytes(const bslam_svm_t *svm, const float *x, float *values)
+{
+    expansion_t expansion;
+    int16_t phi[BLOCK + STEP];
+    begin_expansion(&expansion, svm, x);
+    for (int32_t r = 0; r < svm->rows; r++) {
+        values[r] = 0;
+    }
+    const int32_t weights = weights_in_row(svm);
+    for (int32_t at = 0; at < weights;) {
+        const int32_t count = expand(&expansion, phi);
+        for (int32_t r = 0; r < svm->rows; r++) {
+            const int8_t *w = svm->bytes + r * weights + at;
+            values[r] += (float)(count == BLOCK ? dot_block(w, phi) : dot_rest(w, phi, count));
+        }
+        at += count;
+    }
+    for (int32_t r = 0; r < svm->rows; r++) {
+        values[r] = svm->bias[r] + svm->byte_scale[r] * expansion.unit * values[r];
+    }
 }
 
 void bslam_svm_decide(const bslam_svm_t *svm, const float *x, float *values)
 {
-    const int32_t n = svm->features;
-    for (int32_t r = 0; r < svm->rows; r++) {
-        int32_t at = r * weights_in_row(svm);
-        float sum = dot(svm, at, x, n);
-        at += n;
-        // x_i is taken out of the products of row i: fewer multiplications, and short sums round less.
-        for (int32_t i = 0; svm->quadratic && i < n; i++) {
-            sum += x[i] * dot(svm, at, x + i, n - i);
-            at += n - i;
-        }
-        values[r] = svm->bias[r] + (svm->bytes != NULL ? svm->byte_scale[r] * sum : sum);
+    if (svm->bytes != NULL) {
+        decide_by_bytes(svm, x, values);
+    } else {
+        decide_by_floats(svm, x, values);
     }
 }

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
 from training import export, fit
-from training.compiled import TOLERANCE, CompiledSvm, compile_library, worst_difference
+from training.compiled import (
+    TOLERANCE,
+    CompiledSvm,
+    compile_library,
+    worst_byte_difference,
+    worst_difference,
+)
 
 
 def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -50,7 +56,7 @@ def test_header_bytes_decide_as_the_quantised_machine() -> None:
     assert small.byte_scale is not None
     library = compiled(small)
     wanted = fit.expand(x, True) @ library.weights().T.astype(np.float64) + small.bias
-    assert worst_difference(library, x, wanted) <= TOLERANCE
+    assert worst_byte_difference(library, x, wanted) <= 1.1
     assert np.mean((library.decide(x) > 0) == (machine.decide(x) > 0)) > 0.97
 
 
@@ -62,7 +68,10 @@ def test_machines_that_come_with_the_library_decide_by_their_tables(lens: str, p
     x = np.random.default_rng(5).standard_normal((200, machine.features)).astype(np.float32)
     zero = machine.decide(np.zeros((1, machine.features), np.float32))
     wanted = fit.expand(x, machine.quadratic) @ machine.weights().T.astype(np.float64) + zero
-    assert worst_difference(machine, x, wanted) <= TOLERANCE
+    if part == "kinds":
+        assert worst_byte_difference(machine, x, wanted) <= 1.1
+    else:
+        assert worst_difference(machine, x, wanted) <= TOLERANCE
 
 
 def recogniser(seed: int = 3) -> Recogniser:

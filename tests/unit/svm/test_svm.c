@@ -46,8 +46,8 @@ static void test_decide_bytes_are_scaled_row_by_row(void **state)
     const float x[] = {3, 1};
     float values[2];
     bslam_svm_decide(&svm, x, values);
-    assert_near(values[0], 1 + 0.5 * (381 - 127), 0);
-    assert_near(values[1], 2 + 0.25 * (3 + 2), 0);
+    assert_near(values[0], 1 + 0.5 * (381 - 127), 0.5 * 254 * 3 / 32767);
+    assert_near(values[1], 2 + 0.25 * (3 + 2), 0.25 * 3 * 3 / 32767);
 }
 
 // ---- against the definition, in double --------------------------------------------------------------------
@@ -116,15 +116,23 @@ static void assert_decides_by_definition(const bslam_svm_t *svm, const float *x)
     float values[ROWS];
     bslam_svm_decide(svm, x, values);
     const int count = expand(svm, x, phi);
+    double most = 1;
+    for (int i = 0; i < svm->features; i++) {
+        most = fmax(most, fabs((double)x[i]));
+    }
     for (int r = 0; r < svm->rows; r++) {
         double value = (double)svm->bias[r];
         double sum = fabs(value);
+        double weights = 0;
         for (int k = 0; k < count; k++) {
             value += weight(svm, r, k) * phi[k];
             sum += fabs(weight(svm, r, k) * phi[k]);
+            weights += fabs(weight(svm, r, k));
         }
         // What the header promises, and three roundings for bias and scale.
-        assert_near(values[r], value, (2 * svm->features + 3) * FLOAT_ROUNDING * sum);
+        const double step = svm->quadratic ? most * most / 16383 : most / 32767;
+        const double steps = svm->bytes != NULL ? 1.1 * step * weights : 0;
+        assert_near(values[r], value, (2 * svm->features + 3) * FLOAT_ROUNDING * sum + steps);
     }
 }
 
@@ -138,6 +146,53 @@ static void test_decide_is_the_definition_for_every_kind(void **state)
         assert_int_equal(bslam_svm_check(&svm, FEATURES), BSLAM_OK);
         assert_decides_by_definition(&svm, machine.x);
     }
+}
+
+/// A whole number's worth of rounding, not several, so that a sign or a shift gone wrong shows: the typical
+/// error of a random machine is far below the bound.
+static void test_decide_bytes_are_close_to_floats(void **state)
+{
+    static machine_t machine;
+    static double phi[WEIGHTS];
+    unit_random_t random = {7};
+    double square = 0;
+    for (int k = 0; k < 40; k++) {
+        fill(&machine, &random);
+        const bslam_svm_t svm = view(&machine, true, true);
+        float values[ROWS];
+        bslam_svm_decide(&svm, machine.x, values);
+        const int count = expand(&svm, machine.x, phi);
+        double value = (double)svm.bias[0];
+        double spread = 0;
+        for (int i = 0; i < count; i++) {
+            value += weight(&svm, 0, i) * phi[i];
+            spread += weight(&svm, 0, i) * weight(&svm, 0, i);
+        }
+        // Roundings of independent products, uniform over one step, downwards.
+        const double step = 9.0 / 16383;
+        square += (values[0] - value) * (values[0] - value) / (spread * step * step);
+    }
+    assert_true(sqrt(square / 40) < 1);
+}
+
+static void test_decide_bytes_largest_numbers_do_not_overflow(void **state)
+{
+    enum { N = BSLAM_SVM_FEATURES_MAX, COUNT = BSLAM_SVM_WEIGHTS(N, true) };
+    static int8_t bytes[COUNT];
+    static float x[N];
+    static const float scale[] = {1}, bias[] = {0};
+    for (int i = 0; i < COUNT; i++) {
+        bytes[i] = -128;
+    }
+    for (int i = 0; i < N; i++) {
+        x[i] = -3;
+    }
+    const bslam_svm_t svm = {
+        .rows = 1, .features = N, .quadratic = true, .bytes = bytes, .byte_scale = scale, .bias = bias};
+    float value;
+    bslam_svm_decide(&svm, x, &value);
+    const double wanted = -128.0 * (-3.0 * N + 9.0 * N * (N + 1) / 2);
+    assert_near(value, wanted, fabs(wanted) * 2e-4);
 }
 
 static void test_decide_touches_no_value_beyond_its_rows(void **state)
@@ -239,6 +294,8 @@ int main(void)
         cmocka_unit_test(test_decide_linear_is_the_dot_product),
         cmocka_unit_test(test_decide_quadratic_takes_the_upper_triangle_row_by_row),
         cmocka_unit_test(test_decide_bytes_are_scaled_row_by_row),
+        cmocka_unit_test(test_decide_bytes_are_close_to_floats),
+        cmocka_unit_test(test_decide_bytes_largest_numbers_do_not_overflow),
         cmocka_unit_test(test_decide_is_the_definition_for_every_kind),
         cmocka_unit_test(test_decide_touches_no_value_beyond_its_rows),
         cmocka_unit_test(test_check_sizes_out_of_range_are_refused),
