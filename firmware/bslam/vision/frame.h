@@ -14,9 +14,9 @@
 /// Side of a cell, pixels.
 #define BSLAM_CELL_PX 4
 #define BSLAM_CELLS_MAX ((BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX) * (BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX))
-/// Loops over cells go so many at a time; tables that they read or write have room for whole steps.
+/// Loops over cells go so many at a time, from any cell; tables that they read or write have room for that.
 #define BSLAM_CELL_STEP 16
-#define BSLAM_CELLS_ROOM ((BSLAM_CELLS_MAX + BSLAM_CELL_STEP - 1) / BSLAM_CELL_STEP * BSLAM_CELL_STEP)
+#define BSLAM_CELLS_ROOM (BSLAM_CELLS_MAX + 2 * BSLAM_CELL_STEP)
 /// Pixels of the half-resolution copy.
 #define BSLAM_HALF_MAX ((BSLAM_IMAGE_WIDTH_MAX / 2) * (BSLAM_IMAGE_HEIGHT_MAX / 2))
 

@@ -85,48 +85,56 @@ static void join(bslam_run_t *runs, int32_t a, int32_t b)
     into->cells = (uint16_t)(into->cells + from->cells);
 }
 
-#define WORD ((int32_t)sizeof(uint32_t))
+/// Eight cells of a mask at once: none in it, or all.
+#define WORD ((int32_t)sizeof(uint64_t))
+#define NONE_OF_WORD 0U
+#define ALL_OF_WORD 0x0101010101010101U
 
-/// Four cells of a mask at once.
-static uint32_t word_of(const uint8_t *mask)
+/// The first cell from `column` on that is not as those of the word.
+static int32_t skip(const uint8_t *mask, int32_t column, int32_t columns, uint64_t word)
 {
-    uint32_t word;
-    memcpy(&word, mask, sizeof word);
-    return word;
+    uint64_t here = word;
+    while (column + WORD <= columns) {
+        memcpy(&here, mask + column, sizeof here);
+        if (here != word) {
+            break;
+        }
+        column += WORD;
+    }
+    while (column < columns && mask[column] == (uint8_t)word) {
+        column++;
+    }
+    return column;
 }
 
 /// Appends the runs of a row; returns how many runs there are then.
 static int32_t find_runs(bslam_proposals_t *proposals, const uint8_t *mask, int32_t columns, int32_t row,
                          int32_t count)
 {
-    int32_t column = 0;
-    while (column < columns) {
-        if (mask[column] == 0) {
-            column += column + WORD <= columns && word_of(mask + column) == 0 ? WORD : 1;
-            continue;
+    int32_t end = 0;
+    for (;;) {
+        const int32_t first = skip(mask, end, columns, NONE_OF_WORD);
+        if (first == columns) {
+            return count;
         }
-        const int32_t first = column++;
-        while (column < columns && mask[column] != 0) {
-            column++;
-        }
+        end = skip(mask, first, columns, ALL_OF_WORD);
         if (count == BSLAM_RUNS_MAX) {
             proposals->runs_dropped++;
             continue;
         }
         proposals->runs[count] = (bslam_run_t){
             .parent = (uint16_t)count,
-            .cells = (uint16_t)(column - first),
+            .cells = (uint16_t)(end - first),
             .row = (uint8_t)row,
             .first = (uint8_t)first,
-            .end = (uint8_t)column,
+            .end = (uint8_t)end,
             .left = (uint8_t)first,
             .top = (uint8_t)row,
-            .right = (uint8_t)column,
+            .right = (uint8_t)end,
             .bottom = (uint8_t)(row + 1),
         };
         count++;
     }
-    return count;
 }
 
 /// Joins the runs [middle, end) of a row with the runs [begin, middle) of the row above.
@@ -194,6 +202,73 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
     return edge;
 }
 
+/// Lines of cells around a side that it may snap to, and those with one on either side.
+enum { SNAP_LINES = 5 };
+/// Cells summed at a time, a constant, so that a compiler can use vector instructions.
+enum { STEPS_AT_ONCE = 8 };
+
+static uint8_t limited(uint8_t step)
+{
+    return step < EDGE_STEP_MAX ? step : EDGE_STEP_MAX;
+}
+
+/// Sums of the steps across SNAP_LINES columns from `line` on; what a sum takes from beyond the frame is not
+/// read.
+static void sum_columns(const bslam_view_t *view, const bslam_proposal_t *box, int32_t line,
+                        uint16_t sums[SNAP_LINES])
+{
+    const int32_t columns = view->frame->columns;
+    const int32_t start = most(line, 0);
+    uint16_t all[STEPS_AT_ONCE] = {0};
+    for (int32_t row = box->top; row < box->bottom; row++) {
+        const uint8_t *steps = view->step_x + row * columns + start;
+        for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
+            all[k] = (uint16_t)(all[k] + limited(steps[k]));
+        }
+    }
+    for (int32_t i = 0; i < SNAP_LINES; i++) {
+        sums[i] = line + i >= 0 && line + i < columns ? all[line + i - start] : 0;
+    }
+}
+
+static uint16_t sum_row(const uint8_t *steps, int32_t count)
+{
+    uint16_t all[STEPS_AT_ONCE] = {0};
+    int32_t sum = 0;
+    int32_t i = 0;
+    for (; i + STEPS_AT_ONCE <= count; i += STEPS_AT_ONCE) {
+        for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
+            all[k] = (uint16_t)(all[k] + limited(steps[i + k]));
+        }
+    }
+    for (; i < count; i++) {
+        sum += limited(steps[i]);
+    }
+    for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
+        sum += all[k];
+    }
+    return (uint16_t)sum;
+}
+
+/// Mean steps, as bslam_edge_along gives them, of SNAP_LINES lines of cells from `line` on.
+static void steps_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+                        int32_t line, float steps[SNAP_LINES])
+{
+    const bool upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    const int32_t cells = upright ? box->bottom - box->top : box->right - box->left;
+    const int32_t columns = view->frame->columns;
+    uint16_t sums[SNAP_LINES] = {0};
+    if (upright) {
+        sum_columns(view, box, line, sums);
+    }
+    for (int32_t i = 0; i < SNAP_LINES; i++) {
+        if (!upright && line + i >= 0 && line + i < view->frame->rows) {
+            sums[i] = sum_row(view->step_y + (line + i) * columns + box->left, cells);
+        }
+        steps[i] = (float)sums[i] / (float)cells;
+    }
+}
+
 /// Where an edge lies between the cells `line` - 1 and `line` + 1, in cells from `line`: the top of a
 /// parabola.
 static float peak_of(float before, float here, float after)
@@ -209,10 +284,8 @@ static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, 
                          int32_t line, float *shift)
 {
     const int32_t outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
-    float steps[5];
-    for (int32_t i = 0; i < 5; i++) {
-        steps[i] = bslam_edge_along(view, box, side, line - 2 + i).step;
-    }
+    float steps[SNAP_LINES];
+    steps_along(view, box, side, line - 2, steps);
     int32_t best = steps[2 + outside] > steps[2] ? 2 + outside : 2;
     if (steps[best] < (float)EDGE_STEP_MIN && steps[2 - outside] > steps[best]) {
         best = 2 - outside;
@@ -255,8 +328,12 @@ void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
     const bool small =
         proposal->right - proposal->left < SNAP_SIDE_MIN || proposal->bottom - proposal->top < SNAP_SIDE_MIN;
     bslam_proposal_t box = *proposal;
-    for (int32_t i = 0; i < SNAPS && !small; i++) {
-        box = snapped(view, &box);
+    bool moves = !small;
+    for (int32_t i = 0; i < SNAPS && moves; i++) {
+        const bslam_proposal_t before = box;
+        box = snapped(view, &before);
+        moves = box.left != before.left || box.top != before.top || box.right != before.right ||
+                box.bottom != before.bottom;
     }
     if (is_known(proposals, &box.box)) {
         return;
@@ -366,28 +443,31 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
     }
 }
 
-/// Leaves only the cells whose eight neighbours are in the mask too: rows, then columns.
+/// out[i] is in all three masks. Whole steps of BSLAM_CELL_STEP cells; all have room.
+static void keep_common(uint8_t *restrict out, const uint8_t *a, const uint8_t *b, const uint8_t *c,
+                        int32_t columns)
+{
+    for (int32_t i = 0; i < columns; i += BSLAM_CELL_STEP) {
+        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
+            out[k] = a[k] & b[k] & c[k];
+        }
+    }
+}
+
+/// Leaves only the cells whose eight neighbours are in the mask too: columns, then rows.
 static void shrink_mask(uint8_t *mask, int32_t columns, int32_t rows)
 {
-    uint8_t above[BSLAM_COLUMNS_MAX] = {0};
+    enum { ROOM = BSLAM_COLUMNS_MAX + BSLAM_CELL_STEP };
+    uint8_t above[ROOM] = {0}, here[ROOM] = {0}, upright[1 + ROOM] = {0};
+    static const uint8_t none[ROOM] = {0};
     for (int32_t row = 0; row < rows; row++) {
         uint8_t *line = mask + row * columns;
-        uint8_t before = 0;
-        for (int32_t column = 0; column + 1 < columns; column++) {
-            const uint8_t here = line[column];
-            line[column] = before & here & line[column + 1];
-            before = here;
-        }
-        line[columns - 1] = 0;
-    }
-    for (int32_t row = 0; row < rows; row++) {
-        uint8_t *line = mask + row * columns;
-        for (int32_t column = 0; column < columns; column++) {
-            const uint8_t here = line[column];
-            const uint8_t below = row + 1 < rows ? line[column + columns] : 0;
-            line[column] = above[column] & here & below;
-            above[column] = here;
-        }
+        memcpy(here, line, (size_t)columns);
+        keep_common(upright + 1, above, here, row + 1 < rows ? line + columns : none, columns);
+        upright[1 + columns] = 0;
+        memcpy(above, here, (size_t)columns);
+        keep_common(here, upright, upright + 1, upright + 2, columns);
+        memcpy(line, here, (size_t)columns);
     }
 }
 
