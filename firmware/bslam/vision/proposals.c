@@ -465,7 +465,7 @@ static void shrink_mask(uint8_t *mask, int32_t columns, int32_t rows)
         memcpy(here, line, (size_t)columns);
         keep_common(upright + 1, above, here, row + 1 < rows ? line + columns : none, columns);
         upright[1 + columns] = 0;
-        memcpy(above, here, (size_t)columns);
+        memcpy(above, here, sizeof above);
         keep_common(here, upright, upright + 1, upright + 2, columns);
         memcpy(line, here, (size_t)columns);
     }
