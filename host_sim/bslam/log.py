@@ -36,6 +36,10 @@ ODOMETRY_COLUMNS = {
 }
 SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m")
 """Columns of sightings that a detector may leave out."""
+SIGNATURE_SIZE = 71
+"""Values of a signature: how a sighting looks (firmware/bslam/vision/signature.h)."""
+SIGNATURES = "signatures.npy"
+"""The file of a log folder that holds them, one a row of sightings.csv."""
 BEACON_ID_MAX = 2**31 - 1
 """Labels are 32-bit numbers in the core."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
@@ -71,6 +75,7 @@ class Sightings:
         None  # (m,) noise as the detector gives it; 0, None: it does not
     )
     range_sd_m: NDArray[np.float64] | None = None  # (m,)
+    signature: NDArray[np.float32] | None = None  # (m, SIGNATURE_SIZE) how each looks; None: nobody knows
 
 
 @dataclass(frozen=True)
@@ -154,7 +159,8 @@ class Log:
 
 
 def read_folder(path: str | Path) -> Log:
-    """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`, `beacons.csv`).
+    """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`, `beacons.csv`,
+    `signatures.npy`).
 
     Each .csv may be a .csv.gz. Raises BslamError that names the file, the line and column or key, the value
     and what is allowed there.
@@ -201,6 +207,9 @@ def write_folder(log: Log, path: str | Path) -> None:
                 (folder / name).unlink(missing_ok=True)
             if columns is not None:
                 _write_csv(folder / f"{stem}.csv", columns)
+        (folder / SIGNATURES).unlink(missing_ok=True)
+        if sightings.signature is not None:
+            np.save(folder / SIGNATURES, sightings.signature, allow_pickle=False)
         (folder / "robot.toml").write_text(_robot_text(log.robot), encoding="utf-8")
     except OSError as error:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
@@ -341,7 +350,28 @@ def _read_sightings(folder: Path) -> Sightings:
         range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
         **{name: table.values.get(name) for name in SIGHTING_NOISE},
+        signature=_read_signatures(folder / SIGNATURES, table.rows),
     )
+
+
+def _read_signatures(path: Path, rows: int) -> NDArray[np.float32] | None:
+    if not path.is_file():
+        return None
+    allowed = f"float32 of shape ({rows}, {SIGNATURE_SIZE}), as many rows as sightings.csv, or no such file"
+    try:
+        values = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise BslamError(f"{path}: cannot be read: {error}; allowed: {allowed}") from error
+    if not isinstance(values, np.ndarray) or values.dtype != np.float32:
+        raise BslamError(f"{path}: {getattr(values, 'dtype', 'no array')}; allowed: {allowed}")
+    if values.shape != (rows, SIGNATURE_SIZE):
+        raise BslamError(f"{path}: shape {values.shape}; allowed: {allowed}")
+    bad = ~(np.abs(values) <= 1e12)
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        where = f"row {row}, column {column}, counted from 0"
+        raise BslamError(f"{path}: {values[row, column]} in {where}; allowed: finite, from -1e12 to 1e12")
+    return values
 
 
 def _read_truth(folder: Path) -> Truth | None:

@@ -1,23 +1,25 @@
 #include "bslam/association/association.h"
 
+#include "bslam/association/internal.h"
 #include "bslam/math/trig.h"
 
 /// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
 typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                      int beacon);
 
-static bool is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
+bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
 {
     const bool mappable = sighting->beacon_class != BSLAM_CLASS_NOT_MAPPABLE;
     match->verdict = BSLAM_VERDICT_REJECT;
     match->reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS;
     match->beacon = -1;
     match->distance2 = -1;
+    match->score = 0;
+    match->sure = false;
     return mappable;
 }
 
-/// True if two sightings of different classes are asked to be one beacon.
-static bool classes_differ(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
+bool bslam_classes_differ(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
 {
     return sighting->beacon_class != BSLAM_CLASS_NONE && beacon->beacon_class != BSLAM_CLASS_NONE &&
            sighting->beacon_class != beacon->beacon_class;
@@ -68,7 +70,7 @@ void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *m
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
         bslam_match_t *match = &matches[i];
-        if (!is_mappable(sighting, match)) {
+        if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
         if (sighting->label == BSLAM_LABEL_NONE) {
@@ -91,11 +93,11 @@ static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
         bslam_match_t *match = &matches[i];
-        if (!is_mappable(sighting, match)) {
+        if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
         for (int b = 0; b < frame->ekf->beacon_count; b++) {
-            if (classes_differ(sighting, &frame->ekf->beacons[b])) {
+            if (bslam_classes_differ(sighting, &frame->ekf->beacons[b])) {
                 continue;
             }
             const bslam_real_t d2 = distance2(frame, sighting, b);
@@ -167,6 +169,6 @@ void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_matc
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params)
 {
     static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
-                                                 bslam_associate_mahalanobis};
+                                                 bslam_associate_mahalanobis, bslam_associate_svm};
     return methods[params->association];
 }

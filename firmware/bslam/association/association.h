@@ -3,7 +3,16 @@
 #ifndef BSLAM_ASSOCIATION_ASSOCIATION_H
 #define BSLAM_ASSOCIATION_ASSOCIATION_H
 
+#include "bslam/association/looks.h"
 #include "bslam/ekf/ekf.h"
+
+/// Values of the parameter `association`.
+enum {
+    BSLAM_ASSOCIATION_KNOWN = 0,
+    BSLAM_ASSOCIATION_NEAREST = 1,
+    BSLAM_ASSOCIATION_MAHALANOBIS = 2,
+    BSLAM_ASSOCIATION_SVM = 3
+};
 
 /// Why a sighting was not used.
 typedef enum bslam_reason {
@@ -12,6 +21,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< neither near enough to a beacon to match nor far enough to be new
+    BSLAM_REASON_LOOKS,        ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
@@ -30,14 +40,17 @@ typedef struct bslam_match {
     bslam_verdict_t verdict;
     bslam_reason_t reason;
     int32_t beacon;          ///< index into the map for a match, else -1
-    bslam_real_t distance2;  ///< to the nearest beacon in the method's own measure; negative: not computed
+    bslam_real_t distance2;  ///< to the chosen beacon in the method's own measure; negative: not computed
+    bslam_real_t score;      ///< svm: log odds of that beacon against a new one; else 0
+    bool sure;               ///< svm: sure enough to learn from; else false
 } bslam_match_t;
 
 /// All a method may look at.
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
     const bslam_params_t *params;
-    const bslam_pose_t *mount;  ///< the sensor relative to the robot's present pose
+    const bslam_looks_t *looks;  ///< what the beacons look like; NULL: nobody knows
+    const bslam_pose_t *mount;   ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
 } bslam_sighting_frame_t;
@@ -54,6 +67,11 @@ void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t 
 
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
 void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+
+/// The paper's two steps: candidates by position, then their machines decide between match, new and wait.
+/// Without looks or signatures by position alone. O(count * beacons), and again where two sightings want one
+/// beacon.
+void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// The method that params->association names.
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params);

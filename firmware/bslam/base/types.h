@@ -40,6 +40,7 @@ typedef struct bslam_sighting {
     bool has_range;               ///< false: direction only, paper equation (15)
     uint8_t beacon_class;         ///< BSLAM_CLASS_NONE, BSLAM_CLASS_NOT_MAPPABLE, or the detector's own
     int32_t label;                ///< identity >= 0 if the detector knows it, else BSLAM_LABEL_NONE
+    const float *signature;       ///< how it looks, BSLAM_SAMPLE_FEATURES values (svm/sample.h); NULL: none
 } bslam_sighting_t;
 
 #endif

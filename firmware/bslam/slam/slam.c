@@ -27,6 +27,14 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
+void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
+{
+    slam->looks = looks;
+    if (looks != NULL) {
+        bslam_looks_clear(looks);
+    }
+}
+
 // ---- odometry ---------------------------------------------------------------------------------------------
 
 /// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
@@ -149,9 +157,20 @@ static bool is_noise(bslam_real_t sd, bslam_real_t low, bslam_real_t high)
     return sd == 0 || bslam_in_range(sd, low, high);
 }
 
+static bool signature_is_finite(const float *signature)
+{
+    for (int k = 0; signature != NULL && k < BSLAM_SAMPLE_FEATURES; k++) {
+        if (!bslam_is_number((bslam_real_t)signature[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
-    if (!bslam_is_number(sighting->bearing_rad) || !bslam_is_number(sighting->bearing_sd_rad) ||
+    if (!signature_is_finite(sighting->signature) || !bslam_is_number(sighting->bearing_rad) ||
+        !bslam_is_number(sighting->bearing_sd_rad) ||
         (sighting->has_range &&
          (!bslam_is_number(sighting->range_m) || !bslam_is_number(sighting->range_sd_m)))) {
         return BSLAM_E_NOT_FINITE;
@@ -314,6 +333,51 @@ static void use_matches(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t 
     }
 }
 
+// ---- looks ------------------------------------------------------------------------------------------------
+
+static int find_uid(const bslam_ekf_t *ekf, uint32_t uid)
+{
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        if (ekf->beacons[b].uid == uid) {
+            return b;
+        }
+    }
+    return -1;
+}
+
+/// Machines learn from what a frame surely showed, and train for a bounded time.
+static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
+{
+    if (slam->looks == NULL || slam->params.association != BSLAM_ASSOCIATION_SVM) {
+        return;
+    }
+    for (int i = 0; i < count; i++) {
+        const bslam_account_t *account = &slam->accounts[i];
+        const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
+        if (sightings[i].signature == NULL || (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED)) {
+            continue;
+        }
+        if (is_new || slam->matches[i].sure) {
+            bslam_looks_teach(slam->looks, &slam->params, find_uid(&slam->ekf, account->beacon_uid),
+                              slam->ekf.beacon_count, slam->way_um, sightings[i].signature);
+        } else {
+            slam->looks->counters.unsure++;
+        }
+    }
+    (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
+}
+
+/// Takes a beacon out of the map, and what is known of its looks with it.
+static void drop_beacon(bslam_slam_t *slam, int index)
+{
+    if (slam->looks != NULL) {
+        bslam_looks_forget(slam->looks, index, slam->ekf.beacon_count);
+    }
+    bslam_ekf_remove(&slam->ekf, index);
+}
+
+// ---- tidying ----------------------------------------------------------------------------------------------
+
 /// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
 /// reason against it: it leaves if sightings contradicted it.
 static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
@@ -322,7 +386,7 @@ static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *b
     if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
-    return params->association != 0 || beacon->gated > 0;
+    return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
 }
 
 /// Rays whose distance is known become points; provisional beacons whose time is up leave.
@@ -331,7 +395,7 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
         if (is_unconfirmed(&slam->params, beacon, time_us)) {
-            bslam_ekf_remove(&slam->ekf, b);
+            drop_beacon(slam, b);
             slam->counters.removed++;
         } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
             slam->counters.settled++;
@@ -375,11 +439,11 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
     }
     predict_until(slam, behind_us > 0 ? behind_us : 0);
     const bslam_pose_t mount = mount_of_frame(slam, behind_us);
-    const bslam_sighting_frame_t frame = {
-        .ekf = &slam->ekf, .params = &slam->params, .mount = &mount, .sightings = sightings, .count = count};
+    const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks, &mount, sightings, count};
     const bslam_associate_fn associate = bslam_associate_method(&slam->params);
     associate(&frame, slam->matches);
     use_matches(slam, time_us, &mount, sightings, count);
+    learn_looks(slam, sightings, count);
     tidy_map(slam, time_us, &mount);
     slam->last_frame_us = time_us;
     slam->has_frame = true;
@@ -415,13 +479,12 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
 
 bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
 {
-    for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        if (slam->ekf.beacons[b].uid == uid) {
-            bslam_ekf_remove(&slam->ekf, b);
-            return BSLAM_OK;
-        }
+    const int index = find_uid(&slam->ekf, uid);
+    if (index < 0) {
+        return BSLAM_E_NO_BEACON;
     }
-    return BSLAM_E_NO_BEACON;
+    drop_beacon(slam, index);
+    return BSLAM_OK;
 }
 
 // ---- results ----------------------------------------------------------------------------------------------

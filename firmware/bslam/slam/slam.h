@@ -70,6 +70,7 @@ typedef struct bslam_slam {
     uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
+    bslam_looks_t *looks;  ///< the caller's; NULL: none attached
     bslam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;
@@ -83,6 +84,11 @@ typedef struct bslam_slam {
 /// then *slam is unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
                                                 int *bad_id);
+
+/// From now on the pipeline learns what beacons look like, and association 3 decides by it. *looks has been
+/// through bslam_looks_init and stays the caller's; it serves one pipeline, and forgets what it knew of
+/// another map. NULL: looks are not used any more. bslam_slam_init detaches.
+void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks);
 
 /// One odometry reading, which waits until a frame shows a later moment. BSLAM_E_TIME, BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE, BSLAM_E_JUMP as bslam_odometry_read has them; BSLAM_E_SINGULAR as bslam_ekf_check_motion
@@ -104,7 +110,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, b
 /// BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not after the last frame, older than where the
 /// filter stands, or newer than the odometry by more than ahead_max_us. BSLAM_E_NOT_FINITE, BSLAM_E_RANGE (a
 /// distance or its noise outside 1 mm to 10 km, a direction beyond ±2 pi or its noise outside 1e-5 to pi, a
-/// label below -1): bslam_slam_bad_sighting says which.
+/// label below -1): bslam_slam_bad_sighting says which. Signatures need not outlive the call.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us,
                                                      const bslam_sighting_t *sightings, int count);
 

@@ -180,6 +180,12 @@ int32_t bslam_learner_samples(const bslam_learner_t *learner, int32_t machine)
     return exists(learner, machine) ? learner->machines[machine].samples : 0;
 }
 
+bool bslam_learner_knows(const bslam_learner_t *learner, int32_t machine)
+{
+    return exists(learner, machine) && learner->machines[machine].trained &&
+           learner->machines[machine].rivals > 0;
+}
+
 // ---- decisions
 // ------------------------------------------------------------------------------------------------
 

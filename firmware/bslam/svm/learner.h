@@ -125,6 +125,9 @@ bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 BSLAM_MUST_CHECK bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t machine,
                                                      const bslam_sample_t *sample, float *value);
 
+/// True if a machine has been trained with rivals: its decision values mean something.
+bool bslam_learner_knows(const bslam_learner_t *learner, int32_t machine);
+
 /// Samples that a machine keeps; 0 if there is no such machine.
 int32_t bslam_learner_samples(const bslam_learner_t *learner, int32_t machine);
 

@@ -45,8 +45,15 @@ class Library:
         elements = self.ffi.typeof(type_name).elements
         return {value: name.removeprefix(prefix).lower() for value, name in elements.items()}
 
-    def sightings(self, rows: Sequence[tuple[float, float, int, bool, float, float]]) -> Any:
-        """Rows (bearing_rad, range_m or NaN, label, mappable, bearing_sd_rad, range_sd_m) as a C array."""
+    def sightings(
+        self,
+        rows: Sequence[tuple[float, float, int, bool, float, float]],
+        signature: NDArray[np.float32] | None = None,
+    ) -> Any:
+        """Rows (bearing_rad, range_m or NaN, label, mappable, bearing_sd_rad, range_sd_m) as a C array.
+
+        signature: (rows, n) float32, C-contiguous; the array is good as long as it is.
+        """
         array = self.ffi.new("bslam_sighting_t[]", len(rows))
         not_mappable = 255  # BSLAM_CLASS_NOT_MAPPABLE; a macro has no place in an ffi declaration
         for sighting, row in zip(array, rows, strict=True):
@@ -58,6 +65,10 @@ class Library:
             sighting.label = label
             sighting.bearing_sd_rad = bearing_sd_rad
             sighting.range_sd_m = range_sd_m
+        if signature is not None and len(rows) > 0:
+            first = self.ffi.from_buffer("float[]", signature)
+            for index, sighting in enumerate(array):
+                sighting.signature = first + index * signature.shape[1]
         return array
 
 

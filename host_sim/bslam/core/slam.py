@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.learner import SIGNATURE_SIZE, encode
 from bslam.core.raw import library
 from bslam.errors import BslamError
 
@@ -63,12 +64,19 @@ class Slam:
     """A robot that localises itself and maps beacons: one instance of the C pipeline.
 
     params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must
-    hold. real: "float", as on the target, or "double", the twin. Raises BslamError for what is no parameter
-    or is out of range.
+    hold. real: "float", as on the target, or "double", the twin. looks: it learns what the beacons look like
+    (association 3); seeds (n, 71): signatures of things that are no beacon here. Raises BslamError for what
+    is no parameter or is out of range.
     """
 
     def __init__(
-        self, params: Mapping[str, float] | None = None, *, beacons_max: int = 20, real: str = "float"
+        self,
+        params: Mapping[str, float] | None = None,
+        *,
+        beacons_max: int = 20,
+        real: str = "float",
+        looks: bool = False,
+        seeds: NDArray[np.float32] | None = None,
     ) -> None:
         self._raw = library(real, beacons_max)
         self._lib, self._ffi = self._raw.lib, self._raw.ffi
@@ -85,6 +93,16 @@ class Slam:
             "velocity": (self._lib.BSLAM_ODOMETRY_VELOCITY, "v_mps", "omega_radps"),
         }
         self._init(params or {})
+        self._looks = None
+        if looks:
+            self._attach_looks(np.empty((0, SIGNATURE_SIZE), np.float32) if seeds is None else seeds)
+
+    def _attach_looks(self, seeds: NDArray[np.float32]) -> None:
+        self._looks = self._ffi.new("bslam_looks_t *")
+        self._seeds = encode(self._raw, seeds)
+        status = self._lib.bslam_looks_init(self._looks, self._seeds, len(seeds))
+        self._raw.ensure(status, f"{len(seeds)} seeds")
+        self._lib.bslam_slam_attach_looks(self._slam, self._looks)
 
     def _init(self, params: Mapping[str, float]) -> None:
         table = {p.name: p for p in self.parameters(self._raw.real)}
@@ -132,8 +150,9 @@ class Slam:
 
     @property
     def state_bytes(self) -> bytes:
-        """Every byte of the C instance: for tests that a refused input changes nothing."""
-        return bytes(self._ffi.buffer(self._slam))
+        """Every byte of the C instance and its looks: for tests that a refused input changes nothing."""
+        looks = b"" if self._looks is None else bytes(self._ffi.buffer(self._looks))
+        return bytes(self._ffi.buffer(self._slam)) + looks
 
     def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
         """One reading of kind "wheels" (a, b = left_m, right_m), "ticks" (counters), "velocity" (m/s, rad/s).
@@ -174,18 +193,22 @@ class Slam:
         mappable: Sequence[bool],
         bearing_sd_rad: Sequence[float] | None = None,
         range_sd_m: Sequence[float] | None = None,
+        signature: NDArray[np.float32] | None = None,
     ) -> list[Account]:
         """One image: equal lengths; range NaN: direction only; label -1: no identity.
 
-        The noise as the detector gives it; 0, or none at all: as the parameters have it.
+        The noise as the detector gives it; 0, or none at all: as the parameters have it. signature (m, 71):
+        how each looks; None: nobody knows.
 
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
         silent = [0.0] * len(bearing_rad)
         noise = (bearing_sd_rad or silent, range_sd_m or silent)
         rows = list(zip(bearing_rad, range_m, label, mappable, *noise, strict=True))
+        if signature is not None:
+            signature = _checked_signatures(signature, len(rows))
         try:
-            array = self._raw.sightings(rows)
+            array = self._raw.sightings(rows, signature)
             status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
         except OverflowError as error:
             raise BslamError(f"frame at {time_us} us: {error}") from error
@@ -261,5 +284,17 @@ class Slam:
         self._raw.ensure(self._lib.bslam_slam_remove_beacon(self._slam, uid), f"beacon {uid}")
 
     def counters(self) -> dict[str, int]:
-        """Never-decreasing counts by the names of bslam_counters_t."""
-        return self._raw.fields(self._slam.counters, "bslam_counters_t")
+        """Never-decreasing counts by the names of bslam_counters_t; with looks, theirs and the learner's."""
+        counts = self._raw.fields(self._slam.counters, "bslam_counters_t")
+        if self._looks is not None:
+            counts |= self._raw.fields(self._looks.counters, "bslam_looks_counters_t")
+            counts |= self._raw.fields(self._looks.learner.counters, "bslam_learner_counters_t")
+        return counts
+
+
+def _checked_signatures(signature: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """As C reads it. Raises BslamError for another shape."""
+    if np.shape(signature) != (count, SIGNATURE_SIZE):
+        shape = np.shape(signature)
+        raise BslamError(f"signatures of shape {shape}; allowed: ({count}, {SIGNATURE_SIZE}), or none")
+    return np.ascontiguousarray(signature, np.float32)

@@ -75,6 +75,7 @@ class CameraDrive:
             mappable=np.ones(len(self.seen), dtype=np.bool_),
             bearing_sd_rad=self.seen["bearing_sd_rad"].copy(),
             range_sd_m=self.seen["range_sd_m"].copy(),
+            signature=np.ascontiguousarray(self.seen["signature"]),
         )
 
 

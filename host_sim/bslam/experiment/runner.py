@@ -22,7 +22,7 @@ from bslam.log import Log, Odometry, Sightings
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
-MAPPABLE = 3  # its place among the columns of a frame
+MAPPABLE, SIGNATURE = 3, 6  # their places among the columns of a frame
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
 FALSE_BEACONS_ROOM = 80
 # After an interruption of odometry (the core takes intervals up to 4 s): the robot may have gone this fast.
@@ -39,12 +39,13 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
     beacons to hold.
     """
-    factory = slam_factory or partial(_make_slam, options.real)
+    factory = slam_factory or partial(_make_slam, options)
     return _Run(factory(core_params(options, log), _beacons_to_hold(log, options)), log, options).finish()
 
 
-def _make_slam(real: str, params: Mapping[str, Number], beacons_max: int) -> Slam:
-    return Slam(params, beacons_max=beacons_max, real=real)
+def _make_slam(options: RunOptions, params: Mapping[str, Number], beacons_max: int) -> Slam:
+    looks = options.association == "svm"
+    return Slam(params, beacons_max=beacons_max, real=options.real, looks=looks)
 
 
 def _beacons_to_hold(log: Log, options: RunOptions) -> int:
@@ -217,6 +218,7 @@ class _Frames:
         self._time_us: list[int] = times[first].tolist()
         self._true_id: list[int] = sightings.beacon_id.tolist()
         self._columns = _columns_for_filter(sightings, options)
+        self._signature = sightings.signature if options.association == "svm" else None
         self._next = 0
 
     def waiting_before(self, until_us: int | None) -> bool:
@@ -224,12 +226,15 @@ class _Frames:
             return False
         return until_us is None or self._time_us[self._next] < until_us
 
-    def take(self) -> tuple[int, Sequence[int], list[list[Any]]]:
+    def take(self) -> tuple[int, Sequence[int], list[Any]]:
         """Time, true identities, and the columns of the next frame, see `_columns_for_filter`."""
         frame = self._next
         rows = slice(self._bounds[frame], self._bounds[frame + 1])
         self._next = frame + 1
-        return self._time_us[frame], self._true_id[rows], [column[rows] for column in self._columns]
+        columns: list[Any] = [column[rows] for column in self._columns]
+        if self._signature is not None:
+            columns += [None] * (SIGNATURE - len(columns)) + [self._signature[rows]]
+        return self._time_us[frame], self._true_id[rows], columns
 
 
 def _columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:

@@ -25,10 +25,11 @@ class Wall:
 
 @dataclass(frozen=True)
 class Beacon:
-    """A point that the sensor can see and tell from others."""
+    """A point that the sensor can see and tell from others, unless it looks like another on purpose."""
 
     beacon_id: int
     at: Point
+    looks_like: int | None = None  # the beacon whose looks it has; None: its own
 
 
 @dataclass(frozen=True)

@@ -192,6 +192,7 @@ class _WallTable:
 class _BeaconTable:
     id: int = setting(integer(0, BEACON_ID_MAX))
     at: tuple[float, float] = setting(_POINT)
+    looks_like: int | None = setting(integer(0, BEACON_ID_MAX), None)
 
 
 _TOP_RULES = {
@@ -242,7 +243,7 @@ def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
         name=path.stem,
         arena=Arena(
             walls=_cut_doors(lists["walls"], path),
-            beacons=tuple(Beacon(one.id, one.at) for one in lists["beacons"]),
+            beacons=tuple(Beacon(one.id, one.at, one.looks_like) for one in lists["beacons"]),
         ),
         areas=tuple(lists["areas"]),
         **top,
@@ -312,6 +313,11 @@ def _check_together(scenario: Scenario, path: Path) -> None:
             beacon.beacon_id not in seen, f"beacons[{index}], key id", beacon.beacon_id, "an id of its own"
         )
         seen.add(beacon.beacon_id)
+    own_looks = {beacon.beacon_id for beacon in scenario.arena.beacons if beacon.looks_like is None}
+    for index, beacon in enumerate(scenario.arena.beacons):
+        like = beacon.looks_like
+        allowed = "the id of a beacon with looks of its own"
+        require(like is None or like in own_looks, f"beacons[{index}], key looks_like", like, allowed)
     to_wall_m = scenario.arena.nearest_wall(start.x_m, start.y_m)[0]
     place = (start.x_m, start.y_m)
     require(to_wall_m >= radius_m, "[start], keys x_m, y_m", place, f"a place {radius_m:g} m from every wall")

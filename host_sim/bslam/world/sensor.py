@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bslam.log import Sightings, wrap_rad
 from bslam.world.arena import Arena
 from bslam.world.scenario import Sensor
+from bslam.world.signatures import Looks
 
 Matrix = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ def see(
     on the others. An outlier keeps its beacon's identity, but its direction and range mean nothing.
     """
     bearing_rad, range_m = look(arena, sensor, poses)
+    side_rad, true_range_m = bearing_rad + poses[:, 2:] + sensor.yaw_rad, range_m
     seen = is_visible(arena, sensor, poses, bearing_rad, range_m)
     bearing_noise, range_noise = random.standard_normal((2, *seen.shape))
     bearing_rad = wrap_rad(bearing_rad + sensor.bearing_sigma_rad * bearing_noise)
@@ -38,12 +40,15 @@ def see(
     seen &= range_m > 0.0  # from afar the noise can exceed the range; no detector would report that
     step, beacon = np.nonzero(seen)
     beacon_id = np.array([one.beacon_id for one in arena.beacons], dtype=np.int64)
+    looks_random = random.spawn(1)[0]  # how things look changes nothing of where they are seen
+    looks = Looks(arena, looks_random)
     return Sightings(
         time_us=time_us[step] + sensor.delay_us,
         beacon_id=beacon_id[beacon],
         bearing_rad=bearing_rad[seen],
         range_m=range_m[seen],
         mappable=np.ones(len(step), dtype=np.bool_),
+        signature=looks.see(beacon, side_rad[seen], true_range_m[seen], looks_random),
     )
 
 

@@ -96,6 +96,7 @@ def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], pa
 
 def _until(sightings: Sightings, end_us: int) -> Sightings:
     """Without those that, being delayed, arrive after the end."""
+    assert sightings.signature is not None
     kept = sightings.time_us <= end_us
     return Sightings(
         time_us=sightings.time_us[kept],
@@ -103,6 +104,7 @@ def _until(sightings: Sightings, end_us: int) -> Sightings:
         bearing_rad=sightings.bearing_rad[kept],
         range_m=sightings.range_m[kept],
         mappable=sightings.mappable[kept],
+        signature=sightings.signature[kept],
     )
 
 

@@ -43,7 +43,7 @@ def runs(out):
         (["run"], ["SCENARIO"]),
         (["run", "nowhere"], ["'nowhere'", "paper_room"]),
         (["run", "paper_room", "--observation", "x"], ["--observation", "'x'", "distance, direction"]),
-        (["run", "paper_room", "--association", "svm"], ["--association", "'svm'", "known", "nearest"]),
+        (["run", "paper_room", "--association", "look"], ["--association", "'look'", "known", "nearest"]),
         (["run", "paper_room", "--association", "known:7"], ["--association", "'7'", "0 to 1"]),
         (["run", "paper_room", "--filter", "smoother"], ["--filter", "'smoother'", "standard, invariant"]),
         (["run", "paper_room", "--motion", "x"], ["--motion", "'x'", "euler"]),

@@ -1,0 +1,190 @@
+#include "bslam/association/looks.h"
+
+#include <string.h>
+
+static const bslam_look_t BLANK = {.machine = BSLAM_NO_MACHINE, .twin = BSLAM_NO_MACHINE};
+static const uint32_t MICROMETRES_PER_M = 1000000;
+
+bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds, int32_t seed_count)
+{
+    const bslam_status_t status = bslam_learner_init(&looks->learner, seeds, seed_count);
+    if (status == BSLAM_OK) {
+        looks->counters = (bslam_looks_counters_t){0};
+        for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+            looks->of[b] = BLANK;
+        }
+    }
+    return status;
+}
+
+/// True if a beacon other than `index` has this machine.
+static bool has_other_owner(const bslam_looks_t *looks, int index, int count, int16_t machine)
+{
+    for (int b = 0; b < count; b++) {
+        if (b != index && looks->of[b].machine == machine) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Takes a beacon's machine away, and out of the learner if no other beacon has it.
+static void release(bslam_looks_t *looks, int index, int count)
+{
+    const int16_t machine = looks->of[index].machine;
+    if (machine == BSLAM_NO_MACHINE) {
+        return;
+    }
+    looks->of[index].machine = BSLAM_NO_MACHINE;
+    if (!has_other_owner(looks, index, count, machine) &&
+        bslam_learner_remove(&looks->learner, machine) == BSLAM_OK) {
+        for (int b = 0; b < count; b++) {
+            if (looks->of[b].twin == machine) {
+                looks->of[b].twin = BSLAM_NO_MACHINE;
+                looks->of[b].twin_count = 0;
+            }
+        }
+    }
+}
+
+void bslam_looks_clear(bslam_looks_t *looks)
+{
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        release(looks, b, BSLAM_BEACONS_MAX);
+        looks->of[b] = BLANK;
+    }
+}
+
+void bslam_looks_forget(bslam_looks_t *looks, int index, int count)
+{
+    release(looks, index, count);
+    memmove(&looks->of[index], &looks->of[index + 1], (size_t)(count - 1 - index) * sizeof looks->of[0]);
+    looks->of[count - 1] = BLANK;
+}
+
+// ---- opinions ---------------------------------------------------------------------------------------------
+
+static bslam_opinion_t opinion_of(const bslam_looks_t *looks, const bslam_params_t *params, int32_t machine,
+                                  const bslam_sample_t *sample)
+{
+    bslam_opinion_t opinion = {0.0f, 0.0f};
+    if (machine != BSLAM_NO_MACHINE && bslam_learner_knows(&looks->learner, machine)) {
+        const float samples = (float)bslam_learner_samples(&looks->learner, machine);
+        opinion.value = bslam_sample_decide(&looks->learner.machines[machine].weights, sample);
+        opinion.weight = samples / (samples + (float)params->looks_samples);
+    }
+    return opinion;
+}
+
+bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                const bslam_sample_t *sample)
+{
+    return opinion_of(looks, params, looks->of[index].machine, sample);
+}
+
+// ---- learning ---------------------------------------------------------------------------------------------
+
+/// Another machine than `own` that takes a sample for its own, the surest; BSLAM_NO_MACHINE if none does.
+static int16_t find_twin(const bslam_looks_t *looks, const bslam_params_t *params, int16_t own,
+                         const bslam_sample_t *sample, float at_least)
+{
+    int16_t best = BSLAM_NO_MACHINE;
+    for (int16_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        if (m == own) {
+            continue;
+        }
+        const bslam_opinion_t opinion = opinion_of(looks, params, m, sample);
+        if (opinion.weight >= 0.5f && opinion.value > at_least) {
+            best = m;
+            at_least = opinion.value;
+        }
+    }
+    return best;
+}
+
+/// Counts up to a limit while something holds, and down to 0 while it does not. True at the limit.
+static bool persists(uint8_t *count, bool holds, int32_t limit)
+{
+    if (holds) {
+        *count = (uint8_t)(*count + (*count < limit ? 1 : 0));
+    } else {
+        *count = (uint8_t)(*count - (*count > 0 ? 1 : 0));
+    }
+    return *count >= limit;
+}
+
+/// Whether another machine takes this beacon for its own again and again, as surely as the beacon's machine
+/// does: then they look alike, and two machines would be trained to contradict each other.
+static bool has_twin(const bslam_looks_t *looks, const bslam_params_t *params, bslam_look_t *look,
+                     const bslam_sample_t *sample)
+{
+    const bslam_opinion_t own = opinion_of(looks, params, look->machine, sample);
+    const float least = (float)params->share_value;
+    const float at_least = own.weight > 0.0f && own.value > least ? own.value : least;
+    const int16_t twin = find_twin(looks, params, look->machine, sample, at_least);
+    if (twin != BSLAM_NO_MACHINE && twin != look->twin && look->twin_count == 0) {
+        look->twin = twin;
+    }
+    const bool again = twin != BSLAM_NO_MACHINE && twin == look->twin;
+    return persists(&look->twin_count, again, params->share_sightings);
+}
+
+/// A machine of its own for a beacon, if there is one left.
+static void give_machine(bslam_looks_t *looks, bslam_look_t *look)
+{
+    int32_t machine;
+    if (bslam_learner_add(&looks->learner, &machine) == BSLAM_OK) {
+        look->machine = (int16_t)machine;
+    } else {
+        looks->counters.no_slot++;
+    }
+}
+
+/// Decides which machine a beacon has; false while that is open, when nothing is to be learned.
+static bool settle_machine(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
+                           const bslam_sample_t *sample)
+{
+    bslam_look_t *look = &looks->of[index];
+    const bool is_shared =
+        look->machine != BSLAM_NO_MACHINE && has_other_owner(looks, index, count, look->machine);
+    if (is_shared) {
+        const bslam_opinion_t own = opinion_of(looks, params, look->machine, sample);
+        const bool refused = own.weight > 0.0f && own.value < 0.0f;
+        if (persists(&look->disowned, refused, params->share_sightings)) {
+            look->disowned = 0;
+            release(looks, index, count);
+            give_machine(looks, look);
+            looks->counters.parted++;
+        }
+        return look->machine != BSLAM_NO_MACHINE;
+    }
+    if (has_twin(looks, params, look, sample)) {
+        const int16_t twin = look->twin;
+        look->twin = BSLAM_NO_MACHINE;
+        look->twin_count = 0;
+        release(looks, index, count);
+        look->machine = twin;
+        looks->counters.shared++;
+    } else if (look->machine == BSLAM_NO_MACHINE && look->twin_count == 0) {
+        give_machine(looks, look);
+    }
+    return look->machine != BSLAM_NO_MACHINE;
+}
+
+void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
+                       uint32_t way_um, const float signature[BSLAM_SAMPLE_FEATURES])
+{
+    bslam_look_t *look = &looks->of[index];
+    const uint32_t least_um = (uint32_t)(params->learn_way_m * (bslam_real_t)MICROMETRES_PER_M);
+    bslam_sample_t sample;
+    if ((look->is_taught && way_um - look->taught_um < least_um) ||
+        bslam_sample_encode(signature, &sample) != BSLAM_OK) {
+        return;
+    }
+    look->is_taught = true;
+    look->taught_um = way_um;
+    if (settle_machine(looks, params, index, count, &sample) &&
+        bslam_learner_show(&looks->learner, look->machine, signature) == BSLAM_OK) {
+        looks->counters.taught++;
+    }
+}

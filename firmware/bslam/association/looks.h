@@ -1,0 +1,67 @@
+/// What the beacons of a map look like: a machine each that learns from their sightings, and which beacons
+/// share one. The caller owns it and attaches it to a pipeline; who does without pays no RAM for it. MATH
+/// "Position and looks".
+///
+///     bslam_looks_init(&looks, seeds, seed_count)
+///     bslam_slam_attach_looks(&slam, &looks)      and association = 3
+#ifndef BSLAM_ASSOCIATION_LOOKS_H
+#define BSLAM_ASSOCIATION_LOOKS_H
+
+#include "bslam/base/params.h"
+#include "bslam/svm/learner.h"
+
+#define BSLAM_NO_MACHINE (-1)
+
+/// What happened since init. Never decreases.
+typedef struct bslam_looks_counters {
+    uint32_t taught;   ///< sightings that a machine was shown
+    uint32_t unsure;   ///< matches that none was shown, because they may be wrong
+    uint32_t shared;   ///< times that a beacon was found to look like another and took its machine
+    uint32_t parted;   ///< times that a beacon got a machine of its own again
+    uint32_t no_slot;  ///< beacons that got no machine when they were first seen, because none was free
+} bslam_looks_counters_t;
+
+/// What is known of a beacon's looks. Private.
+typedef struct bslam_look {
+    int16_t machine;
+    int16_t twin;        ///< the machine that takes its sightings for its own, too
+    uint8_t twin_count;  ///< how often, less how often it did not
+    uint8_t disowned;    ///< how often its own machine, a shared one, refused it, less how often not
+    bool is_taught;
+    uint32_t taught_um;  ///< the robot's way when it was taught last
+} bslam_look_t;
+
+/// Private but for the counters.
+typedef struct bslam_looks {
+    bslam_looks_counters_t counters;
+    bslam_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
+    bslam_learner_t learner;
+} bslam_looks_t;
+
+/// What the looks of a sighting say of a beacon.
+typedef struct bslam_opinion {
+    float value;   ///< the machine's decision value
+    float weight;  ///< 0: it knows nothing yet; towards 1 with the samples it keeps
+} bslam_opinion_t;
+
+/// Nothing known. Seeds and errors as bslam_learner_init has them.
+BSLAM_MUST_CHECK bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds,
+                                                 int32_t seed_count);
+
+/// Forgets all beacons, in time for another map.
+void bslam_looks_clear(bslam_looks_t *looks);
+
+/// What the machine of beacon `index` says of a sample.
+bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                const bslam_sample_t *sample);
+
+/// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone way_um. Its
+/// machine is shown it, unless the last one was a few centimetres ago; a machine is found for a beacon that
+/// has none. O(machines).
+void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
+                       uint32_t way_um, const float signature[BSLAM_SAMPLE_FEATURES]);
+
+/// Beacon `index` of `count` leaves the map; those behind it move up.
+void bslam_looks_forget(bslam_looks_t *looks, int index, int count);
+
+#endif

@@ -1,0 +1,200 @@
+// Position selects candidates, looks decide: paper Section IV. MATH "Position and looks".
+#include "bslam/association/association.h"
+#include "bslam/association/internal.h"
+#include "bslam/math/logarithm.h"
+
+/// A sighting against a beacon.
+typedef struct candidate {
+    bslam_real_t score;  ///< log odds of this beacon against a new one
+    bslam_real_t distance2;
+    bslam_opinion_t opinion;
+} candidate_t;
+
+static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/// Log density of beacons that are not in the map, in the units of a sighting: 1/(m rad), or 1/rad.
+static bslam_real_t log_new(const bslam_params_t *params, const bslam_sighting_t *sighting)
+{
+    return bslam_ln(sighting->has_range ? params->new_per_m2 * sighting->range_m : params->new_per_rad);
+}
+
+/// What looks add to the score.
+static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinion_t *opinion)
+{
+    const bslam_real_t odds = params->looks_slope * (bslam_real_t)opinion->value + params->looks_offset;
+    return params->looks_weight * (bslam_real_t)opinion->weight *
+           clip(odds, -params->looks_low, params->looks_high);
+}
+
+/// Weighs a sighting against a beacon. False if it cannot be that one.
+static bool weigh(const bslam_sighting_frame_t *frame, int i, int beacon, const bslam_sample_t *sample,
+                  candidate_t *found)
+{
+    const bslam_sighting_t *sighting = &frame->sightings[i];
+    bslam_innovation_t innovation;
+    bslam_real_t log_density;
+    if (bslam_classes_differ(sighting, &frame->ekf->beacons[beacon]) ||
+        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+            BSLAM_OK ||
+        bslam_ekf_log_density(frame->ekf, &innovation, &found->distance2, &log_density) != BSLAM_OK) {
+        return false;
+    }
+    found->opinion = (bslam_opinion_t){0.0f, 0.0f};
+    if (sample != NULL) {
+        found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
+    }
+    found->score =
+        log_density - log_new(frame->params, sighting) + looks_score(frame->params, &found->opinion);
+    return true;
+}
+
+static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, int beacon)
+{
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].verdict == BSLAM_VERDICT_MATCH && matches[i].beacon == beacon) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// The sample of a sighting, where there are looks to compare it with; else NULL.
+static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int i, bslam_sample_t *sample)
+{
+    const float *signature = frame->sightings[i].signature;
+    if (frame->looks == NULL || signature == NULL || bslam_sample_encode(signature, sample) != BSLAM_OK) {
+        return NULL;
+    }
+    return sample;
+}
+
+/// Whether a machine may learn from a match: it is near, no other beacon comes close, and it looks like it,
+/// if that is known.
+static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam_real_t lead)
+{
+    const bool looks_right =
+        best->opinion.weight < 0.5f || (bslam_real_t)best->opinion.value >= params->learn_margin;
+    return best->distance2 <= params->learn_d2 && lead >= params->learn_lead && looks_right;
+}
+
+/// Finds the best beacon of a sighting among those that are not taken.
+static void find_best(const bslam_sighting_frame_t *frame, int i, bslam_match_t *matches)
+{
+    bslam_match_t *match = &matches[i];
+    bslam_sample_t buffer;
+    const bslam_sample_t *sample = sample_of(frame, i, &buffer);
+    candidate_t best = {0, -1, {0.0f, 0.0f}};
+    bslam_real_t second = 0;
+    bool has_second = false;
+    match->beacon = -1;
+    for (int b = 0; b < frame->ekf->beacon_count; b++) {
+        candidate_t one;
+        if (!weigh(frame, i, b, sample, &one) || one.distance2 > frame->params->candidate_d2) {
+            continue;
+        }
+        if (is_taken(frame, matches, b)) {
+            match->reason = one.score > 0 ? BSLAM_REASON_DUPLICATE : match->reason;
+        } else if (match->beacon < 0 || one.score > best.score) {
+            second = best.score;
+            has_second = match->beacon >= 0;
+            best = one;
+            match->beacon = b;
+        } else if (!has_second || one.score > second) {
+            second = one.score;
+            has_second = true;
+        }
+    }
+    match->distance2 = best.distance2;
+    match->score = best.score;
+    // Another beacon or a new one, whose score is 0.
+    const bslam_real_t rival = has_second && second > 0 ? second : 0;
+    match->sure = match->beacon >= 0 && is_sure(frame->params, &best, best.score - rival);
+}
+
+/// The sighting with the best score above 0 that has no beacon yet; -1: none.
+static int next_to_settle(const bslam_match_t *matches, int count)
+{
+    int next = -1;
+    for (int i = 0; i < count; i++) {
+        const bool open = matches[i].verdict == BSLAM_VERDICT_DEFER && matches[i].beacon >= 0;
+        if (open && matches[i].score > 0 && (next < 0 || matches[i].score > matches[next].score)) {
+            next = i;
+        }
+    }
+    return next;
+}
+
+/// Gives each beacon to one sighting at most, the best score first.
+static void settle(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+{
+    for (int next = next_to_settle(matches, frame->count); next >= 0;
+         next = next_to_settle(matches, frame->count)) {
+        matches[next].verdict = BSLAM_VERDICT_MATCH;
+        for (int i = 0; i < frame->count; i++) {
+            if (matches[i].verdict == BSLAM_VERDICT_DEFER && matches[i].beacon == matches[next].beacon) {
+                find_best(frame, i, matches);
+            }
+        }
+    }
+}
+
+/// Whether a sighting clearly looks like a beacon that is not seen in this frame and that could be here,
+/// though that is no candidate: a beacon that the map has in the wrong place, rather than a new one.
+static bool looks_like_another(const bslam_sighting_frame_t *frame, int i, const bslam_match_t *matches)
+{
+    bslam_sample_t buffer;
+    const bslam_sample_t *sample = sample_of(frame, i, &buffer);
+    for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
+        candidate_t one;
+        if (!is_taken(frame, matches, b) && weigh(frame, i, b, sample, &one) &&
+            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
+            looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// What becomes of a sighting that matches no beacon.
+static void decide_rest(const bslam_sighting_frame_t *frame, int i, bslam_match_t *matches)
+{
+    bslam_match_t *match = &matches[i];
+    const bool is_near = match->beacon >= 0 && match->score > -frame->params->defer_score;
+    match->beacon = -1;
+    match->sure = false;
+    if (match->reason == BSLAM_REASON_DUPLICATE) {
+        match->verdict = BSLAM_VERDICT_REJECT;
+    } else if (is_near) {
+        match->reason = BSLAM_REASON_AMBIGUOUS;
+    } else if (looks_like_another(frame, i, matches)) {
+        match->reason = BSLAM_REASON_LOOKS;
+    } else {
+        match->verdict = BSLAM_VERDICT_NEW;
+    }
+}
+
+void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+{
+    for (int i = 0; i < frame->count; i++) {
+        if (bslam_is_mappable(&frame->sightings[i], &matches[i])) {
+            matches[i].verdict = BSLAM_VERDICT_DEFER;
+        }
+    }
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].verdict == BSLAM_VERDICT_DEFER) {
+            find_best(frame, i, matches);
+        }
+    }
+    settle(frame, matches);
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].verdict == BSLAM_VERDICT_DEFER) {
+            decide_rest(frame, i, matches);
+        }
+        if (matches[i].verdict == BSLAM_VERDICT_MATCH) {
+            matches[i].reason = BSLAM_REASON_NONE;
+        }
+    }
+}
