@@ -41,24 +41,53 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
-static bslam_tone_t tone_of_cell(bslam_cell_t cell)
+/// Loops over this many cells at a time: constants, so that a compiler can use vector instructions.
+#define STEP BSLAM_CELL_STEP
+
+static int16_t limited(int16_t chroma)
 {
-    const int32_t red = tone_log[cell.red], green = tone_log[cell.green], blue = tone_log[cell.blue];
-    const int32_t luma = cell.green + cell.red / 2;  // as thumbnail.c weighs it for the spread
-    const bslam_tone_t tone = {
-        .light = (uint8_t)((red + 2 * green + blue) / 4),
-        .reddish = (int8_t)clamp(red - green, -127, 127),
-        .bluish = (int8_t)clamp(blue - green, -127, 127),
-        .spread = (uint8_t)clamp(128 * cell.spread / (luma + 8), 0, 255),
-    };
-    return tone;
+    const int16_t high = chroma < 127 ? chroma : 127;
+    return high > -127 ? high : -127;
 }
 
-void bslam_background_tones(const bslam_frame_t *frame, bslam_tone_t *tones)
+/// Light and chroma of STEP cells from the logarithms of their channels.
+static void fill_tones(const uint8_t *restrict red, const uint8_t *restrict green,
+                       const uint8_t *restrict blue, uint8_t *restrict light, int8_t *restrict reddish,
+                       int8_t *restrict bluish)
+{
+    for (int32_t k = 0; k < STEP; k++) {
+        const uint16_t sum = (uint16_t)(red[k] + 2 * green[k] + blue[k]);
+        light[k] = (uint8_t)(sum >> 2);
+        reddish[k] = (int8_t)limited((int16_t)(red[k] - green[k]));
+        bluish[k] = (int8_t)limited((int16_t)(blue[k] - green[k]));
+    }
+}
+
+/// Spreads of STEP cells as parts of their brightness. In float a quotient of numbers so small does not reach
+/// the next whole one.
+static void fill_spreads(const bslam_cells_t *cells, int32_t i, uint8_t *restrict spread)
+{
+    const uint8_t *red = cells->red + i, *green = cells->green + i, *range = cells->spread + i;
+    for (int32_t k = 0; k < STEP; k++) {
+        const int32_t luma = green[k] + red[k] / 2;  // as thumbnail.c weighs it for the spread
+        const int32_t part = (int32_t)((float)(128 * range[k]) / (float)(luma + 8));
+        spread[k] = (uint8_t)(part < 255 ? part : 255);
+    }
+}
+
+void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
 {
     const int32_t count = frame->rows * frame->columns;
-    for (int32_t i = 0; i < count; i++) {
-        tones[i] = tone_of_cell(frame->cells[i]);
+    const bslam_cells_t *cells = frame->cells;
+    for (int32_t i = 0; i < count; i += STEP) {
+        uint8_t red[STEP], green[STEP], blue[STEP];
+        for (int32_t k = 0; k < STEP; k++) {
+            red[k] = tone_log[cells->red[i + k]];
+            green[k] = tone_log[cells->green[i + k]];
+            blue[k] = tone_log[cells->blue[i + k]];
+        }
+        fill_tones(red, green, blue, tones->light + i, tones->reddish + i, tones->bluish + i);
+        fill_spreads(cells, i, tones->spread + i);
     }
 }
 
@@ -94,12 +123,12 @@ static bslam_zone_rows_t zone_rows(const bslam_camera_t *camera, int32_t rows, b
     return span;
 }
 
-static void count_tones(uint8_t *counts, bslam_zone_rows_t span, int32_t columns, const bslam_tone_t *tones,
+static void count_tones(uint8_t *counts, bslam_zone_rows_t span, int32_t columns, const bslam_tones_t *tones,
                         int32_t weight)
 {
     for (int32_t row = span.first; row < span.end; row += 2) {
         for (int32_t column = row / 2 % 2; column < columns; column += 2) {
-            uint8_t *count = &counts[bslam_tone_bin(tones[row * columns + column])];
+            uint8_t *count = &counts[bslam_tone_bin(bslam_tone_at(tones, row * columns + column))];
             *count = (uint8_t)clamp(*count + weight, 0, 255);
         }
     }
@@ -113,21 +142,22 @@ typedef struct zone_sums {
 } zone_sums_t;
 
 static zone_sums_t sum_zone(const uint8_t *counts, bslam_zone_rows_t span, const bslam_frame_t *frame,
-                            const bslam_tone_t *tones)
+                            const bslam_tones_t *tones)
 {
     zone_sums_t sums = {0};
     for (int32_t row = span.first; row < span.end; row += 2) {
         for (int32_t column = row / 2 % 2; column < frame->columns; column += 2) {
             const int32_t i = row * frame->columns + column;
-            const float share = (float)counts[bslam_tone_bin(tones[i])];
+            const bslam_tone_t tone = bslam_tone_at(tones, i);
+            const float share = (float)counts[bslam_tone_bin(tone)];
             const float weight = share * share;
             sums.weight += weight;
-            sums.colour.red += weight * (float)frame->cells[i].red;
-            sums.colour.green += weight * (float)frame->cells[i].green;
-            sums.colour.blue += weight * (float)frame->cells[i].blue;
-            sums.light += weight * (float)tones[i].light;
-            sums.reddish += weight * (float)tones[i].reddish;
-            sums.bluish += weight * (float)tones[i].bluish;
+            sums.colour.red += weight * (float)frame->cells->red[i];
+            sums.colour.green += weight * (float)frame->cells->green[i];
+            sums.colour.blue += weight * (float)frame->cells->blue[i];
+            sums.light += weight * (float)tone.light;
+            sums.reddish += weight * (float)tone.reddish;
+            sums.bluish += weight * (float)tone.bluish;
         }
     }
     return sums;
@@ -141,7 +171,7 @@ static void mix(bslam_rgb_t *colour, const zone_sums_t *sums, float rate)
 }
 
 void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,
-                            const bslam_camera_t *camera, const bslam_tone_t *tones)
+                            const bslam_camera_t *camera, const bslam_tones_t *tones)
 {
     bslam_surroundings_t *known = &background->surroundings;
     bslam_rgb_t *colours[BSLAM_ZONE_COUNT] = {&known->wall, &known->floor, &known->ceiling};
@@ -183,14 +213,14 @@ static bslam_real_t floor_distance_m(const bslam_camera_t *camera, bslam_real_t 
 }
 
 void bslam_background_floor_line(const bslam_background_t *background, const bslam_frame_t *frame,
-                                 const bslam_camera_t *camera, const bslam_tone_t *tones,
+                                 const bslam_camera_t *camera, const bslam_tones_t *tones,
                                  bslam_floor_line_t *line)
 {
     const int32_t stop = clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
     for (int32_t column = 0; column < frame->columns; column++) {
         int32_t row = frame->rows;  // the row below which all is floor
         for (int32_t r = frame->rows - 1; r >= stop && r >= row - 2; r--) {
-            if (floor_evidence(background, tones[r * frame->columns + column]) > 0) {
+            if (floor_evidence(background, bslam_tone_at(tones, r * frame->columns + column)) > 0) {
                 row = r;
             }
         }

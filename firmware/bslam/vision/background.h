@@ -24,6 +24,19 @@ typedef struct bslam_tone {
     uint8_t spread;  ///< the cell's spread as a part of its brightness: 128 is all of it
 } bslam_tone_t;
 
+/// The tones of a frame's cells, as the cells themselves.
+typedef struct bslam_tones {
+    uint8_t light[BSLAM_CELLS_ROOM];
+    int8_t reddish[BSLAM_CELLS_ROOM];
+    int8_t bluish[BSLAM_CELLS_ROOM];
+    uint8_t spread[BSLAM_CELLS_ROOM];
+} bslam_tones_t;
+
+static inline bslam_tone_t bslam_tone_at(const bslam_tones_t *tones, int32_t i)
+{
+    return (bslam_tone_t){tones->light[i], tones->reddish[i], tones->bluish[i], tones->spread[i]};
+}
+
 typedef enum bslam_zone {
     BSLAM_ZONE_WALL = 0,
     BSLAM_ZONE_FLOOR = 1,
@@ -49,16 +62,16 @@ typedef struct bslam_background {
 
 /// Where the floor ends in each column of cells, and how far away that is.
 typedef struct bslam_floor_line {
-    int16_t edge_px[BSLAM_COLUMNS_MAX];          ///< the uppermost pixel row of the floor
-    int16_t row[BSLAM_COLUMNS_MAX];              ///< the lowest row of cells that is not floor
+    int16_t edge_px[BSLAM_COLUMNS_MAX];                ///< the uppermost pixel row of the floor
+    int16_t row[BSLAM_COLUMNS_MAX + BSLAM_CELL_STEP];  ///< the lowest row of cells that is not floor
     bslam_real_t distance_m[BSLAM_COLUMNS_MAX];  ///< horizontal, from the camera; 0 where it cannot be told
 } bslam_floor_line_t;
 
 /// Forgets everything.
 void bslam_background_init(bslam_background_t *background);
 
-/// The tones of a frame's cells: tones[rows * columns].
-void bslam_background_tones(const bslam_frame_t *frame, bslam_tone_t *tones);
+/// The tones of a frame's cells.
+void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones);
 
 /// The row of cells that the horizon runs through in the middle of the frame; it may lie outside.
 int32_t bslam_horizon_row(const bslam_camera_t *camera);
@@ -68,7 +81,7 @@ bslam_real_t bslam_horizon_px(const bslam_camera_t *camera);
 
 /// Learns from a frame. Called for the first frame, and for those taken since the robot moved.
 void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,
-                            const bslam_camera_t *camera, const bslam_tone_t *tones);
+                            const bslam_camera_t *camera, const bslam_tones_t *tones);
 
 /// Histogram bin of a tone: 16 of light, 12 steps each; 8 of each chroma, 8 steps each but for the middle
 /// one, which has the greys on both sides of 0, and those at the ends, which are open.
@@ -90,7 +103,7 @@ static inline int32_t bslam_tone_distance(bslam_tone_t a, bslam_tone_t b)
 
 /// Follows each column from below for as long as it looks like floor.
 void bslam_background_floor_line(const bslam_background_t *background, const bslam_frame_t *frame,
-                                 const bslam_camera_t *camera, const bslam_tone_t *tones,
+                                 const bslam_camera_t *camera, const bslam_tones_t *tones,
                                  bslam_floor_line_t *line);
 
 #endif

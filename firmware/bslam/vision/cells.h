@@ -9,16 +9,22 @@
 /// Steps of a cell's value for a decision value of 1.
 #define BSLAM_CELL_VALUE_ONE 32
 
+/// A tone that is seen so often is no more frequent than that.
+#define BSLAM_FREQUENT_MAX 32
+
 /// What is known of a frame before its boxes are.
 typedef struct bslam_view {
     const bslam_frame_t *frame;
     const bslam_camera_t *camera;
     const bslam_background_t *background;
     const bslam_floor_line_t *floor_line;
-    const bslam_tone_t *tones;  ///< [rows][columns], as all that follow
-    const uint8_t *step_x;      ///< colour difference of the cells on the left and right, at most 255
-    const uint8_t *step_y;      ///< of those above and below
-    const int8_t *values;       ///< decision value of each cell, in 1/BSLAM_CELL_VALUE_ONE
+    const bslam_tones_t *tones;
+    const uint8_t *step_x;     ///< [rows][columns], as all that follow: colour difference of the cells on the
+                               ///< left and right, at most 255
+    const uint8_t *step_y;     ///< of those above and below
+    const uint16_t *frequent;  ///< how frequent the tone is on walls, and 256 times that on floors, 0 to
+                               ///< BSLAM_FREQUENT_MAX each
+    const int8_t *values;      ///< decision value of each cell, in 1/BSLAM_CELL_VALUE_ONE
 } bslam_view_t;
 
 /// The cell SVM in whole numbers: value = (sum of weight x feature + bias) >> BSLAM_CELL_WEIGHT_SHIFT.
@@ -28,20 +34,11 @@ typedef struct bslam_cell_machine {
     int32_t bias;
 } bslam_cell_machine_t;
 
-/// What each light, reddish and bluish value and each bin adds to a cell's sum in the present frame, worked
-/// out once a frame: then a cell takes a few look-ups. `distances` packs those from wall, floor and ceiling.
-typedef struct bslam_tone_part {
-    uint32_t distances;
-    int32_t sum;
-    int32_t sum_above_floor;
-    uint16_t bin;
-} bslam_tone_part_t;
-
+/// What each bin adds to a cell's sum in the present frame, worked out once a frame, and the view's
+/// `frequent` of its tones.
 typedef struct bslam_cell_tables {
-    bslam_tone_part_t light[256];
-    bslam_tone_part_t reddish[256];
-    bslam_tone_part_t bluish[256];
-    int32_t bins[BSLAM_TONE_BINS];
+    int32_t sums[BSLAM_TONE_BINS];
+    uint16_t frequent[BSLAM_TONE_BINS];
 } bslam_cell_tables_t;
 
 /// The machine of a model, rounded to whole numbers.
@@ -54,9 +51,9 @@ void bslam_cells_step(const bslam_view_t *view, uint8_t *step_x, uint8_t *step_y
 void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
                          int16_t features[BSLAM_CELL_FEATURES]);
 
-/// Fills the view's values, given as an array to write to: the machine's sum over bslam_cell_features, from
-/// tables that it works out first.
+/// Fills the view's values and frequent, given as arrays to write to: the machine's sum over
+/// bslam_cell_features, with tables that it works out first.
 void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine,
-                        bslam_cell_tables_t *tables, int8_t *values);
+                        bslam_cell_tables_t *tables, uint16_t *frequent, int8_t *values);
 
 #endif

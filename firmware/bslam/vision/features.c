@@ -38,8 +38,8 @@ typedef struct sums {
 
 static void add_cell(sums_t *sums, const bslam_view_t *view, int32_t i)
 {
-    const bslam_tone_t tone = view->tones[i];
-    const int32_t bin = bslam_tone_bin(tone);
+    const bslam_tone_t tone = bslam_tone_at(view->tones, i);
+    const int32_t frequent = view->frequent[i];
     sums->cells++;
     sums->light += tone.light;
     sums->reddish += tone.reddish;
@@ -52,8 +52,8 @@ static void add_cell(sums_t *sums, const bslam_view_t *view, int32_t i)
     sums->step_y += view->step_y[i];
     sums->value += view->values[i];
     sums->likely += view->values[i] > 0 ? 1 : 0;
-    sums->wall += least(view->background->counts[BSLAM_ZONE_WALL][bin], 32);
-    sums->floor += least(view->background->counts[BSLAM_ZONE_FLOOR][bin], 32);
+    sums->wall += frequent & 255;
+    sums->floor += frequent >> 8;
 }
 
 static sums_t sum_area(const bslam_view_t *view, area_t area)

@@ -32,6 +32,14 @@ typedef struct bslam_cell {
     uint8_t spread;
 } bslam_cell_t;
 
+/// The cells of a frame, [rows][columns]: a table a value, so that a compiler can use vector instructions.
+typedef struct bslam_cells {
+    uint8_t red[BSLAM_CELLS_ROOM];
+    uint8_t green[BSLAM_CELLS_ROOM];
+    uint8_t blue[BSLAM_CELLS_ROOM];
+    uint8_t spread[BSLAM_CELLS_ROOM];
+} bslam_cells_t;
+
 /// A colour, each channel 0 to 255.
 typedef struct bslam_rgb {
     float red;
@@ -52,12 +60,17 @@ typedef struct bslam_surroundings {
 typedef struct bslam_frame {
     int32_t width_px;  ///< of the camera's frame, a multiple of BSLAM_CELL_PX; so is the height
     int32_t height_px;
-    int32_t columns;            ///< cells side by side: width_px / BSLAM_CELL_PX
-    int32_t rows;               ///< cells one above the other
-    const bslam_cell_t *cells;  ///< [rows][columns]
-    const uint16_t *half;       ///< [height_px / 2][width_px / 2], RGB565: means of 2x2 pixels
+    int32_t columns;  ///< cells side by side: width_px / BSLAM_CELL_PX
+    int32_t rows;     ///< cells one above the other
+    const bslam_cells_t *cells;
+    const uint16_t *half;  ///< [height_px / 2][width_px / 2], RGB565: means of 2x2 pixels
     const bslam_surroundings_t *surroundings;
 } bslam_frame_t;
+
+static inline bslam_cell_t bslam_cell_at(const bslam_cells_t *cells, int32_t i)
+{
+    return (bslam_cell_t){cells->red[i], cells->green[i], cells->blue[i], cells->spread[i]};
+}
 
 /// Red, green and blue of an RGB565 pixel, 0 to 255 (5 or 6 bits spread over 8).
 static inline bslam_rgb_t bslam_rgb_of_565(uint16_t pixel)

@@ -117,13 +117,17 @@ static void begin_cells(bslam_thumbnail_t *t, int32_t columns)
 }
 
 /// Adds the lower half to it.
-static void finish_cells(bslam_thumbnail_t *t, int32_t columns, bslam_cell_t *cells)
+static void finish_cells(bslam_thumbnail_t *t, int32_t columns, int32_t first)
 {
     for (int32_t c = 0; c < columns; c++) {
         const uint32_t sum = t->cell_sums[c] + t->pair_sums[2 * c] + t->pair_sums[2 * c + 1];
         const uint16_t low = darker(t->darkest[c], darker(t->lumas[2 * c], t->lumas[2 * c + 1]));
         const uint16_t high = brighter(t->brightest[c], brighter(t->lumas[2 * c], t->lumas[2 * c + 1]));
-        cells[c] = cell_of_sum(sum, (uint32_t)(high - low));
+        const bslam_cell_t cell = cell_of_sum(sum, (uint32_t)(high - low));
+        t->cells.red[first + c] = cell.red;
+        t->cells.green[first + c] = cell.green;
+        t->cells.blue[first + c] = cell.blue;
+        t->cells.spread[first + c] = cell.spread;
     }
 }
 
@@ -134,7 +138,7 @@ static void reduce_two_rows(bslam_thumbnail_t *t)
     const int32_t columns = t->width_px / BSLAM_CELL_PX, pairs = t->width_px / 2;
     reduce_quads(t->pair_sums, t->half + t->rows_seen / 2 * pairs, t->lumas, pairs);
     if (t->rows_seen % BSLAM_CELL_PX == 3) {
-        finish_cells(t, columns, t->cells + t->rows_seen / BSLAM_CELL_PX * columns);
+        finish_cells(t, columns, t->rows_seen / BSLAM_CELL_PX * columns);
     } else {
         begin_cells(t, columns);
     }

@@ -27,7 +27,7 @@ typedef struct bslam_thumbnail {
     uint16_t lumas[BSLAM_IMAGE_WIDTH_MAX / 2];
     uint16_t darkest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
     uint16_t brightest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
-    bslam_cell_t cells[BSLAM_CELLS_MAX];
+    bslam_cells_t cells;
     uint16_t half[BSLAM_HALF_MAX];
 } bslam_thumbnail_t;
 

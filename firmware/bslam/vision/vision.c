@@ -105,27 +105,72 @@ bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_
     return BSLAM_OK;
 }
 
+/// How many cells are black and saturated, and the range of their green.
+typedef struct light {
+    int32_t black, saturated;
+    uint8_t low, high;
+} light_t;
+
+static uint8_t lesser(uint8_t a, uint8_t b)
+{
+    return a < b ? a : b;
+}
+
+static uint8_t greater(uint8_t a, uint8_t b)
+{
+    return a > b ? a : b;
+}
+
+static light_t light_of(const bslam_cells_t *cells, int32_t count)
+{
+    enum { STEP = BSLAM_CELL_STEP };
+    const uint8_t *red = cells->red, *green = cells->green, *blue = cells->blue;
+    uint16_t black[STEP] = {0}, saturated[STEP] = {0};
+    uint8_t low[STEP], high[STEP];
+    memset(low, 255, sizeof low);
+    memset(high, 0, sizeof high);
+    int32_t i = 0;
+    for (; i + STEP <= count; i += STEP) {
+        for (int32_t k = 0; k < STEP; k++) {
+            const uint8_t brightest = greater(greater(red[i + k], green[i + k]), blue[i + k]);
+            const uint8_t darkest = lesser(lesser(red[i + k], green[i + k]), blue[i + k]);
+            black[k] = (uint16_t)(black[k] + (brightest < BLACK_BELOW ? 1 : 0));
+            saturated[k] = (uint16_t)(saturated[k] + (darkest >= SATURATED_FROM ? 1 : 0));
+            low[k] = lesser(low[k], green[i + k]);
+            high[k] = greater(high[k], green[i + k]);
+        }
+    }
+    light_t light = {0, 0, 255, 0};
+    for (; i < count; i++) {
+        const uint8_t brightest = greater(greater(red[i], green[i]), blue[i]);
+        const uint8_t darkest = lesser(lesser(red[i], green[i]), blue[i]);
+        light.black += brightest < BLACK_BELOW ? 1 : 0;
+        light.saturated += darkest >= SATURATED_FROM ? 1 : 0;
+        light.low = lesser(light.low, green[i]);
+        light.high = greater(light.high, green[i]);
+    }
+    for (int32_t k = 0; k < STEP; k++) {
+        light.black += black[k];
+        light.saturated += saturated[k];
+        light.low = lesser(light.low, low[k]);
+        light.high = greater(light.high, high[k]);
+    }
+    return light;
+}
+
 /// What makes a frame unusable, or BSLAM_VISION_NOTHING if nothing does.
 static bslam_vision_reason_t judge_light(const bslam_frame_t *frame)
 {
     const int32_t count = frame->rows * frame->columns;
-    int32_t black = 0, saturated = 0;
-    uint8_t low = 255, high = 0;
-    for (int32_t i = 0; i < count; i++) {
-        const bslam_cell_t cell = frame->cells[i];
-        const uint8_t green = cell.green;
-        black += green < BLACK_BELOW && cell.red < BLACK_BELOW && cell.blue < BLACK_BELOW ? 1 : 0;
-        saturated += green >= SATURATED_FROM && cell.red >= SATURATED_FROM && cell.blue >= SATURATED_FROM;
-        low = green < low ? green : low;
-        high = green > high ? green : high;
-    }
+    const light_t light = light_of(frame->cells, count);
+    const int32_t black = light.black, saturated = light.saturated;
     if (100 * black > BLACK_PERCENT * count) {
         return BSLAM_VISION_BLACK;
     }
     if (100 * saturated > SATURATED_PERCENT * count) {
         return BSLAM_VISION_OVEREXPOSED;
     }
-    return high - low <= FLAT_RANGE ? BSLAM_VISION_FLAT : BSLAM_VISION_NOTHING;
+    return light.high - light.low <= FLAT_RANGE ? BSLAM_VISION_FLAT : BSLAM_VISION_NOTHING;
 }
 
 static bslam_frame_t finished_frame(const bslam_vision_t *vision)
@@ -135,7 +180,7 @@ static bslam_frame_t finished_frame(const bslam_vision_t *vision)
         .height_px = vision->thumbnail.height_px,
         .columns = vision->thumbnail.width_px / BSLAM_CELL_PX,
         .rows = vision->thumbnail.height_px / BSLAM_CELL_PX,
-        .cells = vision->thumbnail.cells,
+        .cells = &vision->thumbnail.cells,
         .half = vision->thumbnail.half,
         .surroundings = &vision->backgrounds[vision->camera].surroundings,
     };
@@ -150,7 +195,8 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
         .camera = &vision->cameras[vision->camera],
         .background = &vision->backgrounds[vision->camera],
         .floor_line = &vision->floor_line,
-        .tones = vision->tones,
+        .tones = &vision->tones,
+        .frequent = vision->frequent,
         .step_x = vision->step_x,
         .step_y = vision->step_y,
         .values = vision->values,
@@ -210,13 +256,14 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     const bslam_detector_model_t *detector = detector_for(vision->model, &vision->cameras[camera]);
     const bslam_view_t view = view_of(vision, frame);
 
-    bslam_background_tones(frame, vision->tones);
+    bslam_background_tones(frame, &vision->tones);
     if (robot_moved || !background->surroundings.known) {
-        bslam_background_learn(background, frame, view.camera, vision->tones);
+        bslam_background_learn(background, frame, view.camera, &vision->tones);
     }
-    bslam_background_floor_line(background, frame, view.camera, vision->tones, &vision->floor_line);
+    bslam_background_floor_line(background, frame, view.camera, &vision->tones, &vision->floor_line);
     bslam_cells_step(&view, vision->step_x, vision->step_y);
-    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->values);
+    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->frequent,
+                       vision->values);
     bslam_proposals_find(&vision->proposals, &view);
     bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =

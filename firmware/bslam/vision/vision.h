@@ -43,7 +43,8 @@ typedef struct bslam_vision {
     bslam_proposals_t proposals;
     bslam_floor_line_t floor_line;
     bslam_cell_tables_t cell_tables;
-    bslam_tone_t tones[BSLAM_CELLS_MAX];
+    bslam_tones_t tones;
+    uint16_t frequent[BSLAM_CELLS_ROOM];
     uint8_t step_x[BSLAM_CELLS_ROOM];
     uint8_t step_y[BSLAM_CELLS_ROOM];
     int8_t values[BSLAM_CELLS_ROOM];

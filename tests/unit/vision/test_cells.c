@@ -6,8 +6,9 @@
 #define ROWS 12
 #define CELLS (COLUMNS * ROWS)
 
-static bslam_cell_t cells[CELLS];
-static bslam_tone_t tones[CELLS];
+static bslam_cells_t cells;
+static bslam_tones_t tones;
+static uint16_t frequent[BSLAM_CELLS_ROOM];
 static uint8_t step_x[BSLAM_CELLS_ROOM];
 static uint8_t step_y[BSLAM_CELLS_ROOM];
 static int8_t values[BSLAM_CELLS_ROOM];
@@ -30,7 +31,7 @@ static const bslam_frame_t frame = {
     .height_px = 4 * ROWS,
     .columns = COLUMNS,
     .rows = ROWS,
-    .cells = cells,
+    .cells = &cells,
     .surroundings = &background.surroundings,
 };
 static const bslam_view_t view = {
@@ -38,11 +39,20 @@ static const bslam_view_t view = {
     .camera = &camera,
     .background = &background,
     .floor_line = &floor_line,
-    .tones = tones,
+    .tones = &tones,
+    .frequent = frequent,
     .step_x = step_x,
     .step_y = step_y,
     .values = values,
 };
+
+static void set_cell(int i, bslam_cell_t cell)
+{
+    cells.red[i] = cell.red;
+    cells.green[i] = cell.green;
+    cells.blue[i] = cell.blue;
+    cells.spread[i] = cell.spread;
+}
 
 /// Cells of any colour, a background that learned another such picture.
 static void fill(unsigned seed)
@@ -51,15 +61,15 @@ static void fill(unsigned seed)
     bslam_background_init(&background);
     for (int frames = 0; frames < 2; frames++) {
         for (int i = 0; i < CELLS; i++) {
-            cells[i].red = (uint8_t)unit_random(&random, 0, 249);
-            cells[i].green = (uint8_t)unit_random(&random, 0, 253);
-            cells[i].blue = (uint8_t)unit_random(&random, 0, 249);
-            cells[i].spread = (uint8_t)unit_random(&random, 0, 256);
+            cells.red[i] = (uint8_t)unit_random(&random, 0, 249);
+            cells.green[i] = (uint8_t)unit_random(&random, 0, 253);
+            cells.blue[i] = (uint8_t)unit_random(&random, 0, 249);
+            cells.spread[i] = (uint8_t)unit_random(&random, 0, 256);
         }
-        bslam_background_tones(&frame, tones);
-        bslam_background_learn(&background, &frame, &camera, tones);
+        bslam_background_tones(&frame, &tones);
+        bslam_background_learn(&background, &frame, &camera, &tones);
     }
-    bslam_background_floor_line(&background, &frame, &camera, tones, &floor_line);
+    bslam_background_floor_line(&background, &frame, &camera, &tones, &floor_line);
     bslam_cells_step(&view, step_x, step_y);
 }
 
@@ -73,7 +83,7 @@ static void test_cells_decide_is_the_machine_on_the_features(void **state)
         }
         machine.bias = (int32_t)unit_random(&random, -20000, 20000);
         fill(seed);
-        bslam_cells_decide(&view, &machine, &tables, values);
+        bslam_cells_decide(&view, &machine, &tables, frequent, values);
         int inner = 0;
         for (int i = 0; i < CELLS; i++) {
             int16_t x[BSLAM_CELL_FEATURES];
@@ -112,9 +122,9 @@ static void test_cell_machine_takes_bytes_as_it_takes_floats(void **state)
 
 static void test_cells_step_is_the_difference_of_the_neighbours(void **state)
 {
-    memset(cells, 0, sizeof cells);
-    cells[5 * COLUMNS + 7] = (bslam_cell_t){.red = 10, .green = 20, .blue = 5};
-    cells[2 * COLUMNS + 2] = (bslam_cell_t){.red = 200, .green = 200, .blue = 200};
+    memset(&cells, 0, sizeof cells);
+    set_cell(5 * COLUMNS + 7, (bslam_cell_t){.red = 10, .green = 20, .blue = 5});
+    set_cell(2 * COLUMNS + 2, (bslam_cell_t){.red = 200, .green = 200, .blue = 200});
     bslam_cells_step(&view, step_x, step_y);
     assert_int_equal(step_x[5 * COLUMNS + 7], 0);
     assert_int_equal(step_x[5 * COLUMNS + 6], 10 + 2 * 20 + 5);
@@ -127,13 +137,13 @@ static void test_cells_step_is_the_difference_of_the_neighbours(void **state)
 
 static void test_tone_more_light_shifts_light_and_leaves_chroma(void **state)
 {
-    cells[0] = (bslam_cell_t){.red = 60, .green = 48, .blue = 36, .spread = 20};
-    cells[1] = (bslam_cell_t){.red = 124, .green = 100, .blue = 76, .spread = 42};  // v + 4 is doubled
-    bslam_background_tones(&frame, tones);
-    assert_int_equal(tones[1].light - tones[0].light, BSLAM_TONE_OCTAVE);
-    assert_in_range(tones[1].reddish - tones[0].reddish + 1, 0, 2);
-    assert_in_range(tones[1].bluish - tones[0].bluish + 1, 0, 2);
-    assert_in_range(tones[1].spread - tones[0].spread + 3, 0, 6);
+    set_cell(0, (bslam_cell_t){.red = 60, .green = 48, .blue = 36, .spread = 20});
+    set_cell(1, (bslam_cell_t){.red = 124, .green = 100, .blue = 76, .spread = 42});  // v + 4 is doubled
+    bslam_background_tones(&frame, &tones);
+    assert_int_equal(tones.light[1] - tones.light[0], BSLAM_TONE_OCTAVE);
+    assert_in_range(tones.reddish[1] - tones.reddish[0] + 1, 0, 2);
+    assert_in_range(tones.bluish[1] - tones.bluish[0] + 1, 0, 2);
+    assert_in_range(tones.spread[1] - tones.spread[0] + 3, 0, 6);
 }
 
 static void test_tone_bin_covers_every_tone_once(void **state)

@@ -80,13 +80,13 @@ static void test_row_cell_is_the_mean_of_its_pixels_by_hand(void **state)
         }
     }
     stream_in();
-    const bslam_cell_t cell = thumbnail.cells[1 * (WIDTH / 4) + 1];
+    const bslam_cell_t cell = bslam_cell_at(&thumbnail.cells, 1 * (WIDTH / 4) + 1);
     assert_int_equal(cell.red, 120 / 2);    // 16 values of 5 bits: half their sum is 8 bits
     assert_int_equal(cell.green, 240 / 4);  // 6 bits: a quarter
     assert_int_equal(cell.blue, 31 / 2);
     // Quarters: sums of red 10, 18, 42, 50 and of green twice that; luma is red + green.
     assert_int_equal(cell.spread, 3 * 50 - 3 * 10);
-    assert_int_equal(thumbnail.cells[0].green, 0);
+    assert_int_equal(thumbnail.cells.green[0], 0);
 }
 
 static void test_row_half_resolution_is_the_mean_of_four_rounded(void **state)
@@ -105,10 +105,10 @@ static void test_row_extremes_do_not_run_over(void **state)
     fill(rgb565(31, 63, 31));
     stream_in();
     for (int i = 0; i < WIDTH / 4 * (HEIGHT / 4); i++) {
-        assert_int_equal(thumbnail.cells[i].red, 248);
-        assert_int_equal(thumbnail.cells[i].green, 252);
-        assert_int_equal(thumbnail.cells[i].blue, 248);
-        assert_int_equal(thumbnail.cells[i].spread, 0);
+        assert_int_equal(thumbnail.cells.red[i], 248);
+        assert_int_equal(thumbnail.cells.green[i], 252);
+        assert_int_equal(thumbnail.cells.blue[i], 248);
+        assert_int_equal(thumbnail.cells.spread[i], 0);
     }
     for (int i = 0; i < WIDTH / 2 * (HEIGHT / 2); i++) {
         assert_int_equal(thumbnail.half[i], 0xFFFF);
@@ -137,13 +137,13 @@ static void test_row_rgb888_is_as_rgb565(void **state)
         }
         assert_int_equal(bslam_thumbnail_row(&thumbnail, row888), BSLAM_OK);
     }
-    assert_memory_equal(thumbnail.cells, packed.cells, sizeof packed.cells);
+    assert_memory_equal(&thumbnail.cells, &packed.cells, sizeof packed.cells);
     assert_memory_equal(thumbnail.half, packed.half, sizeof packed.half);
 }
 
 static void test_row_picture_moved_by_a_cell_moves_the_cells(void **state)
 {
-    static bslam_cell_t cells[HEIGHT / 4][WIDTH / 4];
+    static bslam_cells_t cells;
     unit_random_t random = {12};
     fill(rgb565(9, 9, 9));
     for (int row = 8; row < 16; row++) {
@@ -152,14 +152,15 @@ static void test_row_picture_moved_by_a_cell_moves_the_cells(void **state)
         }
     }
     stream_in();
-    memcpy(cells, thumbnail.cells, sizeof cells);
+    cells = thumbnail.cells;
     memmove(&picture[4][8], &picture[0][0],
             sizeof picture - 4 * sizeof picture[0] - 8 * sizeof picture[0][0]);
     stream_in();
     for (int row = 2; row < 4; row++) {
         for (int column = 2; column < 5; column++) {
-            assert_memory_equal(&thumbnail.cells[(row + 1) * (WIDTH / 4) + column + 2], &cells[row][column],
-                                sizeof(bslam_cell_t));
+            const bslam_cell_t moved = bslam_cell_at(&thumbnail.cells, (row + 1) * (WIDTH / 4) + column + 2);
+            const bslam_cell_t before = bslam_cell_at(&cells, row * (WIDTH / 4) + column);
+            assert_memory_equal(&moved, &before, sizeof before);
         }
     }
 }
