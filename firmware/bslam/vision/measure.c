@@ -6,8 +6,9 @@
 #include "bslam/vision/signature.h"
 
 static const bslam_real_t SIZE_MAX_M = 10;
-// A rough box this close to the frame's edge may go on outside.
-static const bslam_real_t CUT_PX = 2;
+// What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels, or
+// at some line of the object short of the edge.
+static const bslam_real_t CUT_PX = 7;
 // Below this height no distance, below this width or height no direction.
 static const bslam_real_t HEIGHT_MIN_PX = 8;
 static const bslam_real_t SIDE_MIN_PX = 5;
@@ -36,18 +37,29 @@ static bool box_is_number(const bslam_box_t *box)
            bslam_is_number(box->bottom_px);
 }
 
-/// Marks of a box that reaches the frame's edge, or is small.
-static unsigned marks_of(const bslam_frame_t *frame, const bslam_box_t *rough)
+/// Marks of a box that comes near the frame's edge.
+static unsigned cuts_of(const bslam_frame_t *frame, const bslam_box_t *box)
 {
     const bslam_real_t right = (bslam_real_t)frame->width_px - BSLAM_R(0.5);
     const bslam_real_t bottom = (bslam_real_t)frame->height_px - BSLAM_R(0.5);
-    const bool small =
-        rough->right_px - rough->left_px < SIDE_MIN_PX || rough->bottom_px - rough->top_px < HEIGHT_MIN_PX;
-    return (rough->left_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_LEFT : 0U) |
-           (rough->right_px > right - CUT_PX ? (unsigned)BSLAM_MARK_CUT_RIGHT : 0U) |
-           (rough->top_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_TOP : 0U) |
-           (rough->bottom_px > bottom - CUT_PX ? (unsigned)BSLAM_MARK_CUT_BOTTOM : 0U) |
-           (small ? (unsigned)BSLAM_MARK_SMALL : 0U);
+    return (box->left_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_LEFT : 0U) |
+           (box->right_px > right - CUT_PX ? (unsigned)BSLAM_MARK_CUT_RIGHT : 0U) |
+           (box->top_px < CUT_PX - BSLAM_R(0.5) ? (unsigned)BSLAM_MARK_CUT_TOP : 0U) |
+           (box->bottom_px > bottom - CUT_PX ? (unsigned)BSLAM_MARK_CUT_BOTTOM : 0U);
+}
+
+static bool is_small(const bslam_box_t *rough)
+{
+    return rough->right_px - rough->left_px < SIDE_MIN_PX || rough->bottom_px - rough->top_px < HEIGHT_MIN_PX;
+}
+
+/// Marks of what the rough box, or the outline found near it, tells.
+static unsigned marks_of(const bslam_frame_t *frame, const bslam_box_t *rough, const bslam_box_t *found,
+                         bslam_real_t turn)
+{
+    return cuts_of(frame, rough) | cuts_of(frame, found) |
+           (is_small(rough) ? (unsigned)BSLAM_MARK_SMALL : 0U) |
+           (bslam_abs(turn) > TURN_MAX ? (unsigned)BSLAM_MARK_SLANTED : 0U);
 }
 
 static bslam_box_t box_around(const bslam_quad_t *quad)
@@ -107,8 +119,8 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
                            &outline) != BSLAM_OK) {
         return BSLAM_E_RANGE;
     }
-    const bool slanted = bslam_abs(outline.turn) > TURN_MAX;
-    const unsigned marks = marks_of(frame, rough) | (slanted ? (unsigned)BSLAM_MARK_SLANTED : 0U);
+    const bslam_box_t found = box_around(&outline.quad);
+    const unsigned marks = marks_of(frame, rough, &found, outline.turn);
     const unsigned sideways =
         BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
@@ -118,7 +130,7 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
         measure_outline(&outline, camera, (marks & upright) == 0U ? size->height_m : 0, candidate);
     }
     candidate->marks = (uint16_t)marks;
-    candidate->outline = box_around(&outline.quad);
+    candidate->outline = found;
     if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {
         memset(candidate->signature, 0, sizeof candidate->signature);
     }
