@@ -97,9 +97,9 @@ enum {
     BSLAM_MARK_CUT_RIGHT = 2,
     BSLAM_MARK_CUT_TOP = 4,
     BSLAM_MARK_CUT_BOTTOM = 8,
-    BSLAM_MARK_SMALL = 16,     ///< too few pixels for a distance or a signature
-    BSLAM_MARK_SLANTED = 32,   ///< seen too obliquely
-    BSLAM_MARK_OCCLUDED = 64,  ///< something stands before it
+    BSLAM_MARK_SMALL = 16,    ///< too few pixels for a distance or a signature
+    BSLAM_MARK_SLANTED = 32,  ///< seen too obliquely
+    BSLAM_MARK_PART = 64,     ///< its level sides go on beyond it: the outline is that of a part
 };
 
 /// No object of the model's recogniser.

@@ -4,6 +4,7 @@
 
 #include "bslam/math/trig.h"
 #include "bslam/vision/signature.h"
+#include "bslam/vision/whole.h"
 
 static const bslam_real_t SIZE_MAX_M = 10;
 // What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels, or
@@ -53,13 +54,18 @@ static bool is_small(const bslam_box_t *rough)
     return rough->right_px - rough->left_px < SIDE_MIN_PX || rough->bottom_px - rough->top_px < HEIGHT_MIN_PX;
 }
 
-/// Marks of what the rough box, or the outline found near it, tells.
-static unsigned marks_of(const bslam_frame_t *frame, const bslam_box_t *rough, const bslam_box_t *found,
-                         bslam_real_t turn)
+static unsigned mark_if(bool is, unsigned mark)
 {
-    return cuts_of(frame, rough) | cuts_of(frame, found) |
-           (is_small(rough) ? (unsigned)BSLAM_MARK_SMALL : 0U) |
-           (bslam_abs(turn) > TURN_MAX ? (unsigned)BSLAM_MARK_SLANTED : 0U);
+    return is ? mark : 0U;
+}
+
+/// Marks of what the rough box, or the outline found near it, tells.
+static unsigned marks_of(const bslam_frame_t *frame, const bslam_whole_t *whole, const bslam_box_t *found)
+{
+    return cuts_of(frame, &whole->rough) | cuts_of(frame, found) |
+           mark_if(is_small(&whole->rough), BSLAM_MARK_SMALL) |
+           mark_if(bslam_abs(whole->outline.turn) > TURN_MAX, BSLAM_MARK_SLANTED) |
+           mark_if(whole->left_goes_on || whole->right_goes_on, BSLAM_MARK_PART);
 }
 
 static bslam_box_t box_around(const bslam_quad_t *quad)
@@ -113,25 +119,25 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
         return BSLAM_E_PARAMETER;
     }
-    bslam_outline_t outline;
+    bslam_whole_t whole;
     if (!bslam_in_range(size->height_m, 0, SIZE_MAX_M) || !bslam_in_range(size->depth_m, 0, SIZE_MAX_M) ||
-        bslam_outline_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
-                           &outline) != BSLAM_OK) {
+        bslam_whole_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
+                         &whole) != BSLAM_OK) {
         return BSLAM_E_RANGE;
     }
-    const bslam_box_t found = box_around(&outline.quad);
-    const unsigned marks = marks_of(frame, rough, &found, outline.turn);
-    const unsigned sideways =
-        BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED;
+    const bslam_box_t found = box_around(&whole.outline.quad);
+    const unsigned marks = marks_of(frame, &whole, &found);
+    const unsigned sideways = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL |
+                              BSLAM_MARK_SLANTED | BSLAM_MARK_PART;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
     candidate->has_bearing = false;
     candidate->has_range = false;
     if ((marks & sideways) == 0U) {
-        measure_outline(&outline, camera, (marks & upright) == 0U ? size->height_m : 0, candidate);
+        measure_outline(&whole.outline, camera, (marks & upright) == 0U ? size->height_m : 0, candidate);
     }
     candidate->marks = (uint16_t)marks;
     candidate->outline = found;
-    if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {
+    if (bslam_signature(frame, &whole.outline.quad, candidate->signature) != BSLAM_OK) {
         memset(candidate->signature, 0, sizeof candidate->signature);
     }
     return BSLAM_OK;

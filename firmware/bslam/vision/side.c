@@ -248,6 +248,13 @@ static int32_t fill_scores(const bslam_side_t *side, const bslam_stance_t *stanc
     return best;
 }
 
+float bslam_side_contrast(const bslam_side_t *side, const bslam_stance_t *stance)
+{
+    float contrast[PLACES] = {0};
+    (void)contrasts(side, stance, contrast);
+    return contrast[REACH_OUT];
+}
+
 float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance)
 {
     float scores[PLACES];

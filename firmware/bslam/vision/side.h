@@ -87,6 +87,9 @@ typedef struct bslam_line {
     float variance;  ///< and these shifts' variance, 0 if no other edge comes into question
 } bslam_line_t;
 
+/// Mean contrast along the rough side itself, turned as the stance is, as a share: 0 none, to 1.
+float bslam_side_contrast(const bslam_side_t *side, const bslam_stance_t *stance);
+
 /// How likely the likeliest line of a stance is: the logarithm of its odds, but for a constant.
 float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance);
 

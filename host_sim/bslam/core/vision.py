@@ -19,7 +19,7 @@ Picture = NDArray[np.uint8] | NDArray[np.uint16]
 SIGNATURE_SIZE = 71
 """Values of a signature."""
 
-MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "occluded")
+MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "part")
 """Names of the bits of a candidate's marks, lowest first."""
 
 
