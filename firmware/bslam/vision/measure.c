@@ -7,8 +7,8 @@
 #include "bslam/vision/whole.h"
 
 static const bslam_real_t SIZE_MAX_M = 10;
-// What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels, or
-// at some line of the object short of the edge.
+// What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels,
+// or at some line of the object short of the edge.
 static const bslam_real_t CUT_PX = 7;
 // Below this height no distance, below this width or height no direction.
 static const bslam_real_t HEIGHT_MIN_PX = 8;
@@ -127,8 +127,8 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     }
     const bslam_box_t found = box_around(&whole.outline.quad);
     const unsigned marks = marks_of(frame, &whole, &found);
-    const unsigned sideways = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL |
-                              BSLAM_MARK_SLANTED | BSLAM_MARK_PART;
+    const unsigned sideways =
+        BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED | BSLAM_MARK_PART;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
     candidate->has_bearing = false;
     candidate->has_range = false;

@@ -43,8 +43,7 @@ static bool goes_on(const bslam_frame_t *frame, const bslam_facing_t *facing, co
 {
     const strip_t within = {o->left, o->right};
     const float inside = level_contrast(frame, facing, o, name, within);
-    return inside > CONTRAST_MIN &&
-           level_contrast(frame, facing, o, name, beyond) > BEYOND_MAX * inside;
+    return inside > CONTRAST_MIN && level_contrast(frame, facing, o, name, beyond) > BEYOND_MAX * inside;
 }
 
 static strip_t strip_beyond(const bslam_outline_t *o, bool left)
@@ -59,8 +58,8 @@ static strip_t strip_beyond(const bslam_outline_t *o, bool left)
 
 /// Both level sides must go on: beneath things on the floor its line always does. Of something cut off above,
 /// the lower side counts alone if it is above the horizon, where no floor is.
-static bool ends_too_soon(const bslam_frame_t *frame, const bslam_facing_t *facing, const bslam_whole_t *whole,
-                          bool left)
+static bool ends_too_soon(const bslam_frame_t *frame, const bslam_facing_t *facing,
+                          const bslam_whole_t *whole, bool left)
 {
     const bslam_outline_t *o = &whole->outline;
     const strip_t beyond = strip_beyond(o, left);
@@ -76,8 +75,7 @@ static bool ends_too_soon(const bslam_frame_t *frame, const bslam_facing_t *faci
 static bslam_status_t find(const bslam_frame_t *frame, const bslam_camera_t *camera, bslam_real_t depth,
                            bslam_whole_t *whole)
 {
-    const bslam_status_t status =
-        bslam_outline_find(frame, camera, &whole->rough, depth, &whole->outline);
+    const bslam_status_t status = bslam_outline_find(frame, camera, &whole->rough, depth, &whole->outline);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -117,8 +115,8 @@ bslam_status_t bslam_whole_find(const bslam_frame_t *frame, const bslam_camera_t
     if (status != BSLAM_OK) {
         return status;
     }
-    for (int32_t i = 0; i < WIDEN_ROUNDS && (found.left_goes_on || found.right_goes_on) &&
-                        !reaches_edge(frame, &found);
+    for (int32_t i = 0;
+         i < WIDEN_ROUNDS && (found.left_goes_on || found.right_goes_on) && !reaches_edge(frame, &found);
          i++) {
         bslam_whole_t wider = found;
         widen(frame, &wider);
