@@ -68,7 +68,7 @@ endif
 
 .PHONY: tables
 tables: setup-run ## the tables of the paper, in our figures
-	$(BSLAM) tables --out out/tables
+	$(BSLAM) tables --association known --out out/tables
 
 .PHONY: train
 train: setup ## train the beacon detectors on rendered worlds, write firmware/models/beacons.h (about 25 min)

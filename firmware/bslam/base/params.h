@@ -85,8 +85,7 @@
          "a ray becomes a point when its linearity index falls below this") \
     /* association and map */ \
     INTEGER(association, 0, 0, 3, \
-            "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis nearest neighbour, " \
-            "3 svm: position and looks") \
+            "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm: position and looks") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
     REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, direction only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \

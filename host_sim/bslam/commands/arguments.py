@@ -51,8 +51,11 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "what a sighting tells (default: distance)",
     )
     associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
-    meaning = "whose a sighting is; known:RATE: identity wrong at that rate (default: known)"
-    add("association", _association, ("known", 0.0), associations, meaning)
+    meaning = (
+        "whose a sighting is; known:RATE: identity wrong at that rate (default: svm where sightings have "
+        "looks and the map is not known, else known)"
+    )
+    add("association", _association, None, associations, meaning)
     add("filter", _word(FILTERS), "invariant", _names(FILTERS), "kind of Kalman filter (default: invariant)")
     meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
     add("sigma", _sigma_mps, None, "M/S", meaning)
@@ -152,10 +155,14 @@ def add_batch_options(
     )
 
 
-def run_options(arguments: argparse.Namespace, **changes: Any) -> RunOptions:
-    """Options of one run; `changes` win, and are needed where the command takes lists."""
+def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **changes: Any) -> RunOptions:
+    """Options of one run; `changes` win, and are needed where the command takes lists.
+
+    has_looks: the sightings have signatures, as all simulated ones do.
+    """
     association = changes.pop("association", arguments.association)
-    name, rate = association
+    by_sight = has_looks and not arguments.known_map
+    name, rate = association or ("svm" if by_sight else "known", 0.0)
     values = {
         "observation": arguments.observation,
         "filter": arguments.filter,

@@ -45,7 +45,7 @@ def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     logs = log_sources(arguments.kind, arguments.directories, arguments.robot)
     pairs = [
-        (source, run_options(arguments, sensor="recorded", seed=seed))
+        (source, run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed))
         for source in logs
         for seed in arguments.seeds
     ]

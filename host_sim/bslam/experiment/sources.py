@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bslam.experiment.align import Rigid
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.mrclam import best_truth, load_mrclam
-from bslam.log import Log, read_folder
+from bslam.log import SIGNATURES, Log, read_folder
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario, simulate
 
@@ -32,6 +32,10 @@ class Source(Protocol):
     @property
     def truth_kind(self) -> str:
         """ "simulated", "recorded" or how complete a data set's truth is."""
+
+    @property
+    def has_looks(self) -> bool:
+        """Its sightings have signatures."""
 
     @property
     def shared(self) -> Hashable | None:
@@ -67,6 +71,7 @@ class ScenarioSource(_Unshared):
 
     align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "simulated"
+    has_looks: ClassVar[bool] = True
 
     @property
     def name(self) -> str:
@@ -116,6 +121,10 @@ class FolderSource(_Unshared):
     def name(self) -> str:
         return self.path.resolve().name
 
+    @property
+    def has_looks(self) -> bool:
+        return (self.path / SIGNATURES).is_file()
+
     def load(self) -> Log:
         return read_folder(self.path)
 
@@ -131,6 +140,7 @@ class MrclamSource(_Unshared):
     robot: int
 
     align: ClassVar[bool] = True
+    has_looks: ClassVar[bool] = False
 
     @property
     def name(self) -> str:
