@@ -83,7 +83,7 @@ test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation
 	    || { echo "make test: FAILED, see above" >&2; exit 1; }
 	@echo "make test: all passed (lint, C unit tests in float and double, firmware build, pytest)"
 
-pytest: ## the Python tests only
+pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
 .PHONY: proof

@@ -45,7 +45,9 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "modelfile": frozenset({"errors"}),
     "core": frozenset({"errors", "modelfile", "rig"}),
     "world": LOG | {"rig"},
-    "experiment": LOG | {"rig", "core", "world"},
+    "link": frozenset({"errors"}),
+    "target": frozenset({"errors", "core", "link"}),
+    "experiment": LOG | {"rig", "core", "world", "target"},
     "view": LOG,
 }
 # The command line ties the parts together and may import them all.

@@ -2,7 +2,7 @@
 # Makes this machine ready: system packages, then .venv with pinned Python packages and the command `bslam`.
 #
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
-#   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, linters
+#   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, QEMU, linters
 #   tools/setup.sh bench   that, and what `make bench` needs: valgrind
 #
 # Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
@@ -80,6 +80,7 @@ find_missing() {
         #include <cmocka.h>" | ${CC:-cc} -E -o /dev/null -'
     need gcc-arm-none-eabi "the firmware build" command -v arm-none-eabi-gcc
     need libnewlib-arm-none-eabi "the firmware build" arm_headers
+    need qemu-system-arm "running the firmware" command -v qemu-system-arm
     [[ $part == test ]] && return
     need valgrind "counting instructions" command -v valgrind
 }

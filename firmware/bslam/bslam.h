@@ -9,7 +9,8 @@
 #define BSLAM_VERSION_MINOR 1
 #define BSLAM_VERSION_PATCH 0
 
-#include "bslam/slam/slam.h"
+#include "bslam/link/parser.h"
+#include "bslam/slam/fingerprint.h"
 #include "bslam/svm/learner.h"
 
 #endif

@@ -176,8 +176,8 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     if (!time_is_valid(odometry, reading->time_us)) {
         return BSLAM_E_TIME;
     }
-    const bslam_real_t dt_s =
-        odometry->has_time ? (bslam_real_t)(reading->time_us - odometry->time_us) * SECONDS_PER_US : 0;
+    const int32_t dt_us = odometry->has_time ? (int32_t)(reading->time_us - odometry->time_us) : 0;
+    const bslam_real_t dt_s = (bslam_real_t)dt_us * SECONDS_PER_US;
     if (reading->has_gyro) {
         if (!bslam_is_number(reading->gyro_radps)) {
             return BSLAM_E_NOT_FINITE;

@@ -107,7 +107,9 @@ bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bsl
     for (int32_t k = first; k < history->count; k++) {
         const bslam_history_step_t step = taken_step(history, k);
         const bool begins_before = left_us <= step.duration_us;
-        const bslam_real_t share = begins_before ? (bslam_real_t)left_us / (bslam_real_t)step.duration_us : 1;
+        // From 32 bits, since the conversion of 64 takes double arithmetic on an ARMv6-M.
+        const bslam_real_t share =
+            begins_before ? (bslam_real_t)(int32_t)left_us / (bslam_real_t)step.duration_us : 1;
         const bslam_pose_t part = part_of_motion(params, step.forward_m, step.turn_rad, share);
         since = bslam_pose_compose(&part, &since);
         if (begins_before) {
@@ -138,5 +140,5 @@ bslam_pose_t bslam_history_look_ahead(const bslam_params_t *params, const bslam_
         return (bslam_pose_t){0, 0, 0};
     }
     return part_of_motion(params, last->forward_m, last->turn_rad,
-                          (bslam_real_t)ahead_us * SECONDS_PER_US / last->dt_s);
+                          (bslam_real_t)(int32_t)ahead_us * SECONDS_PER_US / last->dt_s);
 }

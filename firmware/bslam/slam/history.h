@@ -62,7 +62,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_history_look_back(const bslam_history_t *h
 /// The newest motion as it stands; dt_s = 0 if there is none.
 bslam_motion_t bslam_history_newest(const bslam_history_t *history);
 
-/// The robot ahead_us after the end of `last` as seen from there, if it goes on as in that motion.
+/// The robot ahead_us < 2^31 after the end of `last` as seen from there, if it goes on as in that motion.
 bslam_pose_t bslam_history_look_ahead(const bslam_params_t *params, const bslam_motion_t *last,
                                       int64_t ahead_us);
 

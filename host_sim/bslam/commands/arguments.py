@@ -20,13 +20,13 @@ from bslam.experiment.options import (
     OBSERVATIONS,
     REALS,
     SENSORS,
-    TARGETS,
     Number,
     RunOptions,
     parse_association,
 )
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
+from bslam.target.lines import TARGET_KINDS, allowed_targets
 
 T = TypeVar("T")
 
@@ -72,7 +72,11 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         help="what errs: the reading or the motion (default: as the scenario or log says)",
     )
     group.add_argument(
-        "--target", choices=TARGETS, default="host", help="where the core runs (default: host)"
+        "--target",
+        type=_target,
+        default="host",
+        metavar="{host,qemu:BOARD,serial:DEVICE}",
+        help="where the core runs: here, on an emulated board, on a robot (default: host)",
     )
     group.add_argument(
         "--real", choices=REALS, default="float", help="scalar type: float as on the target, or double"
@@ -246,6 +250,13 @@ def _association(text: str) -> tuple[str, float]:
         return parse_association(text)
     except BslamError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _target(text: str) -> str:
+    kind, colon, name = text.partition(":")
+    if text != "host" and not (colon and name and kind in TARGET_KINDS):
+        raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {allowed_targets()}")
+    return text
 
 
 def _sigma_mps(text: str) -> float:

@@ -154,6 +154,10 @@ class Slam:
         looks = b"" if self._looks is None else bytes(self._ffi.buffer(self._looks))
         return bytes(self._ffi.buffer(self._slam)) + looks
 
+    def fingerprint(self, before: int) -> int:
+        """Goes on with a chain of fingerprints of the state (`bslam_slam_fingerprint`)."""
+        return int(self._lib.bslam_slam_fingerprint(self._slam, before))
+
     def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
         """One reading of kind "wheels" (a, b = left_m, right_m), "ticks" (counters), "velocity" (m/s, rad/s).
 

@@ -77,6 +77,8 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         "diverged": not np.isfinite(trace.pose).all(),
         "step_us_median": trace.step_us_median,
     }
+    if trace.target:
+        entry["target_image"] = trace.target
     if log.beacons is not None:
         entry["beacons_true"] = _beacons_true(log)
     if evaluation is not None:

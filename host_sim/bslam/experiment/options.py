@@ -14,7 +14,6 @@ ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm")
 FILTERS = ("standard", "invariant")
 MOTIONS = ("euler", "arc")
 SENSORS = ("simulated", "camera")
-TARGETS = ("host",)
 REALS = ("float", "double")
 
 # A measurement without any noise would leave the filter to divide by what rounding leaves of the

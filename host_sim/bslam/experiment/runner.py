@@ -19,6 +19,7 @@ from bslam.experiment.options import Number, RunOptions, core_params, odometry_l
 from bslam.experiment.trace import MapBeacon, Trace
 from bslam.experiment.truth import step_times_us
 from bslam.log import Log, Odometry, Sightings
+from bslam.target.remote import connect
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
@@ -39,13 +40,20 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
     beacons to hold.
     """
+    params, beacons = core_params(options, log), _beacons_to_hold(log, options)
+    if slam_factory is None and options.target != "host":
+        with connect(options.target, params, beacons, looks=_uses_looks(options)) as slam:
+            return _Run(slam, log, options).finish(slam.target_description())
     factory = slam_factory or partial(_make_slam, options)
-    return _Run(factory(core_params(options, log), _beacons_to_hold(log, options)), log, options).finish()
+    return _Run(factory(params, beacons), log, options).finish()
 
 
 def _make_slam(options: RunOptions, params: Mapping[str, Number], beacons_max: int) -> Slam:
-    looks = options.association == "svm"
-    return Slam(params, beacons_max=beacons_max, real=options.real, looks=looks)
+    return Slam(params, beacons_max=beacons_max, real=options.real, looks=_uses_looks(options))
+
+
+def _uses_looks(options: RunOptions) -> bool:
+    return options.association == "svm"
 
 
 def _beacons_to_hold(log: Log, options: RunOptions) -> int:
@@ -168,8 +176,8 @@ class _Run:
         except CoreError:
             return START_POSE if len(self.poses) < 2 else None
 
-    def finish(self) -> Trace:
-        """The trace of the run."""
+    def finish(self, target: Mapping[str, Any] | None = None) -> Trace:
+        """The trace of the run; `target` is what it ran on, if not here."""
         return Trace(
             time_us=np.array(self.times_us, dtype=np.int64),
             pose=np.array(self.poses, dtype=np.float64),
@@ -180,6 +188,7 @@ class _Run:
             parameters=self._changed_parameters(),
             counters=dict(self.slam.counters()),
             refusals=dict(self.refusals),
+            target=dict(target or {}),
             step_us_median=float(np.median(self.step_ns)) * 1e-3 if self.step_ns else 0.0,
         )
 
@@ -218,7 +227,7 @@ class _Frames:
         self._time_us: list[int] = times[first].tolist()
         self._true_id: list[int] = sightings.beacon_id.tolist()
         self._columns = _columns_for_filter(sightings, options)
-        self._signature = sightings.signature if options.association == "svm" else None
+        self._signature = sightings.signature if _uses_looks(options) else None
         self._next = 0
 
     def waiting_before(self, until_us: int | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,7 @@ class Trace:
     parameters: dict[str, int | float]  # effective parameters of the core that differ from its defaults
     counters: dict[str, int] = field(default_factory=dict)  # the core's own counters
     refusals: dict[str, int] = field(default_factory=dict)  # inputs that the core refused, by status
+    target: dict[str, Any] = field(default_factory=dict)  # image, hash, instructions, if it ran on a target
     step_us_median: float = 0.0
 
     @property

@@ -1,0 +1,500 @@
+#include "app/session.h"
+
+#include <string.h>
+
+#include "port/port.h"
+
+#define NO_DETAIL 255
+#define BEACON_BYTES 43
+#define BEACONS_A_FRAME ((BSLAM_LINK_PAYLOAD_MAX - 16) / BEACON_BYTES)
+#define FLAG_FINGERPRINT 1u
+#define FLAG_LOOKS 2u
+#define FLAG_GYRO 1u
+#define FLAG_RANGE 1u
+#define FLAG_SIGNATURE 2u
+#define FLAG_BEACON 1u
+#define FLAG_CONFIRMED 1u
+
+static const char *param_name(int id)
+{
+    return bslam_params_info(id)->name;
+}
+
+/// Of all parameters' names with their closing zeros: two tables that agree in it agree in every id.
+static uint16_t names_crc(void)
+{
+    uint16_t crc = BSLAM_CRC16_START;
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const char *name = param_name(id);
+        for (size_t i = 0; i <= strlen(name); i++) {
+            crc = bslam_crc16_add(crc, (uint8_t)name[i]);
+        }
+    }
+    return bslam_crc16_end(crc);
+}
+
+// ---- messages applied: the payload in, a status out
+// ---------------------------------------------------------
+
+/// A payload that is read and is as long as it should be.
+static bool is_whole(session_t *session, const bslam_link_reader_t *reader)
+{
+    if (bslam_link_is_read(reader)) {
+        return true;
+    }
+    session->last_status = SESSION_E_LENGTH;
+    return false;
+}
+
+static void keep(session_t *session, bslam_status_t status)
+{
+    session->last_status = (uint8_t)status;
+}
+
+static void apply_hello(session_t *session, bslam_link_reader_t *reader)
+{
+    const uint32_t id = bslam_link_get_u32(reader);
+    const uint8_t flags = bslam_link_get_u8(reader);
+    if (is_whole(session, reader)) {
+        session->id = id;
+        session->open = true;
+        session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
+        session->uses_looks = (flags & FLAG_LOOKS) != 0;
+        bslam_params_default(&session->params);
+        keep(session, BSLAM_OK);
+    }
+}
+
+static bslam_status_t attach_looks(session_t *session)
+{
+    if (!session->uses_looks) {
+        return BSLAM_OK;
+    }
+    const bslam_status_t status = bslam_looks_init(&session->looks, NULL, 0);
+    if (status == BSLAM_OK) {
+        bslam_slam_attach_looks(&session->slam, &session->looks);
+    }
+    return status;
+}
+
+static void apply_reset(session_t *session, bslam_link_reader_t *reader)
+{
+    if (is_whole(session, reader)) {
+        int bad_id = NO_DETAIL;
+        const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
+        keep(session, status == BSLAM_OK ? attach_looks(session) : status);
+        session->detail = (uint8_t)bad_id;
+        session->fingerprint = BSLAM_FINGERPRINT_START;
+    }
+}
+
+static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
+{
+    bslam_odometry_reading_t reading = {.time_us = session->parser.header.time_us};
+    reading.source = (bslam_odometry_source_t)bslam_link_get_u8(reader);
+    reading.has_gyro = (bslam_link_get_u8(reader) & FLAG_GYRO) != 0;
+    if (reading.source == BSLAM_ODOMETRY_TICKS) {
+        reading.left_ticks = bslam_link_get_u32(reader);
+        reading.right_ticks = bslam_link_get_u32(reader);
+    } else {
+        const bslam_real_t a = bslam_link_get_real(reader);
+        const bslam_real_t b = bslam_link_get_real(reader);
+        const bool is_wheels = reading.source == BSLAM_ODOMETRY_WHEELS;
+        reading.left_m = is_wheels ? a : 0;
+        reading.right_m = is_wheels ? b : 0;
+        reading.v_mps = is_wheels ? 0 : a;
+        reading.omega_radps = is_wheels ? 0 : b;
+    }
+    reading.gyro_radps = bslam_link_get_real(reader);
+    if (is_whole(session, reader)) {
+        const uint32_t began = port_ticks();
+        keep(session, bslam_slam_odometry(&session->slam, &reading));
+        session->ticks = port_ticks() - began;
+    }
+}
+
+static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
+{
+    const int first = bslam_link_get_u8(reader);
+    const int count = bslam_link_get_u8(reader);
+    if (first + count > BSLAM_SIGHTINGS_MAX) {
+        keep(session, BSLAM_E_COUNT);
+        return;
+    }
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+            session->signatures[first + i][k] = (float)bslam_link_get_real(reader);
+        }
+    }
+    if (is_whole(session, reader)) {
+        keep(session, BSLAM_OK);
+    }
+}
+
+static void read_sighting(bslam_link_reader_t *reader, const float *signature, bslam_sighting_t *sighting)
+{
+    sighting->bearing_rad = bslam_link_get_real(reader);
+    sighting->range_m = bslam_link_get_real(reader);
+    sighting->bearing_sd_rad = bslam_link_get_real(reader);
+    sighting->range_sd_m = bslam_link_get_real(reader);
+    sighting->label = bslam_link_get_i32(reader);
+    sighting->beacon_class = bslam_link_get_u8(reader);
+    const uint8_t flags = bslam_link_get_u8(reader);
+    sighting->has_range = (flags & FLAG_RANGE) != 0;
+    sighting->signature = (flags & FLAG_SIGNATURE) != 0 ? signature : NULL;
+}
+
+static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
+{
+    const int count = bslam_link_get_u8(reader);
+    for (int i = 0; i < count && i < BSLAM_SIGHTINGS_MAX; i++) {
+        read_sighting(reader, session->signatures[i], &session->sightings[i]);
+    }
+    // Of too many, which the library refuses, there is no room to read all.
+    if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
+        const uint32_t began = port_ticks();
+        const int64_t time_us = session->parser.header.time_us;
+        keep(session, bslam_slam_sightings(&session->slam, time_us, session->sightings, count));
+        session->ticks = port_ticks() - began;
+        session->detail = (uint8_t)bslam_slam_bad_sighting(&session->slam);
+    }
+}
+
+static void apply_resume(session_t *session, bslam_link_reader_t *reader)
+{
+    const bslam_real_t position_sd_m = bslam_link_get_real(reader);
+    const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
+    if (is_whole(session, reader)) {
+        keep(session, bslam_slam_resume_odometry(&session->slam, position_sd_m, heading_sd_rad));
+    }
+}
+
+static void apply_known_beacon(session_t *session, bslam_link_reader_t *reader)
+{
+    const int32_t label = bslam_link_get_i32(reader);
+    const bslam_real_t x_m = bslam_link_get_real(reader);
+    const bslam_real_t y_m = bslam_link_get_real(reader);
+    if (is_whole(session, reader)) {
+        keep(session, bslam_slam_add_known_beacon(&session->slam, label, x_m, y_m));
+    }
+}
+
+static void apply_remove_beacon(session_t *session, bslam_link_reader_t *reader)
+{
+    const uint32_t uid = bslam_link_get_u32(reader);
+    if (is_whole(session, reader)) {
+        keep(session, bslam_slam_remove_beacon(&session->slam, uid));
+    }
+}
+
+static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
+{
+    const int id = bslam_link_get_u16(reader);
+    const bslam_real_t value = bslam_link_get_real(reader);
+    if (is_whole(session, reader)) {
+        keep(session, bslam_params_set(&session->params, id, value));
+    }
+}
+
+/// A question changes nothing: it is read when it is answered.
+static void apply_nothing(session_t *session, bslam_link_reader_t *reader)
+{
+    (void)reader;
+    keep(session, BSLAM_OK);
+}
+
+// ---- answers: from the state as it stands, so that one that was lost can be given again
+// -----------------------
+
+static void put_pose(session_t *session, bslam_link_writer_t *out)
+{
+    const bslam_pose_t pose = bslam_slam_pose(&session->slam);
+    bslam_real_t lower[6];
+    bslam_slam_pose_covariance(&session->slam, lower);
+    bslam_link_put_real(out, pose.x_m);
+    bslam_link_put_real(out, pose.y_m);
+    bslam_link_put_real(out, pose.theta_rad);
+    for (int i = 0; i < 6; i++) {
+        bslam_link_put_real(out, lower[i]);
+    }
+}
+
+static void put_step(session_t *session, bslam_link_writer_t *out)
+{
+    put_pose(session, out);
+    bslam_link_put_u64(out, session->fingerprint);
+    bslam_link_put_u32(out, session->ticks);
+}
+
+static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    bslam_link_put_u32(out, session->id);
+    bslam_link_put_u8(out, BSLAM_VERSION_MAJOR);
+    bslam_link_put_u8(out, BSLAM_VERSION_MINOR);
+    bslam_link_put_u8(out, BSLAM_VERSION_PATCH);
+    bslam_link_put_u16(out, BSLAM_BEACONS_MAX);
+    bslam_link_put_u16(out, BSLAM_RAYS_MAX);
+    bslam_link_put_u16(out, BSLAM_SIGHTINGS_MAX);
+    bslam_link_put_u16(out, BSLAM_HISTORY_MAX);
+    bslam_link_put_u16(out, (uint16_t)bslam_params_count());
+    bslam_link_put_u16(out, names_crc());
+    bslam_link_put_u32(out, port_ticks_hz());
+    const uint8_t *build_id = port_build_id();
+    for (int i = 0; i < PORT_BUILD_ID_BYTES; i++) {
+        bslam_link_put_u8(out, build_id[i]);
+    }
+}
+
+static void answer_step(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    put_step(session, out);
+}
+
+static void put_account(bslam_link_writer_t *out, const bslam_account_t *account)
+{
+    bslam_link_put_u8(out, (uint8_t)account->outcome);
+    bslam_link_put_u8(out, (uint8_t)account->reason);
+    bslam_link_put_u8(out, account->has_beacon ? FLAG_BEACON : 0);
+    bslam_link_put_u32(out, account->beacon_uid);
+    bslam_link_put_real(out, account->test_ratio);
+    bslam_link_put_real(out, account->weight);
+}
+
+static void answer_sightings(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    put_step(session, out);
+    int count = 0;
+    const bslam_account_t *accounts = bslam_slam_accounts(&session->slam, &count);
+    bslam_link_put_u8(out, (uint8_t)count);
+    for (int i = 0; i < count; i++) {
+        put_account(out, &accounts[i]);
+    }
+}
+
+static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)session;
+    (void)reader;
+    (void)out;
+}
+
+static void answer_param(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    const int id = bslam_link_get_u16(reader);
+    bslam_link_put_real(out, bslam_params_get(&session->params, id));
+}
+
+static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    bslam_pose_t pose = {0, 0, 0};
+    const bslam_status_t status = bslam_slam_pose_at(&session->slam, session->parser.header.time_us, &pose);
+    bslam_link_put_u8(out, (uint8_t)status);
+    bslam_link_put_real(out, pose.x_m);
+    bslam_link_put_real(out, pose.y_m);
+    bslam_link_put_real(out, pose.theta_rad);
+}
+
+static void put_beacon(bslam_link_writer_t *out, const bslam_beacon_view_t *beacon)
+{
+    bslam_link_put_u32(out, beacon->uid);
+    bslam_link_put_i32(out, beacon->label);
+    bslam_link_put_u8(out, (uint8_t)beacon->kind);
+    bslam_link_put_u8(out, beacon->confirmed ? FLAG_CONFIRMED : 0);
+    bslam_link_put_u8(out, beacon->beacon_class);
+    bslam_link_put_u32(out, beacon->sightings);
+    bslam_link_put_real(out, beacon->x_m);
+    bslam_link_put_real(out, beacon->y_m);
+    bslam_link_put_real(out, beacon->covariance_m2.xx);
+    bslam_link_put_real(out, beacon->covariance_m2.xy);
+    bslam_link_put_real(out, beacon->covariance_m2.yy);
+    bslam_link_put_real(out, beacon->range_m);
+    bslam_link_put_real(out, beacon->phi_rad);
+}
+
+static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    const int total = bslam_slam_beacon_count(&session->slam);
+    const int first = bslam_link_get_u8(reader);
+    const int rest = first < total ? total - first : 0;
+    const int count = rest < BEACONS_A_FRAME ? rest : BEACONS_A_FRAME;
+    bslam_link_put_u8(out, (uint8_t)total);
+    bslam_link_put_u8(out, (uint8_t)count);
+    for (int i = 0; i < count; i++) {
+        bslam_beacon_view_t view;
+        if (bslam_slam_beacon(&session->slam, first + i, &view) == BSLAM_OK) {
+            put_beacon(out, &view);
+        }
+    }
+}
+
+/// Counters are structs of nothing but uint32_t.
+static void put_counters(bslam_link_writer_t *out, const void *counters, size_t size)
+{
+    const uint8_t *bytes = counters;
+    for (size_t at = 0; at < size; at += sizeof(uint32_t)) {
+        uint32_t value;
+        memcpy(&value, &bytes[at], sizeof value);
+        bslam_link_put_u32(out, value);
+    }
+}
+
+static void answer_counters(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    put_counters(out, &session->slam.counters, sizeof session->slam.counters);
+    put_counters(out, &session->looks.counters, sizeof session->looks.counters);
+    put_counters(out, &session->looks.learner.counters, sizeof session->looks.learner.counters);
+    put_counters(out, &session->parser.counters, sizeof session->parser.counters);
+    bslam_link_put_u32(out, session->repeated);
+    bslam_link_put_u32(out, session->replayed);
+}
+
+// ---- from a frame to its message
+// ------------------------------------------------------------------------------
+
+typedef struct exchange {
+    uint8_t type;
+    void (*apply)(session_t *session, bslam_link_reader_t *reader);
+    void (*answer)(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out);
+} exchange_t;
+
+static const exchange_t exchanges[] = {
+    {SESSION_HELLO, apply_hello, answer_hello},
+    {SESSION_RESET, apply_reset, answer_nothing},
+    {SESSION_ODOMETRY, apply_odometry, answer_step},
+    {SESSION_SIGHTINGS, apply_sightings, answer_sightings},
+    {SESSION_RESUME, apply_resume, answer_step},
+    {SESSION_KNOWN_BEACON, apply_known_beacon, answer_nothing},
+    {SESSION_REMOVE_BEACON, apply_remove_beacon, answer_nothing},
+    {SESSION_PARAM_SET, apply_param_set, answer_nothing},
+    {SESSION_PARAM_GET, apply_nothing, answer_param},
+    {SESSION_POSE_AT, apply_nothing, answer_pose_at},
+    {SESSION_MAP, apply_nothing, answer_map},
+    {SESSION_COUNTERS, apply_nothing, answer_counters},
+    {SESSION_SIGNATURES, apply_signatures, answer_nothing},
+};
+
+static const exchange_t *find_exchange(uint8_t type)
+{
+    for (size_t i = 0; i < sizeof exchanges / sizeof exchanges[0]; i++) {
+        if (exchanges[i].type == type) {
+            return &exchanges[i];
+        }
+    }
+    return NULL;
+}
+
+static void send(session_t *session, bslam_link_writer_t *out)
+{
+    const size_t length = bslam_link_end(out);
+    port_write(session->out, length);
+}
+
+static void begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
+                  int64_t time_us)
+{
+    const bslam_link_header_t header = {.type = type, .sequence = sequence, .time_us = time_us};
+    bslam_link_begin(out, session->out, sizeof session->out, &header);
+}
+
+/// Every answer says first what became of its message.
+static void answer(session_t *session, const exchange_t *exchange)
+{
+    const bslam_link_header_t *asked = &session->parser.header;
+    bslam_link_writer_t out;
+    begin(session, &out, asked->type | SESSION_ANSWER, asked->sequence, asked->time_us);
+    bslam_link_put_u8(&out, session->last_status);
+    bslam_link_put_u8(&out, session->detail);
+    if (exchange != NULL && session->last_status < SESSION_E_NO_SESSION) {
+        bslam_link_reader_t reader = bslam_link_payload(&session->parser);
+        exchange->answer(session, &reader, &out);
+    }
+    send(session, &out);
+}
+
+static void apply(session_t *session, const exchange_t *exchange)
+{
+    session->last_sequence = session->parser.header.sequence;
+    session->detail = NO_DETAIL;
+    session->ticks = 0;
+    if (!session->open && session->parser.header.type != SESSION_HELLO) {
+        session->last_status = SESSION_E_NO_SESSION;
+        return;
+    }
+    if (exchange == NULL) {
+        session->last_status = SESSION_E_TYPE;
+        return;
+    }
+    bslam_link_reader_t reader = bslam_link_payload(&session->parser);
+    exchange->apply(session, &reader);
+    const bool is_step = exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS;
+    if (is_step && session->takes_fingerprints) {
+        session->fingerprint = bslam_slam_fingerprint(&session->slam, session->fingerprint);
+    }
+}
+
+/// How far a sequence number is ahead of the last one: 0 the same again, negative an older one.
+static int16_t ahead(const session_t *session)
+{
+    return (int16_t)(uint16_t)(session->parser.header.sequence - session->last_sequence);
+}
+
+static void take_message(session_t *session)
+{
+    const exchange_t *exchange = find_exchange(session->parser.header.type);
+    const bool starts = session->parser.header.type == SESSION_HELLO;
+    if (session->open && !starts && ahead(session) < 0) {
+        session->replayed++;
+        return;
+    }
+    if (session->open && !starts && ahead(session) == 0) {
+        session->repeated++;
+    } else {
+        apply(session, exchange);
+    }
+    answer(session, exchange);
+}
+
+void session_take(session_t *session, uint8_t byte)
+{
+    if (bslam_link_push(&session->parser, byte)) {
+        take_message(session);
+    }
+}
+
+void session_init(session_t *session)
+{
+    int bad_id = 0;
+    *session = (session_t){0};
+    bslam_params_default(&session->params);
+    const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
+    session->fingerprint = BSLAM_FINGERPRINT_START;
+    bslam_link_writer_t out;
+    // A delimiter first: whatever the line had before the start is no part of this frame.
+    const uint8_t delimiter = 0;
+    port_write(&delimiter, 1);
+    begin(session, &out, SESSION_READY, 0, port_time_us());
+    bslam_link_put_u8(&out, (uint8_t)status);
+    send(session, &out);
+}
+
+void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks)
+{
+    const bslam_odometry_reading_t reading = {.time_us = time_us,
+                                              .source = BSLAM_ODOMETRY_TICKS,
+                                              .left_ticks = left_ticks,
+                                              .right_ticks = right_ticks};
+    const uint32_t began = port_ticks();
+    const bslam_status_t status = bslam_slam_odometry(&session->slam, &reading);
+    session->ticks = port_ticks() - began;
+    bslam_link_writer_t out;
+    session->report_sequence++;
+    begin(session, &out, SESSION_POSE, session->report_sequence, time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    put_step(session, &out);
+    send(session, &out);
+}

@@ -1,0 +1,76 @@
+/// One robot's side of the link: messages in, calls of the library, answers out. docs/LINK.md has every
+/// message.
+///
+/// The host leads: it opens a session, and each of its messages is applied once and answered once. A message
+/// that comes again, because its answer was lost, is answered again and not applied again; an older one is
+/// dropped and counted.
+#ifndef APP_SESSION_H
+#define APP_SESSION_H
+
+#include "bslam/bslam.h"
+#include "bslam/link/crc16.h"
+
+/// What the host may send. The answer to message m has type m | SESSION_ANSWER and the same sequence number.
+typedef enum session_message {
+    SESSION_HELLO = 0x01,         ///< opens a session; the answer says what the image is
+    SESSION_RESET = 0x02,         ///< starts over, with the parameters as they were set
+    SESSION_ODOMETRY = 0x03,      ///< a reading
+    SESSION_SIGHTINGS = 0x04,     ///< what an image shows; the answer has the account of each sighting
+    SESSION_RESUME = 0x05,        ///< after an interruption of odometry
+    SESSION_KNOWN_BEACON = 0x06,  ///< a beacon whose place is given
+    SESSION_REMOVE_BEACON = 0x07,
+    SESSION_PARAM_SET = 0x08,  ///< takes effect at the next SESSION_RESET
+    SESSION_PARAM_GET = 0x09,
+    SESSION_POSE_AT = 0x0a,
+    SESSION_MAP = 0x0b,  ///< asks for a part of the map
+    SESSION_COUNTERS = 0x0c,
+    SESSION_SIGNATURES = 0x0d,  ///< how some of the next frame's sightings look
+    SESSION_ANSWER = 0x80
+} session_message_t;
+
+/// What the robot sends of itself.
+typedef enum session_report {
+    SESSION_READY = 0x40,  ///< once after start-up
+    SESSION_POSE = 0x41    ///< after a step of the robot's own odometry
+} session_report_t;
+
+/// Statuses of the link itself; those of the library are below, from 0 up.
+typedef enum session_status {
+    SESSION_E_NO_SESSION = 0x40,  ///< no SESSION_HELLO came since the robot started
+    SESSION_E_TYPE = 0x41,        ///< no such message
+    SESSION_E_LENGTH = 0x42       ///< the payload is not as long as its message is
+} session_status_t;
+
+/// All members are the session's own.
+typedef struct session {
+    bslam_slam_t slam;
+    bslam_looks_t looks;
+    bslam_params_t params;  ///< as set, for the next reset
+    bslam_link_parser_t parser;
+    uint32_t id;  ///< the host's number of this session
+    bool open;
+    bool takes_fingerprints;
+    bool uses_looks;
+    uint16_t last_sequence;
+    uint16_t report_sequence;
+    uint8_t last_status;
+    uint8_t detail;     ///< of the last status: the parameter or sighting at fault, 255: none
+    uint32_t repeated;  ///< messages that came again
+    uint32_t replayed;  ///< older messages, which were dropped
+    uint32_t ticks;     ///< that the last message took to apply
+    uint64_t fingerprint;
+    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
+    float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
+    uint8_t out[BSLAM_LINK_FRAME_MAX];
+} session_t;
+
+/// Starts with default parameters and an empty map, and reports that the robot is ready.
+void session_init(session_t *session);
+
+/// Takes a byte that came over the link; applies and answers the message that it completes.
+void session_take(session_t *session, uint8_t byte);
+
+/// A reading of the robot's own encoders; reports the pose.
+void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks);
+
+#endif

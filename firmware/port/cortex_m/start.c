@@ -1,0 +1,59 @@
+/// From reset to main(), for every Cortex-M: the vector table, memory, the FPU. The linker script
+/// (sections.ld) gives the addresses.
+#include <stdint.h>
+
+#include "port/port.h"
+
+extern uint32_t start_stack_top[];
+extern uint32_t start_data_load[], start_data[], start_data_end[];
+extern uint32_t start_bss[], start_bss_end[];
+
+int main(void);
+void systick_interrupt(void);
+void start_reset(void);
+static void fault(void);
+
+#define EXCEPTIONS 16
+
+/// An entry is an address, of code but for the first.
+typedef union vector {
+    uint32_t *stack;
+    void (*handler)(void);
+} vector_t;
+
+__attribute__((section(".vectors"), used)) static const vector_t vectors[EXCEPTIONS] = {
+    {.stack = start_stack_top}, {.handler = start_reset},  {.handler = fault},  // NMI
+    {.handler = fault},  // hard fault, and what escalates to it
+    {.handler = fault},         {.handler = fault},        {.handler = fault},
+    [11] = {.handler = fault},  [14] = {.handler = fault}, [15] = {.handler = systick_interrupt},
+};
+
+#if defined(__ARM_FP)
+static void enable_fpu(void)
+{
+    volatile uint32_t *const cpacr = (volatile uint32_t *)0xe000ed88u;
+    *cpacr |= 0xfu << 20;
+    __asm__ volatile("dsb\n isb" ::: "memory");
+}
+#endif
+
+/// A fault has no one to report to but the host: end, with a status of its own.
+static void fault(void)
+{
+    port_exit(70);
+}
+
+void start_reset(void)
+{
+    const uint32_t *from = start_data_load;
+    for (uint32_t *to = start_data; to < start_data_end; to++, from++) {
+        *to = *from;
+    }
+    for (uint32_t *to = start_bss; to < start_bss_end; to++) {
+        *to = 0;
+    }
+#if defined(__ARM_FP)
+    enable_fpu();
+#endif
+    port_exit(main());
+}

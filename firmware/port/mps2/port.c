@@ -1,0 +1,75 @@
+/// Arm's MPS2 boards as QEMU has them: AN385 (Cortex-M3), AN386 (M4F), AN500 (M7), AN505 (M33). They differ
+/// in where the serial line is, UART_BASE. A board without a robot: what a robot would measure comes over the
+/// link.
+#include "port/port.h"
+
+#include "port/cortex_m/semihosting.h"
+#include "port/cortex_m/systick.h"
+
+/// The CMSDK UART.
+typedef struct uart {
+    uint32_t data;
+    uint32_t state;
+    uint32_t control;
+    uint32_t interrupt;
+    uint32_t baud_divider;
+} uart_t;
+
+#define UART ((volatile uart_t *)UART_BASE)
+#define STATE_SEND_FULL 1u
+#define STATE_RECEIVED 2u
+#define CONTROL_SEND_AND_RECEIVE 3u
+#define CORE_HZ 25000000u
+#define BAUD 115200u
+
+void port_init(void)
+{
+    UART->baud_divider = CORE_HZ / BAUD;
+    UART->control = CONTROL_SEND_AND_RECEIVE;
+    systick_start();
+}
+
+int port_read(void)
+{
+    return (UART->state & STATE_RECEIVED) != 0 ? (int)(UART->data & 0xffu) : -1;
+}
+
+void port_write(const uint8_t *bytes, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        while ((UART->state & STATE_SEND_FULL) != 0) {
+        }
+        UART->data = bytes[i];
+    }
+}
+
+int64_t port_time_us(void)
+{
+    return (int64_t)(systick_ticks() / (CORE_HZ / 1000000u));
+}
+
+uint32_t port_ticks(void)
+{
+    return (uint32_t)systick_ticks();
+}
+
+uint32_t port_ticks_hz(void)
+{
+    return CORE_HZ;
+}
+
+void port_watchdog(void)
+{
+}
+
+bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
+{
+    (void)left_ticks;
+    (void)right_ticks;
+    return false;
+}
+
+void port_exit(int status)
+{
+    semihosting_exit(status);
+}

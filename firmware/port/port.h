@@ -1,0 +1,39 @@
+/// What a board gives to the application: all that a port is. docs/PORTING.md says how to write one.
+#ifndef PORT_PORT_H
+#define PORT_PORT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/// Clocks, the serial line, the timer. Called once, first.
+void port_init(void);
+
+/// The next byte that came over the serial line, or -1 if none waits. Never blocks.
+int port_read(void);
+
+/// Sends bytes over the serial line; returns when the last one is on its way.
+void port_write(const uint8_t *bytes, size_t count);
+
+/// Microseconds since the start. Never goes back.
+int64_t port_time_us(void);
+
+/// A counter that runs up, modulo 2^32, and its rate: to measure what a step costs. A rate of 0: there is
+/// none.
+uint32_t port_ticks(void);
+uint32_t port_ticks_hz(void);
+
+/// PORT_BUILD_ID_BYTES bytes that no other image has.
+#define PORT_BUILD_ID_BYTES 20
+const uint8_t *port_build_id(void);
+
+/// Tells the watchdog that the main loop is alive.
+void port_watchdog(void);
+
+/// The counters of both wheel encoders, if the robot has them and a reading is due. They may roll over.
+bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks);
+
+/// The end: resets a robot; under an emulator ends it with this exit status.
+_Noreturn void port_exit(int status);
+
+#endif

@@ -1,0 +1,244 @@
+"""Messages of the link: payloads to values and back. `firmware/app/session.h` is the other side."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+ANSWER = 0x80
+"""The answer to message m has type m | ANSWER."""
+
+
+class Message(IntEnum):
+    """What the host sends."""
+
+    HELLO = 0x01
+    RESET = 0x02
+    ODOMETRY = 0x03
+    SIGHTINGS = 0x04
+    RESUME = 0x05
+    KNOWN_BEACON = 0x06
+    REMOVE_BEACON = 0x07
+    PARAM_SET = 0x08
+    PARAM_GET = 0x09
+    POSE_AT = 0x0A
+    MAP = 0x0B
+    COUNTERS = 0x0C
+    SIGNATURES = 0x0D
+
+
+class Report(IntEnum):
+    """What the robot sends of itself."""
+
+    READY = 0x40
+    POSE = 0x41
+
+
+LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH"}
+"""Statuses that are the link's own; below are the library's."""
+NO_DETAIL = 255
+
+_HELLO = struct.Struct("<IB")
+_INFO = struct.Struct("<I3B6HI20s")
+_PAIR = struct.Struct("<ff")
+_KNOWN_BEACON = struct.Struct("<iff")
+_UID = struct.Struct("<I")
+_PARAM_ID = struct.Struct("<H")
+_PARAM = struct.Struct("<Hf")
+_VALUE = struct.Struct("<f")
+_POSE_AT = struct.Struct("<B3f")
+_STEP = struct.Struct("<9fQI")
+_ACCOUNT = struct.Struct("<BBBIff")
+_BEACON = struct.Struct("<IiBBBI7f")
+_SIGHTING = np.dtype(
+    [
+        ("bearing_rad", "<f4"),
+        ("range_m", "<f4"),
+        ("bearing_sd_rad", "<f4"),
+        ("range_sd_m", "<f4"),
+        ("label", "<i4"),
+        ("beacon_class", "u1"),
+        ("flags", "u1"),
+    ]
+)
+_SOURCES = {"wheels": 0, "ticks": 1, "velocity": 2}
+_NOT_MAPPABLE = 255
+
+
+def float32(value: float) -> bytes:
+    """A number as C would convert it: rounded to nearest, infinite where it is too large."""
+    with np.errstate(over="ignore"):
+        return np.float32(value).astype("<f4").tobytes()
+
+
+def hello(session: int, fingerprints: bool, looks: bool) -> bytes:
+    return _HELLO.pack(session, int(fingerprints) | int(looks) << 1)
+
+
+def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
+    """A reading; raises struct.error for counters that are no 32-bit numbers."""
+    values = struct.pack("<II", int(a), int(b)) if kind == "ticks" else float32(a) + float32(b)
+    has_gyro = gyro_radps is not None
+    return bytes((_SOURCES[kind], int(has_gyro))) + values + float32(gyro_radps or 0.0)
+
+
+def signatures(first: int, part: NDArray[np.float32]) -> bytes:
+    """How the sightings from `first` on look, (n, features)."""
+    return bytes((first, len(part))) + part.astype("<f4").tobytes()
+
+
+def sightings(
+    rows: Sequence[tuple[float, float, int, bool, float, float]], signed: bool, most: int
+) -> bytes:
+    """Rows as `bslam.core.raw.Library.sightings` takes them; of more than `most` only the number counts.
+
+    signed: the signatures of all have been sent.
+    """
+    count, rows = len(rows), rows[:most]
+    table = np.zeros(len(rows), dtype=_SIGHTING)
+    if rows:
+        bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m = zip(*rows, strict=True)
+        with np.errstate(over="ignore"):
+            has_range = ~np.isnan(np.array(range_m, dtype=np.float64))
+            table["bearing_rad"] = bearing_rad
+            table["range_m"] = np.where(has_range, range_m, 0.0)
+            table["bearing_sd_rad"] = bearing_sd_rad
+            table["range_sd_m"] = range_sd_m
+        table["label"] = label
+        table["beacon_class"] = np.where(mappable, 0, _NOT_MAPPABLE)
+        table["flags"] = has_range | signed << 1
+    return bytes((min(count, 255),)) + table.tobytes()
+
+
+def resume(position_sd_m: float, heading_sd_rad: float) -> bytes:
+    return float32(position_sd_m) + float32(heading_sd_rad)
+
+
+def known_beacon(label: int, x_m: float, y_m: float) -> bytes:
+    return struct.pack("<i", label) + float32(x_m) + float32(y_m)
+
+
+def remove_beacon(uid: int) -> bytes:
+    return _UID.pack(uid)
+
+
+def param_set(number: int, value: float) -> bytes:
+    return _PARAM_ID.pack(number) + float32(value)
+
+
+def param_get(number: int) -> bytes:
+    return _PARAM_ID.pack(number)
+
+
+@dataclass(frozen=True)
+class Info:
+    """What an image says of itself."""
+
+    session: int
+    version: str
+    build_id: str
+    beacons_max: int
+    rays_max: int
+    sightings_max: int
+    history_max: int
+    params_count: int
+    params_crc: int
+    ticks_hz: int
+
+
+def read_info(body: bytes) -> Info:
+    values = _INFO.unpack(body)
+    version = ".".join(map(str, values[1:4]))
+    return Info(values[0], version, values[11].hex(), *values[4:11])
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where the robot stands after a step: pose, lower triangle of its covariance, fingerprint, ticks."""
+
+    pose: tuple[float, float, float]
+    covariance: tuple[float, ...]
+    fingerprint: int
+    ticks: int
+
+
+def read_step(body: bytes) -> Step:
+    values = _STEP.unpack_from(body)
+    return Step((values[0], values[1], values[2]), tuple(values[3:9]), values[9], values[10])
+
+
+@dataclass(frozen=True)
+class RawAccount:
+    """An account in the library's numbers."""
+
+    outcome: int
+    reason: int
+    has_beacon: bool
+    beacon_uid: int
+    test_ratio: float
+    weight: float
+
+
+def read_accounts(body: bytes) -> list[RawAccount]:
+    """The accounts that follow the step in an answer to SIGHTINGS."""
+    count = body[_STEP.size]
+    records = body[_STEP.size + 1 :]
+    if len(records) != count * _ACCOUNT.size:
+        raise struct.error(f"{count} accounts in {len(records)} bytes")
+    return [
+        RawAccount(outcome, reason, bool(flags & 1), uid, ratio, weight)
+        for outcome, reason, flags, uid, ratio, weight in _ACCOUNT.iter_unpack(records)
+    ]
+
+
+def read_value(body: bytes) -> float:
+    """A parameter's value."""
+    return float(_VALUE.unpack(body)[0])
+
+
+def read_pose_at(body: bytes) -> tuple[int, tuple[float, float, float]]:
+    """Status and pose."""
+    status, x_m, y_m, theta_rad = _POSE_AT.unpack(body)
+    return status, (x_m, y_m, theta_rad)
+
+
+@dataclass(frozen=True)
+class RawBeacon:
+    """A beacon of the map in the library's numbers; covariance xx, xy, yy."""
+
+    uid: int
+    label: int
+    kind: int
+    confirmed: bool
+    beacon_class: int
+    sightings: int
+    x_m: float
+    y_m: float
+    covariance: tuple[float, float, float]
+    range_m: float
+    phi_rad: float
+
+
+def read_beacons(body: bytes) -> tuple[int, list[RawBeacon]]:
+    """How many the map has in all, and this part of them."""
+    total, count = body[0], body[1]
+    records = body[2:]
+    if len(records) != count * _BEACON.size:
+        raise struct.error(f"{count} beacons in {len(records)} bytes")
+    part = [
+        RawBeacon(uid, label, kind, bool(flags & 1), group, seen, x, y, (xx, xy, yy), range_m, phi_rad)
+        for uid, label, kind, flags, group, seen, x, y, xx, xy, yy, range_m, phi_rad in _BEACON.iter_unpack(
+            records
+        )
+    ]
+    return total, part
+
+
+def read_counters(body: bytes) -> list[int]:
+    """All counters in a row: the library's, the parser's, messages repeated and replayed."""
+    return [value for (value,) in struct.iter_unpack("<I", body)]

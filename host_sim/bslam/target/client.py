@@ -1,0 +1,79 @@
+"""A session with a robot: one message out, its answer back, sent again if that does not come."""
+
+from __future__ import annotations
+
+import secrets
+from collections import deque
+from dataclasses import dataclass
+
+from bslam.link import messages
+from bslam.link.frames import Decoder, Frame, encode
+from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report
+from bslam.target.lines import Line, TargetError
+
+ANSWER_TIMEOUT_S = 2.0
+ATTEMPTS = 5
+
+
+@dataclass(frozen=True)
+class Answer:
+    """`status` of the library, what it is about (`messages.NO_DETAIL`: nothing), and the rest."""
+
+    status: int
+    detail: int
+    body: bytes
+
+
+class Client:
+    """The host's side of the link. A message is applied once, however often its frame or answer is lost."""
+
+    def __init__(self, line: Line, *, fingerprints: bool = False, looks: bool = False) -> None:
+        self._line = line
+        self._decoder = Decoder()
+        self._frames: deque[Frame] = deque()
+        self._sequence = secrets.randbelow(1 << 16)
+        self.repeats = 0
+        session = secrets.randbits(32)
+        line.write(b"\0")
+        answer = self.ask(Message.HELLO, messages.hello(session, fingerprints, looks))
+        self.info: Info = messages.read_info(answer.body)
+        self._open = True
+
+    _open = False
+
+    def ask(self, message: Message, payload: bytes = b"", time_us: int = 0) -> Answer:
+        """Send a message and wait for its answer. Raises TargetError if none comes, or the robot restarts."""
+        self._sequence = (self._sequence + 1) % (1 << 16)
+        data = encode(Frame(message, self._sequence, time_us, payload))
+        for attempt in range(ATTEMPTS):
+            self.repeats += attempt > 0
+            self._line.write(data)
+            frame = self._answer(message)
+            if frame is not None:
+                return self._checked(message, frame)
+        raise TargetError(f"no answer to {message.name} after {ATTEMPTS} attempts")
+
+    def _answer(self, message: Message) -> Frame | None:
+        """The answer to the last message; None if it did not come in time."""
+        while True:
+            while self._frames:
+                frame = self._frames.popleft()
+                if frame.type == Report.READY and self._open:
+                    raise TargetError("the target started anew: what it knew is lost")
+                if frame.type == message | ANSWER and frame.sequence == self._sequence:
+                    return frame
+            data = self._line.read(ANSWER_TIMEOUT_S)
+            if not data:
+                return None
+            self._frames.extend(self._decoder.push(data))
+
+    def _checked(self, message: Message, frame: Frame) -> Answer:
+        if len(frame.payload) < 2:
+            raise TargetError(f"an empty answer to {message.name}")
+        answer = Answer(frame.payload[0], frame.payload[1], frame.payload[2:])
+        if answer.status in LINK_STATUSES:
+            raise TargetError(f"{message.name} was refused: {LINK_STATUSES[answer.status]}")
+        return answer
+
+    def close(self) -> None:
+        self._line.close()

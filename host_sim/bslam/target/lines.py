@@ -1,0 +1,246 @@
+"""Where bytes go to a robot and come back: an emulated board, a serial device, a process of this computer."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import select
+import shutil
+import socket
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, Protocol
+
+from bslam.errors import BslamError
+
+ROOT = Path(__file__).resolve().parents[3]
+BUILD_DIR = ROOT / "build"
+BOARD_FILES = "firmware/port/*/board.mk"
+
+QEMU = "qemu-system-arm"
+TARGET_KINDS = ("qemu", "serial", "process")
+NS_PER_INSTRUCTION = 64
+"""QEMU's clock under `-icount shift=6`: an instruction takes that long, so that ticks count instructions."""
+START_TIMEOUT_S = 30.0
+
+
+class TargetError(RuntimeError):
+    """The robot at the other end went away, started anew, or says what cannot be."""
+
+
+class Line(Protocol):
+    """Bytes both ways. Reads and writes raise TargetError if the other end has gone."""
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What is at the other end, for summary.json: "image", "image_sha256" where there is an image."""
+
+    @property
+    def ns_per_instruction(self) -> int | None:
+        """How long an instruction takes on the target's clock, if that is fixed."""
+
+    def write(self, data: bytes) -> None:
+        """Sends all of it."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come, at least a byte; nothing after the time-out."""
+
+    def close(self) -> None:
+        """Ends it."""
+
+
+def qemu_machines() -> dict[str, str]:
+    """The boards that QEMU has, by their folder's name, and what it calls them: from their board.mk."""
+    found = {}
+    for path in sorted(ROOT.glob(BOARD_FILES)):
+        board = path.parent.name
+        match = re.search(rf"^BOARD_QEMU_{board} := (\S+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+        if match:
+            found[board] = match[1]
+    return found
+
+
+def open_line(target: str) -> Line:
+    """The line that a word of `--target` names. Raises BslamError if it cannot be: never something else."""
+    kind, _, name = target.partition(":")
+    if kind == "qemu":
+        return QemuLine(name)
+    if kind == "serial":
+        return SerialLine(name)
+    if kind == "process":
+        return ProcessLine(Path(name))
+    raise BslamError(f"target '{target}' does not exist; allowed: {allowed_targets()}")
+
+
+def allowed_targets() -> str:
+    """In the words of an error."""
+    return f"host, {', '.join(f'qemu:{board}' for board in qemu_machines())}, serial:DEVICE, process:PROGRAM"
+
+
+class QemuLine:
+    """An image in QEMU, its serial line on a socket of ours. The same instructions at every run."""
+
+    ns_per_instruction: int | None = NS_PER_INSTRUCTION
+
+    def __init__(self, board: str) -> None:
+        machines = qemu_machines()
+        if board not in machines:
+            raise BslamError(f"target 'qemu:{board}' does not exist; allowed: {allowed_targets()}")
+        if shutil.which(QEMU) is None:
+            package = "qemu-system-arm"
+            raise BslamError(f"{QEMU} is not installed: install it with: sudo apt-get install {package}")
+        self._image = BUILD_DIR / board / "robot.elf"
+        if not self._image.is_file():
+            raise BslamError(f"{self._image} is missing: build it with: make firmware TARGET={board}")
+        self._board = board
+        self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
+        self._socket, self._process = self._start(machines[board])
+
+    def _start(self, machine: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
+        path = str(Path(self._folder.name) / "line")
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(path)
+        listener.listen(1)
+        listener.settimeout(START_TIMEOUT_S)
+        command = [QEMU, "-M", machine, "-display", "none", "-monitor", "none", "-kernel", str(self._image)]
+        command += ["-semihosting-config", "enable=on,target=native", "-icount", "shift=6,sleep=off"]
+        command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line"]
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        try:
+            line, _ = listener.accept()
+        except TimeoutError:
+            process.kill()
+            said = process.communicate()[1].decode(errors="replace")
+            raise TargetError(f"{QEMU} did not start: {said}") from None
+        finally:
+            listener.close()
+        return line, process
+
+    @property
+    def description(self) -> dict[str, Any]:
+        return _image_description(self._image)
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise TargetError(self._gone()) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        return _receive(self._socket, timeout_s, self._gone)
+
+    def _gone(self) -> str:
+        self._process.kill()
+        said = self._process.communicate()[1].decode(errors="replace").strip()
+        return f"{QEMU} with {self._image.name} ended with status {self._process.returncode}: {said}"
+
+    def close(self) -> None:
+        self._socket.close()
+        self._process.kill()
+        self._process.communicate()
+        self._folder.cleanup()
+
+
+class ProcessLine:
+    """A program that speaks the link on its standard input and output: the application on this computer."""
+
+    ns_per_instruction: int | None = None
+
+    def __init__(self, program: Path) -> None:
+        if not program.is_file():
+            raise BslamError(f"{program} is missing; allowed: a program that speaks the link")
+        self._program = program
+        self._process = subprocess.Popen(
+            [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+        )
+
+    @property
+    def description(self) -> dict[str, Any]:
+        return _image_description(self._program)
+
+    def write(self, data: bytes) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(data)
+        except OSError as error:
+            raise TargetError(self._gone()) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], timeout_s)
+        if not ready:
+            return b""
+        data = os.read(self._process.stdout.fileno(), 1 << 16)
+        if not data:
+            raise TargetError(self._gone())
+        return data
+
+    def _gone(self) -> str:
+        self._process.kill()
+        return f"{self._program.name} ended with status {self._process.wait()}"
+
+    def close(self) -> None:
+        self._process.kill()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+        self._process.wait()
+
+
+class SerialLine:
+    """A serial device, a robot at its other end."""
+
+    ns_per_instruction: int | None = None
+    BAUD = 115200
+
+    def __init__(self, device: str) -> None:
+        import serial  # here, since it takes time and few need it
+
+        try:
+            self._serial = serial.serial_for_url(device, baudrate=self.BAUD, timeout=0.1)
+        except (serial.SerialException, ValueError) as error:
+            allowed = "allowed: a device such as /dev/ttyUSB0"
+            raise BslamError(f"serial device '{device}': {error}; {allowed}") from error
+        self._device = device
+        self._gone: type[Exception] = serial.SerialException
+
+    @property
+    def description(self) -> dict[str, Any]:
+        return {"device": self._device}
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._serial.write(data)
+        except self._gone as error:
+            raise TargetError(f"{self._device}: {error}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            self._serial.timeout = timeout_s
+            return bytes(self._serial.read(max(1, self._serial.in_waiting)))
+        except self._gone as error:
+            raise TargetError(f"{self._device}: {error}") from error
+
+    def close(self) -> None:
+        self._serial.close()
+
+
+def _receive(line: socket.socket, timeout_s: float, gone: Any) -> bytes:
+    line.settimeout(timeout_s)
+    try:
+        data = line.recv(1 << 16)
+    except TimeoutError:
+        return b""
+    except OSError as error:
+        raise TargetError(gone()) from error
+    if not data:
+        raise TargetError(gone())
+    return data
+
+
+def _image_description(path: Path) -> dict[str, Any]:
+    return {"image": str(path.name), "image_sha256": hashlib.sha256(path.read_bytes()).hexdigest()}

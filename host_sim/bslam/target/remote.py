@@ -1,0 +1,270 @@
+"""The pipeline on a target, behind the interface of `bslam.core.Slam`."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.raw import library
+from bslam.core.slam import Account, Beacon, Slam
+from bslam.errors import BslamError
+from bslam.link import messages
+from bslam.link.frames import crc16
+from bslam.link.messages import NO_DETAIL, Message, Step
+from bslam.target.client import Answer, Client
+from bslam.target.lines import Line, TargetError, open_line
+
+SIGNATURES_A_FRAME = 1
+"""Fits the payload of any image, whatever its BSLAM_SIGHTINGS_MAX from 12 on."""
+
+
+class RemoteSlam:
+    """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
+
+    params, beacons_max as for `Slam`; `line` is taken over. Raises BslamError for parameters that the library
+    refuses and for an image that is too small or has others, TargetError if the robot does not answer.
+    """
+
+    def __init__(
+        self, line: Line, params: Mapping[str, float], beacons_max: int, *, fingerprints: bool = False, looks: bool = False
+    ) -> None:
+        self._line = line
+        self._raw = library("float", 1)
+        # What the image would refuse is refused here first, in the words of the library.
+        self._values = Slam(params, beacons_max=beacons_max).params
+        self._client = Client(line, fingerprints=fingerprints, looks=looks)
+        self._looks = looks
+        self._check_image(beacons_max)
+        self._step: Step | None = None
+        self._instructions: list[int] = []
+        self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
+        self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
+        self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
+        self._set_params()
+
+    def _check_image(self, beacons_max: int) -> None:
+        info = self._client.info
+        names = [p.name for p in Slam.parameters()]
+        crc = crc16(b"".join(name.encode() + b"\0" for name in names))
+        if (info.params_count, info.params_crc) != (len(names), crc):
+            raise BslamError(
+                "the image has other parameters than this program: build both from the same files"
+            )
+        if beacons_max > info.beacons_max:
+            raise BslamError(
+                f"the run needs room for {beacons_max} beacons, the image has {info.beacons_max}: "
+                "build it with a larger BSLAM_BEACONS_MAX"
+            )
+
+    def _set_params(self) -> None:
+        names = [p.name for p in Slam.parameters()]
+        for number, (name, default) in enumerate(Slam.defaults().items()):
+            value = self._values[name]
+            if value == _as_float32(default):
+                continue
+            self._ensure(self._client.ask(Message.PARAM_SET, messages.param_set(number, value)), name)
+            kept = messages.read_value(self._client.ask(Message.PARAM_GET, messages.param_get(number)).body)
+            if kept != value:
+                raise BslamError(f"parameter {name} = {value}: the link carries float32, which has {kept}")
+        answer = self._client.ask(Message.RESET)
+        if answer.status:
+            self._ensure(answer, f"parameter {names[answer.detail]}")
+
+    # ---- the interface of Slam -----------------------------------------------------------------------------
+
+    @staticmethod
+    def defaults() -> dict[str, float]:
+        """As `Slam.defaults`."""
+        return Slam.defaults()
+
+    @property
+    def params(self) -> dict[str, float]:
+        """The values in force."""
+        return dict(self._values)
+
+    def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
+        """As `Slam.odometry`."""
+        what = f"odometry at {time_us} us ({a}, {b})"
+        payload = _packed(what, messages.odometry, kind, a, b, gyro_radps)
+        self._take_step(self._client.ask(Message.ODOMETRY, payload, time_us), what)
+
+    def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:
+        """As `Slam.resume_odometry`."""
+        answer = self._client.ask(Message.RESUME, messages.resume(position_sd_m, heading_sd_rad))
+        self._take_step(answer, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad")
+
+    def sightings(
+        self,
+        time_us: int,
+        bearing_rad: Sequence[float],
+        range_m: Sequence[float],
+        label: Sequence[int],
+        mappable: Sequence[bool],
+        bearing_sd_rad: Sequence[float] | None = None,
+        range_sd_m: Sequence[float] | None = None,
+        signature: NDArray[np.float32] | None = None,
+    ) -> list[Account]:
+        """As `Slam.sightings`."""
+        silent = [0.0] * len(bearing_rad)
+        noise = (bearing_sd_rad or silent, range_sd_m or silent)
+        rows = list(zip(bearing_rad, range_m, label, mappable, *noise, strict=True))
+        signed, most = signature is not None, self._client.info.sightings_max
+        payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
+        if signature is not None:
+            self._send_signatures(signature[:most])
+        answer = self._client.ask(Message.SIGHTINGS, payload, time_us)
+        which = f"{len(rows)} sightings" if answer.detail == NO_DETAIL else f"sighting {answer.detail}"
+        self._take_step(answer, f"frame at {time_us} us, {which}")
+        return [self._account(one) for one in messages.read_accounts(answer.body)]
+
+    def _send_signatures(self, signature: NDArray[np.float32]) -> None:
+        for first in range(0, len(signature), SIGNATURES_A_FRAME):
+            payload = messages.signatures(first, signature[first : first + SIGNATURES_A_FRAME])
+            self._ensure(self._client.ask(Message.SIGNATURES, payload), "signatures")
+
+    def _account(self, raw: messages.RawAccount) -> Account:
+        return Account(
+            self._outcomes[raw.outcome],
+            self._reasons[raw.reason],
+            raw.beacon_uid if raw.has_beacon else None,
+            raw.test_ratio if raw.test_ratio >= 0 else None,
+            raw.weight,
+        )
+
+    def pose(self) -> tuple[float, float, float]:
+        """As `Slam.pose`: of the last step."""
+        return self._last_step().pose
+
+    def pose_covariance_lower(self) -> tuple[float, ...]:
+        """As `Slam.pose_covariance_lower`."""
+        return self._last_step().covariance
+
+    def pose_at(self, time_us: int) -> tuple[float, float, float]:
+        """As `Slam.pose_at`."""
+        answer = self._client.ask(Message.POSE_AT, b"", time_us)
+        status, pose = messages.read_pose_at(answer.body)
+        if status:
+            self._raw.ensure(status, f"pose at {time_us} us")
+        return pose
+
+    def beacons(self) -> list[Beacon]:
+        """As `Slam.beacons`."""
+        found: list[messages.RawBeacon] = []
+        while True:
+            answer = self._client.ask(Message.MAP, bytes((len(found),)))
+            total, part = messages.read_beacons(answer.body)
+            found += part
+            if len(found) >= total:
+                return [self._beacon(raw) for raw in found]
+            if not part:
+                raise TargetError(f"the map has {total} beacons, and the target sends {len(found)}")
+
+    def _beacon(self, raw: messages.RawBeacon) -> Beacon:
+        xx, xy, yy = raw.covariance
+        return Beacon(
+            uid=raw.uid,
+            label=raw.label,
+            kind=self._kinds[raw.kind],
+            confirmed=raw.confirmed,
+            sightings=raw.sightings,
+            x_m=raw.x_m,
+            y_m=raw.y_m,
+            covariance=np.array([[xx, xy], [xy, yy]]),
+            range_m=raw.range_m,
+            phi_rad=raw.phi_rad,
+        )
+
+    def add_known_beacon(self, label: int, x_m: float, y_m: float) -> None:
+        """As `Slam.add_known_beacon`."""
+        payload = messages.known_beacon(label, x_m, y_m)
+        self._ensure(
+            self._client.ask(Message.KNOWN_BEACON, payload), f"known beacon {label} at ({x_m}, {y_m})"
+        )
+
+    def remove_beacon(self, uid: int) -> None:
+        """As `Slam.remove_beacon`."""
+        self._ensure(self._client.ask(Message.REMOVE_BEACON, messages.remove_beacon(uid)), f"beacon {uid}")
+
+    def counters(self) -> dict[str, int]:
+        """As `Slam.counters`."""
+        types = ["bslam_counters_t", "bslam_looks_counters_t", "bslam_learner_counters_t"]
+        values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
+        counts = [
+            {name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types
+        ]
+        return counts[0] | counts[1] | counts[2] if self._looks else counts[0]
+
+    # ---- what only a target has ----------------------------------------------------------------------------
+
+    @property
+    def fingerprint(self) -> int:
+        """Of all states so far, chained (`bslam_slam_fingerprint`)."""
+        return self._last_step().fingerprint
+
+    @property
+    def last_instructions(self) -> int | None:
+        """Instructions that the target took for the last reading or frame, where its clock tells."""
+        return self._instructions[-1] if self._instructions else None
+
+    def target_description(self) -> dict[str, Any]:
+        """What ran: image and its hash, the linker's build id, instructions in all where they can be had."""
+        found = dict(self._line.description) | {"build_id": self._client.info.build_id}
+        if self._line.ns_per_instruction is not None:
+            found["instructions"] = sum(self._instructions)
+        return found
+
+    def close(self) -> None:
+        """End the session and its line."""
+        self._client.close()
+
+    def __enter__(self) -> RemoteSlam:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # ---- inside --------------------------------------------------------------------------------------------
+
+    def _take_step(self, answer: Answer, what: str) -> None:
+        self._step = messages.read_step(answer.body)
+        if self._line.ns_per_instruction is not None:
+            ns = self._step.ticks * 1_000_000_000 // self._client.info.ticks_hz
+            self._instructions.append(ns // self._line.ns_per_instruction)
+        self._ensure(answer, what)
+
+    def _last_step(self) -> Step:
+        if self._step is None:
+            self.resume_odometry(0.0, 0.0)  # at the start this changes nothing, and is answered with the pose
+        assert self._step is not None
+        return self._step
+
+    def _ensure(self, answer: Answer, what: str) -> None:
+        self._raw.ensure(answer.status, what)
+
+
+def connect(
+    target: str, params: Mapping[str, float], beacons_max: int, *, fingerprints: bool = False, looks: bool = False
+) -> RemoteSlam:
+    """The pipeline on the target that a word of `--target` names; close it, or use it in a `with`."""
+    line = open_line(target)
+    try:
+        return RemoteSlam(line, params, beacons_max, fingerprints=fingerprints, looks=looks)
+    except BaseException:
+        line.close()
+        raise
+
+
+def _as_float32(value: float) -> float:
+    return value if isinstance(value, int) else float(np.float32(value))
+
+
+def _packed(what: str, pack: Any, *values: Any) -> bytes:
+    """A payload; raises BslamError for what the link cannot carry."""
+    try:
+        return bytes(pack(*values))
+    except (struct.error, OverflowError, ValueError) as error:
+        raise BslamError(f"{what}: {error}") from error

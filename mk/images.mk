@@ -1,0 +1,62 @@
+# Complete images: the library, the application and a board's port, linked to build/<board>/robot.elf. A board
+# is a folder firmware/port/<board> with board.mk (core, sources, flags, QEMU's name for it) and memory.ld:
+# there is no list to keep.
+
+BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board.mk))
+
+# What boards may use.
+CORTEX_M_SOURCES := $(wildcard firmware/port/cortex_m/*.c)
+# The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does.
+HOST_SIZES := -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
+
+include $(BOARDS:%=firmware/port/%/board.mk)
+
+APP_SOURCES := firmware/app/session.c
+PROGRAMS := robot
+
+# A square root needs no errno. The stack that each function takes is for tools/check_image.py.
+IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage
+
+IMAGE_LINK := -nostartfiles --specs=nano.specs --specs=nosys.specs -Wl,--gc-sections -Wl,--build-id=sha1 \
+    -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments
+
+# The rules for one board: $(1) is its name.
+define board_rules
+BOARD_ARM_$(1) := $(ARM)gcc -mthumb $(TARGET_FLAGS_$(BOARD_CORE_$(1)))
+BOARD_COMPILE_$(1) := $$(BOARD_ARM_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
+    $(C_WARNINGS) $(C_WARNINGS_FLOAT)
+BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(CORE_SOURCES) $(APP_SOURCES) $(BOARD_SOURCES_$(1)))
+BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
+
+build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
+	@mkdir -p $$(@D)
+	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
+
+build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
+    firmware/port/cortex_m/sections.ld tools/check_image.py
+	@$$(BOARD_ARM_$(1)) $$(IMAGE_LINK) -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
+	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1)
+
+.PHONY: image-$(1)
+image-$(1): $(PROGRAMS:%=build/$(1)/%.elf)
+
+-include $$(BOARD_OBJECTS_$(1):.o=.d) $(PROGRAMS:%=build/$(1)/firmware/app/%.d)
+endef
+$(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
+
+# The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
+HOST_ROBOT := build/host/robot
+HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c firmware/port/posix/port.c
+HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
+
+$(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk
+	@mkdir -p $(@D)
+	@$(UNIT_COMPILE_float) $(C_WARNINGS) $(C_WARNINGS_FLOAT) -c $< -o $@
+
+$(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
+	@$(CC) $(SANITIZE) $^ -lm -o $@
+
+-include $(HOST_ROBOT_OBJECTS:.o=.d)
+
+.PHONY: images
+images: $(BOARDS:%=image-%) $(HOST_ROBOT) ## link the images of every board, and check them

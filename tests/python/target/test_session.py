@@ -1,0 +1,256 @@
+"""A session with the application, as a process of this computer: over a good line, and over a bad one."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from bslam.core.errors import CoreError
+from bslam.core.slam import Slam
+from bslam.errors import BslamError
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
+from bslam.link import messages
+from bslam.link.frames import Frame, encode
+from bslam.link.messages import Message
+from bslam.target import client
+from bslam.target.client import Client
+from bslam.target.lines import ProcessLine, TargetError, open_line
+from bslam.target.remote import RemoteSlam
+from bslam.world.simulate import load_scenario, simulate
+
+ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"
+STEPS = 250
+
+
+@pytest.fixture
+def robot_line():
+    """Makes lines to processes that run the application, and ends them all."""
+    lines = []
+
+    def make():
+        lines.append(ProcessLine(ROBOT))
+        return lines[-1]
+
+    yield make
+    for line in lines:
+        line.close()
+
+
+@pytest.fixture(scope="module")
+def log():
+    import dataclasses
+
+    whole = simulate(load_scenario("paper_room"), 3, None, None)
+    odometry = dataclasses.replace(
+        whole.odometry,
+        time_us=whole.odometry.time_us[:STEPS],
+        a=whole.odometry.a[:STEPS],
+        b=whole.odometry.b[:STEPS],
+    )
+    seen = whole.sightings.time_us <= odometry.time_us[-1]
+    sightings = dataclasses.replace(
+        whole.sightings,
+        **{
+            name: getattr(whole.sightings, name)[seen]
+            for name in ("time_us", "beacon_id", "bearing_rad", "range_m", "mappable")
+        },
+    )
+    return dataclasses.replace(whole, odometry=odometry, sightings=sightings)
+
+
+def same(one, other):
+    """Two traces agree to the bit in everything but where and how fast."""
+    assert (one.pose == other.pose).all()
+    assert (one.covariance == other.covariance).all()
+    assert one.counts == other.counts
+    assert one.counters == other.counters
+    assert one.parameters == other.parameters
+    assert [b.x_m for b in one.beacons] == [b.x_m for b in other.beacons]
+    assert [b.covariance_m2.tolist() for b in one.beacons] == [
+        b.covariance_m2.tolist() for b in other.beacons
+    ]
+
+
+class BadLine:
+    """A line that flips, cuts, doubles and loses: each frame either way with this probability."""
+
+    def __init__(self, seed, rate, line):
+        self.random, self.rate, self.line = random.Random(seed), rate, line
+        self.spoilt = 0
+        self.ns_per_instruction = None
+        self.description = line.description
+
+    def spoil(self, data):
+        if self.random.random() >= self.rate:
+            return data
+        self.spoilt += 1
+        kind = self.random.choice(["lose", "flip", "cut", "double", "noise"])
+        at = self.random.randrange(len(data))
+        if kind == "lose":
+            return b""
+        if kind == "flip":
+            return data[:at] + bytes((data[at] ^ 1 << self.random.randrange(8),)) + data[at + 1 :]
+        if kind == "cut":
+            return data[:at] + b"\0"
+        if kind == "double":
+            return data + data
+        return self.random.randbytes(20) + b"\0" + data
+
+    def write(self, data):
+        spoilt = self.spoil(data)
+        if spoilt:
+            self.line.write(spoilt)
+
+    def read(self, timeout_s):
+        data = self.line.read(timeout_s)
+        return self.spoil(data) if data else data
+
+    def close(self):
+        self.line.close()
+
+
+@pytest.mark.parametrize("observation", ["distance", "direction"])
+def test_a_run_over_the_link_is_the_run_on_the_host(log, observation):
+    options = RunOptions(observation=observation)
+    here = run_log(log, options)
+    there = run_log(log, RunOptions(observation=observation, target=f"process:{ROBOT}"))
+    same(here, there)
+    assert there.target["image"] == "robot"
+
+
+def test_a_run_over_a_bad_line_is_still_the_run_on_the_host(log, monkeypatch, robot_line):
+    monkeypatch.setattr(client, "ANSWER_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(client, "ATTEMPTS", 40)
+    lines = []
+
+    def factory(params, beacons):
+        lines.append(BadLine(5, 0.1, robot_line()))
+        return RemoteSlam(lines[0], params, beacons)
+
+    there = run_log(log, RunOptions(), factory)
+    assert lines[0].spoilt > 20
+    same(run_log(log, RunOptions()), there)
+
+
+def test_a_replayed_message_is_not_applied_again(robot_line):
+    line = robot_line()
+    robot = Client(line)
+    sent = []
+    write = line.write
+    line.write = lambda data: (sent.append(data), write(data))
+    robot.ask(Message.RESET)
+    for step in range(1, 6):
+        robot.ask(Message.ODOMETRY, messages.odometry("wheels", 0.02, 0.02, None), step * 40_000)
+    before = messages.read_counters(robot.ask(Message.COUNTERS).body)
+    for data in sent[:-1]:
+        write(data)  # older than the last: dropped
+    write(sent[-1])  # the last: answered again
+    after = messages.read_counters(robot.ask(Message.COUNTERS).body)
+    assert after[:-7] == before[:-7]  # what follows are counters of the link
+    assert after[-2:] == [1, 6]  # repeated, replayed
+
+
+@pytest.mark.parametrize(
+    ("kind", "payload", "refusal"),
+    [(0x33, b"", "TYPE"), (Message.ODOMETRY, b"\0\0", "LENGTH"), (Message.PARAM_SET, b"\0" * 7, "LENGTH")],
+)
+def test_a_message_that_is_none_is_refused(kind, payload, refusal, robot_line):
+    line = robot_line()
+    robot = Client(line)
+    with pytest.raises(TargetError, match=refusal):
+        robot.ask(Message(kind) if kind in list(Message) else _Odd(kind), payload)
+
+
+class _Odd(int):
+    name = "odd"
+
+
+def test_a_message_before_a_session_is_refused(robot_line):
+    line = robot_line()
+    line.write(encode(Frame(Message.MAP, 7, 0, b"\0")))
+    from bslam.link.frames import Decoder
+
+    decoder, found = Decoder(), []
+    while not any(frame.type == Message.MAP | messages.ANSWER for frame in found):
+        found += decoder.push(line.read(5.0))
+    assert found[-1].payload[0] == 0x40  # NO_SESSION
+
+
+def test_a_robot_that_starts_anew_ends_the_run(robot_line):
+    first, second = robot_line(), robot_line()
+    robot = RemoteSlam(first, {}, 6)
+    robot.odometry("wheels", 40_000, 0.01, 0.01)
+    first.close()
+    first._process, first._program = second._process, second._program
+    with pytest.raises(TargetError, match="started anew"):
+        robot.odometry("wheels", 80_000, 0.01, 0.01)
+
+
+def test_a_robot_that_goes_away_ends_the_run(robot_line):
+    line = robot_line()
+    robot = RemoteSlam(line, {}, 6)
+    line._process.kill()
+    with pytest.raises(TargetError, match="ended with status"):
+        robot.odometry("wheels", 40_000, 0.01, 0.01)
+
+
+def test_refusals_are_those_of_the_host(robot_line):
+    line = robot_line()
+    here, there = Slam({"filter": 0}), RemoteSlam(line, {"filter": 0}, 20)
+    calls = [
+        ("odometry", ("wheels", 40_000, 0.02, 0.02)),
+        ("odometry", ("wheels", 40_000, 0.02, 0.02)),
+        ("odometry", ("wheels", 80_000, float("nan"), 0.02)),
+        ("odometry", ("velocity", 80_000, 1e30, 1e30)),
+        ("odometry", ("ticks", 80_000, 1 << 20, 0)),
+        ("sightings", (80_000, [0.1], [2.0], [3], [True])),
+        ("sightings", (80_000, [0.1], [2.0], [3], [True])),
+        ("sightings", (90_000, [0.1, 9.0], [2.0, 2.0], [3, 4], [True, True])),
+        ("sightings", (95_000, [], [], [], [])),
+        ("sightings", (96_000, [0.0] * 65, [1.0] * 65, list(range(65)), [True] * 65)),
+        ("add_known_beacon", (3, 1.0, 1.0)),
+        ("add_known_beacon", (-5, 1.0, 1.0)),
+        ("remove_beacon", (77,)),
+        ("pose_at", (20_000,)),
+        ("pose_at", (10**9,)),
+        ("resume_odometry", (99.0, 0.0)),
+        ("resume_odometry", (0.1, 0.1)),
+    ]
+    for name, arguments in calls:
+        answers = []
+        for slam in (here, there):
+            try:
+                answers.append(getattr(slam, name)(*arguments))
+            except CoreError as error:
+                answers.append(error.status)
+        assert answers[0] == answers[1], (name, arguments)
+        assert here.pose() == there.pose()
+        assert here.pose_covariance_lower() == there.pose_covariance_lower()
+    assert here.beacons()[0].uid == there.beacons()[0].uid
+
+
+def test_an_image_that_is_too_small_is_refused(robot_line):
+    line = robot_line()
+    with pytest.raises(BslamError, match="room for 50 beacons"):
+        RemoteSlam(line, {}, 50)
+
+
+@pytest.mark.parametrize(
+    ("target", "says"),
+    [
+        ("qemu:nowhere", "allowed: host, qemu:"),
+        ("fax:1", "allowed: host, qemu:"),
+        ("process:/nowhere", "is missing"),
+        ("serial:/dev/nowhere", "allowed: a device"),
+    ],
+)
+def test_a_target_that_cannot_be_is_refused(target, says):
+    with pytest.raises(BslamError, match=says):
+        open_line(target)
+
+
+def test_without_qemu_it_fails_with_what_to_install(monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(BslamError, match="apt-get install qemu-system-arm"):
+        open_line("qemu:mps2_an386")
