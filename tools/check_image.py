@@ -121,6 +121,10 @@ class CallGraph:
             )
         return set()
 
+    def frame(self, name: str) -> int:
+        """Bytes of stack that a function takes by itself."""
+        return max(one.frame_bytes for one in self._functions.values() if one.name == name)
+
     def deepest(self, name: str) -> tuple[int, list[str]]:
         """Bytes of stack from a function on, and the path that takes them."""
         starts = [address for address, one in self._functions.items() if one.name == name]
@@ -163,6 +167,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("image", type=Path, help="the linked ELF file")
     parser.add_argument("--objects", type=Path, required=True, help="folder of the compiler's .su files")
+    parser.add_argument("--paths", action="store_true", help="print the paths that take the most stack")
     parser.add_argument("--tools", default="arm-none-eabi-", help="prefix of nm and objdump")
     options = parser.parse_args(argv)
     symbols = output_of(f"{options.tools}nm", "--portability", str(options.image))
@@ -176,6 +181,9 @@ def main(argv: list[str] | None = None) -> int:
         findings.append(f"{needed} bytes of stack at worst, {room} are there: {' > '.join(path)}")
     for finding in findings:
         print(f"{options.image}: {finding}", file=sys.stderr)
+    if options.paths:
+        for name in ("start_reset", "bslam_slam_sightings"):
+            print(" > ".join(f"{one} {graph.frame(one)}" for one in graph.deepest(name)[1]))
     steps = {name: graph.deepest(name)[0] for name in ("bslam_slam_odometry", "bslam_slam_sightings")}
     told = ", ".join(f"{name} {size}" for name, size in steps.items())
     print(f"{options.image}: stack {needed} of {room} bytes at worst ({told})")

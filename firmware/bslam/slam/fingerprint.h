@@ -8,8 +8,9 @@
 #define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
 
 /// Goes on with a chain of fingerprints: the size of the state, its mean and its covariance, and where looks
-/// are attached the weights of every machine, bit for bit. FNV-1a, 64 bits, over 32-bit words. Once two chains differ they stay different while the states that
-/// follow are equal. O(n²), and O(BSLAM_LEARNER_SLOTS) with looks.
+/// are attached the weights of every machine, bit for bit. FNV-1a, 64 bits, over 32-bit words. Once two
+/// chains differ they stay different while the states that follow are equal. O(n²), and
+/// O(BSLAM_LEARNER_SLOTS) with looks.
 uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before);
 
 #endif

@@ -68,6 +68,7 @@ _SIGHTING = np.dtype(
 )
 _SOURCES = {"wheels": 0, "ticks": 1, "velocity": 2}
 _NOT_MAPPABLE = 255
+_SIGNATURE_BYTES = 4 * 71
 
 
 def float32(value: float) -> bytes:
@@ -87,14 +88,17 @@ def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
     return bytes((_SOURCES[kind], int(has_gyro))) + values + float32(gyro_radps or 0.0)
 
 
+def signatures_a_frame(sightings_max: int) -> int:
+    """How many signatures a payload of that image has room for (BSLAM_LINK_PAYLOAD_MAX)."""
+    return max(1, (16 + 24 * sightings_max - 2) // _SIGNATURE_BYTES)
+
+
 def signatures(first: int, part: NDArray[np.float32]) -> bytes:
     """How the sightings from `first` on look, (n, features)."""
     return bytes((first, len(part))) + part.astype("<f4").tobytes()
 
 
-def sightings(
-    rows: Sequence[tuple[float, float, int, bool, float, float]], signed: bool, most: int
-) -> bytes:
+def sightings(rows: Sequence[tuple[float, float, int, bool, float, float]], signed: bool, most: int) -> bytes:
     """Rows as `bslam.core.raw.Library.sightings` takes them; of more than `most` only the number counts.
 
     signed: the signatures of all have been sent.

@@ -18,9 +18,6 @@ from bslam.link.messages import NO_DETAIL, Message, Step
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
 
-SIGNATURES_A_FRAME = 1
-"""Fits the payload of any image, whatever its BSLAM_SIGHTINGS_MAX from 12 on."""
-
 
 class RemoteSlam:
     """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
@@ -30,7 +27,13 @@ class RemoteSlam:
     """
 
     def __init__(
-        self, line: Line, params: Mapping[str, float], beacons_max: int, *, fingerprints: bool = False, looks: bool = False
+        self,
+        line: Line,
+        params: Mapping[str, float],
+        beacons_max: int,
+        *,
+        fingerprints: bool = False,
+        looks: bool = False,
     ) -> None:
         self._line = line
         self._raw = library("float", 1)
@@ -122,8 +125,9 @@ class RemoteSlam:
         return [self._account(one) for one in messages.read_accounts(answer.body)]
 
     def _send_signatures(self, signature: NDArray[np.float32]) -> None:
-        for first in range(0, len(signature), SIGNATURES_A_FRAME):
-            payload = messages.signatures(first, signature[first : first + SIGNATURES_A_FRAME])
+        step = messages.signatures_a_frame(self._client.info.sightings_max)
+        for first in range(0, len(signature), step):
+            payload = messages.signatures(first, signature[first : first + step])
             self._ensure(self._client.ask(Message.SIGNATURES, payload), "signatures")
 
     def _account(self, raw: messages.RawAccount) -> Account:
@@ -193,9 +197,7 @@ class RemoteSlam:
         """As `Slam.counters`."""
         types = ["bslam_counters_t", "bslam_looks_counters_t", "bslam_learner_counters_t"]
         values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
-        counts = [
-            {name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types
-        ]
+        counts = [{name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types]
         return counts[0] | counts[1] | counts[2] if self._looks else counts[0]
 
     # ---- what only a target has ----------------------------------------------------------------------------
@@ -247,7 +249,12 @@ class RemoteSlam:
 
 
 def connect(
-    target: str, params: Mapping[str, float], beacons_max: int, *, fingerprints: bool = False, looks: bool = False
+    target: str,
+    params: Mapping[str, float],
+    beacons_max: int,
+    *,
+    fingerprints: bool = False,
+    looks: bool = False,
 ) -> RemoteSlam:
     """The pipeline on the target that a word of `--target` names; close it, or use it in a `with`."""
     line = open_line(target)
