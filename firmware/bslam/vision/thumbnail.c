@@ -41,7 +41,7 @@ static void sum_pairs_565(uint32_t *restrict sums, const uint8_t *restrict pixel
         memcpy(words, pixels + 4 * i, sizeof words);
         for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
             const uint32_t turned = words[k] >> 16 | words[k] << 16;
-            sums[i + k] += (words[k] & SPREAD_MASK) + (turned & SPREAD_MASK);
+            sums[i + k] = (words[k] & SPREAD_MASK) + (turned & SPREAD_MASK);
         }
     }
 }
@@ -55,79 +55,99 @@ static uint32_t spread_888(const uint8_t *pixel)
 static void sum_pairs_888(uint32_t *restrict sums, const uint8_t *restrict pixels, int32_t pairs)
 {
     for (int32_t i = 0; i < pairs; i++) {
-        sums[i] += spread_888(pixels + 6 * i) + spread_888(pixels + 6 * i + 3);
+        sums[i] = spread_888(pixels + 6 * i) + spread_888(pixels + 6 * i + 3);
     }
 }
 
-/// A 2x2 sum as an RGB565 pixel of its mean.
-static uint16_t mean_565(uint32_t quad)
-{
-    const uint32_t mean = ((quad + HALF_OF_FOUR) >> 2) & SPREAD_MASK;
-    return (uint16_t)(mean | mean >> 16);
-}
+/// Steps of the loops over sums, which have room for whole ones beyond a row's end. What they write there is
+/// written over later.
+#define SUMS_A_STEP BSLAM_CELL_STEP
 
-/// Brightness of a 2x2 sum, 0 to 376: green counts twice as much as red, because it has a bit more.
-static uint32_t luma(uint32_t quad)
+/// Turns the pair sums of two rows into their 2x2 sums, in `quads`, and a row of the half-resolution copy.
+static void reduce_rows(uint32_t *restrict quads, const uint32_t *restrict upper, uint16_t *restrict half,
+                        int32_t pairs)
 {
-    return ((quad >> RED_SHIFT) & 127) + (quad >> GREEN_SHIFT);
-}
-
-/// A cell from the sum of its 16 pixels.
-static bslam_cell_t cell_of_sum(uint32_t sum, uint32_t spread)
-{
-    const bslam_cell_t cell = {
-        .red = (uint8_t)((sum >> (RED_SHIFT + 1)) & 255),
-        .green = (uint8_t)(sum >> (GREEN_SHIFT + 2)),
-        .blue = (uint8_t)((sum & 511) >> 1),
-        .spread = (uint8_t)(spread > 255 ? 255 : spread),
-    };
-    return cell;
-}
-
-/// A row of the half-resolution copy, and the brightness of its pixels.
-static void reduce_quads(const uint32_t *restrict sums, uint16_t *restrict half, uint16_t *restrict lumas,
-                         int32_t pairs)
-{
-    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
-        for (int32_t k = i; k < i + PAIRS_A_STEP; k++) {
-            half[k] = mean_565(sums[k]);
-            lumas[k] = (uint16_t)luma(sums[k]);
+    for (int32_t i = 0; i < pairs; i += SUMS_A_STEP) {
+        for (int32_t k = i; k < i + SUMS_A_STEP; k++) {
+            quads[k] += upper[k];
+            const uint32_t mean = ((quads[k] + HALF_OF_FOUR) >> 2) & SPREAD_MASK;
+            half[k] = (uint16_t)(mean | mean >> 16);
         }
     }
 }
 
-static uint16_t darker(uint16_t a, uint16_t b)
+/// Brightness of a 2x2 sum, 0 to 376: green counts twice as much as red, because it has a bit more.
+static int16_t luma(uint32_t quad)
+{
+    return (int16_t)(((quad >> RED_SHIFT) & 127) + (quad >> GREEN_SHIFT));
+}
+
+static int16_t darker(int16_t a, int16_t b)
 {
     return a < b ? a : b;
 }
 
-static uint16_t brighter(uint16_t a, uint16_t b)
+static int16_t brighter(int16_t a, int16_t b)
 {
     return a > b ? a : b;
 }
 
-/// Keeps the upper half of a row of cells.
-static void begin_cells(bslam_thumbnail_t *t, int32_t columns)
+/// Keeps the upper 2x2 sums of a row of cells.
+static void begin_cells(bslam_thumbnail_t *t, int32_t pairs)
 {
-    for (int32_t c = 0; c < columns; c++) {
-        t->cell_sums[c] = t->pair_sums[2 * c] + t->pair_sums[2 * c + 1];
-        t->darkest[c] = darker(t->lumas[2 * c], t->lumas[2 * c + 1]);
-        t->brightest[c] = brighter(t->lumas[2 * c], t->lumas[2 * c + 1]);
+    memcpy(t->upper_quads, t->quads, (size_t)pairs * sizeof t->quads[0]);
+}
+
+/// Joins them with the lower ones: sums of halves of cells, the darkest and the brightest of their quarters.
+static void join_quads(uint32_t *restrict quads, const uint32_t *restrict upper, int16_t *restrict darkest,
+                       int16_t *restrict brightest, int32_t pairs)
+{
+    for (int32_t i = 0; i < pairs; i += SUMS_A_STEP) {
+        for (int32_t k = i; k < i + SUMS_A_STEP; k++) {
+            const int16_t above = luma(upper[k]), below = luma(quads[k]);
+            quads[k] += upper[k];
+            darkest[k] = darker(above, below);
+            brightest[k] = brighter(above, below);
+        }
     }
 }
 
-/// Adds the lower half to it.
-static void finish_cells(bslam_thumbnail_t *t, int32_t columns, int32_t first)
+/// Sums and ranges of SUMS_A_STEP cells from those of their halves.
+static void join_halves(uint32_t *restrict sums, int16_t *restrict ranges, const uint32_t *restrict halves,
+                        const int16_t *restrict darkest, const int16_t *restrict brightest)
 {
-    for (int32_t c = 0; c < columns; c++) {
-        const uint32_t sum = t->cell_sums[c] + t->pair_sums[2 * c] + t->pair_sums[2 * c + 1];
-        const uint16_t low = darker(t->darkest[c], darker(t->lumas[2 * c], t->lumas[2 * c + 1]));
-        const uint16_t high = brighter(t->brightest[c], brighter(t->lumas[2 * c], t->lumas[2 * c + 1]));
-        const bslam_cell_t cell = cell_of_sum(sum, (uint32_t)(high - low));
-        t->cells.red[first + c] = cell.red;
-        t->cells.green[first + c] = cell.green;
-        t->cells.blue[first + c] = cell.blue;
-        t->cells.spread[first + c] = cell.spread;
+    for (int32_t k = 0; k < SUMS_A_STEP; k++) {
+        sums[k] = halves[2 * k] + halves[2 * k + 1];
+    }
+    for (int32_t k = 0; k < SUMS_A_STEP; k++) {
+        const int16_t low = darker(darkest[2 * k], darkest[2 * k + 1]);
+        const int16_t high = brighter(brightest[2 * k], brightest[2 * k + 1]);
+        ranges[k] = (int16_t)(high - low);
+    }
+}
+
+/// SUMS_A_STEP cells, from `first` on.
+static void fill_cells(bslam_cells_t *restrict cells, int32_t first, const uint32_t *restrict sums,
+                       const int16_t *restrict ranges)
+{
+    for (int32_t k = 0; k < SUMS_A_STEP; k++) {
+        cells->red[first + k] = (uint8_t)(sums[k] >> (RED_SHIFT + 1));
+        cells->green[first + k] = (uint8_t)(sums[k] >> (GREEN_SHIFT + 2));
+        cells->blue[first + k] = (uint8_t)((sums[k] & 511) >> 1);
+    }
+    for (int32_t k = 0; k < SUMS_A_STEP; k++) {
+        cells->spread[first + k] = (uint8_t)darker(ranges[k], 255);
+    }
+}
+
+/// The cells of a row, from `first` on.
+static void finish_cells(bslam_thumbnail_t *t, int32_t first, int32_t columns)
+{
+    for (int32_t i = 0; i < columns; i += SUMS_A_STEP) {
+        uint32_t sums[SUMS_A_STEP];
+        int16_t ranges[SUMS_A_STEP];
+        join_halves(sums, ranges, t->quads + 2 * i, t->darkest + 2 * i, t->brightest + 2 * i);
+        fill_cells(&t->cells, first + i, sums, ranges);
     }
 }
 
@@ -136,11 +156,12 @@ static void finish_cells(bslam_thumbnail_t *t, int32_t columns, int32_t first)
 static void reduce_two_rows(bslam_thumbnail_t *t)
 {
     const int32_t columns = t->width_px / BSLAM_CELL_PX, pairs = t->width_px / 2;
-    reduce_quads(t->pair_sums, t->half + t->rows_seen / 2 * pairs, t->lumas, pairs);
+    reduce_rows(t->quads, t->pair_sums, t->half + t->rows_seen / 2 * pairs, pairs);
     if (t->rows_seen % BSLAM_CELL_PX == 3) {
-        finish_cells(t, columns, t->rows_seen / BSLAM_CELL_PX * columns);
+        join_quads(t->quads, t->upper_quads, t->darkest, t->brightest, pairs);
+        finish_cells(t, t->rows_seen / BSLAM_CELL_PX * columns, columns);
     } else {
-        begin_cells(t, columns);
+        begin_cells(t, pairs);
     }
 }
 
@@ -151,13 +172,11 @@ bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, const void *pix
         return BSLAM_E_COUNT;
     }
     const int32_t pairs = t->width_px / 2;
-    if (t->rows_seen % 2 == 0) {
-        memset(t->pair_sums, 0, (size_t)pairs * sizeof t->pair_sums[0]);
-    }
+    uint32_t *sums = t->rows_seen % 2 == 0 ? t->pair_sums : t->quads;
     if (t->format == BSLAM_PIXELS_RGB565) {
-        sum_pairs_565(t->pair_sums, pixels, pairs);
+        sum_pairs_565(sums, pixels, pairs);
     } else {
-        sum_pairs_888(t->pair_sums, pixels, pairs);
+        sum_pairs_888(sums, pixels, pairs);
     }
     if (t->rows_seen % 2 == 1) {
         reduce_two_rows(t);

@@ -17,18 +17,21 @@ typedef enum bslam_pixel_format {
     BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
 } bslam_pixel_format_t;
 
+/// Pixel pairs of a row, with room for a step of cells.
+#define BSLAM_PAIRS_ROOM (BSLAM_IMAGE_WIDTH_MAX / 2 + 2 * BSLAM_CELL_STEP)
+
 typedef struct bslam_thumbnail {
     bslam_pixel_format_t format;
     int32_t width_px;
     int32_t height_px;
-    int32_t rows_seen;  ///< of the frame that is streaming in
-    uint32_t pair_sums[BSLAM_IMAGE_WIDTH_MAX / 2];
-    uint32_t cell_sums[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
-    uint16_t lumas[BSLAM_IMAGE_WIDTH_MAX / 2];
-    uint16_t darkest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
-    uint16_t brightest[BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX];
+    int32_t rows_seen;                       ///< of the frame that is streaming in
+    uint32_t pair_sums[BSLAM_PAIRS_ROOM];    ///< of an upper row of two
+    uint32_t quads[BSLAM_PAIRS_ROOM];        ///< of 2x2 pixels
+    uint32_t upper_quads[BSLAM_PAIRS_ROOM];  ///< of a row of cells
+    int16_t darkest[BSLAM_PAIRS_ROOM];
+    int16_t brightest[BSLAM_PAIRS_ROOM];
     bslam_cells_t cells;
-    uint16_t half[BSLAM_HALF_MAX];
+    uint16_t half[BSLAM_HALF_MAX + BSLAM_CELL_STEP];
 } bslam_thumbnail_t;
 
 /// Starts a frame; what streamed in before is forgotten. BSLAM_E_RANGE, and nothing changed, if the size is
