@@ -95,7 +95,7 @@ def worst_difference(machine: CompiledSvm, x: NDArray[np.float32], wanted: Matri
 def worst_byte_difference(machine: CompiledSvm, x: NDArray[np.float32], wanted: Matrix) -> float:
     """The same of a quadratic machine with byte weights, in its own roundings: what svm.h says of bytes.
 
-    One is a step of its whole numbers on every weight; 1.1 is allowed.
+    One is a step of its whole numbers on every weight; 1.5 is allowed.
     """
     largest = np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True)).astype(np.float64)
     step = largest**2 / 16383 * np.abs(machine.weights().astype(np.float64)).sum(axis=1)

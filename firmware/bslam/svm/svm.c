@@ -100,42 +100,70 @@ static void decide_by_floats(const bslam_svm_t *svm, const float *x, float *valu
 #define STEP 8
 #define STRIDE 16
 
-/// Where the expansion goes on. There is room beyond the features for a whole step.
+/// Where the expansion goes on: with the product of `whole` at first and second. In front of the features
+/// stands the number one, so that the first products are the features themselves. There is room beyond them
+/// for a whole step.
 typedef struct expansion {
-    const bslam_svm_t *svm;
-    const float *x;
+    int32_t end;       ///< features, and one more
+    int32_t rows_end;  ///< 1 in a linear machine: no products but those with one
+    int32_t first, second;
     float unit;  ///< what 1 of phi's whole numbers stands for
-    int16_t whole[BSLAM_SVM_FEATURES_MAX + STEP];
-    int32_t first, second;  ///< the next product; first is -1 while phi is x itself
+    int16_t whole[1 + BSLAM_SVM_FEATURES_MAX + STEP];
 } expansion_t;
 
+/// The largest |x_i|, at least 1.
 static float largest(const float *x, int32_t count)
 {
+    float lanes[STEP];
     float most = 1.0f;
-    for (int32_t i = 0; i < count; i++) {
-        most = x[i] > most ? x[i] : -x[i] > most ? -x[i] : most;
+    int32_t i = 0;
+    for (int32_t k = 0; k < STEP; k++) {
+        lanes[k] = 1.0f;
+    }
+    for (; i + STEP <= count; i += STEP) {
+        for (int32_t k = 0; k < STEP; k++) {
+            const float value = fabsf(x[i + k]);
+            lanes[k] = value > lanes[k] ? value : lanes[k];
+        }
+    }
+    for (; i < count; i++) {
+        const float value = fabsf(x[i]);
+        most = value > most ? value : most;
+    }
+    for (int32_t k = 0; k < STEP; k++) {
+        most = lanes[k] > most ? lanes[k] : most;
     }
     return most;
 }
 
+/// To the nearest; what is cut off is positive, so that this takes one conversion and no comparison.
 static int16_t rounded(float x)
 {
-    return (int16_t)(x < 0 ? x - 0.5f : x + 0.5f);
+    return (int16_t)((int32_t)(x + ((float)X_ONE + 1.5f)) - (X_ONE + 1));
 }
 
 static void begin_expansion(expansion_t *e, const bslam_svm_t *svm, const float *x)
 {
-    const float most = largest(x, svm->features);
-    e->svm = svm;
-    e->x = x;
-    e->unit = most / (float)X_ONE;
-    e->unit *= svm->quadratic ? e->unit * 65536.0f : 1.0f;
-    e->first = -1;
-    e->second = 0;
-    for (int32_t i = 0; i < svm->features; i++) {
-        e->whole[i] = rounded(x[i] * ((float)X_ONE / most));
+    const int32_t n = svm->features;
+    const float most = largest(x, n);
+    const float scale = (float)X_ONE / most;
+    int16_t *whole = e->whole + 1;
+    int32_t i = 0;
+    for (; i + STEP <= n; i += STEP) {
+        for (int32_t k = 0; k < STEP; k++) {
+            whole[i + k] = rounded(x[i + k] * scale);
+        }
     }
-    memset(e->whole + svm->features, 0, STEP * sizeof e->whole[0]);
+    for (; i < n; i++) {
+        whole[i] = rounded(x[i] * scale);
+    }
+    memset(whole + n, 0, STEP * sizeof whole[0]);
+    e->whole[0] = rounded(scale);
+    e->end = n + 1;
+    e->rows_end = svm->quadratic ? n + 1 : 1;
+    e->first = 0;
+    e->second = 1;
+    e->unit = 65536.0f / (scale * scale);
 }
 
 /// Products of x_i with values from `x` on: whole steps, so up to STEP - 1 more than `count`.
@@ -151,26 +179,18 @@ static void multiply(int16_t *restrict phi, const int16_t *restrict x, int32_t x
 /// The next values of phi, at most BLOCK; returns how many.
 static int32_t expand(expansion_t *e, int16_t phi[BLOCK + STEP])
 {
-    const int32_t n = e->svm->features;
     int32_t count = 0;
-    for (; e->first < 0 && e->second < n && count < BLOCK; count++) {
-        phi[count] = rounded(e->x[e->second++] / e->unit);
-    }
-    int32_t first = e->first, second = e->second;
-    while (count < BLOCK && first < n) {
-        if (second == n) {
-            first = e->svm->quadratic ? first + 1 : n;
-            second = first;
-            continue;
-        }
-        const int32_t left = n - second, room = BLOCK - count;
+    while (count < BLOCK && e->first < e->rows_end) {
+        const int32_t left = e->end - e->second, room = BLOCK - count;
         const int32_t now = left < room ? left : room;
-        multiply(phi + count, e->whole + second, e->whole[first], now);
+        multiply(phi + count, e->whole + e->second, e->whole[e->first], now);
         count += now;
-        second += now;
+        e->second += now;
+        if (now == left) {
+            e->first++;
+            e->second = e->first;
+        }
     }
-    e->first = first;
-    e->second = second;
     return count;
 }
 

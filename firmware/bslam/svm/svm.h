@@ -41,9 +41,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_svm_check(const bslam_svm_t *svm, int32_t 
 
 /// values[r] = f_r(x) for every row; above 0 is "yes". svm has passed bslam_svm_check, x is within +-1e15.
 /// One multiplication a weight. With float weights the error of rounding is below 2 features roundings (6e-8)
-/// of the sum of |w_k phi_k(x)|. With bytes all is whole numbers: phi_k(x) in steps of M^2 / 16383, or of M /
-/// 32767 in a linear machine, where M is the largest |x_i|, at least 1; the error is below 1.1 steps times
-/// the sum of |w_k|. Takes 1.2 KB of stack. Touches nothing but values.
+/// of the sum of |w_k phi_k(x)|. With bytes all is whole numbers, phi_k(x) in steps of M^2 / 16383, where M
+/// is the largest |x_i|, at least 1: the error is below 1.5 steps times the sum of |w_k|. Takes 1 KB of
+/// stack. Touches nothing but values.
 void bslam_svm_decide(const bslam_svm_t *svm, const float *x, float *values);
 
 #endif

@@ -56,7 +56,7 @@ def test_header_bytes_decide_as_the_quantised_machine() -> None:
     assert small.byte_scale is not None
     library = compiled(small)
     wanted = fit.expand(x, True) @ library.weights().T.astype(np.float64) + small.bias
-    assert worst_byte_difference(library, x, wanted) <= 1.1
+    assert worst_byte_difference(library, x, wanted) <= 1.5
     assert np.mean((library.decide(x) > 0) == (machine.decide(x) > 0)) > 0.97
 
 
@@ -69,7 +69,7 @@ def test_machines_that_come_with_the_library_decide_by_their_tables(lens: str, p
     zero = machine.decide(np.zeros((1, machine.features), np.float32))
     wanted = fit.expand(x, machine.quadratic) @ machine.weights().T.astype(np.float64) + zero
     if part == "kinds":
-        assert worst_byte_difference(machine, x, wanted) <= 1.1
+        assert worst_byte_difference(machine, x, wanted) <= 1.5
     else:
         assert worst_difference(machine, x, wanted) <= TOLERANCE
 
