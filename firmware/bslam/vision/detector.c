@@ -12,19 +12,26 @@
 /// Natural logarithm of how many times too high or too low a candidate may be; the floor line errs too.
 #define LOG_SIZE_MAX 0.65f
 
+static float clamped(float value, float limit)
+{
+    const float high = value < limit ? value : limit;
+    return high > -limit ? high : -limit;
+}
+
 static void clamp_all(float *values, int32_t count, float limit)
 {
     for (int32_t i = 0; i < count; i++) {
-        values[i] = values[i] < -limit ? -limit : values[i] > limit ? limit : values[i];
+        values[i] = clamped(values[i], limit);
     }
 }
 
 void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES])
 {
+    const float *restrict offset = model->blob_offset, *restrict scale = model->blob_scale;
+    float *restrict x = features;
     for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
-        features[i] = (features[i] - model->blob_offset[i]) * model->blob_scale[i];
+        x[i] = clamped((x[i] - offset[i]) * scale[i], BSLAM_FEATURE_LIMIT);
     }
-    clamp_all(features, BSLAM_BLOB_FEATURES, BSLAM_FEATURE_LIMIT);
 }
 
 /// The kind whose machine is surest, and by how much.

@@ -26,45 +26,83 @@ typedef struct area {
     int32_t left, top, right, bottom;
 } area_t;
 
-/// Sums over the cells of a rectangle.
+/// Sums over the cells of a rectangle; all whole numbers of 32 bits.
 typedef struct sums {
     int32_t cells;
     int32_t light, reddish, bluish;
+    int32_t spread;
+    int32_t value;        ///< decision values of the cells
+    int32_t wall, floor;  ///< how frequent the tones are in the zones' histograms
+    // What follows only of what is inside the box.
     int32_t light_sq, reddish_sq, bluish_sq;
-    int32_t spread, step_x, step_y;
-    int32_t value, likely;  ///< decision values of the cells; how many are above 0
-    int32_t wall, floor;    ///< how frequent the tones are in the zones' histograms
+    int32_t step_x, step_y;
+    int32_t likely;  ///< cells whose value is above 0
 } sums_t;
 
-static void add_cell(sums_t *sums, const bslam_view_t *view, int32_t i)
+/// An area within the frame: every row, or every other one.
+typedef struct rows {
+    int32_t first, end, stride;  ///< of rows
+    int32_t left, right;         ///< columns [left, right)
+} rows_t;
+
+static rows_t rows_of(const bslam_view_t *view, area_t area)
 {
-    const bslam_tone_t tone = bslam_tone_at(view->tones, i);
-    const int32_t frequent = view->frequent[i];
-    sums->cells++;
-    sums->light += tone.light;
-    sums->reddish += tone.reddish;
-    sums->bluish += tone.bluish;
-    sums->light_sq += tone.light * tone.light;
-    sums->reddish_sq += tone.reddish * tone.reddish;
-    sums->bluish_sq += tone.bluish * tone.bluish;
-    sums->spread += tone.spread;
-    sums->step_x += view->step_x[i];
-    sums->step_y += view->step_y[i];
-    sums->value += view->values[i];
-    sums->likely += view->values[i] > 0 ? 1 : 0;
-    sums->wall += frequent & 255;
-    sums->floor += frequent >> 8;
+    // Means of every other row of a large area are as good.
+    const int32_t cells = (area.right - area.left) * (area.bottom - area.top);
+    const int32_t left = most(area.left, 0), right = least(area.right, view->frame->columns);
+    return (rows_t){.first = most(area.top, 0),
+                    .end = least(area.bottom, view->frame->rows),
+                    .stride = cells > CELLS_ENOUGH ? 2 : 1,
+                    .left = left,
+                    .right = right > left ? right : left};
 }
 
-static sums_t sum_area(const bslam_view_t *view, area_t area)
+static sums_t sum_inside(const bslam_view_t *view, area_t area)
 {
     sums_t sums = {0};
-    // Means of every other row of a large area are as good.
-    const int32_t stride = (area.right - area.left) * (area.bottom - area.top) > CELLS_ENOUGH ? 2 : 1;
-    for (int32_t row = most(area.top, 0); row < least(area.bottom, view->frame->rows); row += stride) {
-        for (int32_t column = most(area.left, 0); column < least(area.right, view->frame->columns);
-             column++) {
-            add_cell(&sums, view, row * view->frame->columns + column);
+    const bslam_tones_t *tones = view->tones;
+    const rows_t rows = rows_of(view, area);
+    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
+        const int32_t start = row * view->frame->columns, end = start + rows.right;
+        sums.cells += rows.right - rows.left;
+        for (int32_t i = start + rows.left; i < end; i++) {
+            const int32_t light = tones->light[i], reddish = tones->reddish[i], bluish = tones->bluish[i];
+            const int32_t value = view->values[i], frequent = view->frequent[i];
+            sums.light += light;
+            sums.reddish += reddish;
+            sums.bluish += bluish;
+            sums.spread += tones->spread[i];
+            sums.value += value;
+            sums.wall += frequent & 255;
+            sums.floor += frequent >> 8;
+            sums.light_sq += light * light;
+            sums.reddish_sq += reddish * reddish;
+            sums.bluish_sq += bluish * bluish;
+            sums.step_x += view->step_x[i];
+            sums.step_y += view->step_y[i];
+            sums.likely += value > 0 ? 1 : 0;
+        }
+    }
+    return sums;
+}
+
+static sums_t sum_beside(const bslam_view_t *view, area_t area)
+{
+    sums_t sums = {0};
+    const bslam_tones_t *tones = view->tones;
+    const rows_t rows = rows_of(view, area);
+    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
+        const int32_t start = row * view->frame->columns, end = start + rows.right;
+        sums.cells += rows.right - rows.left;
+        for (int32_t i = start + rows.left; i < end; i++) {
+            const int32_t frequent = view->frequent[i];
+            sums.light += tones->light[i];
+            sums.reddish += tones->reddish[i];
+            sums.bluish += tones->bluish[i];
+            sums.spread += tones->spread[i];
+            sums.value += view->values[i];
+            sums.wall += frequent & 255;
+            sums.floor += frequent >> 8;
         }
     }
     return sums;
@@ -289,7 +327,7 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
         const int32_t column = z % ZONES, row = z / ZONES;
         const area_t area = {p->left + column * width / ZONES, p->top + row * height / ZONES,
                              p->left + (column + 1) * width / ZONES, p->top + (row + 1) * height / ZONES};
-        zones[z] = sum_area(view, area);
+        zones[z] = sum_inside(view, area);
         merge(&inside, &zones[z]);
     }
     const area_t sides[BSLAM_SIDES] = {
@@ -299,13 +337,13 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
         {p->left, p->bottom, p->right, p->bottom + STRIP},
     };
     float *x = place_features(view, p, features);
-    const sums_t left = sum_area(view, sides[BSLAM_SIDE_LEFT]),
-                 right = sum_area(view, sides[BSLAM_SIDE_RIGHT]);
+    const sums_t left = sum_beside(view, sides[BSLAM_SIDE_LEFT]),
+                 right = sum_beside(view, sides[BSLAM_SIDE_RIGHT]);
     x = contrast_features(&inside, &left, x);
     x = contrast_features(&inside, &right, x);
     fold(x - 2 * CONTRAST_FEATURES, x - CONTRAST_FEATURES, CONTRAST_FEATURES);
     for (int32_t side = BSLAM_SIDE_TOP; side < BSLAM_SIDES; side++) {
-        const sums_t beside = sum_area(view, sides[side]);
+        const sums_t beside = sum_beside(view, sides[side]);
         x = contrast_features(&inside, &beside, x);
     }
     x = likeness_features(&left, &right, x);
