@@ -203,10 +203,11 @@ static int32_t floor_evidence(const bslam_background_t *background, bslam_tone_t
 }
 
 /// Horizontal distance of the floor at a pixel, 0 where it does not look down at it.
-static bslam_real_t floor_distance_m(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_t v_px)
+static bslam_real_t floor_distance_m(const bslam_camera_t *camera, const bslam_mounting_t *mounting,
+                                     bslam_real_t u_px, bslam_real_t v_px)
 {
     bslam_direction_t ray = {0};
-    if (bslam_camera_unproject(camera, u_px, v_px, &ray) != BSLAM_OK || ray.z > BSLAM_R(-1e-3)) {
+    if (bslam_camera_unproject_as(camera, mounting, u_px, v_px, &ray) != BSLAM_OK || ray.z > BSLAM_R(-1e-3)) {
         return 0;
     }
     return camera->z_m * bslam_sqrt(ray.x * ray.x + ray.y * ray.y) / -ray.z;
@@ -217,6 +218,7 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
                                  bslam_floor_line_t *line)
 {
     const int32_t stop = clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
+    const bslam_mounting_t mounting = bslam_camera_mounting(camera);
     for (int32_t column = 0; column < frame->columns; column++) {
         int32_t row = frame->rows;  // the row below which all is floor
         for (int32_t r = frame->rows - 1; r >= stop && r >= row - 2; r--) {
@@ -228,6 +230,6 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
         line->edge_px[column] = (int16_t)(row * BSLAM_CELL_PX);
         const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
         const bslam_real_t v_px = (bslam_real_t)(row * BSLAM_CELL_PX) - BSLAM_R(0.5);
-        line->distance_m[column] = row < frame->rows ? floor_distance_m(camera, u_px, v_px) : 0;
+        line->distance_m[column] = row < frame->rows ? floor_distance_m(camera, &mounting, u_px, v_px) : 0;
     }
 }

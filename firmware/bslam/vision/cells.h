@@ -16,6 +16,7 @@
 typedef struct bslam_view {
     const bslam_frame_t *frame;
     const bslam_camera_t *camera;
+    bslam_mounting_t mounting;  ///< the camera's
     const bslam_background_t *background;
     const bslam_floor_line_t *floor_line;
     const bslam_tones_t *tones;

@@ -66,8 +66,9 @@ static sums_t sum_inside(const bslam_view_t *view, area_t area)
         const int32_t start = row * view->frame->columns, end = start + rows.right;
         sums.cells += rows.right - rows.left;
         for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t light = tones->light[i], reddish = tones->reddish[i], bluish = tones->bluish[i];
-            const int32_t value = view->values[i], frequent = view->frequent[i];
+            const int32_t light = tones->light[i];
+            const int32_t reddish = (int32_t)tones->reddish[i], bluish = (int32_t)tones->bluish[i];
+            const int32_t value = (int32_t)view->values[i], frequent = view->frequent[i];
             sums.light += light;
             sums.reddish += reddish;
             sums.bluish += bluish;
@@ -135,11 +136,11 @@ typedef struct ray {
     float slope, x, y;
 } ray_t;
 
-static ray_t ray_at(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_t v_px)
+static ray_t ray_at(const bslam_view_t *view, bslam_real_t u_px, bslam_real_t v_px)
 {
     bslam_direction_t d = {0};
     ray_t ray = {0};
-    if (bslam_camera_unproject(camera, u_px, v_px, &d) != BSLAM_OK) {
+    if (bslam_camera_unproject_as(view->camera, &view->mounting, u_px, v_px, &d) != BSLAM_OK) {
         return ray;
     }
     const bslam_real_t flat = bslam_sqrt(d.x * d.x + d.y * d.y);
@@ -193,8 +194,8 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     const bslam_camera_t *camera = view->camera;
     const bslam_real_t u_px = (p->box.left_px + p->box.right_px) / 2;
     const bslam_real_t v_px = (p->box.top_px + p->box.bottom_px) / 2;
-    const ray_t top = ray_at(camera, u_px, p->box.top_px), bottom = ray_at(camera, u_px, p->box.bottom_px);
-    const ray_t left = ray_at(camera, p->box.left_px, v_px), right = ray_at(camera, p->box.right_px, v_px);
+    const ray_t top = ray_at(view, u_px, p->box.top_px), bottom = ray_at(view, u_px, p->box.bottom_px);
+    const ray_t left = ray_at(view, p->box.left_px, v_px), right = ray_at(view, p->box.right_px, v_px);
     const float height_m = (float)camera->z_m;
     float share, ignored;
     float wall_m = line_distance_m(view, p->left - STRIP, p->right + STRIP, &share);

@@ -132,24 +132,16 @@ bslam_status_t bslam_camera_check(const bslam_camera_t *camera)
     return seen ? BSLAM_OK : BSLAM_E_PARAMETER;
 }
 
-/// Sines and cosines of the mounting angles.
-typedef struct mounting {
-    bslam_real_t sin_yaw;
-    bslam_real_t cos_yaw;
-    bslam_real_t sin_pitch;
-    bslam_real_t cos_pitch;
-} mounting_t;
-
-static mounting_t mounting_of(const bslam_camera_t *camera)
+bslam_mounting_t bslam_camera_mounting(const bslam_camera_t *camera)
 {
-    mounting_t mounting;
+    bslam_mounting_t mounting;
     bslam_sin_cos(camera->yaw_rad, &mounting.sin_yaw, &mounting.cos_yaw);
     bslam_sin_cos(camera->pitch_rad, &mounting.sin_pitch, &mounting.cos_pitch);
     return mounting;
 }
 
 /// From the camera's axes (forward, left, up) to the robot's: first pitch, then yaw.
-static bslam_direction_t to_robot(const mounting_t *m, bslam_direction_t seen)
+static bslam_direction_t to_robot(const bslam_mounting_t *m, bslam_direction_t seen)
 {
     const bslam_real_t ahead = m->cos_pitch * seen.x + m->sin_pitch * seen.z;
     return (bslam_direction_t){
@@ -159,7 +151,7 @@ static bslam_direction_t to_robot(const mounting_t *m, bslam_direction_t seen)
     };
 }
 
-static bslam_direction_t to_camera(const mounting_t *m, const bslam_direction_t *direction)
+static bslam_direction_t to_camera(const bslam_mounting_t *m, const bslam_direction_t *direction)
 {
     const bslam_real_t ahead = m->cos_yaw * direction->x + m->sin_yaw * direction->y;
     return (bslam_direction_t){
@@ -185,6 +177,13 @@ static bool angle_from_axis(const bslam_camera_t *camera, bslam_real_t r, bslam_
 bslam_status_t bslam_camera_unproject(const bslam_camera_t *camera, bslam_real_t u_px, bslam_real_t v_px,
                                       bslam_direction_t *direction)
 {
+    const bslam_mounting_t mounting = bslam_camera_mounting(camera);
+    return bslam_camera_unproject_as(camera, &mounting, u_px, v_px, direction);
+}
+
+bslam_status_t bslam_camera_unproject_as(const bslam_camera_t *camera, const bslam_mounting_t *mounting,
+                                         bslam_real_t u_px, bslam_real_t v_px, bslam_direction_t *direction)
+{
     if (!bslam_is_number(u_px) || !bslam_is_number(v_px)) {
         return BSLAM_E_NOT_FINITE;
     }
@@ -197,8 +196,7 @@ bslam_status_t bslam_camera_unproject(const bslam_camera_t *camera, bslam_real_t
         return BSLAM_E_RANGE;
     }
     const bslam_real_t scale = point.radius > 0 ? sine / point.radius : 0;
-    const mounting_t mounting = mounting_of(camera);
-    *direction = to_robot(&mounting, (bslam_direction_t){cosine, -point.right * scale, -point.down * scale});
+    *direction = to_robot(mounting, (bslam_direction_t){cosine, -point.right * scale, -point.down * scale});
     return BSLAM_OK;
 }
 
@@ -223,7 +221,7 @@ bslam_status_t bslam_camera_project(const bslam_camera_t *camera, const bslam_di
     if (!bslam_is_number(direction->x) || !bslam_is_number(direction->y) || !bslam_is_number(direction->z)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const mounting_t mounting = mounting_of(camera);
+    const bslam_mounting_t mounting = bslam_camera_mounting(camera);
     const bslam_direction_t seen = to_camera(&mounting, direction);
     const bslam_real_t sideways = bslam_sqrt(seen.y * seen.y + seen.z * seen.z);
     bslam_real_t r;

@@ -57,6 +57,21 @@ BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera)
 BSLAM_MUST_CHECK bslam_status_t bslam_camera_unproject(const bslam_camera_t *camera, bslam_real_t u_px,
                                                        bslam_real_t v_px, bslam_direction_t *direction);
 
+/// Sines and cosines of a camera's mounting angles, for who unprojects many points.
+typedef struct bslam_mounting {
+    bslam_real_t sin_yaw;
+    bslam_real_t cos_yaw;
+    bslam_real_t sin_pitch;
+    bslam_real_t cos_pitch;
+} bslam_mounting_t;
+
+bslam_mounting_t bslam_camera_mounting(const bslam_camera_t *camera);
+
+/// As bslam_camera_unproject, with the camera's mounting worked out before.
+BSLAM_MUST_CHECK bslam_status_t bslam_camera_unproject_as(const bslam_camera_t *camera,
+                                                          const bslam_mounting_t *mounting, bslam_real_t u_px,
+                                                          bslam_real_t v_px, bslam_direction_t *direction);
+
 /// Where a direction (of any length) falls in the image plane, inside the frame or not.
 /// BSLAM_E_NOT_FINITE; BSLAM_E_RANGE: the lens does not see there (behind a pinhole, straight behind an
 /// equidistant lens, where the distortion folds). *u_px and *v_px are then unchanged.

@@ -193,6 +193,7 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
     const bslam_view_t view = {
         .frame = frame,
         .camera = &vision->cameras[vision->camera],
+        .mounting = bslam_camera_mounting(&vision->cameras[vision->camera]),
         .background = &vision->backgrounds[vision->camera],
         .floor_line = &vision->floor_line,
         .tones = &vision->tones,
