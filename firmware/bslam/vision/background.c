@@ -213,6 +213,95 @@ static bslam_real_t floor_distance_m(const bslam_camera_t *camera, const bslam_m
     return camera->z_m * bslam_sqrt(ray.x * ray.x + ray.y * ray.y) / -ray.z;
 }
 
+// A skirting board is no floor, but often more like it than like the wall. It is looked for up to this
+// height, metres. A boundary has this part of the contrast of the sharpest near it, and that one so much:
+// sums over the channels, 1/126 of their range.
+#define SKIRTING_MAX_M BSLAM_R(0.13)
+#define BOUNDARY_PERCENT 35
+#define BOUNDARY_MIN 16
+#define LASTING_PERCENT 70
+
+enum {
+    FINE_ROWS = 24,  // of the half-resolution copy that are looked at, at most
+    SHARP = 2,       // rows to either side that a boundary's contrast is taken of,
+    WIDE = 5         // and those that must differ as well, or it is only a line on the floor
+};
+
+/// Sums of the channels over rows [0, i) of a column of cells in the half-resolution copy.
+typedef struct strip {
+    int32_t rows;
+    int32_t first;  ///< row of the copy
+    int32_t sums[FINE_ROWS + 1][3];
+} strip_t;
+
+static void sum_strip(const bslam_frame_t *frame, int32_t column, int32_t first, int32_t end, strip_t *strip)
+{
+    const int32_t width = frame->width_px / 2;
+    const uint16_t *at = frame->half + first * width + 2 * column;
+    memset(strip->sums[0], 0, sizeof strip->sums[0]);
+    strip->first = first;
+    strip->rows = end - first < FINE_ROWS ? end - first : FINE_ROWS;
+    for (int32_t i = 0; i < strip->rows; i++, at += width) {
+        const int32_t *above = strip->sums[i];
+        int32_t *sums = strip->sums[i + 1];
+        sums[0] = above[0] + 2 * ((at[0] >> 11) + (at[1] >> 11));
+        sums[1] = above[1] + (at[0] >> 5 & 63) + (at[1] >> 5 & 63);
+        sums[2] = above[2] + 2 * ((at[0] & 31) + (at[1] & 31));
+    }
+}
+
+/// How much the means of the rows [first, at) and [at, end) differ.
+static int32_t difference(const strip_t *strip, int32_t first, int32_t at, int32_t end)
+{
+    int32_t sum = 0;
+    for (int32_t k = 0; k < 3; k++) {
+        const int32_t above = (strip->sums[at][k] - strip->sums[first][k]) / (at - first);
+        const int32_t below = (strip->sums[end][k] - strip->sums[at][k]) / (end - at);
+        sum += above < below ? below - above : above - below;
+    }
+    return sum;
+}
+
+static int32_t contrast_at(const strip_t *strip, int32_t boundary)
+{
+    return boundary < SHARP || boundary > strip->rows - SHARP
+               ? 0
+               : difference(strip, boundary - SHARP, boundary, boundary + SHARP);
+}
+
+/// True if it is sharp, and what lies between it and the coarse end differs from what lies below it: a line
+/// on the floor has floor on both sides.
+static bool is_boundary(const strip_t *strip, int32_t i, int32_t coarse, int32_t sharpest)
+{
+    const int32_t contrast = contrast_at(strip, i);
+    const int32_t end = i + WIDE < strip->rows ? i + WIDE : strip->rows;
+    const int32_t first = coarse < i - SHARP ? coarse : i - SHARP;
+    return 100 * contrast >= BOUNDARY_PERCENT * sharpest && contrast >= contrast_at(strip, i + 1) &&
+           contrast >= contrast_at(strip, i - 1) &&
+           100 * difference(strip, first, i, end) >= LASTING_PERCENT * contrast;
+}
+
+/// The floor's end near a coarse one, rows of the half-resolution copy: the lowest sharp boundary between
+/// what is floor and what is not, down to `lowest`; the coarse one where there is none.
+static int32_t fine_end(const bslam_frame_t *frame, int32_t column, int32_t coarse, int32_t lowest)
+{
+    strip_t strip;
+    const int32_t half_rows = frame->height_px / 2;
+    const int32_t first = coarse > WIDE ? coarse - WIDE : 0;
+    sum_strip(frame, column, first, lowest + WIDE < half_rows ? lowest + WIDE : half_rows, &strip);
+    int32_t sharpest = 0;
+    for (int32_t i = SHARP; i <= strip.rows - SHARP; i++) {
+        const int32_t contrast = contrast_at(&strip, i);
+        sharpest = contrast > sharpest ? contrast : sharpest;
+    }
+    for (int32_t i = strip.rows - SHARP; i >= SHARP && sharpest >= BOUNDARY_MIN; i--) {
+        if (is_boundary(&strip, i, coarse - first, sharpest)) {
+            return first + i;
+        }
+    }
+    return coarse;
+}
+
 void bslam_background_floor_line(const bslam_background_t *background, const bslam_frame_t *frame,
                                  const bslam_camera_t *camera, const bslam_tones_t *tones,
                                  bslam_floor_line_t *line)
@@ -226,10 +315,16 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
                 row = r;
             }
         }
-        line->row[column] = (int16_t)(row - 1);
-        line->edge_px[column] = (int16_t)(row * BSLAM_CELL_PX);
+        int32_t edge_px = row * BSLAM_CELL_PX;
+        if (row < frame->rows) {
+            const bslam_real_t below_px = (bslam_real_t)edge_px - bslam_horizon_px(camera);
+            const bslam_real_t skirting_px = below_px * SKIRTING_MAX_M / (camera->z_m - SKIRTING_MAX_M);
+            edge_px = 2 * fine_end(frame, column, edge_px / 2, (edge_px + (int32_t)skirting_px) / 2 + 1);
+        }
+        line->edge_px[column] = (int16_t)edge_px;
+        line->row[column] = (int16_t)((edge_px + BSLAM_CELL_PX / 2) / BSLAM_CELL_PX - 1);
         const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
-        const bslam_real_t v_px = (bslam_real_t)(row * BSLAM_CELL_PX) - BSLAM_R(0.5);
+        const bslam_real_t v_px = (bslam_real_t)edge_px - BSLAM_R(0.5);
         line->distance_m[column] = row < frame->rows ? floor_distance_m(camera, &mounting, u_px, v_px) : 0;
     }
 }

@@ -7,6 +7,7 @@
 #define CELLS (COLUMNS * ROWS)
 
 static bslam_cells_t cells;
+static uint16_t half[4 * CELLS];
 static bslam_tones_t tones;
 static uint16_t frequent[BSLAM_CELLS_ROOM];
 static uint8_t step_x[BSLAM_CELLS_ROOM];
@@ -32,6 +33,7 @@ static const bslam_frame_t frame = {
     .columns = COLUMNS,
     .rows = ROWS,
     .cells = &cells,
+    .half = half,
     .surroundings = &background.surroundings,
 };
 static const bslam_view_t view = {

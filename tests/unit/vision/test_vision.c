@@ -229,6 +229,18 @@ static void test_end_floor_line_is_where_the_floor_ends(void **state)
     assert_near(vision.floor_line.distance_m[WIDTH / 8], 0.5 * 277.1 / 60.0, 0.01);
 }
 
+/// A skirting board is more like this floor than like the wall, and yet no floor.
+static void test_end_floor_line_is_below_a_skirting_board_and_above_a_line_on_the_floor(void **state)
+{
+    paint_room();
+    paint(0, 170, WIDTH, 180, 140, 90, 40);
+    paint(0, 186, WIDTH, 188, 60, 45, 40);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    for (int column = 0; column < WIDTH / 4; column++) {
+        assert_int_equal(vision.floor_line.edge_px[column], 180);
+    }
+}
+
 static void test_end_unmoved_robot_learns_nothing_but_in_the_first_frame(void **state)
 {
     static bslam_background_t background;
@@ -420,6 +432,7 @@ int main(void)
         TEST(test_reason_name_every_reason_has_its_own),
         TEST(test_end_learns_the_colours_of_wall_and_floor),
         TEST(test_end_floor_line_is_where_the_floor_ends),
+        TEST(test_end_floor_line_is_below_a_skirting_board_and_above_a_line_on_the_floor),
         TEST(test_end_unmoved_robot_learns_nothing_but_in_the_first_frame),
         TEST(test_end_each_camera_remembers_its_own_view),
         TEST(test_end_coloured_rectangle_on_a_wall_is_proposed),
