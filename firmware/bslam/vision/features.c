@@ -1,5 +1,7 @@
 #include "bslam/vision/features.h"
 
+#include <string.h>
+
 /// Columns or rows of cells beside a box that count as its surroundings.
 #define STRIP 2
 #define ZONES 3
@@ -45,14 +47,19 @@ typedef struct rows {
     int32_t left, right;         ///< columns [left, right)
 } rows_t;
 
+/// Means of every other row of a large area are as good.
+static int32_t stride_of(int32_t cells)
+{
+    return cells > CELLS_ENOUGH ? 2 : 1;
+}
+
 static rows_t rows_of(const bslam_view_t *view, area_t area)
 {
-    // Means of every other row of a large area are as good.
     const int32_t cells = (area.right - area.left) * (area.bottom - area.top);
     const int32_t left = most(area.left, 0), right = least(area.right, view->frame->columns);
     return (rows_t){.first = most(area.top, 0),
                     .end = least(area.bottom, view->frame->rows),
-                    .stride = cells > CELLS_ENOUGH ? 2 : 1,
+                    .stride = stride_of(cells),
                     .left = left,
                     .right = right > left ? right : left};
 }
@@ -115,6 +122,161 @@ static void merge(sums_t *into, const sums_t *from)
     const int32_t *b = &from->cells;
     for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
         a[i] += b[i];
+    }
+}
+
+/// Columns of cells summed at a time; a constant, so that a compiler can use vector instructions.
+#define LANES 16
+
+/// Sums down LANES columns: of a row of zones, and of the whole box.
+typedef struct lanes {
+    int16_t light[LANES], reddish[LANES], bluish[LANES];
+    uint16_t spread[LANES], step_x[LANES], step_y[LANES], wall[LANES], floor[LANES];
+    int16_t value[LANES], likely[LANES];
+    uint32_t light_sq[LANES], reddish_sq[LANES], bluish_sq[LANES];
+} lanes_t;
+
+static void add_bytes(uint16_t *restrict sums, const uint8_t *restrict bytes)
+{
+    for (int32_t k = 0; k < LANES; k++) {
+        sums[k] = (uint16_t)(sums[k] + bytes[k]);
+    }
+}
+
+static void add_signed(int16_t *restrict sums, const int8_t *restrict bytes)
+{
+    for (int32_t k = 0; k < LANES; k++) {
+        sums[k] = (int16_t)(sums[k] + bytes[k]);
+    }
+}
+
+static void add_squares(uint32_t *restrict sums, const int8_t *restrict bytes)
+{
+    for (int32_t k = 0; k < LANES; k++) {
+        sums[k] += (uint16_t)(bytes[k] * bytes[k]);
+    }
+}
+
+/// Adds the cells from `i` on; what is beyond the box is not read out.
+static void add_row(lanes_t *restrict lanes, const bslam_view_t *view, int32_t i)
+{
+    const uint8_t *restrict light = view->tones->light + i;
+    const uint16_t *restrict frequent = view->frequent + i;
+    const int8_t *restrict values = view->values + i;
+    for (int32_t k = 0; k < LANES; k++) {
+        lanes->light[k] = (int16_t)(lanes->light[k] + light[k]);
+        lanes->light_sq[k] += (uint16_t)(light[k] * light[k]);
+    }
+    for (int32_t k = 0; k < LANES; k++) {
+        lanes->wall[k] = (uint16_t)(lanes->wall[k] + (frequent[k] & 255));
+        lanes->floor[k] = (uint16_t)(lanes->floor[k] + (frequent[k] >> 8));
+    }
+    for (int32_t k = 0; k < LANES; k++) {
+        lanes->likely[k] = (int16_t)(lanes->likely[k] + (values[k] > 0 ? 1 : 0));
+    }
+    add_signed(lanes->reddish, view->tones->reddish + i);
+    add_signed(lanes->bluish, view->tones->bluish + i);
+    add_signed(lanes->value, values);
+    add_squares(lanes->reddish_sq, view->tones->reddish + i);
+    add_squares(lanes->bluish_sq, view->tones->bluish + i);
+    add_bytes(lanes->spread, view->tones->spread + i);
+    add_bytes(lanes->step_x, view->step_x + i);
+    add_bytes(lanes->step_y, view->step_y + i);
+}
+
+/// The box's zones: rows and columns that they begin at, and one past the last.
+typedef struct grid {
+    int32_t left[ZONES + 1], top[ZONES + 1];
+    int32_t stride[ZONES];  ///< of a row of zones; 0 if it is not the same in all of them
+} grid_t;
+
+static area_t zone_area(const grid_t *grid, int32_t row, int32_t column)
+{
+    return (area_t){grid->left[column], grid->top[row], grid->left[column + 1], grid->top[row + 1]};
+}
+
+static grid_t grid_of(const bslam_proposal_t *p)
+{
+    grid_t grid;
+    for (int32_t i = 0; i <= ZONES; i++) {
+        grid.left[i] = p->left + i * (p->right - p->left) / ZONES;
+        grid.top[i] = p->top + i * (p->bottom - p->top) / ZONES;
+    }
+    // The narrowest and the widest zone of a row; where they differ it is by one column.
+    const int32_t narrow = (p->right - p->left) / ZONES, wide = (p->right - p->left + ZONES - 1) / ZONES;
+    for (int32_t row = 0; row < ZONES; row++) {
+        const int32_t height = grid.top[row + 1] - grid.top[row];
+        const int32_t stride = stride_of(narrow * height);
+        grid.stride[row] = stride == stride_of(wide * height) ? stride : 0;
+    }
+    return grid;
+}
+
+/// Adds what was summed of a row of zones down the columns from `first` on, and forgets it.
+static void take_zones(const grid_t *grid, int32_t first, lanes_t *lanes, sums_t zones[ZONES])
+{
+    int32_t column = 0;
+    for (int32_t k = 0; k < LANES && first + k < grid->left[ZONES]; k++) {
+        while (first + k >= grid->left[column + 1]) {
+            column++;
+        }
+        zones[column].light += lanes->light[k];
+        zones[column].reddish += lanes->reddish[k];
+        zones[column].bluish += lanes->bluish[k];
+    }
+    memset(lanes->light, 0, sizeof lanes->light);
+    memset(lanes->reddish, 0, sizeof lanes->reddish);
+    memset(lanes->bluish, 0, sizeof lanes->bluish);
+}
+
+static void take_texture(const lanes_t *lanes, int32_t count, sums_t *inside)
+{
+    for (int32_t k = 0; k < count; k++) {
+        inside->spread += lanes->spread[k];
+        inside->value += lanes->value[k];
+        inside->wall += lanes->wall[k];
+        inside->floor += lanes->floor[k];
+        inside->light_sq += (int32_t)lanes->light_sq[k];
+        inside->reddish_sq += (int32_t)lanes->reddish_sq[k];
+        inside->bluish_sq += (int32_t)lanes->bluish_sq[k];
+        inside->step_x += lanes->step_x[k];
+        inside->step_y += lanes->step_y[k];
+        inside->likely += lanes->likely[k];
+    }
+}
+
+/// Sums of the zones: their cells, light and chroma; and of the whole box, which is within the frame.
+static void sum_box(const bslam_view_t *view, const bslam_proposal_t *p, sums_t zones[ZONES * ZONES],
+                    sums_t *inside)
+{
+    const int32_t columns = view->frame->columns;
+    const grid_t grid = grid_of(p);
+    memset(inside, 0, sizeof *inside);
+    memset(zones, 0, ZONES * ZONES * sizeof zones[0]);
+    for (int32_t first = p->left; first < p->right; first += LANES) {
+        lanes_t lanes = {0};
+        for (int32_t r = 0; r < ZONES; r++) {
+            for (int32_t row = grid.top[r]; grid.stride[r] > 0 && row < grid.top[r + 1];
+                 row += grid.stride[r]) {
+                add_row(&lanes, view, row * columns + first);
+            }
+            take_zones(&grid, first, &lanes, zones + ZONES * r);
+        }
+        take_texture(&lanes, least(LANES, p->right - first), inside);
+    }
+    for (int32_t z = 0; z < ZONES * ZONES; z++) {
+        const int32_t stride = grid.stride[z / ZONES];
+        const area_t area = zone_area(&grid, z / ZONES, z % ZONES);
+        if (stride == 0) {
+            zones[z] = sum_inside(view, area);
+            merge(inside, &zones[z]);
+            continue;
+        }
+        zones[z].cells = (area.bottom - area.top + stride - 1) / stride * (area.right - area.left);
+        inside->cells += zones[z].cells;
+        inside->light += zones[z].light;
+        inside->reddish += zones[z].reddish;
+        inside->bluish += zones[z].bluish;
     }
 }
 
@@ -321,16 +483,9 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
                          float features[BSLAM_BLOB_FEATURES])
 {
     const bslam_proposal_t *p = proposal;
-    const int32_t width = p->right - p->left, height = p->bottom - p->top;
     sums_t zones[ZONES * ZONES];
-    sums_t inside = {0};
-    for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const int32_t column = z % ZONES, row = z / ZONES;
-        const area_t area = {p->left + column * width / ZONES, p->top + row * height / ZONES,
-                             p->left + (column + 1) * width / ZONES, p->top + (row + 1) * height / ZONES};
-        zones[z] = sum_inside(view, area);
-        merge(&inside, &zones[z]);
-    }
+    sums_t inside;
+    sum_box(view, p, zones, &inside);
     const area_t sides[BSLAM_SIDES] = {
         {p->left - STRIP, p->top, p->left, p->bottom},
         {p->right, p->top, p->right + STRIP, p->bottom},
