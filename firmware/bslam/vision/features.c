@@ -28,6 +28,12 @@ typedef struct area {
     int32_t left, top, right, bottom;
 } area_t;
 
+/// Sums over the cells of a zone.
+typedef struct zone {
+    int32_t cells;
+    int32_t light, reddish, bluish;
+} zone_t;
+
 /// Sums over the cells of a rectangle; all whole numbers of 32 bits.
 typedef struct sums {
     int32_t cells;
@@ -94,11 +100,26 @@ static sums_t sum_inside(const bslam_view_t *view, area_t area)
     return sums;
 }
 
-static sums_t sum_beside(const bslam_view_t *view, area_t area)
+/// A strip along a side of a box, outside.
+static area_t strip_of(const bslam_proposal_t *p, bslam_side_t side)
+{
+    switch (side) {
+    case BSLAM_SIDE_LEFT:
+        return (area_t){p->left - STRIP, p->top, p->left, p->bottom};
+    case BSLAM_SIDE_RIGHT:
+        return (area_t){p->right, p->top, p->right + STRIP, p->bottom};
+    case BSLAM_SIDE_TOP:
+        return (area_t){p->left, p->top - STRIP, p->right, p->top};
+    default:
+        return (area_t){p->left, p->bottom, p->right, p->bottom + STRIP};
+    }
+}
+
+static sums_t sum_beside(const bslam_view_t *view, const bslam_proposal_t *p, bslam_side_t side)
 {
     sums_t sums = {0};
     const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, area);
+    const rows_t rows = rows_of(view, strip_of(p, side));
     for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
         const int32_t start = row * view->frame->columns, end = start + rows.right;
         sums.cells += rows.right - rows.left;
@@ -114,6 +135,11 @@ static sums_t sum_beside(const bslam_view_t *view, area_t area)
         }
     }
     return sums;
+}
+
+static zone_t zone_of(const sums_t *sums)
+{
+    return (zone_t){sums->cells, sums->light, sums->reddish, sums->bluish};
 }
 
 static void merge(sums_t *into, const sums_t *from)
@@ -132,7 +158,8 @@ static void merge(sums_t *into, const sums_t *from)
 typedef struct lanes {
     int16_t light[LANES], reddish[LANES], bluish[LANES];
     uint16_t spread[LANES], step_x[LANES], step_y[LANES], wall[LANES], floor[LANES];
-    int16_t value[LANES], likely[LANES];
+    int16_t value[LANES];
+    uint8_t likely[LANES];
     uint32_t light_sq[LANES], reddish_sq[LANES], bluish_sq[LANES];
 } lanes_t;
 
@@ -172,7 +199,7 @@ static void add_row(lanes_t *restrict lanes, const bslam_view_t *view, int32_t i
         lanes->floor[k] = (uint16_t)(lanes->floor[k] + (frequent[k] >> 8));
     }
     for (int32_t k = 0; k < LANES; k++) {
-        lanes->likely[k] = (int16_t)(lanes->likely[k] + (values[k] > 0 ? 1 : 0));
+        lanes->likely[k] = (uint8_t)(lanes->likely[k] + (values[k] > 0 ? 1 : 0));
     }
     add_signed(lanes->reddish, view->tones->reddish + i);
     add_signed(lanes->bluish, view->tones->bluish + i);
@@ -213,7 +240,7 @@ static grid_t grid_of(const bslam_proposal_t *p)
 }
 
 /// Adds what was summed of a row of zones down the columns from `first` on, and forgets it.
-static void take_zones(const grid_t *grid, int32_t first, lanes_t *lanes, sums_t zones[ZONES])
+static void take_zones(const grid_t *grid, int32_t first, lanes_t *lanes, zone_t zones[ZONES])
 {
     int32_t column = 0;
     for (int32_t k = 0; k < LANES && first + k < grid->left[ZONES]; k++) {
@@ -245,8 +272,8 @@ static void take_texture(const lanes_t *lanes, int32_t count, sums_t *inside)
     }
 }
 
-/// Sums of the zones: their cells, light and chroma; and of the whole box, which is within the frame.
-static void sum_box(const bslam_view_t *view, const bslam_proposal_t *p, sums_t zones[ZONES * ZONES],
+/// Sums of the zones, and of the whole box, which is within the frame.
+static void sum_box(const bslam_view_t *view, const bslam_proposal_t *p, zone_t zones[ZONES * ZONES],
                     sums_t *inside)
 {
     const int32_t columns = view->frame->columns;
@@ -268,8 +295,9 @@ static void sum_box(const bslam_view_t *view, const bslam_proposal_t *p, sums_t 
         const int32_t stride = grid.stride[z / ZONES];
         const area_t area = zone_area(&grid, z / ZONES, z % ZONES);
         if (stride == 0) {
-            zones[z] = sum_inside(view, area);
-            merge(inside, &zones[z]);
+            const sums_t sums = sum_inside(view, area);
+            zones[z] = zone_of(&sums);
+            merge(inside, &sums);
             continue;
         }
         zones[z].cells = (area.bottom - area.top + stride - 1) / stride * (area.right - area.left);
@@ -463,14 +491,16 @@ static float *texture_features(const bslam_view_t *view, const sums_t *inside, f
 }
 
 /// How the zones of the box differ from its mean. 2 features a zone: light, chroma.
-static float *zone_features(const sums_t zones[ZONES * ZONES], const sums_t *inside, float *x)
+static float *zone_features(const zone_t zones[ZONES * ZONES], const sums_t *inside, float *x)
 {
     float *row = x;
+    const zone_t whole = zone_of(inside);
     for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const sums_t *zone = zones[z].cells > 0 ? &zones[z] : inside;
-        const float reddish = mean(zone, zone->reddish) - mean(inside, inside->reddish);
-        const float bluish = mean(zone, zone->bluish) - mean(inside, inside->bluish);
-        *x++ = mean(zone, zone->light) - mean(inside, inside->light);
+        const zone_t *zone = zones[z].cells > 0 ? &zones[z] : &whole;
+        const float cells = (float)(zone->cells > 0 ? zone->cells : 1);
+        const float reddish = (float)zone->reddish / cells - mean(inside, inside->reddish);
+        const float bluish = (float)zone->bluish / cells - mean(inside, inside->bluish);
+        *x++ = (float)zone->light / cells - mean(inside, inside->light);
         *x++ = sqrtf(reddish * reddish + bluish * bluish);
     }
     for (; row < x; row += 2 * ZONES) {
@@ -483,23 +513,16 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
                          float features[BSLAM_BLOB_FEATURES])
 {
     const bslam_proposal_t *p = proposal;
-    sums_t zones[ZONES * ZONES];
+    zone_t zones[ZONES * ZONES];
     sums_t inside;
     sum_box(view, p, zones, &inside);
-    const area_t sides[BSLAM_SIDES] = {
-        {p->left - STRIP, p->top, p->left, p->bottom},
-        {p->right, p->top, p->right + STRIP, p->bottom},
-        {p->left, p->top - STRIP, p->right, p->top},
-        {p->left, p->bottom, p->right, p->bottom + STRIP},
-    };
     float *x = place_features(view, p, features);
-    const sums_t left = sum_beside(view, sides[BSLAM_SIDE_LEFT]),
-                 right = sum_beside(view, sides[BSLAM_SIDE_RIGHT]);
+    const sums_t left = sum_beside(view, p, BSLAM_SIDE_LEFT), right = sum_beside(view, p, BSLAM_SIDE_RIGHT);
     x = contrast_features(&inside, &left, x);
     x = contrast_features(&inside, &right, x);
     fold(x - 2 * CONTRAST_FEATURES, x - CONTRAST_FEATURES, CONTRAST_FEATURES);
     for (int32_t side = BSLAM_SIDE_TOP; side < BSLAM_SIDES; side++) {
-        const sums_t beside = sum_beside(view, sides[side]);
+        const sums_t beside = sum_beside(view, p, (bslam_side_t)side);
         x = contrast_features(&inside, &beside, x);
     }
     x = likeness_features(&left, &right, x);
