@@ -262,22 +262,30 @@ static int32_t difference(const strip_t *strip, int32_t first, int32_t at, int32
     return sum;
 }
 
-static int32_t contrast_at(const strip_t *strip, int32_t boundary)
+/// The same of the SHARP rows above and below each boundary; 0 where there are not so many.
+static void fill_contrasts(const strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
 {
-    return boundary < SHARP || boundary > strip->rows - SHARP
-               ? 0
-               : difference(strip, boundary - SHARP, boundary, boundary + SHARP);
+    memset(contrasts, 0, (FINE_ROWS + 2) * sizeof contrasts[0]);
+    for (int32_t i = SHARP; i <= strip->rows - SHARP; i++) {
+        const int32_t *before = strip->sums[i - SHARP], *here = strip->sums[i];
+        const int32_t *after = strip->sums[i + SHARP];
+        for (int32_t k = 0; k < 3; k++) {
+            const int32_t above = (here[k] - before[k]) / SHARP, below = (after[k] - here[k]) / SHARP;
+            contrasts[i] += above < below ? below - above : above - below;
+        }
+    }
 }
 
 /// True if it is sharp, and what lies between it and the coarse end differs from what lies below it: a line
 /// on the floor has floor on both sides.
-static bool is_boundary(const strip_t *strip, int32_t i, int32_t coarse, int32_t sharpest)
+static bool is_boundary(const strip_t *strip, const int32_t *contrasts, int32_t i, int32_t coarse,
+                        int32_t sharpest)
 {
-    const int32_t contrast = contrast_at(strip, i);
+    const int32_t contrast = contrasts[i];
     const int32_t end = i + WIDE < strip->rows ? i + WIDE : strip->rows;
     const int32_t first = coarse < i - SHARP ? coarse : i - SHARP;
-    return 100 * contrast >= BOUNDARY_PERCENT * sharpest && contrast >= contrast_at(strip, i + 1) &&
-           contrast >= contrast_at(strip, i - 1) &&
+    return 100 * contrast >= BOUNDARY_PERCENT * sharpest && contrast >= contrasts[i + 1] &&
+           contrast >= contrasts[i - 1] &&
            100 * difference(strip, first, i, end) >= LASTING_PERCENT * contrast;
 }
 
@@ -286,16 +294,17 @@ static bool is_boundary(const strip_t *strip, int32_t i, int32_t coarse, int32_t
 static int32_t fine_end(const bslam_frame_t *frame, int32_t column, int32_t coarse, int32_t lowest)
 {
     strip_t strip;
+    int32_t contrasts[FINE_ROWS + 2];
     const int32_t half_rows = frame->height_px / 2;
     const int32_t first = coarse > WIDE ? coarse - WIDE : 0;
     sum_strip(frame, column, first, lowest + WIDE < half_rows ? lowest + WIDE : half_rows, &strip);
+    fill_contrasts(&strip, contrasts);
     int32_t sharpest = 0;
     for (int32_t i = SHARP; i <= strip.rows - SHARP; i++) {
-        const int32_t contrast = contrast_at(&strip, i);
-        sharpest = contrast > sharpest ? contrast : sharpest;
+        sharpest = contrasts[i] > sharpest ? contrasts[i] : sharpest;
     }
     for (int32_t i = strip.rows - SHARP; i >= SHARP && sharpest >= BOUNDARY_MIN; i--) {
-        if (is_boundary(&strip, i, coarse - first, sharpest)) {
+        if (is_boundary(&strip, contrasts, i, coarse - first, sharpest)) {
             return first + i;
         }
     }
