@@ -30,7 +30,10 @@ typedef struct bslam_thumbnail {
     uint32_t upper_quads[BSLAM_PAIRS_ROOM];  ///< of a row of cells
     int16_t darkest[BSLAM_PAIRS_ROOM];
     int16_t brightest[BSLAM_PAIRS_ROOM];
-    bslam_cells_t cells;
+    union {
+        bslam_cells_t cells;                  ///< until the frame's colours have been looked at,
+        uint16_t frequent[BSLAM_CELLS_ROOM];  ///< and then the view's table of this name (cells.h)
+    };
     uint16_t half[BSLAM_HALF_MAX + BSLAM_CELL_STEP];
 } bslam_thumbnail_t;
 

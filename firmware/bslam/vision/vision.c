@@ -197,7 +197,7 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
         .background = &vision->backgrounds[vision->camera],
         .floor_line = &vision->floor_line,
         .tones = &vision->tones,
-        .frequent = vision->frequent,
+        .frequent = vision->thumbnail.frequent,
         .step_x = vision->step_x,
         .step_y = vision->step_y,
         .values = vision->values,
@@ -263,7 +263,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     }
     bslam_background_floor_line(background, frame, view.camera, &vision->tones, &vision->floor_line);
     bslam_cells_step(&view, vision->step_x, vision->step_y);
-    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->frequent,
+    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->thumbnail.frequent,
                        vision->values);
     bslam_proposals_find(&vision->proposals, &view);
     bslam_uprights_propose(&vision->proposals, &view);

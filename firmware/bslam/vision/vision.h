@@ -38,13 +38,14 @@ typedef struct bslam_vision {
     bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
     bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
     bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
-    bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];
+    union {
+        bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];  ///< of a frame that has been looked at
+        bslam_cell_tables_t cell_tables;                     ///< while its cells are
+    };
     bslam_thumbnail_t thumbnail;
     bslam_proposals_t proposals;
     bslam_floor_line_t floor_line;
-    bslam_cell_tables_t cell_tables;
     bslam_tones_t tones;
-    uint16_t frequent[BSLAM_CELLS_ROOM];
     uint8_t step_x[BSLAM_CELLS_ROOM];
     uint8_t step_y[BSLAM_CELLS_ROOM];
     int8_t values[BSLAM_CELLS_ROOM];
