@@ -40,6 +40,9 @@ SIGNATURE_SIZE = 71
 """Values of a signature: how a sighting looks (firmware/bslam/vision/signature.h)."""
 SIGNATURES = "signatures.npy"
 """The file of a log folder that holds them, one a row of sightings.csv."""
+SEEDS = "seeds.npy"
+"""The file that holds signatures of things that are no beacon."""
+SEEDS_MAX = 128
 BEACON_ID_MAX = 2**31 - 1
 """Labels are 32-bit numbers in the core."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
@@ -155,12 +158,15 @@ class Log:
     truth: Truth | None
     beacons: Beacons | None
     robot: Robot
+    seeds: NDArray[np.float32] | None = (
+        None  # (k, SIGNATURE_SIZE) signatures of what is no beacon, for machines
+    )
     collection: str = ""  # the published data set it is from, "mrclam" say; none for folders and simulations
 
 
 def read_folder(path: str | Path) -> Log:
     """Read a log folder (`odometry.csv`, `sightings.csv`, `robot.toml`; optional `truth.csv`, `beacons.csv`,
-    `signatures.npy`).
+    `signatures.npy`, `seeds.npy`).
 
     Each .csv may be a .csv.gz. Raises BslamError that names the file, the line and column or key, the value
     and what is allowed there.
@@ -178,6 +184,7 @@ def read_folder(path: str | Path) -> Log:
         truth=_read_truth(folder),
         beacons=_read_beacons(folder),
         robot=robot,
+        seeds=_read_seeds(folder / SEEDS),
     )
 
 
@@ -207,9 +214,10 @@ def write_folder(log: Log, path: str | Path) -> None:
                 (folder / name).unlink(missing_ok=True)
             if columns is not None:
                 _write_csv(folder / f"{stem}.csv", columns)
-        (folder / SIGNATURES).unlink(missing_ok=True)
-        if sightings.signature is not None:
-            np.save(folder / SIGNATURES, sightings.signature, allow_pickle=False)
+        for name, values in ((SIGNATURES, sightings.signature), (SEEDS, log.seeds)):
+            (folder / name).unlink(missing_ok=True)
+            if values is not None:
+                np.save(folder / name, values, allow_pickle=False)
         (folder / "robot.toml").write_text(_robot_text(log.robot), encoding="utf-8")
     except OSError as error:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
@@ -265,6 +273,7 @@ def _robot_text(robot: Robot) -> str:
 
 # In m, m/s or rad no robot comes near it; beyond it, figures would overflow.
 _FARTHEST = 1e6
+_LARGEST_FEATURE = 1e12  # as the core has it
 
 _COUNT = Column("an integer from 0", is_count)
 _NUMBER = Column("a number from -1e6 to 1e6", lambda values: np.abs(values) <= _FARTHEST)
@@ -355,18 +364,34 @@ def _read_sightings(folder: Path) -> Sightings:
 
 
 def _read_signatures(path: Path, rows: int) -> NDArray[np.float32] | None:
+    allowed = f"float32 of shape ({rows}, {SIGNATURE_SIZE}), as many rows as sightings.csv, or no such file"
+    values = _read_looks(path, allowed)
+    if values is not None and len(values) != rows:
+        raise BslamError(f"{path}: shape {values.shape}; allowed: {allowed}")
+    return values
+
+
+def _read_seeds(path: Path) -> NDArray[np.float32] | None:
+    allowed = f"float32 of shape (k, {SIGNATURE_SIZE}), k up to {SEEDS_MAX}, or no such file"
+    values = _read_looks(path, allowed)
+    if values is not None and len(values) > SEEDS_MAX:
+        raise BslamError(f"{path}: shape {values.shape}; allowed: {allowed}")
+    return values
+
+
+def _read_looks(path: Path, allowed: str) -> NDArray[np.float32] | None:
+    """Signatures (n, SIGNATURE_SIZE); None if there is no such file."""
     if not path.is_file():
         return None
-    allowed = f"float32 of shape ({rows}, {SIGNATURE_SIZE}), as many rows as sightings.csv, or no such file"
     try:
         values = np.load(path, allow_pickle=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError) as error:
         raise BslamError(f"{path}: cannot be read: {error}; allowed: {allowed}") from error
     if not isinstance(values, np.ndarray) or values.dtype != np.float32:
         raise BslamError(f"{path}: {getattr(values, 'dtype', 'no array')}; allowed: {allowed}")
-    if values.shape != (rows, SIGNATURE_SIZE):
+    if values.ndim != 2 or values.shape[1] != SIGNATURE_SIZE:
         raise BslamError(f"{path}: shape {values.shape}; allowed: {allowed}")
-    bad = ~(np.abs(values) <= 1e12)
+    bad = ~(np.abs(values) <= _LARGEST_FEATURE)
     if bad.any():
         row, column = np.argwhere(bad)[0]
         where = f"row {row}, column {column}, counted from 0"

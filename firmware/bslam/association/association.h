@@ -42,6 +42,8 @@ typedef struct bslam_match {
     int32_t beacon;          ///< index into the map for a match, else -1
     bslam_real_t distance2;  ///< to the chosen beacon in the method's own measure; negative: not computed
     bslam_real_t score;      ///< svm: log odds of that beacon against a new one; else 0
+    bslam_real_t lead;       ///< svm: by how much the score leads that of any other beacon, and of a new one
+    int32_t near;            ///< svm, new: the candidate that it is not, by its looks; else -1
     bool sure;               ///< svm: sure enough to learn from; else false
 } bslam_match_t;
 

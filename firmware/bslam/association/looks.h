@@ -17,6 +17,7 @@ typedef struct bslam_looks_counters {
     uint32_t taught;   ///< sightings that a machine was shown
     uint32_t unsure;   ///< matches that none was shown, because they may be wrong
     uint32_t shared;   ///< times that a beacon was found to look like another and took its machine
+    uint32_t retired;  ///< beacons taken out because they were in another's place
     uint32_t parted;   ///< times that a beacon got a machine of its own again
     uint32_t no_slot;  ///< beacons that got no machine when they were first seen, because none was free
 } bslam_looks_counters_t;
@@ -27,7 +28,11 @@ typedef struct bslam_look {
     int16_t twin;        ///< the machine that takes its sightings for its own, too
     uint8_t twin_count;  ///< how often, less how often it did not
     uint8_t disowned;    ///< how often its own machine, a shared one, refused it, less how often not
+    uint8_t alone;       ///< a doubted beacon: how often it was seen without the one whose place it is in
+    uint8_t ousted;      ///< how many beacons were retired for being in this one's place
+    bool is_doubted;
     bool is_taught;
+    uint32_t near_uid;   ///< of the beacon whose place a doubted one is in
     uint32_t taught_um;  ///< the robot's way when it was taught last
 } bslam_look_t;
 

@@ -1,5 +1,6 @@
 // Position selects candidates, looks decide: paper Section IV. MATH "Position and looks".
 #include "bslam/association/association.h"
+#include "bslam/association/given.h"
 #include "bslam/association/internal.h"
 #include "bslam/math/logarithm.h"
 
@@ -29,25 +30,26 @@ static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinio
            clip(odds, -params->looks_low, params->looks_high);
 }
 
-/// Weighs a sighting against a beacon. False if it cannot be that one.
-static bool weigh(const bslam_sighting_frame_t *frame, int i, int beacon, const bslam_sample_t *sample,
-                  candidate_t *found)
+/// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
+static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, int beacon,
+                  const bslam_sample_t *sample, candidate_t *found)
 {
     const bslam_sighting_t *sighting = &frame->sightings[i];
     bslam_innovation_t innovation;
-    bslam_real_t log_density;
+    bslam_weight_t weight;
     if (bslam_classes_differ(sighting, &frame->ekf->beacons[beacon]) ||
         bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
-        bslam_ekf_log_density(frame->ekf, &innovation, &found->distance2, &log_density) != BSLAM_OK) {
+        bslam_given_weigh(frame->ekf, given, &innovation, &weight) != BSLAM_OK) {
         return false;
     }
+    found->distance2 = weight.distance2;
     found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
         found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
     }
     found->score =
-        log_density - log_new(frame->params, sighting) + looks_score(frame->params, &found->opinion);
+        weight.log_density - log_new(frame->params, sighting) + looks_score(frame->params, &found->opinion);
     return true;
 }
 
@@ -81,7 +83,8 @@ static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam
 }
 
 /// Finds the best beacon of a sighting among those that are not taken.
-static void find_best(const bslam_sighting_frame_t *frame, int i, bslam_match_t *matches)
+static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
+                      bslam_match_t *matches)
 {
     bslam_match_t *match = &matches[i];
     bslam_sample_t buffer;
@@ -92,7 +95,7 @@ static void find_best(const bslam_sighting_frame_t *frame, int i, bslam_match_t 
     match->beacon = -1;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         candidate_t one;
-        if (!weigh(frame, i, b, sample, &one) || one.distance2 > frame->params->candidate_d2) {
+        if (!weigh(frame, given, i, b, sample, &one) || one.distance2 > frame->params->candidate_d2) {
             continue;
         }
         if (is_taken(frame, matches, b)) {
@@ -109,33 +112,51 @@ static void find_best(const bslam_sighting_frame_t *frame, int i, bslam_match_t 
     }
     match->distance2 = best.distance2;
     match->score = best.score;
-    // Another beacon or a new one, whose score is 0.
-    const bslam_real_t rival = has_second && second > 0 ? second : 0;
-    match->sure = match->beacon >= 0 && is_sure(frame->params, &best, best.score - rival);
+    // Another beacon, or a new one, whose score is 0.
+    match->lead = best.score - (has_second && second > 0 ? second : 0);
+    match->sure = match->beacon >= 0 && is_sure(frame->params, &best, match->lead);
 }
 
-/// The sighting with the best score above 0 that has no beacon yet; -1: none.
+static bool is_open(const bslam_match_t *match)
+{
+    return match->verdict == BSLAM_VERDICT_DEFER;
+}
+
+/// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0.
 static int next_to_settle(const bslam_match_t *matches, int count)
 {
     int next = -1;
     for (int i = 0; i < count; i++) {
-        const bool open = matches[i].verdict == BSLAM_VERDICT_DEFER && matches[i].beacon >= 0;
-        if (open && matches[i].score > 0 && (next < 0 || matches[i].score > matches[next].score)) {
+        const bool fits = is_open(&matches[i]) && matches[i].beacon >= 0 && matches[i].score > 0;
+        if (fits && (next < 0 || matches[i].lead > matches[next].lead)) {
             next = i;
         }
     }
     return next;
 }
 
-/// Gives each beacon to one sighting at most, the best score first.
-static void settle(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+/// Takes a match into what is given for the others.
+static void give(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, const bslam_match_t *match)
+{
+    bslam_innovation_t innovation;
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &frame->sightings[i], match->beacon,
+                             &innovation) == BSLAM_OK) {
+        (void)bslam_given_add(frame->ekf, given, &innovation);
+    }
+}
+
+/// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
+/// made anew, given the matches so far.
+static void settle(const bslam_sighting_frame_t *frame, bslam_given_t *given, bslam_match_t *matches)
 {
     for (int next = next_to_settle(matches, frame->count); next >= 0;
          next = next_to_settle(matches, frame->count)) {
         matches[next].verdict = BSLAM_VERDICT_MATCH;
+        give(frame, given, next, &matches[next]);
         for (int i = 0; i < frame->count; i++) {
-            if (matches[i].verdict == BSLAM_VERDICT_DEFER && matches[i].beacon == matches[next].beacon) {
-                find_best(frame, i, matches);
+            const bool is_clear = matches[i].lead >= frame->params->learn_lead;
+            if (is_open(&matches[i]) && (!is_clear || matches[i].beacon == matches[next].beacon)) {
+                find_best(frame, given, i, matches);
             }
         }
     }
@@ -143,13 +164,14 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 
 /// Whether a sighting clearly looks like a beacon that is not seen in this frame and that could be here,
 /// though that is no candidate: a beacon that the map has in the wrong place, rather than a new one.
-static bool looks_like_another(const bslam_sighting_frame_t *frame, int i, const bslam_match_t *matches)
+static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
+                               const bslam_match_t *matches)
 {
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
     for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
         candidate_t one;
-        if (!is_taken(frame, matches, b) && weigh(frame, i, b, sample, &one) &&
+        if (!is_taken(frame, matches, b) && weigh(frame, given, i, b, sample, &one) &&
             one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high) {
             return true;
@@ -159,41 +181,45 @@ static bool looks_like_another(const bslam_sighting_frame_t *frame, int i, const
 }
 
 /// What becomes of a sighting that matches no beacon.
-static void decide_rest(const bslam_sighting_frame_t *frame, int i, bslam_match_t *matches)
+static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
+                        bslam_match_t *matches)
 {
     bslam_match_t *match = &matches[i];
     const bool is_near = match->beacon >= 0 && match->score > -frame->params->defer_score;
+    const int32_t near = match->beacon;
     match->beacon = -1;
     match->sure = false;
     if (match->reason == BSLAM_REASON_DUPLICATE) {
         match->verdict = BSLAM_VERDICT_REJECT;
     } else if (is_near) {
         match->reason = BSLAM_REASON_AMBIGUOUS;
-    } else if (looks_like_another(frame, i, matches)) {
+    } else if (looks_like_another(frame, given, i, matches)) {
         match->reason = BSLAM_REASON_LOOKS;
     } else {
         match->verdict = BSLAM_VERDICT_NEW;
+        match->near = near;
     }
 }
 
 void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
+    bslam_given_t given;
+    bslam_given_nothing(&given);
     for (int i = 0; i < frame->count; i++) {
         if (bslam_is_mappable(&frame->sightings[i], &matches[i])) {
             matches[i].verdict = BSLAM_VERDICT_DEFER;
         }
     }
     for (int i = 0; i < frame->count; i++) {
-        if (matches[i].verdict == BSLAM_VERDICT_DEFER) {
-            find_best(frame, i, matches);
+        if (is_open(&matches[i])) {
+            find_best(frame, &given, i, matches);
         }
     }
-    settle(frame, matches);
+    settle(frame, &given, matches);
     for (int i = 0; i < frame->count; i++) {
-        if (matches[i].verdict == BSLAM_VERDICT_DEFER) {
-            decide_rest(frame, i, matches);
-        }
-        if (matches[i].verdict == BSLAM_VERDICT_MATCH) {
+        if (is_open(&matches[i])) {
+            decide_rest(frame, &given, i, matches);
+        } else if (matches[i].verdict == BSLAM_VERDICT_MATCH) {
             matches[i].reason = BSLAM_REASON_NONE;
         }
     }

@@ -97,10 +97,10 @@
     REAL(defer_score, 4.0, 0.0, 1e3, "svm: a best score between 0 and minus this is left undecided") \
     REAL(looks_weight, 1.0, 0.0, 100.0, "svm: what looks count against position (0: nothing)") \
     REAL(looks_samples, 3.0, 0.0, 1e3, "svm: looks count half when a machine keeps so many samples") \
-    REAL(looks_slope, 6.0, 0.0, 1e3, "svm: log odds of a decision value") \
-    REAL(looks_offset, 2.0, -100.0, 100.0, "svm: log odds of the decision value 0") \
+    REAL(looks_slope, 4.0, 0.0, 1e3, "svm: log odds of a decision value") \
+    REAL(looks_offset, -0.5, -100.0, 100.0, "svm: log odds of the decision value 0") \
     REAL(looks_low, 8.0, 0.0, 100.0, "svm: looks speak against a match by this much at most") \
-    REAL(looks_high, 5.0, 0.0, 100.0, "svm: and for one by this much") \
+    REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
     REAL(far_d2, 300.0, 0.0, 1e6, \
          "svm: a sighting that clearly looks like a beacon up to here, but is no candidate, is not new") \
     REAL(learn_d2, 9.0, 0.0, 1e6, "svm: a machine learns from matches nearer than this") \
@@ -108,10 +108,12 @@
     REAL(learn_margin, 0.0, -100.0, 100.0, \
          "svm: and whose decision value is above this, once looks count half") \
     REAL(learn_way_m, 0.1, 0.0, 100.0, "svm: and since the last one of its beacon the robot went this far") \
-    REAL(share_value, 0.3, -100.0, 100.0, \
+    REAL(share_value, 0.8, -100.0, 100.0, \
          "svm: a decision value above this says that a beacon looks like another machine's") \
-    INTEGER(share_sightings, 6, 1, 250, "svm: so often before it shares that machine, or leaves one again") \
-    INTEGER(learn_budget, 200, 0, 1000000, "svm: pieces of training after each frame") \
+    INTEGER(share_sightings, 12, 1, 250, "svm: so often before it shares that machine, or leaves one again") \
+    INTEGER(doubt_sightings, 25, 1, 250, \
+            "svm: a new beacon in another's place, seen so often and never with it, is retired") \
+    INTEGER(learn_budget, 600, 0, 1000000, "svm: pieces of training after each frame") \
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none")

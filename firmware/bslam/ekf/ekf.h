@@ -150,11 +150,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
                                                     const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
 
-/// The same, and the logarithm of the innovation's density N(y; 0, S) in 1/(m rad), or 1/rad without a
-/// distance.
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_log_density(const bslam_ekf_t *ekf,
-                                                      const bslam_innovation_t *innovation,
-                                                      bslam_real_t *distance2, bslam_real_t *log_density);
+/// a P bᵀ for two rows, from the covariance as it stands: how alike the errors of two predictions are. O(1).
+bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b);
 
 /// What became of a sighting.
 typedef struct bslam_fusion {

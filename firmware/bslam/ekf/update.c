@@ -3,12 +3,9 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/internal.h"
-#include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
-
-static const bslam_real_t LN_TWO_PI = BSLAM_R(1.83787706640934548356);
 
 // ---- rows of H --------------------------------------------------------------------------------------------
 
@@ -137,41 +134,22 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     return BSLAM_OK;
 }
 
-/// Equation (8)'s S, in the order distance, direction; without a distance its first row is that of I.
-static bslam_sym2_t innovation_covariance(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation)
-{
-    bslam_sym2_t s = {.xx = 1, .xy = 0, .yy = 0};
-    s.yy = quadratic(ekf, &innovation->bearing_row, &innovation->bearing_row) + innovation->bearing_var_rad2;
-    if (innovation->has_range) {
-        s.xx = quadratic(ekf, &innovation->range_row, &innovation->range_row) + innovation->range_var_m2;
-        s.xy = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
-    }
-    return s;
-}
-
 bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
                                    bslam_real_t *distance2)
 {
-    const bslam_sym2_t s = innovation_covariance(ekf, innovation);
-    const bslam_real_t range_m = innovation->has_range ? innovation->range_m : 0;
-    return bslam_sym2_mahalanobis(&s, range_m, innovation->bearing_rad, distance2);
+    bslam_sym2_t s = {.xx = 1, .xy = 0, .yy = 0};
+    s.yy = quadratic(ekf, &innovation->bearing_row, &innovation->bearing_row) + innovation->bearing_var_rad2;
+    if (!innovation->has_range) {
+        return bslam_sym2_mahalanobis(&s, 0, innovation->bearing_rad, distance2);
+    }
+    s.xx = quadratic(ekf, &innovation->range_row, &innovation->range_row) + innovation->range_var_m2;
+    s.xy = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
+    return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
 }
 
-bslam_status_t bslam_ekf_log_density(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
-                                     bslam_real_t *distance2, bslam_real_t *log_density)
+bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
-    const bslam_sym2_t s = innovation_covariance(ekf, innovation);
-    const bslam_real_t range_m = innovation->has_range ? innovation->range_m : 0;
-    const bslam_real_t determinant = s.xx * s.yy - s.xy * s.xy;
-    if (!bslam_in_range(determinant, BSLAM_R(1e-30), BSLAM_R(1e30))) {
-        return BSLAM_E_SINGULAR;
-    }
-    const bslam_status_t status = bslam_sym2_mahalanobis(&s, range_m, innovation->bearing_rad, distance2);
-    if (status == BSLAM_OK) {
-        const bslam_real_t two_pi_terms = innovation->has_range ? 2 : 1;
-        *log_density = -(*distance2 + bslam_ln(determinant) + two_pi_terms * LN_TWO_PI) / 2;
-    }
-    return status;
+    return quadratic(ekf, a, b);
 }
 
 // ---- gain and down-date -----------------------------------------------------------------------------------

@@ -12,6 +12,9 @@ static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
 
+// Beacons that are retired for being in one's place before it is that one that leaves.
+enum { OUSTED_MAX = 3 };
+
 bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id)
 {
     const bslam_status_t status = bslam_params_check(params, bad_id);
@@ -345,6 +348,70 @@ static int find_uid(const bslam_ekf_t *ekf, uint32_t uid)
     return -1;
 }
 
+/// Takes a beacon out of the map, and what is known of its looks with it.
+static void drop_beacon(bslam_slam_t *slam, int index)
+{
+    if (slam->looks != NULL) {
+        bslam_looks_forget(slam->looks, index, slam->ekf.beacon_count);
+    }
+    bslam_ekf_remove(&slam->ekf, index);
+}
+
+/// True if the last frame matched a beacon, or made it.
+static bool is_seen(const bslam_slam_t *slam, int index, int count)
+{
+    for (int i = 0; i < count; i++) {
+        const bslam_account_t *account = &slam->accounts[i];
+        const bool used = account->outcome == BSLAM_OUTCOME_MATCHED || account->outcome == BSLAM_OUTCOME_NEW;
+        if (used && account->beacon_uid == slam->ekf.beacons[index].uid) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// A new beacon in another's place: one that has never been seen together with that other is the same seen
+/// amiss, and leaves. When that happens again and again, the other has gone and leaves instead. True if one
+/// left.
+static bool settle_doubt(bslam_slam_t *slam, int index, int count)
+{
+    bslam_look_t *look = &slam->looks->of[index];
+    const int other = find_uid(&slam->ekf, look->near_uid);
+    if (other < 0 || is_seen(slam, other, count)) {
+        look->is_doubted = false;
+        return false;
+    }
+    look->alone++;
+    if (look->alone < slam->params.doubt_sightings) {
+        return false;
+    }
+    bslam_look_t *place = &slam->looks->of[other];
+    place->ousted++;
+    const bool is_gone = place->ousted >= OUSTED_MAX;
+    look->is_doubted = false;
+    drop_beacon(slam, is_gone ? other : index);
+    slam->looks->counters.retired++;
+    return true;
+}
+
+static void settle_doubts(bslam_slam_t *slam, int count)
+{
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
+        if (slam->looks->of[b].is_doubted && is_seen(slam, b, count) && settle_doubt(slam, b, count)) {
+            return;
+        }
+    }
+}
+
+/// Notes whose place a new beacon is in.
+static void doubt(bslam_slam_t *slam, int index, uint32_t near_uid)
+{
+    bslam_look_t *look = &slam->looks->of[index];
+    look->is_doubted = true;
+    look->near_uid = near_uid;
+    look->alone = 0;
+}
+
 /// Machines learn from what a frame surely showed, and train for a bounded time.
 static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
 {
@@ -357,23 +424,19 @@ static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, i
         if (sightings[i].signature == NULL || (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED)) {
             continue;
         }
+        const int index = find_uid(&slam->ekf, account->beacon_uid);
+        if (is_new && slam->matches[i].near >= 0) {
+            doubt(slam, index, slam->ekf.beacons[slam->matches[i].near].uid);
+        }
         if (is_new || slam->matches[i].sure) {
-            bslam_looks_teach(slam->looks, &slam->params, find_uid(&slam->ekf, account->beacon_uid),
-                              slam->ekf.beacon_count, slam->way_um, sightings[i].signature);
+            bslam_looks_teach(slam->looks, &slam->params, index, slam->ekf.beacon_count, slam->way_um,
+                              sightings[i].signature);
         } else {
             slam->looks->counters.unsure++;
         }
     }
+    settle_doubts(slam, count);
     (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
-}
-
-/// Takes a beacon out of the map, and what is known of its looks with it.
-static void drop_beacon(bslam_slam_t *slam, int index)
-{
-    if (slam->looks != NULL) {
-        bslam_looks_forget(slam->looks, index, slam->ekf.beacon_count);
-    }
-    bslam_ekf_remove(&slam->ekf, index);
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------

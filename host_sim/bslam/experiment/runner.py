@@ -44,12 +44,13 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     if slam_factory is None and options.target != "host":
         with connect(options.target, params, beacons, looks=_uses_looks(options)) as slam:
             return _Run(slam, log, options).finish(slam.target_description())
-    factory = slam_factory or partial(_make_slam, options)
+    factory = slam_factory or partial(_make_slam, options, log)
     return _Run(factory(params, beacons), log, options).finish()
 
 
-def _make_slam(options: RunOptions, params: Mapping[str, Number], beacons_max: int) -> Slam:
-    return Slam(params, beacons_max=beacons_max, real=options.real, looks=_uses_looks(options))
+def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Slam:
+    looks = _uses_looks(options)
+    return Slam(params, beacons_max=beacons_max, real=options.real, looks=looks, seeds=log.seeds)
 
 
 def _uses_looks(options: RunOptions) -> bool:

@@ -23,6 +23,7 @@ from bslam.log import (
 from bslam.world.driving import Drive, drive
 from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
+from bslam.world.signatures import generic_looks
 from bslam.world.wheels import count_ticks, read_travel
 
 __all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
@@ -48,6 +49,7 @@ def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, nois
         truth=Truth(time_us, x_m, y_m, wrap_rad(path.theta_rad - scenario.start.heading_rad)),
         beacons=_true_map(scenario),
         robot=_describe_robot(scenario),
+        seeds=generic_looks(),
     )
 
 
