@@ -119,7 +119,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
 
 static bool is_open(const bslam_match_t *match)
 {
-    return match->verdict == BSLAM_VERDICT_DEFER;
+    return match->verdict == BSLAM_VERDICT_DEFER && match->reason != BSLAM_REASON_AMBIGUOUS;
 }
 
 /// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0.
@@ -145,12 +145,39 @@ static void give(const bslam_sighting_frame_t *frame, bslam_given_t *given, int 
     }
 }
 
+static void leave_open(bslam_match_t *match)
+{
+    match->reason = BSLAM_REASON_AMBIGUOUS;
+    match->beacon = -1;
+    match->sure = false;
+}
+
+/// Where another sighting wants the same beacon, and about as much, neither gets it. True if so.
+static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *matches, int next)
+{
+    bool contested = false;
+    for (int i = 0; i < frame->count; i++) {
+        if (i != next && is_open(&matches[i]) && matches[i].beacon == matches[next].beacon &&
+            matches[i].score > matches[next].score - frame->params->rival_lead) {
+            leave_open(&matches[i]);
+            contested = true;
+        }
+    }
+    if (contested) {
+        leave_open(&matches[next]);
+    }
+    return contested;
+}
+
 /// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
 /// made anew, given the matches so far.
 static void settle(const bslam_sighting_frame_t *frame, bslam_given_t *given, bslam_match_t *matches)
 {
     for (int next = next_to_settle(matches, frame->count); next >= 0;
          next = next_to_settle(matches, frame->count)) {
+        if (is_contested(frame, matches, next)) {
+            continue;
+        }
         matches[next].verdict = BSLAM_VERDICT_MATCH;
         give(frame, given, next, &matches[next]);
         for (int i = 0; i < frame->count; i++) {
@@ -185,18 +212,18 @@ static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *give
                         bslam_match_t *matches)
 {
     bslam_match_t *match = &matches[i];
-    const bool is_near = match->beacon >= 0 && match->score > -frame->params->defer_score;
     const int32_t near = match->beacon;
-    match->beacon = -1;
-    match->sure = false;
-    if (match->reason == BSLAM_REASON_DUPLICATE) {
+    const bool is_duplicate = match->reason == BSLAM_REASON_DUPLICATE;
+    const bool is_near = near >= 0 && match->score > -frame->params->defer_score;
+    leave_open(match);
+    if (is_duplicate) {
         match->verdict = BSLAM_VERDICT_REJECT;
-    } else if (is_near) {
-        match->reason = BSLAM_REASON_AMBIGUOUS;
-    } else if (looks_like_another(frame, given, i, matches)) {
+        match->reason = BSLAM_REASON_DUPLICATE;
+    } else if (!is_near && looks_like_another(frame, given, i, matches)) {
         match->reason = BSLAM_REASON_LOOKS;
-    } else {
+    } else if (!is_near) {
         match->verdict = BSLAM_VERDICT_NEW;
+        match->reason = BSLAM_REASON_NONE;
         match->near = near;
     }
 }

@@ -95,6 +95,8 @@
     REAL(new_per_m2, 0.02, 1e-9, 1e3, "svm: density of beacons not yet in the map") \
     REAL(new_per_rad, 0.3, 1e-9, 1e3, "svm: the same, direction only") \
     REAL(defer_score, 4.0, 0.0, 1e3, "svm: a best score between 0 and minus this is left undecided") \
+    REAL(rival_lead, 2.0, 0.0, 1e3, \
+         "svm: of two sightings that want a beacon, one must score higher by this, or both wait") \
     REAL(looks_weight, 1.0, 0.0, 100.0, "svm: what looks count against position (0: nothing)") \
     REAL(looks_samples, 3.0, 0.0, 1e3, "svm: looks count half when a machine keeps so many samples") \
     REAL(looks_slope, 4.0, 0.0, 1e3, "svm: log odds of a decision value") \
