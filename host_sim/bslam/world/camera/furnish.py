@@ -135,15 +135,26 @@ class Furnisher:
         return not any(footprint.overlaps(other) for other in self._taken)
 
     def add_beacon(
-        self, beacon_id: int, name: str, kind: Kind, face: WallFace, along_m: float, width_m: float
-    ) -> None:
-        """A beacon of a kind on a wall, its middle so far from the wall's left end."""
+        self,
+        beacon_id: int,
+        name: str,
+        kind: Kind,
+        face: WallFace,
+        along_m: float,
+        width_m: float,
+        look: looks.Look | None = None,
+    ) -> looks.Look:
+        """A beacon of a kind on a wall, its middle so far from the wall's left end; how it looks.
+
+        look: another's; None: a new one is painted.
+        """
         depth_m, bottom_m = self._artist.between(*kind.depth_m), self._artist.between(*kind.bottom_m)
         place = Mount(face, along_m, width_m, depth_m, bottom_m, kind.height_m)
         x_m, y_m = face.at(along_m, depth_m)
         facing_rad = math.atan2(face.normal[1], face.normal[0])
         first = self._builder.surface_count
-        self._hang(place, looks.BEACONS[name](self._artist), beacon_id, name in ROUND)
+        look = look or looks.BEACONS[name](self._artist)
+        self._hang(place, look, beacon_id, name in ROUND)
         self._beacons.append(
             BeaconLook(beacon_id, name, x_m, y_m, kind.height_m, width_m, bottom_m, depth_m, facing_rad)
         )
@@ -154,6 +165,7 @@ class Furnisher:
             lamp_x_m, lamp_y_m = face.at(along_m, 0.3)
             middle_m = bottom_m + 0.5 * kind.height_m
             self._lamps.append((lamp_x_m, lamp_y_m, middle_m, _WINDOW_LIGHT * width_m, 1.0))
+        return look
 
     def add_wall_things(self, count: int) -> None:
         """Small things on the walls that are no beacons; those that find no place stay away."""

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.world.arena import Point, Wall
+from bslam.world.arena import Beacon, Point, Wall
 from bslam.world.camera.furnish import Area, Furnisher, WallFace
-from bslam.world.camera.kinds import KINDS, KindDeck
-from bslam.world.camera.looks import Artist, clutter, style_of
+from bslam.world.camera.kinds import KINDS, Kind, KindDeck
+from bslam.world.camera.looks import Artist, Look, clutter, style_of
 from bslam.world.camera.scene import IDENTITY_MAX, Scene
 from bslam.world.scenario import Scenario
 
@@ -51,7 +51,8 @@ def make_world(seed: int, style: str = "train") -> Scene:
 
 
 def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
-    """A scenario's arena, furnished: each beacon gets a kind that fits its place, and a look.
+    """A scenario's arena, furnished: each beacon gets a kind that fits its place, and a look, or those
+    of the beacon that it looks like.
 
     A beacon's foot is where the scenario has it; what stands out from the wall is seen its depth farther in
     (`Scene.beacons`, `Scene.arena`). Clutter stands at the walls, where no robot drives. BslamError: a beacon
@@ -64,19 +65,24 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         Area(arena.low, arena.high),
     )
     furnisher = Furnisher(arena.walls, areas, artist)
-    deck = KindDeck(artist.random)
-    for beacon in arena.beacons:
-        where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
-        if beacon.beacon_id > IDENTITY_MAX:
-            raise BslamError(f"{where}: allowed with a camera: ids up to {IDENTITY_MAX}")
-        face, along_m = _hang(furnisher, beacon.at, where)
-        free_m = _free_width(face, along_m, beacon.at, [other.at for other in arena.beacons])
-        name = deck.draw(free_m)
-        if name is None:
+    hung = [_hang_beacon(furnisher, scenario, beacon) for beacon in arena.beacons]
+    deck, made = KindDeck(artist.random), dict[int, tuple[str, Kind, float, Look]]()
+    for beacon, (face, along_m, _) in zip(arena.beacons, hung, strict=True):
+        whose = _own_looks(beacon)
+        if whose in made:
+            name, kind, width_m, look = made[whose]
+            furnisher.add_beacon(beacon.beacon_id, name, kind, face, along_m, width_m, look)
+            continue
+        alike = zip(arena.beacons, hung, strict=True)
+        free_m = min(place[2] for other, place in alike if _own_looks(other) == whose)
+        drawn = deck.draw(free_m)
+        if drawn is None:
+            where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
             raise BslamError(f"{where}: {free_m:.2f} m of free wall; allowed: enough for a beacon, 0.18 m")
-        kind = KINDS[name].shallow(_DRESSED_DEPTH_M)
+        kind = KINDS[drawn].shallow(_DRESSED_DEPTH_M)
         width_m = artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
-        furnisher.add_beacon(beacon.beacon_id, name, kind, face, along_m, width_m)
+        look = furnisher.add_beacon(beacon.beacon_id, drawn, kind, face, along_m, width_m)
+        made[whose] = drawn, kind, width_m, look
     furnisher.add_wall_things(artist.count(*_WALL_THINGS) * len(areas))
     for _ in range(artist.count(*_CLUTTER) * len(areas)):
         piece = clutter(artist)
@@ -84,6 +90,21 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         if foot is not None:
             furnisher.add_clutter(piece, *foot)
     return furnisher.finish(seed)
+
+
+def _own_looks(beacon: Beacon) -> int:
+    """The beacon whose looks it has."""
+    return beacon.beacon_id if beacon.looks_like is None else beacon.looks_like
+
+
+def _hang_beacon(furnisher: Furnisher, scenario: Scenario, beacon: Beacon) -> tuple[WallFace, float, float]:
+    """Where on which wall a beacon hangs, and how wide it may be."""
+    where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
+    if beacon.beacon_id > IDENTITY_MAX:
+        raise BslamError(f"{where}: allowed with a camera: ids up to {IDENTITY_MAX}")
+    face, along_m = _hang(furnisher, beacon.at, where)
+    others = [other.at for other in scenario.arena.beacons]
+    return face, along_m, _free_width(face, along_m, beacon.at, others)
 
 
 def _artist(seed: int, style: str, purpose: int) -> Artist:

@@ -1,0 +1,169 @@
+"""How well sightings find their beacons: method x world x sigma over seeds, against known identity.
+
+Prints, for each combination: wrong, missed, false-new and deferred sightings in per cent of all; runs whose
+count of beacons is exact; the error of the map; the error of the position, and its ratio to that with known
+identity on the same drives; diverged runs. Beside each mean its 95 % interval over the seeds (Student's t).
+
+Two ablations of `svm` stand beside the methods: `untrained`, machines that are never trained
+(learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0).
+`--looks` prints how alike simulated signatures are to a camera's instead: top-1 of LinearSVC, C = 10, by
+views a beacon, on the given worlds (the camera's: tools/measure_learner.py).
+`.venv/bin/python tools/measure_association.py pairs lookalikes --sigma 0.6,1.0 --seeds 100:110`
+"""
+
+import argparse
+import itertools
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats  # type: ignore[import-untyped]
+from sklearn.svm import LinearSVC
+
+from bslam.experiment.batch import make_jobs, run_batch
+from bslam.experiment.options import Number, RunOptions
+from bslam.experiment.sources import CameraSource, ScenarioSource
+from bslam.world.simulate import load_scenario, simulate
+
+CAMERA_STORE = Path("out") / "camera"
+ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
+    "untrained": (("learn_budget", 0),),
+    "position": (("looks_weight", 0.0),),
+}
+METHODS = ("known", "nearest", "mahalanobis", "svm", *ABLATIONS)
+VIEWS = (1, 2, 4, 10)
+TEST_VIEWS, FAR_M = 30, 6.5
+
+Entry = dict[str, Any]
+
+
+def options_of(method: str, sensor: str, sigma_mps: float, seed: int) -> RunOptions:
+    """One run of a method; an ablation is `svm` with a parameter changed."""
+    association = "svm" if method in ABLATIONS else method
+    return RunOptions(
+        association=association,
+        sensor=sensor,
+        sigma_mps=sigma_mps,
+        noise="speedometer",
+        seed=seed,
+        parameters=ABLATIONS.get(method, ()),
+    )
+
+
+def run_all(arguments: argparse.Namespace) -> dict[tuple[str, float, str], list[Entry]]:
+    """The summaries of every combination, in the order of the seeds."""
+    grid = list(itertools.product(arguments.worlds, arguments.sigma, arguments.methods))
+    sources: list[ScenarioSource] = []
+    options: list[RunOptions] = []
+    for (world, sigma_mps, method), seed in itertools.product(grid, arguments.seeds):
+        if arguments.sensor == "camera":
+            sources.append(CameraSource(world, seed, sigma_mps, "speedometer", arguments.rig, CAMERA_STORE))
+        else:
+            sources.append(ScenarioSource(world, seed, sigma_mps, "speedometer"))
+        options.append(options_of(method, arguments.sensor, sigma_mps, seed))
+    outcomes = run_batch(make_jobs(sources, options, None, 0), arguments.out, arguments.jobs).outcomes
+    entries = [outcome.entry for outcome in outcomes]
+    seeds = len(arguments.seeds)
+    return {key: entries[seeds * i : seeds * (i + 1)] for i, key in enumerate(grid)}
+
+
+def interval(values: Sequence[float]) -> str:
+    """Mean and half the width of its 95 % interval."""
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return f"{mean:.3g}"
+    half = float(stats.t.ppf(0.975, len(values) - 1)) * float(np.std(values, ddof=1)) / math.sqrt(len(values))
+    return f"{mean:.3g} ± {half:.2g}"
+
+
+def row(name: str, entries: list[Entry], known: list[Entry] | None) -> str:
+    """A line of the table."""
+
+    def share(key: str) -> str:
+        return interval([100.0 * one[key] / max(one["sightings"], 1) for one in entries])
+
+    errors_m = [one["position_error_m"]["mean"] for one in entries]
+    ratio = "-"
+    if known is not None:
+        pairs = zip(errors_m, known, strict=True)
+        ratio = interval([error_m / one["position_error_m"]["mean"] for error_m, one in pairs])
+    exact = sum(one["beacons_mapped"] == one["beacons_true"] for one in entries)
+    mapped = float(np.mean([one["beacons_mapped"] for one in entries]))
+    cells = [
+        name,
+        *(share(key) for key in ("wrong_associations", "missed", "false_new", "deferred")),
+        f"{exact} of {len(entries)} ({mapped:.1f})",
+        interval([100.0 * one["map_rmse_m"] for one in entries]),
+        interval([100.0 * error_m for error_m in errors_m]),
+        ratio,
+        str(sum(one["diverged"] for one in entries)),
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def print_looks(worlds: Sequence[str], seeds: Sequence[int]) -> None:
+    """Top-1 by views of each beacon, nearer than FAR_M."""
+    print("| world, beacons | " + " | ".join(f"{views} views" for views in VIEWS) + " |")
+    for world, seed in itertools.product(worlds, seeds):
+        sightings = simulate(load_scenario(world), seed).sightings
+        assert sightings.signature is not None
+        near = sightings.range_m < FAR_M
+        signature, beacon = sightings.signature[near], sightings.beacon_id[near]
+        there = [one for one in np.unique(beacon) if np.sum(beacon == one) >= 2 * TEST_VIEWS]
+        random, shares = np.random.default_rng(seed), []
+        for views in VIEWS:
+            drawn = [random.permutation(np.flatnonzero(beacon == one)) for one in there]
+            train = np.concatenate([one[:views] for one in drawn])
+            test = np.concatenate([one[views : views + TEST_VIEWS] for one in drawn])
+            machines = LinearSVC(C=10.0, dual=False).fit(signature[train], beacon[train])
+            shares.append(float(np.mean(machines.predict(signature[test]) == beacon[test])))
+        cells = " | ".join(f"{100.0 * one:.1f}" for one in shares)
+        print(f"| {world} seed {seed}, {len(there)} | {cells} |")
+
+
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("worlds", nargs="+", help="scenarios")
+    parser.add_argument("--methods", type=lambda text: text.split(","), default=list(METHODS))
+    parser.add_argument("--sigma", type=lambda text: [float(one) for one in text.split(",")], default=[0.6])
+    parser.add_argument(
+        "--seeds", type=lambda text: range(*map(int, text.split(":"))), default=range(100, 104)
+    )
+    parser.add_argument("--sensor", choices=("simulated", "camera"), default="simulated")
+    parser.add_argument("--rig", default="three60")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("out") / "association")
+    parser.add_argument("--looks", action="store_true")
+    arguments = parser.parse_args(argv)
+    unknown = set(arguments.methods) - set(METHODS)
+    if unknown:
+        parser.error(f"methods {', '.join(sorted(unknown))}; allowed: {', '.join(METHODS)}")
+    return arguments
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    arguments = parse(argv)
+    if arguments.looks:
+        print_looks(arguments.worlds, arguments.seeds)
+        return 0
+    table = run_all(arguments)
+    for world, sigma_mps in itertools.product(arguments.worlds, arguments.sigma):
+        print(f"\n{world}, {arguments.sensor}, sigma {sigma_mps:g}, seeds {arguments.seeds}\n")
+        print(
+            "| method | wrong % | missed % | false-new % | deferred % | exact count (mean) | map cm ", end=""
+        )
+        print("| position cm | against known | lost |\n|---|---|---|---|---|---|---|---|---|---|")
+        known = table.get((world, sigma_mps, "known"))
+        for method in arguments.methods:
+            print(row(method, table[world, sigma_mps, method], known))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
