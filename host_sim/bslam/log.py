@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -221,6 +221,21 @@ def write_folder(log: Log, path: str | Path) -> None:
         (folder / "robot.toml").write_text(_robot_text(log.robot), encoding="utf-8")
     except OSError as error:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
+
+
+def first_steps(log: Log, steps: int) -> Log:
+    """The beginning of a log: so many rows of odometry, and the sightings until the last of them."""
+    kept = slice(0, steps)
+    odometry = replace(
+        log.odometry,
+        time_us=log.odometry.time_us[kept],
+        a=log.odometry.a[kept],
+        b=log.odometry.b[kept],
+    )
+    seen = log.sightings.time_us <= odometry.time_us[-1]
+    columns = {one.name: getattr(log.sightings, one.name) for one in fields(log.sightings)}
+    cut: Any = {name: None if column is None else column[seen] for name, column in columns.items()}
+    return replace(log, odometry=odometry, sightings=replace(log.sightings, **cut))
 
 
 def wrap_rad(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -243,4 +243,7 @@ def _receive(line: socket.socket, timeout_s: float, gone: Any) -> bytes:
 
 
 def _image_description(path: Path) -> dict[str, Any]:
-    return {"image": str(path.name), "image_sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return {
+        "image": f"{path.parent.name}/{path.name}",
+        "image_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+    }

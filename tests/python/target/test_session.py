@@ -13,6 +13,7 @@ from bslam.experiment.runner import run_log
 from bslam.link import messages
 from bslam.link.frames import Frame, encode
 from bslam.link.messages import Message
+from bslam.log import first_steps
 from bslam.target import client
 from bslam.target.client import Client
 from bslam.target.lines import ProcessLine, TargetError, open_line
@@ -39,24 +40,7 @@ def robot_line():
 
 @pytest.fixture(scope="module")
 def log():
-    import dataclasses
-
-    whole = simulate(load_scenario("paper_room"), 3, None, None)
-    odometry = dataclasses.replace(
-        whole.odometry,
-        time_us=whole.odometry.time_us[:STEPS],
-        a=whole.odometry.a[:STEPS],
-        b=whole.odometry.b[:STEPS],
-    )
-    seen = whole.sightings.time_us <= odometry.time_us[-1]
-    sightings = dataclasses.replace(
-        whole.sightings,
-        **{
-            name: getattr(whole.sightings, name)[seen]
-            for name in ("time_us", "beacon_id", "bearing_rad", "range_m", "mappable")
-        },
-    )
-    return dataclasses.replace(whole, odometry=odometry, sightings=sightings)
+    return first_steps(simulate(load_scenario("paper_room"), 3), STEPS)
 
 
 def same(one, other):
@@ -110,13 +94,15 @@ class BadLine:
         self.line.close()
 
 
-@pytest.mark.parametrize("observation", ["distance", "direction"])
-def test_a_run_over_the_link_is_the_run_on_the_host(log, observation):
-    options = RunOptions(observation=observation)
-    here = run_log(log, options)
-    there = run_log(log, RunOptions(observation=observation, target=f"process:{ROBOT}"))
+@pytest.mark.parametrize(
+    "words",
+    [{}, {"observation": "direction"}, {"known_map": True}, {"parameters": (("sighting_delay_us", 50_000),)}],
+)
+def test_a_run_over_the_link_is_the_run_on_the_host(log, words):
+    here = run_log(log, RunOptions(**words))
+    there = run_log(log, RunOptions(**words, target=f"process:{ROBOT}"))
     same(here, there)
-    assert there.target["image"] == "robot"
+    assert there.target["image"] == "host/robot"
 
 
 def test_a_run_over_a_bad_line_is_still_the_run_on_the_host(log, monkeypatch, robot_line):

@@ -1,0 +1,49 @@
+"""The images in QEMU: the same bits as here on every core, the same instructions at every run."""
+
+import pytest
+
+import same_bits
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
+from bslam.log import first_steps
+from bslam.target.lines import qemu_machines
+from bslam.world.simulate import load_scenario, simulate
+
+STEPS = 120
+
+
+@pytest.fixture(scope="module")
+def log():
+    return first_steps(simulate(load_scenario("paper_room"), 5), STEPS)
+
+
+@pytest.fixture(scope="module")
+def host(log):
+    """What the cores are compared with, of each way to run; more of them in tools/same_bits.py."""
+    return {words: same_bits.fingerprints(log, RunOptions(**dict(words))) for words in WAYS}
+
+
+WAYS = (
+    (("association", "svm"),),
+    (("association", "known"), ("observation", "direction")),
+)
+
+
+@pytest.mark.parametrize("board", sorted(qemu_machines()))
+def test_every_state_is_that_of_the_host(log, host, board):
+    for words in WAYS:
+        there = same_bits.fingerprints(log, RunOptions(**dict(words), target=f"qemu:{board}"))
+        assert len(there) == len(host[words]) > STEPS
+        assert same_bits.first_difference(host[words], there) is None
+        assert len(set(there)) == len(there)
+
+
+def test_a_run_names_its_image_and_counts_the_same_instructions_twice(log):
+    short = first_steps(log, 40)
+    runs = [run_log(short, RunOptions(target="qemu:mps2_an386")) for _ in range(2)]
+    one, other = (run.target for run in runs)
+    assert one == other
+    assert one["image"] == "mps2_an386/robot.elf"
+    assert len(one["image_sha256"]) == 64
+    assert len(one["build_id"]) == 40
+    assert one["instructions"] > 40 * 1000

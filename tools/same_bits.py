@@ -1,0 +1,125 @@
+"""Feeds one log to the core on this computer and on emulated boards, and compares the state after every step.
+
+Prints the fingerprint of all states for each, and where the first difference is. The fingerprint is computed
+where the core runs (bslam_slam_fingerprint): the state, its covariance, and the weights of every machine that
+was learned on the way.
+
+Exit status 0: all the same. 1: some differ.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from bslam.core.slam import Slam
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
+from bslam.log import Log, first_steps, read_folder
+from bslam.target.lines import qemu_machines
+from bslam.target.remote import connect
+from bslam.world.simulate import load_scenario, simulate
+
+START = 0xCBF29CE484222325
+"""BSLAM_FINGERPRINT_START."""
+
+
+class Noting:
+    """A pipeline that keeps a fingerprint after every reading and frame."""
+
+    def __init__(self, slam: Any) -> None:
+        self._slam = slam
+        self.notes: list[int] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._slam, name)
+
+    def odometry(self, *inputs: Any) -> Any:
+        try:
+            return self._slam.odometry(*inputs)
+        finally:
+            self._note()
+
+    def sightings(self, *inputs: Any) -> Any:
+        try:
+            return self._slam.sightings(*inputs)
+        finally:
+            self._note()
+
+    def _note(self) -> None:
+        raise NotImplementedError
+
+
+class NotingHost(Noting):
+    def _note(self) -> None:
+        self.notes.append(self._slam.fingerprint(self.notes[-1] if self.notes else START))
+
+
+class NotingTarget(Noting):
+    def _note(self) -> None:
+        self.notes.append(self._slam.fingerprint)
+
+
+def fingerprints(log: Log, options: RunOptions) -> list[int]:
+    """After every reading and frame of a run on options.target, chained: the last stands for all."""
+    looks = options.association == "svm"
+    if options.target == "host":
+        made: list[Noting] = []
+
+        def factory(params: Any, beacons: int) -> Noting:
+            made.append(NotingHost(Slam(params, beacons_max=beacons, looks=looks)))
+            return made[0]
+
+        run_log(log, options, factory)
+        return made[0].notes
+    opened: list[NotingTarget] = []
+
+    def connected(params: Any, beacons: int) -> Noting:
+        slam = connect(options.target, params, beacons, fingerprints=True, looks=looks)
+        opened.append(NotingTarget(slam))
+        return opened[0]
+
+    try:
+        run_log(log, options, connected)
+    finally:
+        for one in opened:
+            one.close()
+    return opened[0].notes
+
+
+def first_difference(one: list[int], other: list[int]) -> int | None:
+    """The first place where two chains differ, or None."""
+    for place, (a, b) in enumerate(zip(one, other, strict=True)):
+        if a != b:
+            return place
+    return None
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("log", nargs="?", default="paper_room", help="a scenario, or the folder of a log")
+    parser.add_argument("--steps", type=int, default=5000, help="of the log (default: 5000)")
+    parser.add_argument("--seed", type=int, default=0, help="of a scenario (default: 0)")
+    parser.add_argument("--boards", nargs="+", default=sorted(qemu_machines()), help="default: all of QEMU")
+    parser.add_argument("--association", default="svm", help="default: svm")
+    parser.add_argument("--observation", default="distance", help="default: distance")
+    options = parser.parse_args(argv)
+    folder = Path(options.log)
+    whole = read_folder(folder) if folder.is_dir() else simulate(load_scenario(options.log), options.seed)
+    log = first_steps(whole, options.steps)
+    words = {"association": options.association, "observation": options.observation}
+    here = fingerprints(log, RunOptions(**words))
+    print(f"{log.name}, {len(log.odometry.time_us)} steps, {len(here)} states, {words}")
+    print(f"{'host':<12} {here[-1]:016x}")
+    different = 0
+    for board in options.boards:
+        there = fingerprints(log, RunOptions(target=f"qemu:{board}", **words))
+        place = first_difference(here, there)
+        different += place is not None
+        said = "the same" if place is None else f"differs from state {place} on"
+        print(f"{board:<12} {there[-1]:016x}  {said}", flush=True)
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
