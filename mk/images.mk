@@ -12,7 +12,8 @@ HOST_SIZES := -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=9
 include $(BOARDS:%=firmware/port/%/board.mk)
 
 APP_SOURCES := firmware/app/session.c
-PROGRAMS := robot
+# What every board runs; a board with memory enough adds `cost` (BOARD_PROGRAMS_<board>).
+PROGRAMS := robot selftest
 
 # A square root needs no errno. The stack that each function takes is for tools/check_image.py.
 IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage
@@ -38,9 +39,9 @@ build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/po
 	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1)
 
 .PHONY: image-$(1)
-image-$(1): $(PROGRAMS:%=build/$(1)/%.elf)
+image-$(1): $(patsubst %,build/$(1)/%.elf,$(PROGRAMS) $(BOARD_PROGRAMS_$(1)))
 
--include $$(BOARD_OBJECTS_$(1):.o=.d) $(PROGRAMS:%=build/$(1)/firmware/app/%.d)
+-include $$(BOARD_OBJECTS_$(1):.o=.d) $(patsubst %,build/$(1)/firmware/app/%.d,$(PROGRAMS) $(BOARD_PROGRAMS_$(1)))
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
@@ -60,3 +61,7 @@ $(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
 
 .PHONY: images
 images: $(BOARDS:%=image-%) $(HOST_ROBOT) ## link the images of every board, and check them
+
+.PHONY: selftest
+selftest: images ## run the self-test of every board that QEMU has
+	@$(PYTHON) tools/run_image.py selftest

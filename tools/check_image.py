@@ -20,8 +20,9 @@ from check_symbols import UNWANTED_CALLS
 
 CALLED_BY_POINTER = (
     (r"session_", r"(apply|answer)_"),
-    (r"bslam_slam_", r"bslam_associate_"),
+    (r"bslam_slam_|associate_ticks", r"bslam_associate_"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
+    (r"main", r"test_"),
 )
 """Callers, and whom they may call through a pointer."""
 
@@ -44,6 +45,7 @@ class Function:
     frame_bytes: int = 0
     calls: set[int] = field(default_factory=set)
     calls_pointer: bool = False
+    popped: str = ""  # the registers of the last pop: an ARMv6-M returns by one of them
 
 
 def read_functions(listing: str) -> dict[int, Function]:
@@ -67,8 +69,10 @@ def _read_instruction(function: Function, name: str, operands: str) -> None:
         # A jump to another function is a call at its end; one to the function's own start is a loop.
         if name in ("bl", "blx") or int(target[1], 16) != function.address:
             function.calls.add(int(target[1], 16))
-    elif name == "blx" or (name == "bx" and not operands.startswith("lr")):
+    elif name == "blx" or (name == "bx" and operands not in ("lr", function.popped.strip("{}"))):
         function.calls_pointer = True
+    elif name == "pop":
+        function.popped = operands
     elif name in ("push", "vpush"):
         function.frame_bytes += _listed_registers(operands) * (8 if "d" in operands.split("-")[0] else 4)
     elif name in ("stmdb", "vstmdb") and operands.startswith("sp!"):

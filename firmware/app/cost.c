@@ -1,0 +1,240 @@
+/// What the parts of a step cost on this board, in ticks of port_ticks: one line each, "name size ticks", the
+/// mean of several calls. tools/costs.py runs it and knows what a tick is.
+#include <string.h>
+
+#include "bslam/bslam.h"
+#include "bslam/math/trig.h"
+#include "port/port.h"
+
+#define STEP_US 40000
+#define STEPS 8
+#define SEEN 3
+/// Sightings shown to each machine.
+#define VIEWS 12
+
+static bslam_slam_t slam;
+static bslam_looks_t looks;
+static bslam_params_t params;
+static int64_t time_us;
+static float signatures[BSLAM_BEACONS_MAX][BSLAM_SAMPLE_FEATURES];
+static uint32_t random_state;
+
+// ---- the report -------------------------------------------------------------------------------------------
+
+static void put_text(const char *text)
+{
+    port_write((const uint8_t *)text, strlen(text));
+}
+
+static void put_number(uint32_t number)
+{
+    char digits[12];
+    size_t at = sizeof digits - 1;
+    digits[at] = '\0';
+    do {
+        at--;
+        digits[at] = (char)('0' + number % 10);
+        number /= 10;
+    } while (number > 0);
+    put_text(&digits[at]);
+}
+
+static void report(const char *name, int size, uint32_t ticks)
+{
+    put_text(name);
+    put_text(" ");
+    put_number((uint32_t)size);
+    put_text(" ");
+    put_number(ticks);
+    put_text("\n");
+}
+
+/// What should not happen ends the program.
+static void need(bool good)
+{
+    if (!good) {
+        put_text("failed\n");
+        port_exit(1);
+    }
+}
+
+// ---- the world: beacons on a grid, the robot at rest at the origin
+// ------------------------------------------
+
+static uint32_t next_random(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+/// Uniform in -1 to 1.
+static float random_unit(void)
+{
+    return (float)(int32_t)next_random() * (1.0f / 2147483648.0f);
+}
+
+static bslam_sighting_t see(int beacon)
+{
+    const float x_m = 2.0f + (float)(beacon % 10);
+    const float y_m = (float)(beacon / 10) - 2.4f;
+    return (bslam_sighting_t){.bearing_rad = bslam_atan2(y_m, x_m),
+                              .range_m = bslam_sqrt(x_m * x_m + y_m * y_m),
+                              .has_range = true,
+                              .label = beacon,
+                              .signature = signatures[beacon]};
+}
+
+static void stand_still(void)
+{
+    time_us += STEP_US;
+    const bslam_odometry_reading_t reading = {.time_us = time_us, .source = BSLAM_ODOMETRY_WHEELS};
+    need(bslam_slam_odometry(&slam, &reading) == BSLAM_OK);
+}
+
+static void look_at(int first, int count)
+{
+    bslam_sighting_t seen[SEEN];
+    for (int i = 0; i < count; i++) {
+        seen[i] = see(first + i);
+    }
+    need(bslam_slam_sightings(&slam, time_us, seen, count) == BSLAM_OK);
+}
+
+/// A map of so many beacons, each seen once.
+static void start(int beacons, int association)
+{
+    int bad_id = 0;
+    params.association = association;
+    need(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK);
+    time_us = 0;
+    params.association = 0;
+    for (int b = 0; b < beacons; b++) {
+        const bslam_sighting_t sighting = see(b);
+        slam.params.association = 0;
+        need(bslam_slam_sightings(&slam, time_us, &sighting, 1) == BSLAM_OK);
+        time_us++;
+    }
+    slam.params.association = association;
+    need(bslam_slam_beacon_count(&slam) == beacons);
+}
+
+// ---- what is measured -------------------------------------------------------------------------------------
+
+/// An odometry reading, and a frame of `count` sightings that the filter goes there for.
+static uint32_t step_ticks(int beacons, int count)
+{
+    uint32_t ticks = 0;
+    for (int k = 0; k < STEPS; k++) {
+        const uint32_t began = port_ticks();
+        stand_still();
+        look_at(k * SEEN % (beacons - SEEN + 1), count);
+        ticks += port_ticks() - began;
+    }
+    return ticks / STEPS;
+}
+
+/// Starting a beacon, in a frame of its own.
+static uint32_t augment_ticks(int beacons)
+{
+    uint32_t ticks = 0;
+    for (int k = 0; k < STEPS; k++) {
+        stand_still();
+        look_at(0, 0);
+        time_us++;
+        const uint32_t began = port_ticks();
+        look_at(beacons, 1);
+        ticks += port_ticks() - began;
+        bslam_beacon_view_t view;
+        need(bslam_slam_beacon(&slam, beacons, &view) == BSLAM_OK);
+        need(bslam_slam_remove_beacon(&slam, view.uid) == BSLAM_OK);
+    }
+    return ticks / STEPS;
+}
+
+static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
+{
+    const bslam_pose_t mount = {0, 0, 0};
+    bslam_match_t matches[SEEN];
+    bslam_sighting_t seen[SEEN];
+    uint32_t ticks = 0;
+    for (int k = 0; k < STEPS; k++) {
+        for (int i = 0; i < SEEN; i++) {
+            seen[i] = see((k * SEEN + i) % beacons);
+        }
+        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.params, &looks, &mount, seen, SEEN};
+        const uint32_t began = port_ticks();
+        associate(&frame, matches);
+        ticks += port_ticks() - began;
+    }
+    return ticks / STEPS;
+}
+
+/// Every machine is shown views of its beacon, as different from each other as random numbers make them; the
+/// mean of a training.
+static uint32_t train_ticks(int machines)
+{
+    bslam_learner_t *learner = &looks.learner;
+    uint64_t ticks = 0;
+    for (int b = 0; b < machines; b++) {
+        int32_t machine;
+        need(bslam_learner_add(learner, &machine) == BSLAM_OK);
+    }
+    for (int view = 0; view < VIEWS * machines; view++) {
+        float signature[BSLAM_SAMPLE_FEATURES];
+        const int machine = view % machines;
+        for (int i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
+            signature[i] = 0.5f * signatures[machine][i] + 0.5f * random_unit();
+        }
+        need(bslam_learner_show(learner, machine, signature) == BSLAM_OK);
+        bool left = true;
+        while (left) {
+            const uint32_t began = port_ticks();
+            left = bslam_learner_work(learner, 1);
+            ticks += port_ticks() - began;
+        }
+    }
+    need(learner->counters.updates > 0);
+    return (uint32_t)(ticks / learner->counters.updates);
+}
+
+static void measure_filter(int beacons, int velocity_states)
+{
+    bslam_params_default(&params);
+    params.velocity_states = velocity_states;
+    params.confirm_window_us = 0;
+    start(beacons, 0);
+    (void)step_ticks(beacons, SEEN);  // until the covariance has no zeros left
+    report(velocity_states != 0 ? "predict_velocity" : "predict", beacons, step_ticks(beacons, 0));
+    report(velocity_states != 0 ? "step_velocity" : "step", beacons, step_ticks(beacons, SEEN));
+    if (velocity_states == 0) {
+        report("augment", beacons, augment_ticks(beacons));
+        report("associate_mahalanobis", beacons, associate_ticks(beacons, bslam_associate_mahalanobis));
+    }
+}
+
+static void measure_learning(int beacons)
+{
+    need(bslam_looks_init(&looks, NULL, 0) == BSLAM_OK);
+    report("train", beacons, train_ticks(beacons));
+}
+
+int main(void)
+{
+    static const int sizes[] = {6, 20, 50};
+    port_init();
+    random_state = 1;
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        for (int i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
+            signatures[b][i] = random_unit();
+        }
+    }
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        measure_filter(sizes[i], 0);
+        measure_filter(sizes[i], 1);
+        measure_learning(sizes[i]);
+    }
+    put_text("end\n");
+    port_exit(0);
+}
