@@ -1,6 +1,6 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
-# live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (cross-compiling, sizes), lint.mk (style),
-# bench.mk (instruction counts), docs.mk (generated documents).
+# live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (the library for a core), images.mk (images
+# for boards, sizes), lint.mk (style), bench.mk (instruction counts), docs.mk (generated documents).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -78,17 +78,18 @@ train: setup ## train the beacon detectors on rendered worlds, write firmware/mo
 # --- Testing ------------------------------------------------------------------------------------------------
 
 .PHONY: test pytest
-test: setup ## lint, C unit tests (float, double; sanitizers), cross-compilation, pytest
-	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit firmware pytest \
+test: setup ## lint, C unit tests (float, double; sanitizers), firmware in QEMU and its sizes, pytest
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit check-sizes pytest \
 	    || { echo "make test: FAILED, see above" >&2; exit 1; }
-	@echo "make test: all passed (lint, C unit tests in float and double, firmware build, pytest)"
+	@echo "make test: all passed (lint, C unit tests in float and double, firmware and its sizes, pytest)"
 
 pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
 .PHONY: proof
-proof: setup ## what takes longer: everything `make test` does, and the firmware for every target
+proof: setup ## what takes longer: `make test`, the library for every core, the same bits over 5000 steps
 	@$(MAKE) --no-print-directory test firmware-all
+	@$(PYTHON) tools/same_bits.py --steps 5000
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

@@ -25,7 +25,8 @@ firmware: $(if $(filter $(TARGET),$(BOARDS)),image,library)-$(TARGET) ## build f
 define core_rules
 CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
 CORE_COMPILE_$(1) := $(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_$(1)) -Os -g \
-    -ffunction-sections -fdata-sections $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(STACK_BYTES_MAX)
+    -fno-math-errno -DBSLAM_PARAM_MEANINGS=0 -ffunction-sections -fdata-sections \
+    $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(STACK_BYTES_MAX)
 
 .PHONY: library-$(1)
 library-$(1): build/$(1)/libbslam.a

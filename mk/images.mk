@@ -16,7 +16,8 @@ APP_SOURCES := firmware/app/session.c
 PROGRAMS := robot selftest
 
 # A square root needs no errno. The stack that each function takes is for tools/check_image.py.
-IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage
+IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
+    -DBSLAM_PARAM_MEANINGS=0
 
 IMAGE_LINK := -nostartfiles --specs=nano.specs --specs=nosys.specs -Wl,--gc-sections -Wl,--build-id=sha1 \
     -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments
@@ -27,6 +28,7 @@ BOARD_ARM_$(1) := $(ARM)gcc -mthumb $(TARGET_FLAGS_$(BOARD_CORE_$(1)))
 BOARD_COMPILE_$(1) := $$(BOARD_ARM_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(CORE_SOURCES) $(APP_SOURCES) $(BOARD_SOURCES_$(1)))
+BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
 BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
 
 build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
@@ -39,9 +41,9 @@ build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/po
 	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1)
 
 .PHONY: image-$(1)
-image-$(1): $(patsubst %,build/$(1)/%.elf,$(PROGRAMS) $(BOARD_PROGRAMS_$(1)))
+image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 
--include $$(BOARD_OBJECTS_$(1):.o=.d) $(patsubst %,build/$(1)/firmware/app/%.d,$(PROGRAMS) $(BOARD_PROGRAMS_$(1)))
+-include $$(BOARD_OBJECTS_$(1):.o=.d) $$(BOARD_ALL_$(1):%=build/$(1)/firmware/app/%.d)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
@@ -65,3 +67,10 @@ images: $(BOARDS:%=image-%) $(HOST_ROBOT) ## link the images of every board, and
 .PHONY: selftest
 selftest: images ## run the self-test of every board that QEMU has
 	@$(PYTHON) tools/run_image.py selftest
+
+.PHONY: sizes-doc check-sizes
+sizes-doc: images library-m4f ## measure flash, RAM, stack and instructions anew, write docs/SIZES.md
+	@$(PYTHON) tools/sizes_doc.py
+
+check-sizes: images library-m4f
+	@$(PYTHON) tools/sizes_doc.py --check

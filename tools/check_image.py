@@ -26,7 +26,7 @@ CALLED_BY_POINTER = (
 )
 """Callers, and whom they may call through a pointer."""
 
-INTERRUPT = "systick_interrupt"
+INTERRUPTS = ("systick_interrupt", "port_interrupt")
 INTERRUPT_FRAME_BYTES = 26 * 4 + 4
 """What the core saves when it takes an interrupt: 8 registers, 18 of the FPU, and up to 4 bytes to align."""
 
@@ -178,7 +178,7 @@ def main(argv: list[str] | None = None) -> int:
     disassembly = output_of(f"{options.tools}objdump", "-d", "--no-show-raw-insn", str(options.image))
     graph = CallGraph(read_functions(disassembly), read_frames(options.objects))
     depth, path = graph.deepest("start_reset")
-    interrupt, _ = graph.deepest(INTERRUPT)
+    interrupt = max(graph.deepest(name)[0] for name in INTERRUPTS)  # they do not nest
     needed, room = depth + interrupt + INTERRUPT_FRAME_BYTES, stack_room(symbols)
     findings = [*unwanted(symbols), *graph.faults]
     if needed > room:

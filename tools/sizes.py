@@ -10,17 +10,20 @@ import sys
 import tempfile
 from pathlib import Path
 
-PROBE = """#include "bslam/bslam.h"
+PROBE = """#include "{}"
 unsigned char bslam_size_probe[sizeof({})];
 """
 
 
-def instance_bytes(compiler: str, nm: str, beacons_max: int, type_name: str) -> int:
+def instance_bytes(
+    compiler: str, nm: str, beacons_max: int, type_name: str, header: str = "bslam/bslam.h"
+) -> int:
     """sizeof(type_name) for a map of `beacons_max`; `compiler` is a command with its flags."""
     with tempfile.TemporaryDirectory() as folder:
         probe = Path(folder) / "probe.o"
-        compile_probe = f"{compiler} -DBSLAM_BEACONS_MAX={beacons_max} -x c - -c -o {shlex.quote(str(probe))}"
-        subprocess.run(shlex.split(compile_probe), input=PROBE.format(type_name), check=True, text=True)
+        source = PROBE.format(header, type_name)
+        compile_probe = f"{compiler} -DBSLAM_BEACONS_MAX={beacons_max} -xc - -c -o {shlex.quote(str(probe))}"
+        subprocess.run(shlex.split(compile_probe), input=source, check=True, text=True)
         list_symbols = [nm, "--portability", str(probe)]
         listing = subprocess.run(list_symbols, check=True, capture_output=True, text=True).stdout
     _name, _kind, _address, size = listing.split()

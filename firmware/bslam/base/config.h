@@ -123,6 +123,14 @@
 #error "BSLAM_LEARNER_STEPS_MAX is 100 to 100000"
 #endif
 
+/// 0: bslam_params_info has no texts of what a parameter means, which saves 4 KB of flash.
+#ifndef BSLAM_PARAM_MEANINGS
+#define BSLAM_PARAM_MEANINGS 1
+#endif
+#if BSLAM_PARAM_MEANINGS != 0 && BSLAM_PARAM_MEANINGS != 1
+#error "BSLAM_PARAM_MEANINGS is 0 or 1"
+#endif
+
 /// 0: samples have 8 bits a feature. 1: float32, four times the RAM.
 #ifndef BSLAM_SAMPLE_FLOAT
 #define BSLAM_SAMPLE_FLOAT 0

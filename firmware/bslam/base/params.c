@@ -2,10 +2,15 @@
 
 #include <stddef.h>
 
+#if BSLAM_PARAM_MEANINGS
+#define MEANING(text) text
+#else
+#define MEANING(text) ""
+#endif
 #define INFO_REAL(name, value, low, high, meaning) \
-    {#name, meaning, BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), false},
+    {#name, MEANING(meaning), BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), false},
 #define INFO_INTEGER(name, value, low, high, meaning) \
-    {#name, meaning, (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
+    {#name, MEANING(meaning), (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
 static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)};
 
 #define OFFSET(name, value, low, high, meaning) offsetof(bslam_params_t, name),

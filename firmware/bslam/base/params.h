@@ -132,7 +132,7 @@ typedef struct bslam_params {
 /// One line of the table, for tools and parameter servers.
 typedef struct bslam_param_info {
     const char *name;
-    const char *meaning;
+    const char *meaning;  ///< empty without BSLAM_PARAM_MEANINGS
     bslam_real_t initial;
     bslam_real_t low;
     bslam_real_t high;

@@ -11,9 +11,11 @@ extern uint32_t start_bss[], start_bss_end[];
 int main(void);
 void systick_interrupt(void);
 void start_reset(void);
+void port_interrupt(void);
 static void fault(void);
 
 #define EXCEPTIONS 16
+#define INTERRUPTS 112
 
 /// An entry is an address, of code but for the first.
 typedef union vector {
@@ -21,11 +23,12 @@ typedef union vector {
     void (*handler)(void);
 } vector_t;
 
-__attribute__((section(".vectors"), used)) static const vector_t vectors[EXCEPTIONS] = {
-    {.stack = start_stack_top}, {.handler = start_reset},  {.handler = fault},  // NMI
-    {.handler = fault},  // hard fault, and what escalates to it
-    {.handler = fault},         {.handler = fault},        {.handler = fault},
-    [11] = {.handler = fault},  [14] = {.handler = fault}, [15] = {.handler = systick_interrupt},
+__attribute__((section(".vectors"), used)) static const vector_t vectors[EXCEPTIONS + INTERRUPTS] = {
+    [0] = {.stack = start_stack_top},
+    [1] = {.handler = start_reset},
+    [2 ... 14] = {.handler = fault},
+    [15] = {.handler = systick_interrupt},
+    [16 ... EXCEPTIONS + INTERRUPTS - 1] = {.handler = port_interrupt},
 };
 
 #if defined(__ARM_FP)
@@ -41,6 +44,12 @@ static void enable_fpu(void)
 static void fault(void)
 {
     port_exit(70);
+}
+
+/// A port that enables an interrupt has a handler of its own.
+__attribute__((weak)) void port_interrupt(void)
+{
+    fault();
 }
 
 void start_reset(void)

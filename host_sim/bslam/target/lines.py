@@ -96,7 +96,9 @@ class QemuLine:
             raise BslamError(f"{self._image} is missing: build it with: make firmware TARGET={board}")
         self._board = board
         self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
+        self._first = b""
         self._socket, self._process = self._start(machines[board])
+        self._first = self._wait_for_start()
 
     def _start(self, machine: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
         path = str(Path(self._folder.name) / "line")
@@ -120,6 +122,13 @@ class QemuLine:
             listener.close()
         return line, process
 
+    def _wait_for_start(self) -> bytes:
+        """A UART drops what comes before the program has enabled it: its first bytes say that it has."""
+        data = self.read(START_TIMEOUT_S)
+        if not data:
+            raise TargetError(f"{self._image} on {QEMU} says nothing")
+        return data
+
     @property
     def description(self) -> dict[str, Any]:
         return _image_description(self._image)
@@ -131,7 +140,8 @@ class QemuLine:
             raise TargetError(self._gone()) from error
 
     def read(self, timeout_s: float) -> bytes:
-        return _receive(self._socket, timeout_s, self._gone)
+        first, self._first = self._first, b""
+        return first or _receive(self._socket, timeout_s, self._gone)
 
     def _gone(self) -> str:
         self._process.kill()
@@ -141,7 +151,9 @@ class QemuLine:
     def close(self) -> None:
         self._socket.close()
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
+        assert self._process.stderr is not None
+        self._process.stderr.close()
         self._folder.cleanup()
 
 

@@ -1,0 +1,184 @@
+"""Writes docs/SIZES.md: flash, RAM, stack and instructions of the firmware, all measured here.
+
+With --check nothing is written: exit status 1 if a figure of the file is more than 2 % off what is measured
+now, one finding a line. Whoever accepts the change writes the file anew.
+"""
+
+import argparse
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, ROOT
+from check_image import CallGraph, output_of, read_frames, read_functions
+from run_image import run_image
+from sizes import instance_bytes
+
+FILE = ROOT / "docs" / "SIZES.md"
+TOLERANCE = 0.02
+TICKS_HZ = 25_000_000
+"""Of the emulated boards (port_ticks_hz)."""
+COST_BOARDS = {"Cortex-M0+": "mps2_an385", "Cortex-M4F": "mps2_an386", "Cortex-M7": "mps2_an500"}
+BEACONS = (6, 20, 50)
+M4F = "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"
+COMPILER = f"arm-none-eabi-gcc -std=c11 -ffp-contract=off -I{ROOT / 'firmware'} -mthumb {M4F} -Os"
+SLAM_LAYERS = ("base", "math", "odometry", "model", "ekf", "association", "slam", "svm", "link")
+STRUCTS = {
+    "bslam_slam_t": "bslam/bslam.h",
+    "bslam_looks_t": "bslam/bslam.h",
+    "bslam_vision_t": "bslam/vision/vision.h",
+}
+STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
+PARTS = {
+    "predict": "odometry and an empty frame",
+    "step": "odometry and a frame of 3 sightings with distance, identity known",
+    "predict_velocity": "the same as predict, with velocity states",
+    "step_velocity": "the same as step, with velocity states",
+    "augment": "a frame that starts a beacon",
+    "associate_mahalanobis": "3 sightings against the whole map",
+    "train": "one training of a machine, mean, on made-up signatures that are hard to part",
+}
+
+Row = Sequence[object]
+
+
+def table(head: Row, rows: Sequence[Row]) -> str:
+    """A table in Markdown; the first column to the left, numbers to the right."""
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
+
+
+def flash_by_layer() -> dict[str, int]:
+    """Code and constants of build/m4f/libbslam.a by layer, bytes."""
+    found: dict[str, int] = defaultdict(int)
+    for path in sorted((BUILD_DIR / "m4f").rglob("*.o")):
+        text, data = output_of("arm-none-eabi-size", str(path)).splitlines()[1].split()[:2]
+        found[path.parent.name] += int(text) + int(data)
+    return found
+
+
+def image_sections(path: Path) -> tuple[int, int]:
+    """Bytes of ROM and RAM of an image; the RAM without the stack."""
+    sizes = defaultdict(int)
+    for line in output_of("arm-none-eabi-size", "-A", str(path)).splitlines():
+        words = line.split()
+        if len(words) == 3 and words[1].isdigit():
+            sizes[words[0]] = int(words[1])
+    rom = sizes[".text"] + sizes[".note.gnu.build-id"] + sizes[".ARM.exidx"] + sizes[".data"]
+    return rom, sizes[".data"] + sizes[".bss"]
+
+
+def stack_of(path: Path, functions: Sequence[str]) -> dict[str, int]:
+    """Bytes of stack from a function on, in an image."""
+    disassembly = output_of("arm-none-eabi-objdump", "-d", "--no-show-raw-insn", str(path))
+    graph = CallGraph(read_functions(disassembly), read_frames(path.parent))
+    return {name: graph.deepest(name)[0] for name in functions}
+
+
+def costs(board: str) -> dict[tuple[str, int], int]:
+    """Instructions by part and number of beacons."""
+    ended = run_image(board, "cost")
+    if ended.status != 0:
+        raise SystemExit(f"cost on {board} ended with status {ended.status}: {ended.output}")
+    lines = re.findall(r"^(\w+) (\d+) (\d+)\r?$", ended.output, re.MULTILINE)
+    ns_a_tick = 1_000_000_000 // TICKS_HZ
+    return {(name, int(size)): int(ticks) * ns_a_tick // NS_PER_INSTRUCTION for name, size, ticks in lines}
+
+
+def ram_rows() -> Iterator[Row]:
+    for struct, header in STRUCTS.items():
+        sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
+        yield (f"`{struct}`", *sizes)
+
+
+def document() -> str:
+    """The whole page."""
+    flash = flash_by_layer()
+    slam = sum(flash[layer] for layer in SLAM_LAYERS)
+    images = sorted(BUILD_DIR.glob("*/robot.elf"))
+    measured = {core: costs(board) for core, board in COST_BOARDS.items()}
+    cost_rows = [
+        (f"`{part}`", n, *(measured[core][part, n] for core in COST_BOARDS))
+        for part in PARTS
+        for n in BEACONS
+        if (part, n) in measured["Cortex-M4F"]
+    ]
+    parts = "".join(f"- `{name}`: {what}.\n" for name, what in PARTS.items())
+    stacks = [
+        (core, *stack_of(BUILD_DIR / board / "robot.elf", STEP_FUNCTIONS).values())
+        for core, board in COST_BOARDS.items()
+    ]
+    return f"""# What bslam costs on a microcontroller
+
+Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. Compiler: \
+{output_of("arm-none-eabi-gcc", "--version").splitlines()[0]}.
+
+## Flash
+
+Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
+takes of it what is called.
+
+{table(("layer", "bytes"), [*((name, flash[name]) for name in sorted(flash)), ("all but vision", slam)])}
+## RAM
+
+Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_looks_t` is \
+for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam.
+
+{table(("instance", *BEACONS), list(ram_rows()))}
+## Images
+
+`robot.elf`, `-O2`, bytes; RAM without the stack. The MPS2 boards have the host's largest sizes (80 beacons).
+
+{table(("image", "ROM", "RAM"), [(path.parent.name, *image_sections(path)) for path in images])}
+## Stack
+
+The longest path from a call on, bytes, from the linked image: the compiler's frames along the call graph \
+(tools/check_image.py).
+
+{table(("core", *(f"`{name}`" for name in STEP_FUNCTIONS)), stacks)}
+## Instructions
+
+Counted by QEMU (`-icount`), the same at every run; instructions are not cycles. `-O2`, invariant filter, \
+`firmware/app/cost.c`. No board of QEMU has a Cortex-M0+: its image runs on a Cortex-M3.
+
+{table(("part", "beacons", *COST_BOARDS), cost_rows)}
+{parts}"""
+
+
+def differences(stands: str, measured: str) -> Iterator[str]:
+    """Lines whose figures differ by more than the tolerance, or that are not there."""
+    old, new = stands.splitlines(), measured.splitlines()
+    if len(old) != len(new):
+        yield f"{len(old)} lines stand, {len(new)} are measured"
+        return
+    number = re.compile(r"\b\d+\b")
+    for before, now in zip(old, new, strict=True):
+        if number.sub("", before) != number.sub("", now):
+            yield f"stands: {before}\n  now: {now}"
+            continue
+        pairs = zip(map(int, number.findall(before)), map(int, number.findall(now)), strict=True)
+        if any(abs(a - b) > TOLERANCE * max(a, b) for a, b in pairs):
+            yield f"stands: {before}\n  now: {now}"
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing, compare")
+    options = parser.parse_args(argv)
+    text = document()
+    if not options.check:
+        FILE.write_text(text, encoding="utf-8")
+        return 0
+    stands = FILE.read_text(encoding="utf-8") if FILE.is_file() else ""
+    found = list(differences(stands, text))
+    for finding in found:
+        print(f"{FILE.relative_to(ROOT)}: {finding}", file=sys.stderr)
+    if found:
+        print("if that is as it should be: make sizes-doc", file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
