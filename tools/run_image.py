@@ -9,7 +9,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from bslam.target.lines import BUILD_DIR, QEMU, qemu_machines
+from bslam.target.lines import BUILD_DIR, ICOUNT, QEMU, qemu_machines
 
 TIMEOUT_S = 120.0
 
@@ -27,7 +27,7 @@ def run_image(board: str, program: str, *more: str) -> Ended:
     if shutil.which(QEMU) is None:
         raise SystemExit(f"{QEMU} is not installed: install it with: sudo apt-get install qemu-system-arm")
     command = [QEMU, "-M", qemu_machines()[board], "-display", "none", "-monitor", "none"]
-    command += ["-semihosting-config", "enable=on,target=native", "-icount", "shift=6,sleep=off"]
+    command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
     command += ["-serial", "stdio", "-kernel", str(BUILD_DIR / board / f"{program}.elf"), *more]
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=TIMEOUT_S)

@@ -83,8 +83,8 @@ def costs(board: str) -> dict[tuple[str, int], int]:
     if ended.status != 0:
         raise SystemExit(f"cost on {board} ended with status {ended.status}: {ended.output}")
     lines = re.findall(r"^(\w+) (\d+) (\d+)\r?$", ended.output, re.MULTILINE)
-    ns_a_tick = 1_000_000_000 // TICKS_HZ
-    return {(name, int(size)): int(ticks) * ns_a_tick // NS_PER_INSTRUCTION for name, size, ticks in lines}
+    instructions_a_tick = 1e9 / TICKS_HZ / NS_PER_INSTRUCTION
+    return {(name, int(size)): round(int(ticks) * instructions_a_tick) for name, size, ticks in lines}
 
 
 def ram_rows() -> Iterator[Row]:

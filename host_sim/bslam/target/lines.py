@@ -21,8 +21,9 @@ BOARD_FILES = "firmware/port/*/board.mk"
 
 QEMU = "qemu-system-arm"
 TARGET_KINDS = ("qemu", "serial", "process")
-NS_PER_INSTRUCTION = 64
-"""QEMU's clock under `-icount shift=6`: an instruction takes that long, so that ticks count instructions."""
+ICOUNT = "shift=7,sleep=off"
+NS_PER_INSTRUCTION = 128
+"""QEMU's clock under ICOUNT: an instruction takes that long, more than a tick, so that ticks count them."""
 START_TIMEOUT_S = 30.0
 
 
@@ -107,7 +108,7 @@ class QemuLine:
         listener.listen(1)
         listener.settimeout(START_TIMEOUT_S)
         command = [QEMU, "-M", machine, "-display", "none", "-monitor", "none", "-kernel", str(self._image)]
-        command += ["-semihosting-config", "enable=on,target=native", "-icount", "shift=6,sleep=off"]
+        command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
         command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line"]
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE

@@ -234,8 +234,8 @@ class RemoteSlam:
     def _take_step(self, answer: Answer, what: str) -> None:
         self._step = messages.read_step(answer.body)
         if self._line.ns_per_instruction is not None:
-            ns = self._step.ticks * 1_000_000_000 // self._client.info.ticks_hz
-            self._instructions.append(ns // self._line.ns_per_instruction)
+            ns = self._step.ticks * 1e9 / self._client.info.ticks_hz
+            self._instructions.append(round(ns / self._line.ns_per_instruction))
         self._ensure(answer, what)
 
     def _last_step(self) -> Step:
