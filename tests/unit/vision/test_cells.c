@@ -2,7 +2,7 @@
 
 #include "bslam/vision/cells.h"
 
-#define COLUMNS 16
+#define COLUMNS 20
 #define ROWS 12
 #define CELLS (COLUMNS * ROWS)
 
@@ -23,7 +23,7 @@ static const bslam_camera_t camera = {
     .height_px = 4 * ROWS,
     .fx_px = 50,
     .fy_px = 50,
-    .cx_px = 32,
+    .cx_px = 2 * COLUMNS,
     .cy_px = 20,
     .z_m = 1,
 };

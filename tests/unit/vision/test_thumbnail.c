@@ -100,6 +100,50 @@ static void test_row_half_resolution_is_the_mean_of_four_rounded(void **state)
     assert_int_equal(thumbnail.half[3 * (WIDTH / 2) + 4], rgb565(11, 21, 30));
 }
 
+/// Sums of the channels of `side` x `side` pixels.
+static void plain_sums(int row, int column, int side, int sums[3])
+{
+    memset(sums, 0, 3 * sizeof sums[0]);
+    for (int r = row; r < row + side; r++) {
+        for (int c = column; c < column + side; c++) {
+            sums[0] += picture[r][c] >> 11;
+            sums[1] += picture[r][c] >> 5 & 63;
+            sums[2] += picture[r][c] & 31;
+        }
+    }
+}
+
+static void test_row_random_picture_is_summed_as_pixel_by_pixel(void **state)
+{
+    unit_random_t random = {21};
+    for (int row = 0; row < HEIGHT; row++) {
+        for (int column = 0; column < WIDTH; column++) {
+            picture[row][column] = (uint16_t)unit_random(&random, 0, 65536);
+        }
+    }
+    stream_in();
+    int sums[3];
+    for (int i = 0; i < WIDTH / 2 * (HEIGHT / 2); i++) {
+        plain_sums(i / (WIDTH / 2) * 2, i % (WIDTH / 2) * 2, 2, sums);
+        assert_int_equal(thumbnail.half[i], rgb565((sums[0] + 2) / 4, (sums[1] + 2) / 4, (sums[2] + 2) / 4));
+    }
+    for (int i = 0; i < WIDTH / 4 * (HEIGHT / 4); i++) {
+        const int row = i / (WIDTH / 4) * 4, column = i % (WIDTH / 4) * 4;
+        int low = 1000, high = 0;
+        for (int quarter = 0; quarter < 4; quarter++) {
+            plain_sums(row + quarter / 2 * 2, column + quarter % 2 * 2, 2, sums);
+            low = sums[0] + sums[1] < low ? sums[0] + sums[1] : low;
+            high = sums[0] + sums[1] > high ? sums[0] + sums[1] : high;
+        }
+        plain_sums(row, column, 4, sums);
+        const bslam_cell_t cell = bslam_cell_at(&thumbnail.cells, i);
+        assert_int_equal(cell.red, sums[0] / 2);
+        assert_int_equal(cell.green, sums[1] / 4);
+        assert_int_equal(cell.blue, sums[2] / 2);
+        assert_int_equal(cell.spread, high - low > 255 ? 255 : high - low);
+    }
+}
+
 static void test_row_extremes_do_not_run_over(void **state)
 {
     fill(rgb565(31, 63, 31));
@@ -172,6 +216,7 @@ int main(void)
         cmocka_unit_test(test_row_beyond_the_last_is_refused_and_nothing_changes),
         cmocka_unit_test(test_row_cell_is_the_mean_of_its_pixels_by_hand),
         cmocka_unit_test(test_row_half_resolution_is_the_mean_of_four_rounded),
+        cmocka_unit_test(test_row_random_picture_is_summed_as_pixel_by_pixel),
         cmocka_unit_test(test_row_extremes_do_not_run_over),
         cmocka_unit_test(test_row_rgb888_is_as_rgb565),
         cmocka_unit_test(test_row_picture_moved_by_a_cell_moves_the_cells),

@@ -385,6 +385,81 @@ static void test_end_same_frames_give_the_same_state(void **state)
     }
 }
 
+enum { LIGHT, SPREAD, STEP_X, LIKELY, FLOOR, MEANS };
+
+/// Sums over a zone of a box, cell by cell, every other row if there are more than 16; adds them to `sums`,
+/// returns how many cells.
+static int plain_zone(const bslam_proposal_t *box, int zone, double sums[MEANS])
+{
+    const int width = box->right - box->left, height = box->bottom - box->top;
+    const int left = box->left + zone % 3 * width / 3, right = box->left + (zone % 3 + 1) * width / 3;
+    const int top = box->top + zone / 3 * height / 3, bottom = box->top + (zone / 3 + 1) * height / 3;
+    const int stride = (right - left) * (bottom - top) > 16 ? 2 : 1;
+    int cells = 0;
+    for (int row = top; row < bottom; row += stride) {
+        for (int i = row * (WIDTH / 4) + left; i < row * (WIDTH / 4) + right; i++) {
+            const bslam_tone_t tone = bslam_tone_at(&vision.tones, i);
+            const int seen = vision.backgrounds[0].counts[BSLAM_ZONE_FLOOR][bslam_tone_bin(tone)];
+            sums[LIGHT] += tone.light;
+            sums[SPREAD] += tone.spread;
+            sums[STEP_X] += vision.step_x[i];
+            sums[LIKELY] += vision.values[i] > 0 ? 1 : 0;
+            sums[FLOOR] += seen < BSLAM_FREQUENT_MAX ? seen : BSLAM_FREQUENT_MAX;
+            cells++;
+        }
+    }
+    return cells;
+}
+
+/// The zones and the texture of boxes of all sizes, summed many cells at a time, against cell by cell.
+static void test_blob_features_are_means_over_the_cells(void **state)
+{
+    enum { TEXTURE = 47, ZONE_MIDDLE = 62 + 2 * 4 };  // where these features begin
+    unit_random_t random = {9};
+    for (int row = 0; row < HEIGHT; row++) {
+        for (int column = 0; column < WIDTH; column++) {
+            for (int channel = 0; channel < 3; channel++) {
+                picture[row][column][channel] = (uint8_t)unit_random(&random, 40, 60 + row / 2);
+            }
+        }
+    }
+    for (int i = 0; i < BSLAM_CELL_FEATURES; i++) {
+        detector.cell_weights[i] = (float)unit_random(&random, -0.02, 0.02);
+    }
+    const bslam_camera_t camera = camera_at(0);
+    assert_int_equal(bslam_vision_init(&vision, &model, &camera, 1), BSLAM_OK);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    for (int k = 0; k < 200; k++) {
+        const int width = (int)unit_random(&random, 2, WIDTH / 4),
+                  height = (int)unit_random(&random, 2, HEIGHT / 4);
+        const int left = (int)unit_random(&random, 0, WIDTH / 4 - width);
+        const int top = (int)unit_random(&random, 0, HEIGHT / 4 - height);
+        const bslam_proposal_t box = {
+            .left = (int16_t)left,
+            .top = (int16_t)top,
+            .right = (int16_t)(left + width),
+            .bottom = (int16_t)(top + height),
+            .cells = (uint16_t)(width * height),
+            .box = {real(4 * left), real(4 * top), real(4 * (left + width)), real(4 * (top + height))}};
+        float features[BSLAM_BLOB_FEATURES];
+        vision.proposals.items[0] = box;
+        bslam_vision_blob_features(&vision, 0, features);
+        double sums[MEANS] = {0}, middle[MEANS] = {0};
+        int cells = 0;
+        for (int zone = 0; zone < 9; zone++) {
+            cells += plain_zone(&box, zone, sums);
+        }
+        const int of_middle = plain_zone(&box, 4, middle);
+        const double light = sums[LIGHT] / cells;
+        assert_near(features[TEXTURE], light - vision.backgrounds[0].tone[BSLAM_ZONE_WALL].light, 1e-4);
+        assert_near(features[TEXTURE + 6], sums[LIKELY] / cells, 1e-5);
+        assert_near(features[TEXTURE + 7], sums[SPREAD] / cells, 1e-4);
+        assert_near(features[TEXTURE + 8], sums[STEP_X] / cells, 1e-4);
+        assert_near(features[TEXTURE + 14], sums[FLOOR] / cells, 1e-4);
+        assert_near(features[ZONE_MIDDLE], of_middle > 0 ? middle[LIGHT] / of_middle - light : 0, 1e-4);
+    }
+}
+
 static void test_end_noise_keeps_within_all_bounds(void **state)
 {
     unit_random_t random = {5};
@@ -442,6 +517,7 @@ int main(void)
         TEST(test_end_candidates_come_surest_first),
         TEST(test_end_box_of_another_size_than_its_kind_is_no_candidate),
         TEST(test_end_same_frames_give_the_same_state),
+        TEST(test_blob_features_are_means_over_the_cells),
         TEST(test_end_noise_keeps_within_all_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
