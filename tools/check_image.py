@@ -2,8 +2,8 @@
 
 No double arithmetic, heap or printf, by the image's symbols. No recursion, and no more stack than the image
 sets aside: the longest path through the call graph of the disassembled image, with each function's frame as
-the compiler gives it (-fstack-usage), or as its first instructions show (libgcc, libm). A call through a
-pointer may go to any function that CALLED_BY_POINTER names for its caller.
+the compiler gives it (-fstack-usage), or as its instructions show (libgcc, libm, names that are not unique).
+A call through a pointer may go to any function that CALLED_BY_POINTER names for its caller.
 
 Exit status 0: all is well. 1: what is wrong, one finding a line.
 """
@@ -91,16 +91,15 @@ def _listed_registers(operands: str) -> int:
 
 
 def read_frames(folder: Path) -> dict[str, int]:
-    """Bytes of stack by function, of the compiler's .su files; the largest where two share a name."""
-    frames: dict[str, int] = {}
+    """Bytes of stack by function, of the compiler's .su files; without names that several files use."""
+    sizes: dict[str, set[int]] = {}
     for path in folder.rglob("*.su"):
         for line in path.read_text(encoding="utf-8").splitlines():
             place, size, kind = line.split("\t")
             if "dynamic" in kind and "bounded" not in kind:
                 raise SystemExit(f"{path}: {place}: a stack frame without bound")
-            name = place.rsplit(":", 1)[1]
-            frames[name] = max(frames.get(name, 0), int(size))
-    return frames
+            sizes.setdefault(place.rsplit(":", 1)[1], set()).add(int(size))
+    return {name: max(found) for name, found in sizes.items() if len(found) == 1}
 
 
 class CallGraph:
