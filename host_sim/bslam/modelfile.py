@@ -50,12 +50,17 @@ class Svm:
 class BeaconClass:
     """A kind of beacon, or one object of a user's.
 
-    height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known.
+    height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known. top_low_m to
+    top_high_m: how high its upper side is above the floor; 0: not known. looks_sd: by what part a distance
+    from its height errs because of its looks, a pale rim say.
     """
 
     name: str
     height_m: float = 0.0
     depth_m: float = 0.0
+    top_low_m: float = 0.0
+    top_high_m: float = 0.0
+    looks_sd: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,16 @@ from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
-    BeaconClass("extinguisher", 0.60, 0.0),  # round: it shows no flank
-    BeaconClass("radiator", 0.60, 0.12),
-    BeaconClass("door", 2.00, 0.035),
-    BeaconClass("window", 1.20, 0.04),
-    BeaconClass("poster", 0.84, 0.015),
-    BeaconClass("sign", 0.30, 0.015),
-    BeaconClass("cabinet", 1.80, 0.375),
+    BeaconClass("extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01),  # round: it shows no flank
+    BeaconClass("radiator", 0.60, 0.12, 0.70, 0.70, 0.08),
+    BeaconClass("door", 2.00, 0.035, 2.00, 2.00, 0.01),
+    BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.03),
+    BeaconClass("poster", 0.84, 0.015, 1.92, 1.92, 0.05),
+    BeaconClass("sign", 0.30, 0.015, 1.75, 2.35, 0.09),
+    BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02),
 )
-"""Whole heights and middling depths, in the order of KINDS."""
+"""In the order of KINDS: whole heights, middling depths, where their upper sides are, and what their looks make
+of a distance in training worlds (tools/measure_outline.py --style train)."""
 
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""

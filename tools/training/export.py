@@ -10,6 +10,7 @@ import hashlib
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ class Header:
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
         """Add a table of kinds or objects; its name."""
         rows = "".join(
-            f"    {{{c_string(one.name)}, {c_float(one.height_m)}, {c_float(one.depth_m)}}},\n"
+            f"    {{{', '.join([c_string(one.name), *map(c_float, astuple(one)[1:])])}}},\n"
             for one in classes
         )
         self._body.append(f"static const bslam_beacon_class_t {name}[{len(classes)}] = {{\n{rows}}};")

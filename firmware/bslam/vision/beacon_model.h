@@ -18,8 +18,11 @@ enum {
 /// A kind of beacon.
 typedef struct bslam_beacon_class {
     const char *name;
-    float height_m;  ///< of every beacon of the kind; 0: not known, direction only
-    float depth_m;   ///< how far it stands out from the wall: what of it is a flank; 0: flat, or not known
+    float height_m;    ///< of every beacon of the kind; 0: not known, direction only
+    float depth_m;     ///< how far it stands out from the wall: what of it is a flank; 0: flat, or not known
+    float top_low_m;   ///< its upper side is so high above the floor at least,
+    float top_high_m;  ///< and at most; 0: not known
+    float looks_sd;    ///< what its looks (a pale rim, a lid) make of a distance by its height, as a fraction
 } bslam_beacon_class_t;
 
 /// The detector for one kind of lens.

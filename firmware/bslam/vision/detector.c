@@ -38,17 +38,18 @@ void bslam_detector_normalise(const bslam_detector_model_t *model, float feature
 static void choose_class(const float *kinds, int32_t class_count, bslam_candidate_t *candidate)
 {
     int32_t best = 0;
-    float second = -1e9f;
+    int32_t next = -1;
     for (int32_t c = 1; c < class_count; c++) {
         if (kinds[c] > kinds[best]) {
-            second = kinds[best];
+            next = best;
             best = c;
-        } else if (kinds[c] > second) {
-            second = kinds[c];
+        } else if (next < 0 || kinds[c] > kinds[next]) {
+            next = c;
         }
     }
     candidate->beacon_class = (uint8_t)(best + 1);
-    candidate->class_margin = kinds[best] - second;
+    candidate->second_class = (uint8_t)(next + 1);
+    candidate->class_margin = kinds[best] - (next < 0 ? -BSLAM_FUSION_LIMIT : kinds[next]);
 }
 
 /// True if the box is far from as high as its kind is, where the floor line tells; a box at the upper or

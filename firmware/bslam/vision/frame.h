@@ -97,9 +97,10 @@ enum {
     BSLAM_MARK_CUT_RIGHT = 2,
     BSLAM_MARK_CUT_TOP = 4,
     BSLAM_MARK_CUT_BOTTOM = 8,
-    BSLAM_MARK_SMALL = 16,    ///< too few pixels for a distance or a signature
-    BSLAM_MARK_SLANTED = 32,  ///< seen too obliquely
-    BSLAM_MARK_PART = 64,     ///< its level sides go on beyond it: the outline is that of a part
+    BSLAM_MARK_SMALL = 16,       ///< too few pixels for a distance or a signature
+    BSLAM_MARK_SLANTED = 32,     ///< seen too obliquely
+    BSLAM_MARK_MISPLACED = 128,  ///< by its height it would hang where its kind does not: no distance
+    BSLAM_MARK_PART = 64,        ///< its level sides go on beyond it: the outline is that of a part
 };
 
 /// No object of the model's recogniser.
@@ -115,11 +116,13 @@ typedef struct bslam_candidate {
     bool has_bearing;
     bool has_range;
     uint8_t beacon_class;  ///< 1 + index in the model's class table; BSLAM_CLASS_NONE if unsure
-    float class_margin;    ///< value of the best class less that of the next
+    uint8_t second_class;  ///< the next likely one; BSLAM_CLASS_NONE if there is none
+    float class_margin;    ///< value of the class less that of the next; negative if its place decided
     float score;           ///< detector's decision value: larger is surer
     int16_t object;        ///< index in the model's recogniser; BSLAM_OBJECT_NONE: none of its objects
     float object_margin;   ///< what the recogniser's machine for the likeliest object says
     uint16_t marks;
+    float misplaced_sds;  ///< by how many standard deviations it hangs where its kind does not; 0: not at all
     float signature[BSLAM_SIGNATURE_SIZE];
 } bslam_candidate_t;
 

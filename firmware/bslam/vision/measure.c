@@ -29,6 +29,11 @@ static const bslam_real_t OFF_AXIS_RAD = BSLAM_R(1.05);
 static const bslam_real_t RANGE_DOUBT = 1;
 // A distance that is less certain than this, as a fraction, is none.
 static const bslam_real_t RANGE_SD_MAX = BSLAM_R(0.15);
+// An upper side that is outside its kind's band by more than so many standard deviations is another kind's,
+// or no side. What is known of the band, and of where the horizon is.
+static const bslam_real_t MISPLACED_SDS = 3;
+static const bslam_real_t BAND_SD_M = BSLAM_R(0.015);
+static const bslam_real_t HORIZON_SD_PX = BSLAM_R(0.7);
 // Seen more obliquely than this, tangent, an object is marked and not measured.
 static const bslam_real_t TURN_MAX = BSLAM_R(1.5);
 
@@ -90,11 +95,34 @@ static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camer
            (1 + square * square * square);
 }
 
+/// By how many standard deviations the upper side is out of its band, if the object is so far ahead as its
+/// height says; 0: it is within, or there is no band.
+static bslam_real_t misplaced_sds(const bslam_outline_t *o, const bslam_camera_t *camera,
+                                  const bslam_size_t *size)
+{
+    if (!(size->top_high_m > 0)) {
+        return 0;
+    }
+    const bslam_real_t tall = o->top - o->bottom;
+    const bslam_real_t ahead_m = size->height_m / tall;
+    const bslam_real_t top_m = camera->z_m + ahead_m * o->top;
+    const bslam_real_t out_m = top_m < size->top_low_m    ? size->top_low_m - top_m
+                               : top_m > size->top_high_m ? top_m - size->top_high_m
+                                                          : 0;
+    const bslam_real_t by_top = ahead_m * o->bottom / tall;
+    const bslam_real_t by_bottom = ahead_m * o->top / tall;
+    const bslam_real_t by_horizon = ahead_m * HORIZON_SD_PX * o->pixel;
+    const bslam_real_t variance = BAND_SD_M * BAND_SD_M + by_horizon * by_horizon +
+                                  by_top * by_top * o->top_var + by_bottom * by_bottom * o->bottom_var;
+    return out_m / bslam_sqrt(variance);
+}
+
 /// Direction, and distance if the height is known, with what is left of their errors when the outline is
 /// known.
-static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, bslam_real_t height_m,
-                            bslam_candidate_t *candidate)
+static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
+                            bool is_whole, bslam_candidate_t *candidate)
 {
+    const bslam_real_t height_m = is_whole ? size->height_m : 0;
     const bslam_real_t point_var = POINT_SD_PX * POINT_SD_PX * o->pixel * o->pixel;
     candidate->bearing_rad = bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1));
     candidate->bearing_sd_rad = bslam_sqrt(bearing_variance(o, camera, point_var));
@@ -103,10 +131,16 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
         const bslam_real_t tall = o->top - o->bottom;
         const bslam_real_t ahead_m = height_m / (tall * (1 + o->turn * o->middle));
         const bslam_real_t tall_var = 2 * point_var + RANGE_DOUBT * (o->top_var + o->bottom_var);
-        const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + tall_var / (tall * tall);
+        const bslam_real_t relative_var =
+            RANGE_FLOOR * RANGE_FLOOR + size->looks_sd * size->looks_sd + tall_var / (tall * tall);
         candidate->range_m = ahead_m * bslam_sqrt(1 + o->middle * o->middle);
         candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
         candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
+        candidate->misplaced_sds = (float)misplaced_sds(o, camera, size);
+        if (candidate->misplaced_sds > (float)MISPLACED_SDS) {
+            candidate->marks |= BSLAM_MARK_MISPLACED;
+            candidate->has_range = false;
+        }
     }
 }
 
@@ -132,10 +166,11 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
     candidate->has_bearing = false;
     candidate->has_range = false;
-    if ((marks & sideways) == 0U) {
-        measure_outline(&whole.outline, camera, (marks & upright) == 0U ? size->height_m : 0, candidate);
-    }
+    candidate->misplaced_sds = 0;
     candidate->marks = (uint16_t)marks;
+    if ((marks & sideways) == 0U) {
+        measure_outline(&whole.outline, camera, size, (marks & upright) == 0U, candidate);
+    }
     candidate->outline = found;
     if (bslam_signature(frame, &whole.outline.quad, candidate->signature) != BSLAM_OK) {
         memset(candidate->signature, 0, sizeof candidate->signature);

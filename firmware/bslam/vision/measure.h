@@ -7,8 +7,11 @@
 
 /// What is known of an object's size.
 typedef struct bslam_size {
-    bslam_real_t height_m;  ///< 0: not known
-    bslam_real_t depth_m;   ///< how far it stands out from the wall; 0: it is flat, or not known
+    bslam_real_t height_m;    ///< 0: not known
+    bslam_real_t depth_m;     ///< how far it stands out from the wall; 0: it is flat, or not known
+    bslam_real_t top_low_m;   ///< its upper side is so high above the floor at least,
+    bslam_real_t top_high_m;  ///< and at most; 0: not known
+    bslam_real_t looks_sd;    ///< what its looks make of a distance by its height, as a fraction
 } bslam_size_t;
 
 /// Refines the rough box and fills the candidate's outline, bearing, range, marks and signature; its class,

@@ -1,3 +1,4 @@
+#include "bslam/base/types.h"
 #include "bslam/vision/vision.h"
 
 #include <stddef.h>
@@ -207,7 +208,40 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
 
 static bslam_size_t size_of(const bslam_beacon_class_t *kind)
 {
-    return (bslam_size_t){.height_m = (bslam_real_t)kind->height_m, .depth_m = (bslam_real_t)kind->depth_m};
+    return (bslam_size_t){
+        .height_m = (bslam_real_t)kind->height_m,
+        .depth_m = (bslam_real_t)kind->depth_m,
+        .top_low_m = (bslam_real_t)kind->top_low_m,
+        .top_high_m = (bslam_real_t)kind->top_high_m,
+        .looks_sd = (bslam_real_t)kind->looks_sd,
+    };
+}
+
+/// What hanging in the wrong place costs, in margins: half the square, and no more than two.
+static float misplacement(const bslam_candidate_t *candidate)
+{
+    const float half_square = candidate->misplaced_sds * candidate->misplaced_sds / 2;
+    return half_square < 2.0f ? half_square : 2.0f;
+}
+
+/// Where the second kind hangs better, so much that it outweighs the margin, the candidate becomes that: a
+/// cabinet is often taken for a door, but would end in the air as one.
+static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *frame,
+                             const bslam_box_t *rough, bslam_candidate_t *candidate)
+{
+    if (candidate->second_class == BSLAM_CLASS_NONE || !(candidate->misplaced_sds > 0)) {
+        return;
+    }
+    bslam_candidate_t other = *candidate;
+    const bslam_size_t size = size_of(&vision->model->classes[candidate->second_class - 1]);
+    if (bslam_measure(frame, &vision->cameras[vision->camera], rough, &size, &other) == BSLAM_OK &&
+        other.has_range &&
+        half_square(other.misplaced_sds) + candidate->class_margin < half_square(candidate->misplaced_sds)) {
+        other.beacon_class = candidate->second_class;
+        other.second_class = candidate->beacon_class;
+        other.class_margin = -candidate->class_margin;
+        *candidate = other;
+    }
 }
 
 /// Direction, distance and signature of a candidate; of a recognised object the distance is by its own
@@ -222,7 +256,11 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
     candidate->object = BSLAM_OBJECT_NONE;
     candidate->object_margin = 0;
     const bslam_status_t status = bslam_measure(frame, camera, &rough, &size, candidate);
-    if (status != BSLAM_OK || recogniser == NULL) {
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    try_second_class(vision, frame, &rough, candidate);
+    if (recogniser == NULL) {
         return status;
     }
     candidate->object = bslam_recognise(recogniser, candidate->signature, &candidate->object_margin);

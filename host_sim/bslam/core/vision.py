@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ Picture = NDArray[np.uint8] | NDArray[np.uint16]
 SIGNATURE_SIZE = 71
 """Values of a signature."""
 
-MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "part")
+MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "part", "misplaced")
 """Names of the bits of a candidate's marks, lowest first."""
 
 
@@ -288,7 +288,7 @@ class FrontEnd:
     def _classes(self, classes: Sequence[BeaconClass]) -> Any:
         ffi = self._library.ffi
         names = [ffi.new("char[]", one.name.encode()) for one in classes]
-        rows = [(name, one.height_m, one.depth_m) for name, one in zip(names, classes, strict=True)]
+        rows = [(name, *astuple(one)[1:]) for name, one in zip(names, classes, strict=True)]
         table = ffi.new("bslam_beacon_class_t[]", rows)
         self._keep += [*names, table]
         return table
