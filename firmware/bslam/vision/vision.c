@@ -235,8 +235,7 @@ static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *
     bslam_candidate_t other = *candidate;
     const bslam_size_t size = size_of(&vision->model->classes[candidate->second_class - 1]);
     if (bslam_measure(frame, &vision->cameras[vision->camera], rough, &size, &other) == BSLAM_OK &&
-        other.has_range &&
-        half_square(other.misplaced_sds) + candidate->class_margin < half_square(candidate->misplaced_sds)) {
+        other.has_range && misplacement(&other) + candidate->class_margin < misplacement(candidate)) {
         other.beacon_class = candidate->second_class;
         other.second_class = candidate->beacon_class;
         other.class_margin = -candidate->class_margin;
