@@ -3,8 +3,8 @@
 #include <string.h>
 
 static const bslam_beacon_class_t classes[UNIT_MODEL_CLASSES] = {
-    {"tall", 2.0f, 0.0f},
-    {"small", 0.3f, 0.0f},
+    {.name = "tall", .height_m = 2.0f},
+    {.name = "small", .height_m = 0.3f},
 };
 
 static bslam_svm_t machine(int32_t rows, int32_t features, bool quadratic, const float *weights,

@@ -26,8 +26,8 @@ CLASSES = (
     BeaconClass("sign", 0.30, 0.015, 1.75, 2.35, 0.09),
     BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02),
 )
-"""In the order of KINDS: whole heights, middling depths, where their upper sides are, and what their looks make
-of a distance in training worlds (tools/measure_outline.py --style train)."""
+"""In the order of KINDS: whole heights, middling depths, where their upper sides are, and what their looks
+make of a distance in training worlds (tools/measure_outline.py --style train)."""
 
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""

@@ -43,6 +43,18 @@ static bool box_is_number(const bslam_box_t *box)
            bslam_is_number(box->bottom_px);
 }
 
+static bslam_status_t check_size(const bslam_size_t *size)
+{
+    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m, size->top_low_m, size->top_high_m};
+    bool in_range = size->top_low_m <= size->top_high_m && bslam_in_range(size->looks_sd, 0, 1);
+    bool are_numbers = bslam_is_number(size->looks_sd);
+    for (int32_t i = 0; i < 4; i++) {
+        in_range = in_range && bslam_in_range(lengths_m[i], 0, SIZE_MAX_M);
+        are_numbers = are_numbers && bslam_is_number(lengths_m[i]);
+    }
+    return !are_numbers ? BSLAM_E_NOT_FINITE : in_range ? BSLAM_OK : BSLAM_E_RANGE;
+}
+
 /// Marks of a box that comes near the frame's edge.
 static unsigned cuts_of(const bslam_frame_t *frame, const bslam_box_t *box)
 {
@@ -147,14 +159,15 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
 bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
                              const bslam_box_t *rough, const bslam_size_t *size, bslam_candidate_t *candidate)
 {
-    if (!box_is_number(rough) || !bslam_is_number(size->height_m) || !bslam_is_number(size->depth_m)) {
+    const bslam_status_t bad_size = check_size(size);
+    if (!box_is_number(rough) || bad_size == BSLAM_E_NOT_FINITE) {
         return BSLAM_E_NOT_FINITE;
     }
     if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
         return BSLAM_E_PARAMETER;
     }
     bslam_whole_t whole;
-    if (!bslam_in_range(size->height_m, 0, SIZE_MAX_M) || !bslam_in_range(size->depth_m, 0, SIZE_MAX_M) ||
+    if (bad_size != BSLAM_OK ||
         bslam_whole_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
                          &whole) != BSLAM_OK) {
         return BSLAM_E_RANGE;

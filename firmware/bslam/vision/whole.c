@@ -46,11 +46,16 @@ static bool goes_on(const bslam_frame_t *frame, const bslam_facing_t *facing, co
     return inside > CONTRAST_MIN && level_contrast(frame, facing, o, name, beyond) > BEYOND_MAX * inside;
 }
 
-static strip_t strip_beyond(const bslam_outline_t *o, bool left)
+/// The strip, as far as it is in the frame.
+static strip_t strip_beyond(const bslam_frame_t *frame, const bslam_outline_t *o, bool left)
 {
+    const bslam_real_t last_px = (bslam_real_t)frame->width_px - 1;
+    const bslam_real_t room_px = (left ? o->quad.left_px : last_px - o->quad.right_px) - GAP_PX;
     const bslam_real_t share = STRIP_SHARE * (o->left - o->right);
     const bslam_real_t least = STRIP_MIN_PX * o->pixel;
-    const bslam_real_t width = share > least ? share : least;
+    const bslam_real_t room = room_px * o->pixel;
+    const bslam_real_t wanted = share > least ? share : least;
+    const bslam_real_t width = wanted < room ? wanted : room;
     const bslam_real_t gap = GAP_PX * o->pixel;
     return left ? (strip_t){o->left + gap + width, o->left + gap}
                 : (strip_t){o->right - gap, o->right - gap - width};
@@ -62,7 +67,7 @@ static bool ends_too_soon(const bslam_frame_t *frame, const bslam_facing_t *faci
                           const bslam_whole_t *whole, bool left)
 {
     const bslam_outline_t *o = &whole->outline;
-    const strip_t beyond = strip_beyond(o, left);
+    const strip_t beyond = strip_beyond(frame, o, left);
     const bool has_top = whole->rough.top_px > CUT_PX;
     const bool has_bottom = whole->rough.bottom_px < (bslam_real_t)frame->height_px - 1 - CUT_PX;
     if ((has_top && !goes_on(frame, facing, o, BSLAM_SIDE_TOP, beyond)) ||

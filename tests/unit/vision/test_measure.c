@@ -145,6 +145,61 @@ static void test_measure_marks_what_is_cut_off(void **state)
     assert_true(top.has_bearing && !top.has_range && bottom.has_bearing && !bottom.has_range);
 }
 
+static void test_measure_marks_what_ends_close_to_the_frames_edge(void **state)
+{
+    const unit_panel_t panel = poster(3, 0.45, 0);  // its left side is 6 px inside
+    const bslam_candidate_t found = measured_in(&panel, (bslam_box_t){5, 20, 74, 100});
+    assert_true((found.marks & BSLAM_MARK_CUT_LEFT) != 0 && !found.has_bearing);
+}
+
+/// A detector's box that holds only the right half, the left half, or a slice.
+static void test_measure_widens_a_box_to_the_whole_object(void **state)
+{
+    const unit_panel_t panel = poster(3, 0, 0.3);
+    const bslam_box_t parts[] = {{158, 27, 192, 102}, {127, 27, 150, 102}, {150, 27, 170, 102}};
+    for (int i = 0; i < COUNT_OF(parts); i++) {
+        const bslam_candidate_t found = measured_in(&panel, parts[i]);
+        assert_int_equal(found.marks, 0);
+        assert_near(found.bearing_rad, 0, 2.0 / 277);  // a smooth panel tells little of where it ends
+        assert_near(found.range_m, 3, 0.06);
+    }
+}
+
+static void test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked(void **state)
+{
+    const unit_panel_t panel = {3, 3, 3, -0.4, 0.7, 1.5, 60, 80, 150};
+    const bslam_candidate_t found = measured_in(&panel, (bslam_box_t){120, 27, 197, 102});
+    assert_true((found.marks & (BSLAM_MARK_CUT_LEFT | BSLAM_MARK_PART)) != 0 && !found.has_bearing);
+}
+
+static void test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0.1, 0.2);  // its upper side is 1.5 m above the floor
+    bslam_size_t size = POSTER_SIZE;
+    size.top_low_m = size.top_high_m = BSLAM_R(1.5);
+    const bslam_candidate_t right = measured(&camera, &panel, &size);
+    size.top_low_m = size.top_high_m = BSLAM_R(1.9);
+    const bslam_candidate_t wrong = measured(&camera, &panel, &size);
+    size.top_low_m = BSLAM_R(1.3);
+    const bslam_candidate_t within = measured(&camera, &panel, &size);
+    assert_true(right.has_range && right.misplaced_sds < 1 && within.has_range && within.misplaced_sds == 0);
+    assert_int_equal(wrong.marks, BSLAM_MARK_MISPLACED);
+    assert_true(wrong.has_bearing && !wrong.has_range && wrong.misplaced_sds > 3);
+}
+
+static void test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0, 0);
+    bslam_size_t size = POSTER_SIZE;
+    const bslam_candidate_t plain = measured(&camera, &panel, &size);
+    size.looks_sd = BSLAM_R(0.08);
+    const bslam_candidate_t rimmed = measured(&camera, &panel, &size);
+    const double relative = (double)(plain.range_sd_m / plain.range_m);
+    assert_near(rimmed.range_sd_m / rimmed.range_m, sqrt(relative * relative + 0.08 * 0.08), 1e-5);
+}
+
 static void test_measure_marks_what_is_small(void **state)
 {
     // 4.6 px wide and 46 px high; 69 px wide and 7.4 px high.
@@ -189,8 +244,22 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
         bslam_status_t status;
     } sizes[] = {{NAN, 0, BSLAM_E_NOT_FINITE}, {1, NAN, BSLAM_E_NOT_FINITE}, {-1, 0, BSLAM_E_RANGE},
                  {11, 0, BSLAM_E_RANGE},       {1, -0.1, BSLAM_E_RANGE},     {1, 2.1, BSLAM_E_RANGE}};
+    const struct {
+        double low_m, high_m, looks_sd;
+        bslam_status_t status;
+    } bands[] = {{NAN, 1, 0, BSLAM_E_NOT_FINITE}, {1, NAN, 0, BSLAM_E_NOT_FINITE},
+                 {1, 1, NAN, BSLAM_E_NOT_FINITE}, {2, 1, 0, BSLAM_E_RANGE},
+                 {-1, 1, 0, BSLAM_E_RANGE},       {1, 11, 0, BSLAM_E_RANGE},
+                 {1, 1, -0.1, BSLAM_E_RANGE},     {1, 1, 1.1, BSLAM_E_RANGE}};
+    for (int i = 0; i < COUNT_OF(bands); i++) {
+        const bslam_size_t size = {.height_m = 1,
+                                   .top_low_m = real(bands[i].low_m),
+                                   .top_high_m = real(bands[i].high_m),
+                                   .looks_sd = real(bands[i].looks_sd)};
+        assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &size, &candidate), bands[i].status);
+    }
     for (int i = 0; i < COUNT_OF(sizes); i++) {
-        const bslam_size_t size = {real(sizes[i].height_m), real(sizes[i].depth_m)};
+        const bslam_size_t size = {.height_m = real(sizes[i].height_m), .depth_m = real(sizes[i].depth_m)};
         assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &size, &candidate), sizes[i].status);
     }
     camera.width_px = 160;
@@ -208,6 +277,11 @@ int main(void)
         cmocka_unit_test(test_measure_without_a_height_has_a_direction_only),
         cmocka_unit_test(test_measure_is_less_sure_of_what_is_farther_or_fainter),
         cmocka_unit_test(test_measure_marks_what_is_cut_off),
+        cmocka_unit_test(test_measure_marks_what_ends_close_to_the_frames_edge),
+        cmocka_unit_test(test_measure_widens_a_box_to_the_whole_object),
+        cmocka_unit_test(test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked),
+        cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
+        cmocka_unit_test(test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow),
         cmocka_unit_test(test_measure_marks_what_is_small),
         cmocka_unit_test(test_measure_marks_what_is_slanted),
         cmocka_unit_test(test_measure_refuses_bad_input_and_leaves_the_candidate),
