@@ -11,8 +11,8 @@ HOST_SIZES := -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=9
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := firmware/app/session.c
-# What every board runs; a board with memory enough adds `cost` (BOARD_PROGRAMS_<board>).
+APP_SOURCES := firmware/app/session.c firmware/app/text.c
+# What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
 # A square root needs no errno. The stack that each function takes is for tools/check_image.py.

@@ -7,19 +7,29 @@ now, one finding a line. Whoever accepts the change writes the file anew.
 import argparse
 import re
 import sys
+import tempfile
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, ROOT
 from check_image import CallGraph, output_of, read_frames, read_functions
 from run_image import run_image
 from sizes import instance_bytes
+from training.render_set import RIGS, camera_of, render_world
 
 FILE = ROOT / "docs" / "SIZES.md"
 TOLERANCE = 0.02
 TICKS_HZ = 25_000_000
 """Of the emulated boards (port_ticks_hz)."""
+INSTRUCTIONS_A_TICK = 1e9 / TICKS_HZ / NS_PER_INSTRUCTION
+WORLD_SEED, FRAMES = 7000, 3
+PICTURES_AT = 0x20200000
+"""As in firmware/app/cost_vision.c: the upper half of the boards' 4 MB, which no image uses."""
+PIXELS = 320 * 240
+STEPS_A_SECOND, CORE_HZ = 25, 168_000_000
 COST_BOARDS = {"Cortex-M0+": "mps2_an385", "Cortex-M4F": "mps2_an386", "Cortex-M7": "mps2_an500"}
 BEACONS = (6, 20, 50)
 M4F = "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"
@@ -31,6 +41,7 @@ STRUCTS = {
     "bslam_vision_t": "bslam/vision/vision.h",
 }
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
+VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
     "predict": "odometry and an empty frame",
     "step": "odometry and a frame of 3 sightings with distance, identity known",
@@ -83,8 +94,46 @@ def costs(board: str) -> dict[tuple[str, int], int]:
     if ended.status != 0:
         raise SystemExit(f"cost on {board} ended with status {ended.status}: {ended.output}")
     lines = re.findall(r"^(\w+) (\d+) (\d+)\r?$", ended.output, re.MULTILINE)
-    instructions_a_tick = 1e9 / TICKS_HZ / NS_PER_INSTRUCTION
-    return {(name, int(size)): round(int(ticks) * instructions_a_tick) for name, size, ticks in lines}
+    return {(name, int(size)): round(int(ticks) * INSTRUCTIONS_A_TICK) for name, size, ticks in lines}
+
+
+def pictures(lens: str, is_wide: bool, folder: Path) -> Path:
+    """A short walk through a rendered world, as firmware/app/cost_vision.c reads it."""
+    frames = render_world(WORLD_SEED, "test", camera_of(lens, WORLD_SEED), FRAMES).pictures
+    path = folder / f"{lens}.bin"
+    path.write_bytes(np.array([is_wide, len(frames)], "<u4").tobytes() + frames.astype("<u2").tobytes())
+    return path
+
+
+def vision_costs() -> dict[tuple[str, str], int]:
+    """Instructions of a frame, mean, by core and lens."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for number, lens in enumerate(RIGS):
+            path = pictures(lens, number == 1, Path(folder))
+            loader = f"loader,file={path},addr={PICTURES_AT:#x},force-raw=on"
+            for core, board in COST_BOARDS.items():
+                ended = run_image(board, "cost_vision", "-device", loader)
+                ticks = [int(one) for one in re.findall(r"^frame \d+ (\d+) ", ended.output, re.MULTILINE)]
+                if ended.status != 0 or len(ticks) != FRAMES:
+                    raise SystemExit(f"cost_vision on {board}: status {ended.status}: {ended.output}")
+                found[core, lens] = round(sum(ticks) / FRAMES * INSTRUCTIONS_A_TICK)
+    return found
+
+
+def budget(filter_costs: dict[tuple[str, int], int], frame: int) -> list[Row]:
+    """A second of a robot with 20 beacons: what each part takes of the core's instructions."""
+    each = {
+        "filter: `step_velocity`": filter_costs["step_velocity", 20],
+        "association: `associate_mahalanobis`": filter_costs["associate_mahalanobis", 20],
+        "learning: one `train` a step": filter_costs["train", 20],
+        "vision: one QVGA frame a step, the dearer lens": frame,
+    }
+    rows: list[Row] = [
+        (name, cost, f"{100 * cost * STEPS_A_SECOND / CORE_HZ:.0f} %") for name, cost in each.items()
+    ]
+    total = sum(each.values())
+    return [*rows, ("all", total, f"{100 * total * STEPS_A_SECOND / CORE_HZ:.0f} %")]
 
 
 def ram_rows() -> Iterator[Row]:
@@ -106,6 +155,13 @@ def document() -> str:
         if (part, n) in measured["Cortex-M4F"]
     ]
     parts = "".join(f"- `{name}`: {what}.\n" for name, what in PARTS.items())
+    seeing = vision_costs()
+    dearest = max(seeing["Cortex-M4F", lens] for lens in RIGS)
+    vision_rows = [(lens, *(f"{seeing[core, lens] / PIXELS:.0f}" for core in COST_BOARDS)) for lens in RIGS]
+    vision_stacks = [
+        (core, *stack_of(BUILD_DIR / board / "cost_vision.elf", VISION_FUNCTIONS).values())
+        for core, board in COST_BOARDS.items()
+    ]
     stacks = [
         (core, *stack_of(BUILD_DIR / board / "robot.elf", STEP_FUNCTIONS).values())
         for core, board in COST_BOARDS.items()
@@ -138,13 +194,25 @@ The longest path from a call on, bytes, from the linked image: the compiler's fr
 (tools/check_image.py).
 
 {table(("core", *(f"`{name}`" for name in STEP_FUNCTIONS)), stacks)}
+{table(("core", *(f"`{name}`" for name in VISION_FUNCTIONS)), vision_stacks)}
 ## Instructions
 
 Counted by QEMU (`-icount`), the same at every run; instructions are not cycles. `-O2`, invariant filter, \
 `firmware/app/cost.c`. No board of QEMU has a Cortex-M0+: its image runs on a Cortex-M3.
 
 {table(("part", "beacons", *COST_BOARDS), cost_rows)}
-{parts}"""
+{parts}
+The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
+world (seed {WORLD_SEED}; firmware/app/cost_vision.c):
+
+{table(("lens", *COST_BOARDS), vision_rows)}
+## A second on a Cortex-M4F
+
+{STEPS_A_SECOND} steps a second, 20 beacons, instructions a step and their share of \
+{CORE_HZ // 1_000_000} million a second. A core takes more than a cycle for some instructions: \
+this is a lower bound of its load.
+
+{table(("part", "instructions", "share"), budget(measured["Cortex-M4F"], dearest))}"""
 
 
 def differences(stands: str, measured: str) -> Iterator[str]:

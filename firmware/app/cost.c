@@ -1,7 +1,6 @@
 /// What the parts of a step cost on this board, in ticks of port_ticks: one line each, "name size ticks", the
 /// mean of several calls. tools/costs.py runs it and knows what a tick is.
-#include <string.h>
-
+#include "app/text.h"
 #include "bslam/bslam.h"
 #include "bslam/math/trig.h"
 #include "port/port.h"
@@ -21,39 +20,21 @@ static uint32_t random_state;
 
 // ---- the report -------------------------------------------------------------------------------------------
 
-static void put_text(const char *text)
-{
-    port_write((const uint8_t *)text, strlen(text));
-}
-
-static void put_number(uint32_t number)
-{
-    char digits[12];
-    size_t at = sizeof digits - 1;
-    digits[at] = '\0';
-    do {
-        at--;
-        digits[at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    put_text(&digits[at]);
-}
-
 static void report(const char *name, int size, uint32_t ticks)
 {
-    put_text(name);
-    put_text(" ");
-    put_number((uint32_t)size);
-    put_text(" ");
-    put_number(ticks);
-    put_text("\n");
+    text_put(name);
+    text_put(" ");
+    text_put_number((uint32_t)size);
+    text_put(" ");
+    text_put_number(ticks);
+    text_put("\n");
 }
 
 /// What should not happen ends the program.
 static void need(bool good)
 {
     if (!good) {
-        put_text("failed\n");
+        text_put("failed\n");
         port_exit(1);
     }
 }
@@ -236,6 +217,6 @@ int main(void)
     }
     measure_learning(6);
     measure_learning(20);
-    put_text("end\n");
+    text_put("end\n");
     port_exit(0);
 }

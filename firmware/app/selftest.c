@@ -3,6 +3,7 @@
 /// serial line, then ends with status 0 if all passed.
 #include <string.h>
 
+#include "app/text.h"
 #include "bslam/bslam.h"
 #include "bslam/link/crc16.h"
 #include "port/port.h"
@@ -50,31 +51,13 @@ static bslam_slam_t slam;
 
 // ---- the report -------------------------------------------------------------------------------------------
 
-static void put_text(const char *text)
-{
-    port_write((const uint8_t *)text, strlen(text));
-}
-
-static void put_number(uint32_t number)
-{
-    char digits[11];
-    size_t at = sizeof digits - 1;
-    digits[at] = '\0';
-    do {
-        at--;
-        digits[at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    put_text(&digits[at]);
-}
-
 static bool report(uint32_t number, const char *name, bool good)
 {
-    put_text(good ? "ok " : "not ok ");
-    put_number(number);
-    put_text(" - ");
-    put_text(name);
-    put_text("\n");
+    text_put(good ? "ok " : "not ok ");
+    text_put_number(number);
+    text_put(" - ");
+    text_put(name);
+    text_put("\n");
     return good;
 }
 
@@ -229,9 +212,9 @@ int main(void)
     };
     uint32_t failed = 0;
     port_init();
-    put_text("\nTAP version 14\n1..");
-    put_number(COUNT_OF(tests));
-    put_text("\n");
+    text_put("\nTAP version 14\n1..");
+    text_put_number(COUNT_OF(tests));
+    text_put("\n");
     for (uint32_t i = 0; i < COUNT_OF(tests); i++) {
         failed += report(i + 1, tests[i].name, tests[i].passes()) ? 0 : 1;
     }

@@ -4,4 +4,4 @@ BOARD_CORE_mps2_an385 := m0plus
 BOARD_SOURCES_mps2_an385 := firmware/port/mps2/port.c $(CORTEX_M_SOURCES)
 BOARD_FLAGS_mps2_an385 := -DUART_BASE=0x40004000u $(HOST_SIZES)
 BOARD_QEMU_mps2_an385 := mps2-an385
-BOARD_PROGRAMS_mps2_an385 := cost
+BOARD_PROGRAMS_mps2_an385 := cost cost_vision
