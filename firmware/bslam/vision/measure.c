@@ -107,26 +107,49 @@ static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camer
            (1 + square * square * square);
 }
 
-/// By how many standard deviations the upper side is out of its band, if the object is so far ahead as its
-/// height says; 0: it is within, or there is no band.
-static bslam_real_t misplaced_sds(const bslam_outline_t *o, const bslam_camera_t *camera,
-                                  const bslam_size_t *size)
+/// How far ahead an object is, from where its upper and its lower side are seen.
+typedef struct ahead {
+    bslam_real_t inverse;       ///< 1/m
+    bslam_real_t relative_var;  ///< of it, but for what repeats from sighting to sighting
+    bslam_real_t residual_sds;  ///< by how much its two sides contradict its place; 0 without one
+} ahead_t;
+
+/// Least squares over both sides: each is seen at its height over the camera times the inverse distance. What
+/// errs alike for both, the horizon and the place, counts as one common error: where the place is not known,
+/// it is endless, and all that is left is the apparent height. MATH "Measuring".
+static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
+                        bslam_real_t point_var)
 {
+    const bslam_real_t nearness = 1 + o->turn * o->middle;  // of the middle, to what is straight ahead
+    const bslam_real_t top = o->top * nearness;
+    const bslam_real_t bottom = o->bottom * nearness;
+    const bslam_real_t height_m = size->height_m;
+    const bslam_real_t by_height = (top - bottom) / height_m;
+    const bslam_real_t looks = size->looks_sd * height_m * by_height;
+    const bslam_real_t top_var = point_var + RANGE_DOUBT * o->top_var + looks * looks / 2;
+    const bslam_real_t bottom_var = point_var + RANGE_DOUBT * o->bottom_var + looks * looks / 2;
     if (!(size->top_high_m > 0)) {
-        return 0;
+        return (ahead_t){by_height, (top_var + bottom_var) / ((top - bottom) * (top - bottom)), 0};
     }
-    const bslam_real_t tall = o->top - o->bottom;
-    const bslam_real_t ahead_m = size->height_m / tall;
-    const bslam_real_t top_m = camera->z_m + ahead_m * o->top;
-    const bslam_real_t out_m = top_m < size->top_low_m    ? size->top_low_m - top_m
-                               : top_m > size->top_high_m ? top_m - size->top_high_m
-                                                          : 0;
-    const bslam_real_t by_top = ahead_m * o->bottom / tall;
-    const bslam_real_t by_bottom = ahead_m * o->top / tall;
-    const bslam_real_t by_horizon = ahead_m * HORIZON_SD_PX * o->pixel;
-    const bslam_real_t variance = BAND_SD_M * BAND_SD_M + by_horizon * by_horizon +
-                                  by_top * by_top * o->top_var + by_bottom * by_bottom * o->bottom_var;
-    return out_m / bslam_sqrt(variance);
+    const bslam_real_t band_m = size->top_high_m - size->top_low_m;
+    const bslam_real_t place_var = (BAND_SD_M * BAND_SD_M + band_m * band_m / 12) * by_height * by_height;
+    const bslam_real_t horizon = HORIZON_SD_PX * o->pixel;
+    const bslam_real_t common = horizon * horizon + place_var;
+    const bslam_real_t top_m = (size->top_low_m + size->top_high_m) / 2 - camera->z_m;
+    const bslam_real_t bottom_m = top_m - height_m;
+    const bslam_real_t information =
+        top_m * top_m * bottom_var + bottom_m * bottom_m * top_var + common * height_m * height_m;
+    const bslam_real_t determinant = top_var * bottom_var + common * (top_var + bottom_var);
+    const bslam_real_t inverse =
+        (top_m * top * bottom_var + bottom_m * bottom * top_var + common * height_m * (top - bottom)) /
+        information;
+    const bslam_real_t top_left = top - top_m * inverse;
+    const bslam_real_t bottom_left = bottom - bottom_m * inverse;
+    const bslam_real_t apart = top_left - bottom_left;
+    const bslam_real_t distance2 =
+        (top_left * top_left * bottom_var + bottom_left * bottom_left * top_var + common * apart * apart) /
+        determinant;
+    return (ahead_t){inverse, determinant / (information * inverse * inverse), bslam_sqrt(distance2)};
 }
 
 /// Direction, and distance if the height is known, with what is left of their errors when the outline is
@@ -134,26 +157,23 @@ static bslam_real_t misplaced_sds(const bslam_outline_t *o, const bslam_camera_t
 static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
                             bool is_whole, bslam_candidate_t *candidate)
 {
-    const bslam_real_t height_m = is_whole ? size->height_m : 0;
     const bslam_real_t point_var = POINT_SD_PX * POINT_SD_PX * o->pixel * o->pixel;
     candidate->bearing_rad = bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1));
     candidate->bearing_sd_rad = bslam_sqrt(bearing_variance(o, camera, point_var));
     candidate->has_bearing = true;
-    if (height_m > 0) {
-        const bslam_real_t tall = o->top - o->bottom;
-        const bslam_real_t ahead_m = height_m / (tall * (1 + o->turn * o->middle));
-        const bslam_real_t tall_var = 2 * point_var + RANGE_DOUBT * (o->top_var + o->bottom_var);
-        const bslam_real_t relative_var =
-            RANGE_FLOOR * RANGE_FLOOR + size->looks_sd * size->looks_sd + tall_var / (tall * tall);
-        candidate->range_m = ahead_m * bslam_sqrt(1 + o->middle * o->middle);
-        candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
-        candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
-        candidate->misplaced_sds = (float)misplaced_sds(o, camera, size);
-        if (candidate->misplaced_sds > (float)MISPLACED_SDS) {
-            candidate->marks |= BSLAM_MARK_MISPLACED;
-            candidate->has_range = false;
-        }
+    if (!is_whole || !(size->height_m > 0)) {
+        return;
     }
+    const ahead_t ahead = ahead_of(o, camera, size, point_var);
+    const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var;
+    candidate->misplaced_sds = (float)ahead.residual_sds;
+    if (ahead.residual_sds > MISPLACED_SDS || !(ahead.inverse > 0)) {
+        candidate->marks |= BSLAM_MARK_MISPLACED;
+        return;
+    }
+    candidate->range_m = bslam_sqrt(1 + o->middle * o->middle) / ahead.inverse;
+    candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
+    candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
 }
 
 bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
