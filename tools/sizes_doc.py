@@ -9,7 +9,7 @@ import re
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +55,7 @@ PARTS = {
 Row = Sequence[object]
 
 
-def table(head: Row, rows: Sequence[Row]) -> str:
+def table(head: Row, rows: Iterable[Row]) -> str:
     """A table in Markdown; the first column to the left, numbers to the right."""
     lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
@@ -136,36 +136,50 @@ def budget(filter_costs: dict[tuple[str, int], int], frame: int) -> list[Row]:
     return [*rows, ("all", total, f"{100 * total * STEPS_A_SECOND / CORE_HZ:.0f} %")]
 
 
+def flash_rows() -> list[Row]:
+    flash = flash_by_layer()
+    slam = sum(flash[layer] for layer in SLAM_LAYERS)
+    return [*((name, flash[name]) for name in sorted(flash)), ("all but vision", slam)]
+
+
 def ram_rows() -> Iterator[Row]:
     for struct, header in STRUCTS.items():
         sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
         yield (f"`{struct}`", *sizes)
 
 
+def image_rows() -> Iterator[Row]:
+    for path in sorted(BUILD_DIR.glob("*/robot.elf")):
+        yield (path.parent.name, *image_sections(path))
+
+
+def stack_rows(program: str, functions: Sequence[str]) -> Iterator[Row]:
+    for core, board in COST_BOARDS.items():
+        yield (core, *stack_of(BUILD_DIR / board / f"{program}.elf", functions).values())
+
+
+def cost_rows(measured: dict[str, dict[tuple[str, int], int]]) -> Iterator[Row]:
+    for part in PARTS:
+        for beacons in BEACONS:
+            if (part, beacons) in measured["Cortex-M4F"]:
+                yield (f"`{part}`", beacons, *(measured[core][part, beacons] for core in COST_BOARDS))
+
+
+def vision_rows(measured: dict[tuple[str, str], int]) -> Iterator[Row]:
+    for lens in RIGS:
+        yield (lens, *(f"{measured[core, lens] / PIXELS:.0f}" for core in COST_BOARDS))
+
+
+def code_heads(names: Sequence[str]) -> Row:
+    return ["core", *(f"`{name}`" for name in names)]
+
+
 def document() -> str:
     """The whole page."""
-    flash = flash_by_layer()
-    slam = sum(flash[layer] for layer in SLAM_LAYERS)
-    images = sorted(BUILD_DIR.glob("*/robot.elf"))
     measured = {core: costs(board) for core, board in COST_BOARDS.items()}
-    cost_rows = [
-        (f"`{part}`", n, *(measured[core][part, n] for core in COST_BOARDS))
-        for part in PARTS
-        for n in BEACONS
-        if (part, n) in measured["Cortex-M4F"]
-    ]
     parts = "".join(f"- `{name}`: {what}.\n" for name, what in PARTS.items())
     seeing = vision_costs()
     dearest = max(seeing["Cortex-M4F", lens] for lens in RIGS)
-    vision_rows = [(lens, *(f"{seeing[core, lens] / PIXELS:.0f}" for core in COST_BOARDS)) for lens in RIGS]
-    vision_stacks = [
-        (core, *stack_of(BUILD_DIR / board / "cost_vision.elf", VISION_FUNCTIONS).values())
-        for core, board in COST_BOARDS.items()
-    ]
-    stacks = [
-        (core, *stack_of(BUILD_DIR / board / "robot.elf", STEP_FUNCTIONS).values())
-        for core, board in COST_BOARDS.items()
-    ]
     return f"""# What bslam costs on a microcontroller
 
 Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. Compiler: \
@@ -176,36 +190,36 @@ Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off.
 Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
 takes of it what is called.
 
-{table(("layer", "bytes"), [*((name, flash[name]) for name in sorted(flash)), ("all but vision", slam)])}
+{table(("layer", "bytes"), flash_rows())}
 ## RAM
 
 Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_looks_t` is \
 for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam.
 
-{table(("instance", *BEACONS), list(ram_rows()))}
+{table(("instance", *BEACONS), ram_rows())}
 ## Images
 
 `robot.elf`, `-O2`, bytes; RAM without the stack. The MPS2 boards have the host's largest sizes (80 beacons).
 
-{table(("image", "ROM", "RAM"), [(path.parent.name, *image_sections(path)) for path in images])}
+{table(("image", "ROM", "RAM"), image_rows())}
 ## Stack
 
 The longest path from a call on, bytes, from the linked image: the compiler's frames along the call graph \
 (tools/check_image.py).
 
-{table(("core", *(f"`{name}`" for name in STEP_FUNCTIONS)), stacks)}
-{table(("core", *(f"`{name}`" for name in VISION_FUNCTIONS)), vision_stacks)}
+{table(code_heads(STEP_FUNCTIONS), stack_rows("robot", STEP_FUNCTIONS))}
+{table(code_heads(VISION_FUNCTIONS), stack_rows("cost_vision", VISION_FUNCTIONS))}
 ## Instructions
 
 Counted by QEMU (`-icount`), the same at every run; instructions are not cycles. `-O2`, invariant filter, \
 `firmware/app/cost.c`. No board of QEMU has a Cortex-M0+: its image runs on a Cortex-M3.
 
-{table(("part", "beacons", *COST_BOARDS), cost_rows)}
+{table(("part", "beacons", *COST_BOARDS), cost_rows(measured))}
 {parts}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
 world (seed {WORLD_SEED}; firmware/app/cost_vision.c):
 
-{table(("lens", *COST_BOARDS), vision_rows)}
+{table(("lens", *COST_BOARDS), vision_rows(seeing))}
 ## A second on a Cortex-M4F
 
 {STEPS_A_SECOND} steps a second, 20 beacons, instructions a step and their share of \
