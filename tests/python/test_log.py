@@ -13,7 +13,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bslam.errors import BslamError
-from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, read_folder, wrap_rad, write_folder
+from bslam.log import (
+    SIGNATURE_SIZE,
+    Beacons,
+    Log,
+    Odometry,
+    Robot,
+    Sightings,
+    Truth,
+    read_folder,
+    wrap_rad,
+    write_folder,
+)
 
 ROBOT = Robot(
     wheelbase_m=0.4,
@@ -391,3 +402,50 @@ def test_read_of_the_reference_logs_is_complete_and_quick() -> None:
         assert log.beacons is not None
         assert log.beacons.beacon_id.tolist() == [0, 1, 2, 3, 4, 5]
         assert log.sightings.time_us[0] == 0
+
+
+def with_looks(log: Log) -> Log:
+    """Signatures, one a sighting, and two seeds."""
+    random = np.random.default_rng(5)
+    signature = random.random((len(log.sightings.time_us), SIGNATURE_SIZE)).astype(np.float32)
+    seeds = random.random((2, SIGNATURE_SIZE)).astype(np.float32)
+    return replace(log, sightings=replace(log.sightings, signature=signature), seeds=seeds)
+
+
+def test_signatures_and_seeds_are_kept_to_the_bit(tmp_path: Path) -> None:
+    log = with_looks(a_log())
+    write_folder(log, tmp_path)
+    back = read_folder(tmp_path)
+    np.testing.assert_array_equal(back.sightings.signature, log.sightings.signature)
+    np.testing.assert_array_equal(back.seeds, log.seeds)
+    write_folder(a_log(), tmp_path)  # a log without takes them away
+    assert read_folder(tmp_path).sightings.signature is None
+    assert read_folder(tmp_path).seeds is None
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed"), [("signatures.npy", "as many rows"), ("seeds.npy", "k up to 128")]
+)
+@pytest.mark.parametrize("fault", ["rows", "columns", "dtype", "nan", "inf", "text", "pickle"])
+def test_looks_that_are_not_what_they_should_be_are_refused(
+    tmp_path: Path, name: str, allowed: str, fault: str
+) -> None:
+    log = with_looks(a_log())
+    write_folder(log, tmp_path)
+    good = np.load(tmp_path / name)
+    bad: object = {
+        "rows": np.ones((200, SIGNATURE_SIZE), np.float32),
+        "columns": good[:, 1:],
+        "dtype": good.astype(np.float64),
+        "nan": np.where(np.arange(SIGNATURE_SIZE) == 3, np.float32(np.nan), good),
+        "inf": np.where(np.arange(SIGNATURE_SIZE) == 70, np.float32(np.inf), good),
+        "text": None,
+        "pickle": np.array([{}], dtype=object),
+    }[fault]
+    if bad is None:
+        (tmp_path / name).write_text("no numbers")
+    else:
+        np.save(tmp_path / name, bad)
+    with pytest.raises(BslamError, match=name) as refusal:
+        read_folder(tmp_path)
+    assert ("finite" if fault in ("nan", "inf") else allowed) in str(refusal.value)

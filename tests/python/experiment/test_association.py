@@ -1,0 +1,117 @@
+"""Association by position and looks, on simulated drives: what it reaches, and what it may not know."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bslam.core.slam import Slam
+from bslam.errors import BslamError
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
+from bslam.experiment.trace import Trace
+from bslam.log import SIGNATURE_SIZE, Log
+from bslam.world.simulate import load_scenario, simulate
+
+SVM = RunOptions(association="svm")
+SEED, SIGMA_MPS, STEPS = 42, 1.0, 2500
+
+
+def a_drive(name: str) -> Log:
+    return simulate(replace(load_scenario(name), steps=STEPS), SEED, SIGMA_MPS)
+
+
+@pytest.fixture(scope="module")
+def pairs() -> Log:
+    return a_drive("pairs")
+
+
+def mean_error_m(log: Log, trace: Trace) -> float:
+    assert log.truth is not None
+    off = trace.pose[:, :2] - np.stack([log.truth.x_m, log.truth.y_m], axis=1)
+    return float(np.hypot(*off.T).mean())
+
+
+def relabelled(log: Log) -> Log:
+    """Every beacon with another's identity."""
+    beacon_id = log.sightings.beacon_id
+    return replace(log, sightings=replace(log.sightings, beacon_id=(beacon_id * 5 + 3) % 12))
+
+
+def test_true_identities_change_no_bit(pairs: Log) -> None:
+    one, other = run_log(pairs, SVM), run_log(relabelled(pairs), SVM)
+    np.testing.assert_array_equal(one.pose, other.pose)
+    np.testing.assert_array_equal(one.covariance, other.covariance)
+    assert one.counters == other.counters
+    assert [(b.uid, b.x_m, b.y_m) for b in one.beacons] == [(b.uid, b.x_m, b.y_m) for b in other.beacons]
+    assert one.counts == other.counts  # the true identities are consistent in both
+
+
+def test_pairs_are_told_apart(pairs: Log) -> None:
+    trace, known = run_log(pairs, SVM), run_log(pairs, RunOptions())
+    assert trace.counts.wrong_associations < 0.001 * trace.counts.sightings
+    assert trace.counts.deferred < 0.01 * trace.counts.sightings
+    assert mean_error_m(pairs, trace) < 1.1 * mean_error_m(pairs, known)
+
+
+@pytest.mark.parametrize("off", [("learn_budget", 0), ("looks_weight", 0.0)])
+def test_pairs_are_not_told_apart_without_machines(pairs: Log, off: tuple[str, float]) -> None:
+    trace = run_log(pairs, replace(SVM, parameters=(off,)))
+    assert trace.counts.wrong_associations > 0.03 * trace.counts.sightings
+
+
+def test_without_signatures_position_alone_decides(pairs: Log) -> None:
+    log = replace(pairs, sightings=replace(pairs.sightings, signature=None))
+    blind = run_log(log, SVM)
+    off = run_log(pairs, replace(SVM, parameters=(("looks_weight", 0.0),)))
+    assert blind.counters["taught"] == 0
+    # Where looks weigh nothing, what is left of them is who is retired and who may wait.
+    assert blind.counts.wrong_associations > 0.03 * blind.counts.sightings
+    assert off.counts.wrong_associations > 0.03 * off.counts.sightings
+
+
+def test_directions_alone_find_their_beacons() -> None:
+    log = a_drive("paper_room")
+    trace = run_log(log, replace(SVM, observation="direction"))
+    assert trace.counts.wrong_associations <= 0.001 * trace.counts.sightings
+    assert sum(beacon.confirmed for beacon in trace.beacons) <= 7
+
+
+def test_double_finds_the_same_beacons(pairs: Log) -> None:
+    trace = run_log(pairs, replace(SVM, real="double"))
+    assert trace.counts.wrong_associations < 0.001 * trace.counts.sightings
+
+
+@pytest.mark.parametrize("shape", [(1, SIGNATURE_SIZE - 1), (2, SIGNATURE_SIZE), (SIGNATURE_SIZE,)])
+def test_signatures_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
+    slam = Slam({"association": 3}, looks=True)
+    before = slam.state_bytes
+    with pytest.raises(BslamError, match="signatures of shape"):
+        slam.sightings(0, [0.1], [4.0], [-1], [True], signature=np.zeros(shape, np.float32))
+    assert slam.state_bytes == before
+
+
+def test_no_signature_is_used_twice_in_a_run(pairs: Log) -> None:
+    signature = pairs.sightings.signature
+    assert signature is not None
+    assert len(np.unique(signature, axis=0)) == len(signature)
+
+
+def test_looks_are_the_seed_s_and_change_nothing_else() -> None:
+    one, again, other = (simulate(load_scenario("paper_room"), seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.sightings.signature, again.sightings.signature)
+    assert one.sightings.signature is not None and other.sightings.signature is not None
+    assert not np.array_equal(one.sightings.signature[:5], other.sightings.signature[:5])
+
+
+def test_beacons_that_look_alike_do_and_others_do_not() -> None:
+    log = simulate(load_scenario("lookalikes"), 3)
+    signature = log.sightings.signature
+    assert signature is not None
+
+    def mean_look(beacon_id: int) -> np.ndarray:
+        return signature[log.sightings.beacon_id == beacon_id].mean(axis=0)
+
+    alike = [np.linalg.norm(mean_look(one) - mean_look(one + 7)) for one in (2, 5, 8, 11)]
+    other = [np.linalg.norm(mean_look(one) - mean_look(one + 6)) for one in (3, 6, 9, 12)]
+    assert max(alike) < min(other)

@@ -1,0 +1,242 @@
+#include "support.h"
+
+#include "bslam/association/looks.h"
+
+static bslam_looks_t looks;
+static bslam_params_t params;
+static uint32_t way_um;
+
+enum { SHARE = 3 };
+
+static int setup(void **state)
+{
+    params = unit_params();
+    params.looks_samples = 3;
+    params.learn_way_m = BSLAM_R(0.1);
+    params.share_value = BSLAM_R(0.3);
+    params.share_sightings = SHARE;
+    way_um = 0;
+    return bslam_looks_init(&looks, NULL, 0) == BSLAM_OK ? 0 : -1;
+}
+
+/// The n-th view of an object: two colours of its own, and a little of others.
+static void view_of(int object, int view, float *signature)
+{
+    unit_random_t random = {(uint64_t)(1 + 997 * object + 31 * view)};
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        signature[k] = (float)unit_random(&random, 0, 0.1);
+    }
+    signature[3 * object] += 0.7f;
+    signature[3 * object + 1] += 0.6f;
+}
+
+static void train(void)
+{
+    while (bslam_learner_work(&looks.learner, 1000)) {
+    }
+}
+
+/// A sure sighting of beacon `index` of `count`, which looks like an object, a good way after the last.
+static void teach(int index, int count, int object, int view)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    view_of(object, view, signature);
+    way_um += 150000;
+    bslam_looks_teach(&looks, &params, index, count, way_um, signature);
+    train();
+}
+
+static double value_of(int index, int object, int view)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    bslam_sample_t sample;
+    view_of(object, view, signature);
+    assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
+    return (double)bslam_looks_ask(&looks, &params, index, &sample).value;
+}
+
+static void test_each_beacon_learns_its_own_look(void **state)
+{
+    for (int view = 0; view < 8; view++) {
+        for (int b = 0; b < 3; b++) {
+            teach(b, 3, b, view);
+        }
+    }
+    for (int b = 0; b < 3; b++) {
+        for (int other = 0; other < 3; other++) {
+            assert_true((value_of(b, other, 50) > 0) == (b == other));
+        }
+    }
+    assert_int_equal(looks.counters.taught, 24);
+    assert_int_equal(looks.counters.shared, 0);
+}
+
+static void test_nothing_is_known_of_a_beacon_without_a_machine(void **state)
+{
+    bslam_sample_t sample = {{0}};
+    const bslam_opinion_t opinion = bslam_looks_ask(&looks, &params, 0, &sample);
+    assert_true(opinion.weight == 0.0f && opinion.value == 0.0f);
+}
+
+static void test_weight_grows_with_the_samples(void **state)
+{
+    for (int view = 0; view < 3; view++) {
+        teach(0, 2, 0, view);
+        teach(1, 2, 1, view);
+    }
+    bslam_sample_t sample = {{0}};
+    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).weight, 0.5, 1e-6);
+}
+
+static void test_a_robot_that_stands_still_teaches_once(void **state)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    view_of(0, 0, signature);
+    for (int i = 0; i < 5; i++) {
+        bslam_looks_teach(&looks, &params, 0, 1, way_um, signature);
+    }
+    assert_int_equal(looks.counters.taught, 1);
+    // The way counts modulo 2^32 micrometres.
+    bslam_looks_teach(&looks, &params, 0, 1, way_um - 1, signature);
+    assert_int_equal(looks.counters.taught, 2);
+}
+
+static void learn_two(int views)
+{
+    for (int view = 0; view < views; view++) {
+        teach(0, 3, 0, view);
+        teach(1, 3, 1, view);
+    }
+}
+
+static void test_a_new_beacon_that_looks_like_another_shares_its_machine(void **state)
+{
+    learn_two(8);
+    for (int view = 20; view < 20 + SHARE; view++) {
+        assert_int_equal(looks.of[2].machine, BSLAM_NO_MACHINE);  // while that is open it learns nothing
+        teach(2, 3, 0, view);
+    }
+    assert_int_equal(looks.of[2].machine, looks.of[0].machine);
+    assert_int_equal(looks.counters.shared, 1);
+    assert_true(value_of(2, 0, 70) > 0);
+}
+
+static void test_a_beacon_that_only_once_looked_like_another_gets_its_own(void **state)
+{
+    learn_two(8);
+    teach(2, 3, 0, 20);
+    teach(2, 3, 2, 21);
+    assert_true(looks.of[2].machine >= 0);
+    assert_int_not_equal(looks.of[2].machine, looks.of[0].machine);
+    assert_int_equal(looks.counters.shared, 0);
+}
+
+static void test_a_shared_machine_that_refuses_a_beacon_is_left(void **state)
+{
+    learn_two(8);
+    looks.of[2].machine = looks.of[0].machine;  // shared by mistake: beacon 2 looks otherwise
+    for (int view = 0; view < SHARE; view++) {
+        teach(2, 3, 1, 30 + view);
+    }
+    assert_int_equal(looks.counters.parted, 1);
+    assert_int_not_equal(looks.of[2].machine, looks.of[0].machine);
+}
+
+static void test_forget_frees_a_machine_unless_another_beacon_has_it(void **state)
+{
+    learn_two(8);
+    looks.of[2].machine = looks.of[0].machine;
+    const int16_t shared = looks.of[0].machine;
+    const int16_t second = looks.of[1].machine;
+    bslam_looks_forget(&looks, 0, 3);
+    assert_int_equal(looks.of[0].machine, second);
+    assert_int_equal(looks.of[1].machine, shared);
+    assert_int_equal(looks.of[2].machine, BSLAM_NO_MACHINE);
+    assert_true(bslam_learner_knows(&looks.learner, shared));
+    bslam_looks_forget(&looks, 1, 2);
+    assert_int_equal(bslam_learner_samples(&looks.learner, shared), 0);
+    assert_true(bslam_learner_samples(&looks.learner, second) > 0);
+}
+
+static void test_forget_while_the_machine_is_in_training(void **state)
+{
+    for (int view = 0; view < 4; view++) {
+        for (int b = 0; b < 3; b++) {
+            teach(b, 3, b, view);
+        }
+    }
+    float signature[BSLAM_SAMPLE_FEATURES];
+    view_of(0, 90, signature);
+    way_um += 150000;
+    bslam_looks_teach(&looks, &params, 0, 3, way_um, signature);
+    (void)bslam_learner_work(&looks.learner, 5);
+    bslam_looks_forget(&looks, 0, 3);
+    train();
+    assert_true(value_of(0, 1, 60) > 0);  // what was beacon 1
+}
+
+static void test_all_beacons_alike_end_with_one_machine(void **state)
+{
+    for (int view = 0; view < 40; view++) {
+        for (int b = 0; b < 4; b++) {
+            teach(b, 4, 0, 4 * view + b);
+        }
+    }
+    // Whoever came first keeps its machine; the rest, which it takes for its own, share it, or have one that
+    // says nothing sure.
+    for (int b = 0; b < 4; b++) {
+        assert_true(looks.of[b].machine == looks.of[0].machine || value_of(b, 0, 777) < 1);
+    }
+}
+
+static void test_without_a_free_slot_a_beacon_goes_without(void **state)
+{
+    int32_t machine;
+    while (bslam_learner_add(&looks.learner, &machine) == BSLAM_OK) {
+    }
+    teach(0, 1, 0, 0);
+    assert_int_equal(looks.of[0].machine, BSLAM_NO_MACHINE);
+    assert_int_equal(looks.counters.no_slot, 1);
+    assert_int_equal(looks.counters.taught, 0);
+}
+
+static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)
+{
+    static bslam_looks_t before;
+    memset(&looks, 0x5a, sizeof looks);
+    memcpy(&before, &looks, sizeof looks);
+    assert_int_equal(bslam_looks_init(&looks, NULL, BSLAM_SEEDS_MAX + 1), BSLAM_E_COUNT);
+    assert_memory_equal(&looks, &before, sizeof looks);
+}
+
+static void test_clear_forgets_all(void **state)
+{
+    learn_two(4);
+    bslam_looks_clear(&looks);
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        assert_int_equal(looks.of[b].machine, BSLAM_NO_MACHINE);
+    }
+    int32_t machine;
+    assert_int_equal(bslam_learner_add(&looks.learner, &machine), BSLAM_OK);
+    assert_int_equal(machine, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
+        cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_machine, setup),
+        cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),
+        cmocka_unit_test_setup(test_a_robot_that_stands_still_teaches_once, setup),
+        cmocka_unit_test_setup(test_a_new_beacon_that_looks_like_another_shares_its_machine, setup),
+        cmocka_unit_test_setup(test_a_beacon_that_only_once_looked_like_another_gets_its_own, setup),
+        cmocka_unit_test_setup(test_a_shared_machine_that_refuses_a_beacon_is_left, setup),
+        cmocka_unit_test_setup(test_forget_frees_a_machine_unless_another_beacon_has_it, setup),
+        cmocka_unit_test_setup(test_forget_while_the_machine_is_in_training, setup),
+        cmocka_unit_test_setup(test_all_beacons_alike_end_with_one_machine, setup),
+        cmocka_unit_test_setup(test_without_a_free_slot_a_beacon_goes_without, setup),
+        cmocka_unit_test_setup(test_init_refuses_too_many_seeds_and_changes_nothing, setup),
+        cmocka_unit_test_setup(test_clear_forgets_all, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

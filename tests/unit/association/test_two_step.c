@@ -1,0 +1,374 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/association/association.h"
+#include "bslam/association/given.h"
+#include "bslam/model/noise.h"
+
+static const bslam_pose_t on_axle = {0, 0, 0};
+static const float PLAIN[BSLAM_SAMPLE_FEATURES] = {0.0f};
+
+static bslam_looks_t looks;
+
+/// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
+static bslam_ekf_t map_of(const bslam_params_t *params, const double (*places)[2], int count)
+{
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, params);
+    for (int i = 0; i < count; i++) {
+        const bslam_sighting_t sighting = unit_polar(0, 1, -1);
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
+        const int at = ekf.beacons[index].at;
+        for (int k = 0; k < 2; k++) {
+            ekf.mean[at + k] = real(places[i][k]);
+            for (int j = 0; j < ekf.dim; j++) {
+                bslam_symmat_set(ekf.covariance, at + k, j, j == at + k ? BSLAM_R(0.01) : 0);
+            }
+        }
+    }
+    return ekf;
+}
+
+/// A machine for beacon `index` that has learned from `samples`, and answers value * first feature.
+static void give_machine(int index, double value, int samples)
+{
+    int32_t machine;
+    assert_int_equal(bslam_learner_add(&looks.learner, &machine), BSLAM_OK);
+    looks.of[index].machine = (int16_t)machine;
+    bslam_machine_t *made = &looks.learner.machines[machine];
+    made->trained = true;
+    made->rivals = 1;
+    made->samples = (uint8_t)samples;
+    float weights[BSLAM_SAMPLE_SIZE] = {0};
+    weights[0] = (float)value * BSLAM_SAMPLE_UNIT;
+    bslam_weights_round(weights, &made->weights);
+}
+
+static bslam_sighting_t seen_with(bslam_sighting_t sighting, const float *signature)
+{
+    sighting.signature = signature;
+    return sighting;
+}
+
+static bslam_params_t svm_params(void)
+{
+    bslam_params_t params = unit_params();
+    params.association = BSLAM_ASSOCIATION_SVM;
+    params.candidate_d2 = 30;
+    params.new_per_m2 = BSLAM_R(0.02);
+    params.new_per_rad = BSLAM_R(0.3);
+    params.defer_score = 4;
+    params.rival_lead = 2;
+    params.looks_weight = 1;
+    params.looks_samples = 3;
+    params.looks_slope = 4;
+    params.looks_offset = BSLAM_R(-0.5);
+    params.looks_low = 8;
+    params.looks_high = 4;
+    params.far_d2 = 300;
+    params.learn_d2 = 9;
+    params.learn_lead = 4;
+    params.learn_margin = 0;
+    return params;
+}
+
+typedef struct decision {
+    bslam_match_t matches[8];
+} decision_t;
+
+static decision_t decide(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_sighting_t *seen,
+                         int count)
+{
+    const bslam_sighting_frame_t frame = {ekf, params, &looks, &on_axle, seen, count};
+    decision_t decision;
+    memset(&decision, 0x77, sizeof decision);
+    bslam_associate_svm(&frame, decision.matches);
+    return decision;
+}
+
+static void assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
+                           int beacon)
+{
+    assert_int_equal(match->verdict, verdict);
+    assert_int_equal(match->reason, reason);
+    assert_int_equal(match->beacon, beacon);
+}
+
+static int setup(void **state)
+{
+    return bslam_looks_init(&looks, NULL, 0) == BSLAM_OK ? 0 : -1;
+}
+
+/// Equation (47) without looks, for a beacon straight ahead at (4, 0).
+static double position_score(const bslam_params_t *params, double range_m, double bearing_rad)
+{
+    const bslam_sighting_t plain = unit_polar(0, 4, -1);
+    const double range_var = 0.01 + (double)bslam_range_variance_m2(params, &plain, 4);
+    const double bearing_var = 0.01 / 16 + (double)bslam_bearing_variance_rad2(params, &plain);
+    const double range = range_m - 4;
+    const double distance2 = range * range / range_var + bearing_rad * bearing_rad / bearing_var;
+    const double two_pi = 6.283185307179586;
+    return -0.5 * distance2 - log(two_pi * sqrt(range_var * bearing_var)) -
+           log((double)params->new_per_m2 * range_m);
+}
+
+static const double ahead[1][2] = {{4, 0}};
+
+static void test_score_is_equation_47_without_looks(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01), 1e-4);
+}
+
+static void test_score_adds_what_looks_say_as_samples_come(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
+    give_machine(0, 0.75, 3);
+    // 3 of 3 + 3 samples: half of 4 * 0.75 - 0.5.
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 1.25, 0.01);
+    looks.learner.machines[0].samples = 12;
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 2.0, 0.01);
+    signature[0] = -1.0f;  // 4 * -0.75 - 0.5 = -3.5
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 2.8, 0.01);
+}
+
+static void test_score_of_looks_is_clipped(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
+    give_machine(0, 5, 3);
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 2, 1e-3);
+    signature[0] = -1.0f;
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 4, 1e-3);
+}
+
+static void test_a_machine_without_rivals_says_nothing(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
+    give_machine(0, 5, 3);
+    looks.learner.machines[0].rivals = 0;
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0), 1e-4);
+}
+
+static void test_between_match_and_new_a_sighting_waits(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const double waits_m = 4.72;
+    const double is_new_m = 4.98;
+    assert_true(position_score(&params, waits_m, 0) < 0 && position_score(&params, waits_m, 0) > -4);
+    assert_true(position_score(&params, is_new_m, 0) < -4);
+    const bslam_sighting_t seen[] = {unit_polar(0, waits_m, -1)};
+    const bslam_sighting_t other[] = {unit_polar(0, is_new_m, -1)};
+    decision_t d = decide(&ekf, &params, seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    d = decide(&ekf, &params, other, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+}
+
+static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
+    give_machine(0, 3, 16);
+    const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    assert_int_equal(d.matches[0].near, 0);
+}
+
+static void test_far_but_clearly_alike_is_not_new(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    give_machine(0, 2, 16);
+    const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
+    const bslam_sighting_t plain = seen_with(unit_polar(0.2, 4.4, -1), PLAIN);
+    const bslam_sighting_t farther = seen_with(unit_polar(1.5, 4.4, -1), alike);
+    decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    d = decide(&ekf, &params, &plain, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    d = decide(&ekf, &params, &farther, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+}
+
+static const double pair[2][2] = {{4, 0}, {4, 0.4}};
+
+static void test_one_to_one_the_clearest_choice_first(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, pair, 2);
+    const bslam_sighting_t seen[] = {unit_polar(0.1, 4.02, -1), unit_polar(0, 4, -1)};
+    const decision_t d = decide(&ekf, &params, seen, 2);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+}
+
+static void test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_sighting_t seen[] = {unit_polar(0.05, 4.4, -1), unit_polar(0, 4, -1)};
+    assert_true(position_score(&params, 4.4, 0.05) > 0);
+    const decision_t d = decide(&ekf, &params, seen, 2);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
+    assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+}
+
+static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_sighting_t seen[] = {unit_polar(0.02, 4, -1), unit_polar(-0.02, 4, -1)};
+    const decision_t d = decide(&ekf, &params, seen, 2);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    assert_decided(&d.matches[1], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+}
+
+static void test_looks_decide_between_two_in_the_gate(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, pair, 2);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    give_machine(0, -1.5, 16);
+    give_machine(1, 1.5, 16);
+    // Half way between them, a little nearer to the first.
+    const bslam_sighting_t seen = seen_with(unit_polar(0.045, 4, -1), signature);
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    bslam_sighting_t blind = seen;
+    blind.signature = NULL;
+    assert_int_equal(decide(&ekf, &params, &blind, 1).matches[0].beacon, 0);
+}
+
+static void test_sure_enough_to_learn_from(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    const bslam_sighting_t near = seen_with(unit_polar(0, 4, -1), signature);
+    const bslam_sighting_t far = seen_with(unit_polar(0.05, 4.4, -1), signature);
+    // Young: position alone says so. The farther one does not lead enough.
+    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure == (position_score(&params, 4, 0) >= 4));
+    assert_false(decide(&ekf, &params, &far, 1).matches[0].sure);
+    give_machine(0, 1, 16);
+    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure);
+    // Grown up, and its machine says no.
+    looks.learner.machines[0].weights.unit = -looks.learner.machines[0].weights.unit;
+    assert_false(decide(&ekf, &params, &near, 1).matches[0].sure);
+}
+
+static void test_directions_alone_have_their_own_density_of_new(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_sighting_t seen = unit_direction(0.01, -1);
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);
+    const double variance = 0.01 / 16 + (double)innovation.bearing_var_rad2;
+    const double expected =
+        -0.5 * 0.01 * 0.01 / variance - 0.5 * log(6.283185307179586 * variance) - log(0.3);
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    assert_near(d.matches[0].score, expected, 1e-4);
+}
+
+static void test_an_unmappable_sighting_is_rejected(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    bslam_sighting_t seen = unit_polar(0, 4, -1);
+    seen.beacon_class = BSLAM_CLASS_NOT_MAPPABLE;
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
+}
+
+/// A heading that is 0.1 rad off displaces all sightings alike: given one, the other is where it should be.
+static void test_given_a_match_the_others_are_surer(void **state)
+{
+    const bslam_params_t params = svm_params();
+    static const double places[2][2] = {{4, 0}, {0, 4}};
+    bslam_ekf_t ekf = map_of(&params, places, 2);
+    bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
+    const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1), unit_polar(1.570796 + 0.1, 4, -1)};
+    bslam_innovation_t innovations[2];
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen[i], i, &innovations[i]),
+                         BSLAM_OK);
+    }
+    static bslam_given_t given;
+    bslam_given_nothing(&given);
+    bslam_weight_t alone;
+    bslam_weight_t after;
+    assert_int_equal(bslam_given_weigh(&ekf, &given, &innovations[1], &alone), BSLAM_OK);
+    assert_true(bslam_given_add(&ekf, &given, &innovations[0]));
+    assert_int_equal(bslam_given_weigh(&ekf, &given, &innovations[1], &after), BSLAM_OK);
+    // By hand: S = [[a, b], [b, a]] of the two directions, b the variance of the heading.
+    const double b = 0.01;
+    const double a = b + 0.01 / 16 + (double)innovations[1].bearing_var_rad2;
+    const double left = a - b * b / a;
+    const double y = 0.1 - b / a * 0.1;
+    const double range_var = 0.01 + (double)innovations[1].range_var_m2;
+    assert_near(alone.distance2, 0.01 / a, 1e-4);
+    assert_near(after.distance2, y * y / left, 1e-4);
+    assert_near(after.log_density, -0.5 * y * y / left - log(6.283185307179586 * sqrt(left * range_var)),
+                1e-3);
+}
+
+static void test_given_takes_no_more_than_it_has_room_for(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_sighting_t seen = unit_polar(0, 4, -1);
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);
+    static bslam_given_t given;
+    bslam_given_nothing(&given);
+    for (int i = 0; i < BSLAM_GIVEN_MAX; i++) {
+        assert_true(bslam_given_add(&ekf, &given, &innovation));
+    }
+    assert_false(bslam_given_add(&ekf, &given, &innovation));
+    assert_int_equal(given.count, 2 * BSLAM_GIVEN_MAX);
+    bslam_weight_t weight;
+    assert_int_equal(bslam_given_weigh(&ekf, &given, &innovation, &weight), BSLAM_OK);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
+        cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
+        cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
+        cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
+        cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
+        cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),
+        cmocka_unit_test_setup(test_far_but_clearly_alike_is_not_new, setup),
+        cmocka_unit_test_setup(test_one_to_one_the_clearest_choice_first, setup),
+        cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),
+        cmocka_unit_test_setup(test_two_sightings_that_want_a_beacon_alike_both_wait, setup),
+        cmocka_unit_test_setup(test_looks_decide_between_two_in_the_gate, setup),
+        cmocka_unit_test_setup(test_sure_enough_to_learn_from, setup),
+        cmocka_unit_test_setup(test_directions_alone_have_their_own_density_of_new, setup),
+        cmocka_unit_test_setup(test_an_unmappable_sighting_is_rejected, setup),
+        cmocka_unit_test_setup(test_given_a_match_the_others_are_surer, setup),
+        cmocka_unit_test_setup(test_given_takes_no_more_than_it_has_room_for, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,216 @@
+// The pipeline with looks attached: what it refuses, learns and takes out.
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/slam/slam.h"
+
+enum { STEP_US = 40000 };
+
+static bslam_slam_t slam;
+static bslam_looks_t looks;
+static int64_t now_us;
+
+static void start(bslam_params_t params)
+{
+    int bad_id;
+    memset(&slam, 0, sizeof slam);
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_looks_init(&looks, NULL, 0), BSLAM_OK);
+    bslam_slam_attach_looks(&slam, &looks);
+    now_us = 0;
+}
+
+static bslam_params_t svm_params(void)
+{
+    bslam_params_t params = unit_params();
+    params.association = BSLAM_ASSOCIATION_SVM;
+    params.left_speed_sd_mps = BSLAM_R(1e-3);
+    params.right_speed_sd_mps = BSLAM_R(1e-3);
+    params.learn_way_m = 0;
+    params.learn_budget = 2000;
+    params.doubt_sightings = 5;
+    return params;
+}
+
+static int setup(void **state)
+{
+    start(svm_params());
+    return 0;
+}
+
+/// An object's signature, a little different each time.
+static const float *signature_of(int object, int view, float *signature)
+{
+    unit_random_t random = {(uint64_t)(1 + 997 * object + 31 * view)};
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        signature[k] = (float)unit_random(&random, 0, 0.1);
+    }
+    signature[3 * object] += 0.7f;
+    signature[3 * object + 1] += 0.6f;
+    return signature;
+}
+
+static void see(const bslam_sighting_t *sightings, int count)
+{
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    now_us += STEP_US;
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us, sightings, count), BSLAM_OK);
+}
+
+/// Two beacons 4 m away, of objects 0 and 1, for so many frames.
+static void see_two(int frames)
+{
+    for (int view = 0; view < frames; view++) {
+        float a[BSLAM_SAMPLE_FEATURES];
+        float b[BSLAM_SAMPLE_FEATURES];
+        bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1, 4, -1)};
+        seen[0].signature = signature_of(0, view, a);
+        seen[1].signature = signature_of(1, view, b);
+        see(seen, 2);
+    }
+}
+
+static void see_object(int object, int view, double bearing_rad)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen = unit_polar(bearing_rad, 4, -1);
+    seen.signature = signature_of(object, view, signature);
+    see(&seen, 1);
+}
+
+static void test_a_signature_that_is_not_finite_is_refused_and_changes_nothing(void **state)
+{
+    see_two(6);
+    static const float bad[] = {NAN, INFINITY, -INFINITY, 2e12f};
+    for (int k = 0; k < COUNT_OF(bad); k++) {
+        float a[BSLAM_SAMPLE_FEATURES];
+        float b[BSLAM_SAMPLE_FEATURES];
+        bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1, 4, -1)};
+        seen[0].signature = signature_of(0, 99, a);
+        seen[1].signature = signature_of(1, 99, b);
+        b[(k * 23) % BSLAM_SAMPLE_FEATURES] = bad[k];
+        static bslam_slam_t before;
+        static bslam_looks_t looks_before;
+        memcpy(&before, &slam, sizeof slam);
+        memcpy(&looks_before, &looks, sizeof looks);
+        assert_int_equal(bslam_slam_sightings(&slam, now_us + STEP_US, seen, 2), BSLAM_E_NOT_FINITE);
+        assert_int_equal(bslam_slam_bad_sighting(&slam), 1);
+        before.bad_sighting = 1;
+        before.counters.frames_refused++;
+        assert_memory_equal(&slam, &before, sizeof slam);
+        assert_memory_equal(&looks, &looks_before, sizeof looks);
+    }
+}
+
+static void test_what_is_surely_matched_is_learned(void **state)
+{
+    see_two(10);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(bslam_slam_counters(&slam)->matched, 18);
+    assert_true(looks.counters.taught > 10);
+    assert_true(bslam_learner_knows(&looks.learner, looks.of[0].machine));
+}
+
+static void test_other_methods_leave_looks_alone(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.association = BSLAM_ASSOCIATION_MAHALANOBIS;
+    start(params);
+    see_two(10);
+    assert_int_equal(looks.counters.taught + looks.counters.unsure, 0);
+}
+
+static void test_without_looks_position_decides(void **state)
+{
+    bslam_slam_attach_looks(&slam, NULL);
+    see_two(10);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(bslam_slam_counters(&slam)->matched, 18);
+}
+
+static void test_attaching_again_forgets(void **state)
+{
+    see_two(10);
+    bslam_slam_attach_looks(&slam, &looks);
+    assert_int_equal(looks.of[0].machine, BSLAM_NO_MACHINE);
+    see_two(10);
+    assert_true(looks.of[0].machine >= 0);
+}
+
+static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **state)
+{
+    slam.params.learn_budget = 3;  // training is always under way
+    see_two(8);
+    bslam_beacon_view_t view;
+    assert_int_equal(bslam_slam_beacon(&slam, 0, &view), BSLAM_OK);
+    const int16_t other = looks.of[1].machine;
+    assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_OK);
+    assert_int_equal(looks.of[0].machine, other);
+    assert_int_equal(looks.of[1].machine, BSLAM_NO_MACHINE);
+    see_two(8);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_E_NO_BEACON);
+}
+
+/// Another object where beacon 0 is, which is not seen with it.
+static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void **state)
+{
+    see_two(20);
+    int view = 0;
+    while (looks.counters.retired == 0 && view < 60) {
+        see_object(2, view++, 0.1);
+    }
+    assert_int_equal(looks.counters.retired, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(looks.of[0].ousted, 1);
+}
+
+static void test_what_keeps_being_replaced_is_gone_itself(void **state)
+{
+    see_two(20);
+    bslam_beacon_view_t first;
+    assert_int_equal(bslam_slam_beacon(&slam, 0, &first), BSLAM_OK);
+    int view = 0;
+    while (looks.counters.retired < 3 && view < 200) {
+        see_object(2, view++, 0.1);
+    }
+    assert_int_equal(looks.counters.retired, 3);
+    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
+        bslam_beacon_view_t beacon;
+        assert_int_equal(bslam_slam_beacon(&slam, b, &beacon), BSLAM_OK);
+        assert_int_not_equal(beacon.uid, first.uid);
+    }
+}
+
+static void test_a_neighbour_seen_with_the_other_stays(void **state)
+{
+    see_two(20);
+    for (int view = 0; view < 30; view++) {
+        float a[BSLAM_SAMPLE_FEATURES];
+        float c[BSLAM_SAMPLE_FEATURES];
+        bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(0.1, 4, -1)};
+        seen[0].signature = signature_of(0, 40 + view, a);
+        seen[1].signature = signature_of(2, view, c);
+        see(seen, 2);
+    }
+    assert_int_equal(bslam_slam_beacon_count(&slam), 3);
+    assert_int_equal(looks.counters.retired, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
+        cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),
+        cmocka_unit_test_setup(test_other_methods_leave_looks_alone, setup),
+        cmocka_unit_test_setup(test_without_looks_position_decides, setup),
+        cmocka_unit_test_setup(test_attaching_again_forgets, setup),
+        cmocka_unit_test_setup(test_a_beacon_removed_while_its_machine_trains_is_forgotten, setup),
+        cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
+        cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
+        cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
