@@ -67,7 +67,7 @@ static void test_default_every_field_is_the_tables_and_passes_the_check(void **s
     memset(&params, 0xa5, sizeof params);
     bslam_params_default(&params);
 #define ASSERT_DEFAULT(field, value, low, high, meaning) \
-    assert_near(params.field, value, UNIT_ROUNDING *(value));
+    assert_near(params.field, value, UNIT_ROUNDING *fabs((double)(value)));
     BSLAM_PARAMS(ASSERT_DEFAULT, ASSERT_DEFAULT)
     int bad_id = 7;
     assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
