@@ -159,8 +159,7 @@ class Furnisher:
             BeaconLook(beacon_id, name, x_m, y_m, kind.height_m, width_m, bottom_m, depth_m, facing_rad)
         )
         self._bodies.append(self._builder.body(first, name in ROUND))
-        if depth_m > _OBSTACLE_FROM_M:
-            self._obstacles.append(Obstacle(*face.at(along_m, 0.5 * depth_m), 0.5 * width_m))
+        self._stand(place)
         if name == "window":
             lamp_x_m, lamp_y_m = face.at(along_m, 0.3)
             middle_m = bottom_m + 0.5 * kind.height_m
@@ -176,6 +175,7 @@ class Furnisher:
                 face, along_m = place
                 mount = Mount(face, along_m, piece.width_m, piece.out_m, piece.bottom_m, piece.height_m)
                 self._hang(mount, piece.look, CLUTTER, False)
+                self._stand(mount)
 
     def add_clutter(self, piece: Piece, x_m: float, y_m: float) -> None:
         """A thing that stands on the floor and always shows the same side."""
@@ -278,6 +278,12 @@ class Furnisher:
             corner = np.array([x_m - 0.5 * side_m[0], y_m - 0.5 * side_m[1], self._height_m - 0.03])
             right, back = np.array([side_m[0], 0.0, 0.0]), np.array([0.0, side_m[1], 0.0])
             self._builder.rectangle(corner, right, back, texture, glow=(_LAMP_GLOW * share, 0.0))
+
+    def _stand(self, mount: Mount) -> None:
+        """What stands out far is in the way."""
+        if mount.depth_m > _OBSTACLE_FROM_M:
+            at = mount.face.at(mount.along_m, 0.5 * mount.depth_m)
+            self._obstacles.append(Obstacle(*at, 0.5 * mount.width_m))
 
     def _hang(self, mount: Mount, look: Look, identity: int, turns: bool) -> None:
         """A thing on a wall: its front, and its sides if it stands out enough."""

@@ -17,9 +17,6 @@ from bslam.world.scenario import Scenario
 _SIDE_M = (5.0, 12.0)
 _ROOM_SIDE_MIN_M = 3.5
 _GAP_M = (1.2, 2.2)
-_BEACONS = (6, 16)
-_CLUTTER = (3, 8)
-_WALL_THINGS = (2, 6)
 _TRIES = 60
 _BEFORE_WALL_M, _BEFORE_WALL_SHARE = 0.9, 0.9
 
@@ -38,15 +35,15 @@ def make_world(seed: int, style: str = "train") -> Scene:
     low, high = (0.0, 0.0), (artist.between(*_SIDE_M), artist.between(*_SIDE_M))
     furnisher = Furnisher(*_rooms(low, high, artist.count(0, 2), artist), artist)
     beacon_id = 0
-    for name in _balanced_names(artist.count(*_BEACONS), artist):
+    for name in _balanced_names(artist.count(*artist.style.beacon_count), artist):
         kind = KINDS[name]
         width_m = artist.between(*kind.width_m)
         place = furnisher.draw_place(width_m, kind.depth_m[1])
         if place is not None:
             furnisher.add_beacon(beacon_id, name, kind, *place, width_m)
             beacon_id += 1
-    furnisher.add_wall_things(artist.count(*_WALL_THINGS))
-    _stand_clutter(furnisher, artist, artist.count(*_CLUTTER))
+    furnisher.add_wall_things(artist.count(*artist.style.thing_count))
+    _stand_clutter(furnisher, artist, artist.count(*artist.style.clutter_count))
     return furnisher.finish(seed)
 
 
@@ -83,8 +80,8 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         width_m = artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
         look = furnisher.add_beacon(beacon.beacon_id, drawn, kind, face, along_m, width_m)
         made[whose] = drawn, kind, width_m, look
-    furnisher.add_wall_things(artist.count(*_WALL_THINGS) * len(areas))
-    for _ in range(artist.count(*_CLUTTER) * len(areas)):
+    furnisher.add_wall_things(artist.count(*artist.style.thing_count) * len(areas))
+    for _ in range(artist.count(*artist.style.clutter_count) * len(areas)):
         piece = clutter(artist)
         foot = furnisher.draw_foot(piece.width_m, _AT_WALL_M)
         if foot is not None:

@@ -11,7 +11,8 @@ import pytest
 from bslam.errors import BslamError
 from bslam.rig import load_rig
 from bslam.world.arena import Beacon
-from bslam.world.camera import CLUTTER, KINDS, Renderer, Scene, dress, free_pose, make_world, walk
+from bslam.world.camera import CLUTTER, KINDS, Renderer, Scene, dress, free_pose, looks, make_world, walk
+from bslam.world.camera.looks import oddments, style_of
 from bslam.world.scenario import Scenario, load_scenario, scenario_names
 
 SEEDS = range(12)
@@ -30,7 +31,7 @@ def worlds(request: pytest.FixtureRequest) -> list[Scene]:
 def test_make_world_has_the_beacons_it_promises(worlds: list[Scene]) -> None:
     kinds = set()
     for scene in worlds:
-        assert 4 <= len(scene.beacons) <= 16
+        assert 4 <= len(scene.beacons) <= style_of(scene.style).beacon_count[1]
         assert [one.beacon_id for one in scene.beacons] == list(range(len(scene.beacons)))
         for one in scene.beacons:
             kind = KINDS[one.kind]
@@ -161,3 +162,21 @@ def test_walk_moves_as_a_robot_does(worlds: list[Scene]) -> None:
 def test_walk_bad_length_or_rate_is_refused(worlds: list[Scene], frames: int, hz: float) -> None:
     with pytest.raises(BslamError, match="frames"):
         walk(worlds[0], np.random.default_rng(2), frames, hz)
+
+
+@pytest.mark.parametrize("name", list(oddments.THINGS))
+def test_unlisted_things_are_never_as_large_as_a_beacon_and_stay_below_the_ceiling(name: str) -> None:
+    artist = looks.Artist(style_of("train"), np.random.default_rng(5))
+    pieces = [oddments.THINGS[name](artist) for _ in range(40)]
+    for piece in pieces:
+        assert name == "column" or not oddments.is_beacon_sized(piece.width_m, piece.height_m)
+        assert piece.bottom_m >= 0.0
+        assert piece.bottom_m + piece.height_m < 2.4
+    assert len({piece.look.front.tobytes() for piece in pieces}) > 30
+    assert np.ptp([piece.width_m for piece in pieces]) > 0.05
+
+
+def test_beacon_sizes_are_known_as_such() -> None:
+    for kind in KINDS.values():
+        assert oddments.is_beacon_sized(float(np.mean(kind.width_m)), kind.height_m)
+    assert not oddments.is_beacon_sized(0.1, 0.1)

@@ -101,6 +101,24 @@ def _planked(canvas: Canvas, artist: Artist, leaf: Colour) -> None:
         canvas.scale(0.0, y, 1.0, y + 0.04, 0.85)
 
 
+def _medley(canvas: Canvas, artist: Artist, leaf: Colour) -> None:
+    """Panels, panes, plates and notices in any number."""
+    if artist.chance(0.5):
+        _panels(artist.count(1, 3), artist.count(1, 4))(canvas, artist, leaf)
+    if artist.chance(0.15):
+        canvas.rect(0.49, 0.0, 0.51, 1.0, tint(leaf, 0.5))  # two leaves
+    if artist.chance(0.4):
+        left, top = artist.between(0.14, 0.6), artist.between(0.06, 0.4)
+        right, bottom = artist.between(left + 0.08, 0.88), artist.between(top + 0.06, 0.9)
+        _pane(left, top, right, bottom)(canvas, artist, leaf)
+    for _ in range(artist.count(0, 2)):
+        left, top = artist.between(0.12, 0.7), artist.between(0.1, 0.9)
+        right, bottom = left + artist.between(0.05, 0.5), top + artist.between(0.01, 0.12)
+        canvas.rect(left, top, right, bottom, artist.accent())
+    if artist.chance(0.2):
+        canvas.rect(0.12, 0.5, 0.88, 0.53, artist.metal())  # a push bar
+
+
 _DOORS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "plain": _plain,
     "panels2": _panels(1, 2),
@@ -114,6 +132,7 @@ _DOORS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "round_pane": _round_pane,
     "vent": _vent,
     "planked": _planked,
+    "medley": _medley,
 }
 
 # --- Windows ------------------------------------------------------------------------------------------------
@@ -196,12 +215,21 @@ def _facade(canvas: Canvas, artist: Artist) -> None:
             canvas.rect(column, row, column + 0.55 * step, row + 0.8 * step, artist.grey(0.2, 0.6))
 
 
+def _dusk(canvas: Canvas, artist: Artist) -> None:
+    canvas.gradient(artist.accent(), artist.grey(0.05, 0.4), artist.chance(0.2))
+    for _ in range(artist.count(0, 12)):
+        wide, tall = artist.between(0.02, 0.2), artist.between(0.02, 0.3)
+        x, y = artist.between(0.0, 1.0), artist.between(0.2, 1.0)
+        canvas.ellipse(x, y, wide, tall, tint(artist.accent(), artist.between(0.3, 1.2)))
+
+
 _VIEWS: dict[str, Callable[[Canvas, Artist], None]] = {
     "sky": _sky,
     "trees": _trees,
     "houses": _houses,
     "hills": _hills,
     "facade": _facade,
+    "dusk": _dusk,
 }
 
 
@@ -236,12 +264,23 @@ def _frosted(canvas: Canvas, artist: Artist) -> None:
     canvas.rect(0.0, top, 1.0, 1.0, artist.grey(0.75, 0.95), 0.85)
 
 
+def _slats(canvas: Canvas, artist: Artist) -> None:
+    """Upright ones, over some of it."""
+    cloth, count = artist.grey(0.5, 1.0), artist.count(6, 18)
+    start, end = sorted((artist.between(0.0, 1.0), artist.between(0.0, 1.0)))
+    for i in range(count):
+        x = start + (end - start) * i / count
+        canvas.rect(x, 0.0, x + 0.7 * (end - start) / count, 1.0, cloth)
+        canvas.hole(x, 0.0, x + 0.7 * (end - start) / count, 1.0, alpha=artist.between(0.6, 0.95))
+
+
 _DRAPES: dict[str, Callable[[Canvas, Artist], None]] = {
     "none": _no_drapes,
     "blind": _blind,
     "curtains": _curtains,
     "roller": _roller,
     "frosted": _frosted,
+    "slats": _slats,
 }
 
 # --- Radiators and extinguishers ----------------------------------------------------------------------------
@@ -295,11 +334,23 @@ def _bars_across(canvas: Canvas, artist: Artist, body: Colour) -> None:
         canvas.rect(x, 0.0, x + 0.04, 1.0, tint(body, 0.9))
 
 
+def _slots(canvas: Canvas, artist: Artist, body: Colour) -> None:
+    """Slots across, or a grating of both, or a bare front."""
+    rows, columns, deep = artist.count(0, 9), artist.count(0, 30), artist.between(0.5, 0.95)
+    for i in range(rows):
+        canvas.scale(0.03, (i + 0.5) / rows, 0.97, (i + 0.8) / rows, deep)
+    for i in range(columns if artist.chance(0.6) else 0):
+        canvas.scale((i + 0.5) / columns, 0.05, (i + 0.8) / columns, 0.95, deep)
+    if artist.chance(0.5):
+        canvas.frame(0.0, 0.0, 1.0, 1.0, artist.between(0.005, 0.02), tint(body, artist.between(0.6, 1.1)))
+
+
 _RADIATORS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "ribs": _ribs,
     "plates": _plates,
     "columns": _columns,
     "bars": _bars_across,
+    "slots": _slots,
 }
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from bslam.world.camera.looks.canvas import Canvas, Colour, hsv, tint
+from bslam.world.camera.looks import oddments
+from bslam.world.camera.looks.canvas import Canvas, Colour, hsv, mix, tint
 from bslam.world.camera.looks.fittings import wood_grain
 from bslam.world.camera.looks.look import Look
+from bslam.world.camera.looks.piece import Piece
 from bslam.world.camera.looks.prints import text
 from bslam.world.camera.looks.style import Artist
 
@@ -113,6 +114,26 @@ def _sliding(canvas: Canvas, artist: Artist, body: Colour) -> None:
     canvas.rect(0.0, 0.0, 1.0, 0.03, tint(body, 0.6))
 
 
+def _medley(canvas: Canvas, artist: Artist, body: Colour) -> None:
+    """Anything above anything: shelves, doors, glass, drawers, bare board."""
+    top = 0.01
+    while top < 0.9:
+        bottom = min(top + artist.between(0.15, 0.9), 0.97)
+        if 0.97 - bottom < 0.12:
+            bottom = 0.97
+        kind = artist.random.random()
+        if kind < 0.3:
+            _shelves(canvas, artist, top, bottom, body)
+            if artist.chance(0.4):
+                glass = mix(artist.metal(), _WHITE, 0.4)
+                canvas.rect(0.02, top, 0.98, bottom, glass, artist.between(0.1, 0.5))
+        elif kind < 0.85:
+            tint_of = tint(body, artist.between(0.85, 1.1)) if artist.chance(0.7) else artist.varnish()
+            canvas.rect(0.0, top, 1.0, bottom, tint_of)
+            _doors_in(canvas, artist, top, bottom, artist.count(1, 4), tint_of)
+        top = bottom
+
+
 _CABINETS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "two_doors": _two_doors,
     "drawers": _drawers,
@@ -122,20 +143,10 @@ _CABINETS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "files": _files,
     "glass_doors": _glass_doors,
     "sliding": _sliding,
+    "medley": _medley,
 }
 
 # --- Clutter ------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Something that is no beacon; bottom_m: how high it hangs, out_m: how far it stands out."""
-
-    look: Look
-    width_m: float
-    height_m: float
-    bottom_m: float = 0.0
-    out_m: float = 0.02
 
 
 def clutter(artist: Artist) -> Piece:
@@ -278,6 +289,10 @@ _CLUTTER: dict[str, tuple[Callable[[Canvas, Artist], None], float, float]] = {
     "bin": (_bin, 0.3, 0.4),
     "cone": (_cone, 0.3, 0.55),
     "box": (_carton, 0.45, 0.4),
+    "figure": (oddments.figure, 0.5, 1.0),
+    "stand": (oddments.figure, 0.35, 1.4),
+    "heap": (oddments.figure, 0.8, 0.6),
+    "foliage": (oddments.leaves, 0.7, 1.2),
 }
 
 # --- Things on the wall -------------------------------------------------------------------------------------
@@ -394,4 +409,5 @@ _THINGS: dict[str, Callable[[Artist], Piece]] = {
     "duct": _duct,
     "rail": _rail,
     "shelf": _shelf,
+    **oddments.THINGS,
 }

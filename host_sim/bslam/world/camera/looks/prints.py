@@ -33,6 +33,28 @@ def text(
         y += pitch
 
 
+def scribble(canvas: Canvas, artist: Artist, count: int) -> None:
+    """So many marks of any shape and colour, anywhere."""
+    for _ in range(count):
+        ink = artist.pick((artist.accent(), artist.accent(), _WHITE, artist.grey(0.0, 0.4)))
+        wide, tall = artist.between(0.04, 0.45), artist.between(0.04, 0.45)
+        x, y = artist.between(0.0, 1.0), artist.between(0.0, 1.0)
+        box = (max(0.0, x - wide), max(0.0, y - tall), min(1.0, x + wide), min(1.0, y + tall))
+        kind = artist.random.random()
+        if kind < 0.3:
+            canvas.rect(*box, ink, artist.between(0.5, 1.0))
+        elif kind < 0.5:
+            canvas.ellipse(x, y, wide, tall, ink, artist.between(0.5, 1.0))
+        elif kind < 0.65:
+            canvas.line((x, y), (artist.between(0.0, 1.0), artist.between(0.0, 1.0)), 0.2 * wide, ink)
+        elif kind < 0.8:
+            text(canvas, artist, box, artist.between(0.03, 0.15), ink)
+        elif kind < 0.9:
+            _photo_in(canvas, artist, *box)
+        else:
+            canvas.polygon(_regular(canvas, x, y, wide, artist.count(3, 6), artist.between(0.0, 6.3)), ink)
+
+
 def poster(artist: Artist) -> Look:
     ground = artist.pick((_WHITE, artist.accent(), artist.accent(), artist.grey(0.85, 1.0)))
     canvas = Canvas(128, 128, ground, _POSTER_ASPECT)
@@ -169,6 +191,14 @@ def _mosaic(canvas: Canvas, artist: Artist) -> None:
             canvas.rect(*box, artist.pick(inks))
 
 
+def _medley(canvas: Canvas, artist: Artist) -> None:
+    if artist.chance(0.3):
+        canvas.gradient(artist.accent(), artist.accent(), artist.chance(0.5))
+    scribble(canvas, artist, artist.count(3, 12))
+    if artist.chance(0.3):
+        canvas.grain(artist.random, artist.between(0.05, 0.3), artist.count(3, 20), artist.count(3, 20), 0.5)
+
+
 _POSTERS: dict[str, Callable[[Canvas, Artist], None]] = {
     "fields": _fields,
     "article": _article,
@@ -182,6 +212,7 @@ _POSTERS: dict[str, Callable[[Canvas, Artist], None]] = {
     "rings": _rings,
     "map": _map,
     "mosaic": _mosaic,
+    "medley": _medley,
 }
 
 _GREEN, _BLUE, _YELLOW, _RED = (0.0, 0.33, 0.16), (0.0, 0.38, 0.72), (0.98, 0.8, 0.0), (0.8, 0.05, 0.08)
@@ -299,6 +330,25 @@ def _number(canvas: Canvas, artist: Artist) -> None:
             canvas.rect(left, 0.47, left + 0.25, 0.54, ink)
 
 
+def _glyph(canvas: Canvas, artist: Artist) -> None:
+    """Marks of one ink on a plate of another."""
+    plates = (_GREEN, _BLUE, _YELLOW, _RED, _WHITE, artist.accent())
+    _plate(canvas, artist, *plates)
+    ink = artist.pick((_WHITE, _WHITE, (0.05, 0.05, 0.05), _near(artist, artist.pick(plates))))
+    for _ in range(artist.count(1, 5)):
+        wide, tall = artist.between(0.06, 0.35), artist.between(0.06, 0.35)
+        x, y = artist.between(0.1 + wide, 0.9 - wide), artist.between(0.1 + tall, 0.9 - tall)
+        kind = artist.random.random()
+        if kind < 0.4:
+            canvas.rect(x - wide, y - tall, x + wide, y + tall, ink)
+        elif kind < 0.7:
+            canvas.ellipse(x, y, wide, tall, ink)
+        else:
+            canvas.polygon([(x - wide, y - tall), (x + wide, y), (x - wide, y + tall)], ink)
+    if artist.chance(0.3):
+        canvas.frame(0.0, 0.0, 1.0, 1.0, artist.between(0.05, 0.14), ink)
+
+
 _SIGNS: dict[str, Callable[[Canvas, Artist], None]] = {
     "arrow": _arrow,
     "runner": _runner,
@@ -311,6 +361,7 @@ _SIGNS: dict[str, Callable[[Canvas, Artist], None]] = {
     "diamond": _diamond,
     "extinguisher": _extinguisher_sign,
     "number": _number,
+    "glyph": _glyph,
 }
 
 

@@ -39,8 +39,11 @@ class Style:
     radiators: tuple[str, ...]
     views: tuple[str, ...]  # through a window
     drapes: tuple[str, ...]
+    beacon_count: tuple[int, int]  # in a world
     clutter: tuple[str, ...]
+    clutter_count: tuple[int, int]
     things: tuple[str, ...]
+    thing_count: tuple[int, int]
     lamp_strength: tuple[float, float]
     lamp_warmth: tuple[float, float]  # blue of the lamps' light, red being 1
     ambient: tuple[float, float]
@@ -53,8 +56,12 @@ TRAIN = Style(
     stream=0x7261,
     wall_hues=(0.08, 0.11, 0.14, 0.30, 0.45, 0.56, 0.62, 0.75, 0.95),
     wall_values=(0.72, 0.98),
-    wall_patterns=(*_MOSTLY_PLAIN, "two_tone", "brick", "stripes", "rough", "blocks"),
-    floor_patterns=("tiles", "planks", "carpet", "checker", "linoleum"),
+    wall_patterns=(
+        *_MOSTLY_PLAIN,
+        *("two_tone", "brick", "stripes", "rough", "blocks"),
+        *("wainscot", "wainscot", "wainscot", "bands", "cladding", "cladding", "mottled", "motif"),
+    ),
+    floor_patterns=("tiles", "planks", "carpet", "checker", "linoleum", "patchwork", "patchwork"),
     accent_hues=(0.0, 0.03, 0.07, 0.12, 0.16, 0.27, 0.36, 0.47, 0.55, 0.61, 0.67, 0.78, 0.91),
     woods=(
         (0.62, 0.43, 0.26),
@@ -63,18 +70,27 @@ TRAIN = Style(
         (0.33, 0.21, 0.14),
         (0.70, 0.50, 0.36),
     ),
-    posters=("fields", "article", "photo", "shapes", "grid", "headline", "stripes"),
-    doors=("plain", "panels4", "panels2", "slit", "pane", "kick", "glazed"),
-    cabinets=("two_doors", "drawers", "books", "lockers", "half_books"),
-    signs=("arrow", "runner", "ring", "triangle", "flame", "text"),
-    radiators=("ribs", "plates", "columns"),
-    views=("sky", "trees", "houses"),
-    drapes=("none", "none", "blind", "curtains", "roller"),
-    clutter=("chair", "office_chair", "bush", "palm", "bin", "box"),
-    things=("clock", "switch", "pipe", "shelf", "duct", "note", "grille"),
-    lamp_strength=(1.2, 4.5),
-    lamp_warmth=(0.55, 1.05),
-    ambient=(0.08, 0.35),
+    posters=("fields", "article", "photo", "shapes", "grid", "headline", "stripes", *("medley",) * 5),
+    doors=("plain", "panels4", "panels2", "slit", "pane", "kick", "glazed", *("medley",) * 5),
+    cabinets=("two_doors", "drawers", "books", "lockers", "half_books", *("medley",) * 4),
+    signs=("arrow", "runner", "ring", "triangle", "flame", "text", *("glyph",) * 5),
+    radiators=("ribs", "plates", "columns", "slots"),
+    views=("sky", "trees", "houses", "dusk"),
+    drapes=("none", "none", "blind", "curtains", "roller", "slats"),
+    clutter=(
+        *("chair", "office_chair", "bush", "palm", "bin", "box"),
+        *("figure", "figure", "stand", "heap", "foliage", "foliage"),
+    ),
+    beacon_count=(8, 22),
+    clutter_count=(3, 9),
+    things=(
+        *("clock", "switch", "pipe", "shelf", "duct", "note", "grille"),
+        *("plate", "plate", "plate", "board", "board", "block", "block", "column", "shape"),
+    ),
+    thing_count=(4, 14),
+    lamp_strength=(0.9, 5.0),
+    lamp_warmth=(0.5, 1.1),
+    ambient=(0.06, 0.4),
 )
 
 TEST = Style(
@@ -94,7 +110,10 @@ TEST = Style(
     views=("sky", "hills", "facade"),
     drapes=("none", "none", "blind", "curtains", "frosted"),
     clutter=("stool_chair", "swivel_chair", "ficus", "bush", "cone", "box"),
+    beacon_count=(6, 16),
+    clutter_count=(3, 8),
     things=("clock", "socket", "pipe", "shelf", "rail", "note", "alarm"),
+    thing_count=(2, 6),
     lamp_strength=(1.5, 4.0),
     lamp_warmth=(0.6, 1.0),
     ambient=(0.10, 0.30),

@@ -114,6 +114,73 @@ def _rough(canvas: Canvas, artist: Artist) -> None:
     canvas.grain(artist.random, artist.between(0.02, 0.06), 100, 150)
 
 
+def _material(artist: Artist) -> Colour:
+    return artist.pick(
+        (artist.varnish(), artist.wood(), artist.accent(), artist.paint(), artist.grey(0.2, 0.9))
+    )
+
+
+def _fields(canvas: Canvas, artist: Artist, top: float, bottom: float, colour: Colour) -> None:
+    """A part of a wall in fields: boards, slats, battens, frames, tiles."""
+    columns, rows = artist.count(1, 24), artist.pick((1, 1, 1, 2, 3, 8))
+    joint, depth, spread = artist.between(0.03, 0.25), artist.between(0.1, 0.5), artist.between(0.0, 0.12)
+    tall = (bottom - top) / rows
+    for row in range(rows):
+        for column in range(columns):
+            box = (column / columns, top + row * tall, (column + 1) / columns, top + (row + 1) * tall)
+            canvas.rect(*box, tint(colour, artist.between(1.0 - spread, 1.0 + spread)))
+    framed = artist.chance(0.4)
+    for row in range(rows):
+        for column in range(columns):
+            left, right = (column + joint) / columns, (column + 1 - joint) / columns
+            high, low = top + (row + joint) * tall, top + (row + 1 - joint) * tall
+            if framed:
+                canvas.bevel(left, high, right, low, 0.1 / columns, depth)
+            else:
+                canvas.scale((column + 1 - joint) / columns, top, (column + 1) / columns, bottom, 1.0 - depth)
+
+
+def _wainscot(canvas: Canvas, artist: Artist) -> None:
+    """Panelling of any make to any height, up to the ceiling."""
+    colour, top = _material(artist), artist.pick((artist.between(0.4, 0.85), artist.between(0.0, 0.4)))
+    _fields(canvas, artist, top, 1.0, colour)
+    if artist.chance(0.7):
+        canvas.rect(0.0, top, 1.0, top + artist.between(0.01, 0.04), tint(colour, artist.between(0.6, 1.2)))
+
+
+def _bands(canvas: Canvas, artist: Artist) -> None:
+    """Stripes across, anywhere."""
+    for _ in range(artist.count(1, 4)):
+        top = artist.between(0.0, 0.95)
+        canvas.rect(0.0, top, 1.0, min(1.0, top + artist.between(0.02, 0.4)), _material(artist))
+
+
+def _cladding(canvas: Canvas, artist: Artist) -> None:
+    """All of it in fields with joints: tiles, sheets, boards."""
+    colour = _material(artist)
+    canvas.rect(0.0, 0.0, 1.0, 1.0, colour)
+    _fields(canvas, artist, 0.0, 1.0, colour)
+
+
+def _mottled(canvas: Canvas, artist: Artist) -> None:
+    """Stains of all sizes, in any colour."""
+    canvas.rect(0.0, 0.0, 1.0, 1.0, mix(artist.paint(), _material(artist), artist.between(0.0, 1.0)))
+    for cells in (4, 16, 60):
+        canvas.grain(artist.random, artist.between(0.0, 0.1), cells, cells, artist.between(0.0, 0.6))
+
+
+def _motif(canvas: Canvas, artist: Artist) -> None:
+    """Paper with a print that comes again and again."""
+    columns, rows, ink = artist.count(3, 9), artist.count(4, 14), mix(artist.paint(), artist.accent(), 0.4)
+    for row in range(rows):
+        for column in range(columns):
+            x, y = (column + 0.5) / columns, (row + 0.5) / rows
+            if (row + column) % 2:
+                canvas.rect(x - 0.2 / columns, y - 0.3 / rows, x + 0.2 / columns, y + 0.3 / rows, ink)
+            else:
+                canvas.ellipse(x, y, 0.3 / columns, 0.2 / rows, ink)
+
+
 _WALLS: dict[str, Callable[[Canvas, Artist], None]] = {
     "plain": _plain,
     "two_tone": _two_tone,
@@ -123,6 +190,11 @@ _WALLS: dict[str, Callable[[Canvas, Artist], None]] = {
     "stripes": _stripes,
     "dots": _dots,
     "rough": _rough,
+    "wainscot": _wainscot,
+    "bands": _bands,
+    "cladding": _cladding,
+    "mottled": _mottled,
+    "motif": _motif,
 }
 
 # --- Floors -------------------------------------------------------------------------------------------------
@@ -214,6 +286,19 @@ def _terrazzo(artist: Artist) -> Covering:
     return _speckled(artist, _stone(artist), artist.between(0.06, 0.14), 64, 0.4)
 
 
+def _patchwork(artist: Artist) -> Covering:
+    """Fields of a few colours in any order: mosaics, carpet tiles, painted concrete."""
+    inks = [mix(_stone(artist), artist.accent(), artist.between(0.0, 0.8)) for _ in range(artist.count(1, 4))]
+    canvas = Canvas(128, 128, inks[0])
+    columns, rows = artist.count(1, 16), artist.count(1, 16)
+    for row in range(rows):
+        for column in range(columns):
+            box = (column / columns, row / rows, (column + 1) / columns, (row + 1) / rows)
+            canvas.rect(*box, artist.pick(inks))
+    canvas.grain(artist.random, artist.between(0.0, 0.1), artist.count(4, 64), artist.count(4, 64), 0.3)
+    return Covering(canvas.picture(), artist.between(0.8, 2.4))
+
+
 _FLOORS: dict[str, Callable[[Artist], Covering]] = {
     "tiles": _tiles,
     "checker": _checker,
@@ -223,6 +308,7 @@ _FLOORS: dict[str, Callable[[Artist], Covering]] = {
     "carpet": _carpet,
     "linoleum": _linoleum,
     "terrazzo": _terrazzo,
+    "patchwork": _patchwork,
 }
 
 
