@@ -22,6 +22,8 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADER = ROOT / "firmware" / "models" / "beacons.h"
 VALIDATION_FROM = 5000
 PRECISION = 0.95
+WORLDS = {"pinhole": 528, "wide": 256}  # a wide frame shows thrice as many beacons
+CELLS_STEP = 4  # the cell machine has few weights: every so many worlds are enough
 
 
 def train(folder: Path, lens: str, worlds: int, validation: int, processes: int) -> tuple[DetectorModel, str]:
@@ -31,7 +33,8 @@ def train(folder: Path, lens: str, worlds: int, validation: int, processes: int)
     for some in (seeds, left_out):
         render_set(folder, lens, "train", some, processes)
     detector = blank_detector()
-    detector = replace(detector, cell=fit_cells(gather_cells(folder, lens, "train", seeds, processes)))
+    cells = gather_cells(folder, lens, "train", seeds[::CELLS_STEP], processes)
+    detector = replace(detector, cell=fit_cells(cells))
     boxes = gather_boxes(folder, lens, "train", seeds, detector, processes)
     print(f"{lens}: {summary(boxes)}", flush=True)
     offset, scale = normaliser(boxes.features)
@@ -48,20 +51,22 @@ def train(folder: Path, lens: str, worlds: int, validation: int, processes: int)
 def main() -> int:
     """Trains a detector for each kind of lens and writes the header."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=528, help="to train on, a lens (default: 528)")
+    parser.add_argument("--worlds", type=int, help="to train on, a lens (default: as the model was made)")
     parser.add_argument("--validation", type=int, default=40, help="worlds left out (default: 40)")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "training", help="rendered worlds")
     parser.add_argument("--header", type=Path, default=HEADER, help="what to write")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
-    detectors, notes = {}, {}
+    detectors, notes, sets = {}, {}, []
     for lens in RIGS:
+        worlds = options.worlds or WORLDS[lens]
+        sets.append(f"{lens} seeds 0 to {worlds - 1}")
         detectors[lens], notes[lens] = train(
-            options.folder, lens, options.worlds, options.validation, options.processes
+            options.folder, lens, worlds, options.validation, options.processes
         )
         print(f"{lens}: {notes[lens]}", flush=True)
     training_set = (
-        f"rendered worlds, style train, seeds 0 to {options.worlds - 1}, {FRAMES_A_WORLD} frames each; "
+        f"rendered worlds, style train, {', '.join(sets)}, {FRAMES_A_WORLD} frames each; "
         f"thresholds from seeds {VALIDATION_FROM} to {VALIDATION_FROM + options.validation - 1}"
     )
     model = BeaconModel(CLASSES, detectors["pinhole"], detectors["wide"])

@@ -47,6 +47,25 @@ class Svm:
 
 
 @dataclass(frozen=True)
+class AdditiveSvm:
+    """A machine as bslam_additive_t takes it: curves of single features, surfaces of crossed pairs."""
+
+    knots: NDArray[np.float32]  # (features, KNOTS), rising
+    crossed: NDArray[np.uint8]  # features that have a grid with each other
+    weights: NDArray[np.int8]  # (rows, weights)
+    byte_scale: NDArray[np.float32]  # (rows,)
+    bias: NDArray[np.float32]  # (rows,)
+
+    @property
+    def rows(self) -> int:
+        return len(self.bias)
+
+    @property
+    def features(self) -> int:
+        return len(self.knots)
+
+
+@dataclass(frozen=True)
 class BeaconClass:
     """A kind of beacon, or one object of a user's.
 

@@ -21,6 +21,9 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
     memset(d, 0, sizeof *d);
     for (int i = 0; i < BSLAM_BLOB_FEATURES; i++) {
         d->blob_scale[i] = 1;
+        for (int k = 0; k < BSLAM_KNOTS; k++) {
+            d->knots[i * BSLAM_KNOTS + k] = (float)k;
+        }
     }
     const bslam_detector_model_t views = {
         .cell = machine(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
@@ -29,7 +32,12 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
         .screen = machine(1, BSLAM_BLOB_FEATURES, false, d->screen_weights, &d->screen_bias),
         .screen_threshold = -1e6f,
         .any_threshold = -1e6f,
-        .kinds = machine(UNIT_MODEL_CLASSES + 2, BSLAM_BLOB_FEATURES, true, d->kind_weights, d->kind_bias),
+        .kinds = {.rows = UNIT_MODEL_CLASSES + 2,
+                  .features = BSLAM_BLOB_FEATURES,
+                  .knots = d->knots,
+                  .bytes = d->kind_weights,
+                  .byte_scale = d->kind_scale,
+                  .bias = d->kind_bias},
         .fusion = machine(1, UNIT_MODEL_CLASSES + 3, false, d->fusion_weights, &d->fusion_bias),
         .threshold = 0,
     };

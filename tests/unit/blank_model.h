@@ -11,7 +11,9 @@ typedef struct unit_detector {
     float blob_offset[BSLAM_BLOB_FEATURES];
     float blob_scale[BSLAM_BLOB_FEATURES];
     float screen_weights[BSLAM_BLOB_FEATURES];
-    float kind_weights[(UNIT_MODEL_CLASSES + 2) * BSLAM_SVM_WEIGHTS(BSLAM_BLOB_FEATURES, true)];
+    float knots[BSLAM_BLOB_FEATURES * BSLAM_KNOTS];
+    int8_t kind_weights[(UNIT_MODEL_CLASSES + 2) * BSLAM_ADDITIVE_WEIGHTS(BSLAM_BLOB_FEATURES, 0)];
+    float kind_scale[UNIT_MODEL_CLASSES + 2];
     float kind_bias[UNIT_MODEL_CLASSES + 2];
     float fusion_weights[UNIT_MODEL_CLASSES + 3];
     float cell_bias, screen_bias, fusion_bias;

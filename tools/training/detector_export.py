@@ -30,7 +30,7 @@ def _detector(header: Header, name: str, detector: DetectorModel) -> str:
             "screen": header.svm(f"{name}_screen", detector.screen),
             "screen_threshold": c_float(detector.screen_threshold),
             "any_threshold": c_float(detector.any_threshold),
-            "kinds": header.svm(f"{name}_kinds", detector.kinds),
+            "kinds": header.additive(f"{name}_kinds", detector.kinds),
             "fusion": header.svm(f"{name}_fusion", detector.fusion),
             "threshold": c_float(detector.threshold),
         }

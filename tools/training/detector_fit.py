@@ -11,24 +11,29 @@ from sklearn.preprocessing import StandardScaler
 
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import Svm
+from training.additive import decide_additive, fit_additive, most_telling, place_knots
 from training.detector_samples import CLUTTER, BoxSamples, CellSamples
-from training.fit import choose_cost, fit, quantised
+from training.fit import choose_cost, fit
 from training.render_set import KINDS
 from training.together import fit_together
 from training.truth import IGNORED, NOTHING
 
 CELLS_MAX = 200_000
 CELL_COSTS = (0.01, 0.1)
-KIND_COST = 0.001
+KIND_COST = 0.002
 FUSION_COST = 0.001
 SCREEN_COST = 0.01
-SCREEN_RECALL = 0.985
+SCREEN_RECALL = 0.99
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
 OVERLAP_NEGATIVE = 0.45
-POSITIVES_MAX = 22_000
-NEGATIVES_FIRST = 16_000
-NEGATIVES_HARD = 20_000
+POSITIVES_MAX = 60_000
+NEGATIVES_FIRST = 30_000
+NEGATIVES_HARD = 45_000
+NOT_CROSSED = np.zeros(0, np.uint8)
+CROSSED = 16  # features that are told in pairs, too
+FIRST_ITERATIONS = 50
+ITERATIONS = 80
 FUSION_LIMIT = 4.0  # as BSLAM_FUSION_LIMIT
 FUSION_SHARE = 5  # every so many worlds are kept for the fusion
 
@@ -99,7 +104,8 @@ def fit_screen(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
 
 
 def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
-    """The quadratic machines, with the hardest negatives found in a second round; int8 weights."""
+    """The additive machines. A first fit without crossed features tells which of them to cross, and which
+    negatives are hard."""
     random = np.random.default_rng(1)
     fits = np.flatnonzero(usable(samples) & (samples.world % FUSION_SHARE != 0))
     screened = decide(detector.screen, normalised(samples.features[fits], detector))[:, 0]
@@ -109,15 +115,18 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     positives = random.permutation(fits[is_beacon])[:POSITIVES_MAX]
     negatives = random.permutation(fits[~is_beacon])
     chosen = np.concatenate([positives, negatives[:NEGATIVES_FIRST]])
+    x = normalised(samples.features[chosen], detector)
+    knots = place_knots(x[: len(positives)])
+    first = fit_additive(x, targets[chosen], knots, NOT_CROSSED, KIND_COST, FIRST_ITERATIONS)
+    crossed = most_telling(first, x, CROSSED)
     rest = negatives[NEGATIVES_FIRST:]
-    machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
     if len(rest):
-        worst = decide(machine, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
-        order = np.argsort(-worst)[:NEGATIVES_HARD]
-        hard = rest[order[worst[order] > -1.0]]
+        worst = decide_additive(first, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
+        hard = rest[np.argsort(-worst)[:NEGATIVES_HARD]]
         chosen = np.concatenate([chosen, hard])
-        machine = fit_together(normalised(samples.features[chosen], detector), targets[chosen], KIND_COST)
-    return replace(detector, kinds=quantised(machine))
+    x = normalised(samples.features[chosen], detector)
+    kinds = fit_additive(x, targets[chosen], knots, crossed, KIND_COST, ITERATIONS)
+    return replace(detector, kinds=kinds)
 
 
 def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
@@ -126,7 +135,7 @@ def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     x = normalised(samples.features[chosen], detector)
     screened = decide(detector.screen, x)
     passed = screened[:, 0] >= detector.screen_threshold
-    values = np.hstack([decide(detector.kinds, x), screened])[passed]
+    values = np.hstack([decide_additive(detector.kinds, x), screened])[passed]
     is_beacon = kind_targets(samples)[chosen][passed][:, :1]
     svm = fit_together(np.clip(values, -FUSION_LIMIT, FUSION_LIMIT), is_beacon, FUSION_COST, 150)
     any_threshold = float(np.quantile(values[is_beacon[:, 0], 0], 1 - SCREEN_RECALL))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, feature_counts
-from bslam.modelfile import BeaconClass, Svm, weights_in_row
+from bslam.modelfile import AdditiveSvm, BeaconClass, Svm, weights_in_row
+from training.additive import KNOTS
 from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners, teaches
 
@@ -32,7 +33,9 @@ make of a distance in training worlds (tools/measure_outline.py --style train)."
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""
 
-SWAPPED = 100_000
+RECOLOURED = 100_000
+ORDERS = ((2, 1, 0), (2, 1, 0), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1))
+GAMMAS = (0.85, 1.2)
 
 CELLS_A_FRAME = 80
 CELL_FRAMES_STEP = 3
@@ -59,15 +62,31 @@ class BoxSamples:
     world: NDArray[np.int32]
 
 
-def swap_red_and_blue(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Of a picture in RGB565."""
-    return (picture & 0x07E0 | picture >> 11 | picture << 11).astype(np.uint16)
+def recoloured(picture: NDArray[np.uint16], seed: int) -> NDArray[np.uint16]:
+    """A picture in RGB565 as if everything had been painted otherwise: its channels in another order, each
+    with another gamma; the same for all pictures of a seed."""
+    random = np.random.default_rng([seed, 4])
+    order = ORDERS[int(random.integers(len(ORDERS)))]
+    channels = (picture >> 11) / 31.0, (picture >> 5 & 63) / 63.0, (picture & 31) / 31.0
+    painted = [channels[one] ** random.uniform(*GAMMAS) for one in order]
+    red, green, blue = (
+        np.rint(most * one).astype(np.uint16) for most, one in zip((31.0, 63.0, 31.0), painted, strict=True)
+    )
+    return (red << 11 | green << 5 | blue).astype(np.uint16)
 
 
 def blank_svm(rows: int, features: int, quadratic: bool = False) -> Svm:
     """A machine that decides 0."""
     weights = np.zeros((rows, weights_in_row(features, quadratic)), np.float32)
     return Svm(features, quadratic, weights, np.zeros(rows, np.float32))
+
+
+def blank_additive(rows: int, features: int) -> AdditiveSvm:
+    """One that decides 0."""
+    knots = np.tile(np.arange(KNOTS, dtype=np.float32), (features, 1))
+    weights = np.zeros((rows, features * KNOTS), np.int8)
+    zeros = np.zeros(rows, np.float32)
+    return AdditiveSvm(knots, np.zeros(0, np.uint8), weights, zeros, zeros)
 
 
 def blank_detector() -> DetectorModel:
@@ -80,7 +99,7 @@ def blank_detector() -> DetectorModel:
         screen=blank_svm(1, blobs),
         screen_threshold=1.0,
         any_threshold=1.0,
-        kinds=blank_svm(len(KINDS) + 2, blobs, quadratic=True),
+        kinds=blank_additive(len(KINDS) + 2, blobs),
         fusion=blank_svm(1, len(KINDS) + 3, quadratic=True),
         threshold=1.0,
     )
@@ -100,13 +119,13 @@ def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], proc
 def gather_boxes(
     folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel, processes: int
 ) -> BoxSamples:
-    """Proposals of the worlds' frames, each looked at twice: as it is, and with red and blue exchanged.
+    """Proposals of the worlds' frames, each looked at twice: as it is, and in other colours.
 
-    The second look has SWAPPED added to its world's number. What is a beacon hangs on shape, size and place
+    The second look has RECOLOURED added to its world's number. What is a beacon hangs on shape, size, place
     more than on its colour: a detector that has seen red signs and no other red things takes those for signs.
     """
     seeds = list(seeds)
-    seeds += [seed + SWAPPED for seed in seeds]
+    seeds += [seed + RECOLOURED for seed in seeds]
     work = partial(_boxes_of_world, folder, lens, style, model_of(detector))
     return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
@@ -138,11 +157,11 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
 
 
 def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> BoxSamples:
-    world = replace(read_world(folder, lens, style, seed % SWAPPED), seed=seed)
-    front_end = FrontEnd([camera_of(lens, seed % SWAPPED)], model)
+    world = replace(read_world(folder, lens, style, seed % RECOLOURED), seed=seed)
+    front_end = FrontEnd([camera_of(lens, seed % RECOLOURED)], model)
     parts = []
     for index, picture in enumerate(world.pictures):
-        front_end.see(picture if seed < SWAPPED else swap_red_and_blue(picture))
+        front_end.see(picture if seed < RECOLOURED else recoloured(picture, seed))
         found = front_end.proposals()
         parts.append(_label_boxes(world, index, found.boxes, found.features))
     return BoxSamples(

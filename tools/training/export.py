@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.modelfile import BeaconClass, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, Recogniser, Svm
 
 COLUMNS = 110
 NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -43,8 +43,8 @@ class Header:
         self._arrays: list[NDArray[np.generic]] = []
 
     def array(self, name: str, values: NDArray[np.generic]) -> str:
-        """Add a table of float32 or int8; its name."""
-        kind = {"float32": "float", "int8": "int8_t"}[values.dtype.name]
+        """Add a table of float32, int8 or uint8; its name."""
+        kind = {"float32": "float", "int8": "int8_t", "uint8": "uint8_t"}[values.dtype.name]
         self._arrays.append(values)
         numbers = ", ".join(map(c_float if kind == "float" else str, values.ravel().tolist()))
         lines = textwrap.fill(
@@ -64,6 +64,18 @@ class Header:
             fields["bytes"] = self.array(f"{name}_bytes", svm.weights)
             fields["byte_scale"] = self.array(f"{name}_byte_scale", svm.byte_scale)
         fields["bias"] = self.array(f"{name}_bias", svm.bias)
+        return initialiser(fields)
+
+    def additive(self, name: str, machine: AdditiveSvm) -> str:
+        """Add the tables of an additive machine; the initialiser of its bslam_additive_t."""
+        fields = {"rows": str(machine.rows), "features": str(machine.features)}
+        fields["knots"] = self.array(f"{name}_knots", machine.knots)
+        if len(machine.crossed):
+            fields["crossed_count"] = str(len(machine.crossed))
+            fields["crossed"] = self.array(f"{name}_crossed", machine.crossed)
+        fields["bytes"] = self.array(f"{name}_bytes", machine.weights)
+        fields["byte_scale"] = self.array(f"{name}_byte_scale", machine.byte_scale)
+        fields["bias"] = self.array(f"{name}_bias", machine.bias)
         return initialiser(fields)
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:

@@ -35,12 +35,10 @@ def expand_and_scale(x: Matrix) -> tuple[NDArray[np.float32], NDArray[np.float64
     return phi, mean, deviation
 
 
-def fit_together(x: Matrix, targets: NDArray[np.bool_], cost: float, iterations: int = 60) -> Svm:
-    """One quadratic machine a column of `targets` (samples, rows), on x (samples, features).
-
-    Ends after `iterations` steps of L-BFGS, before the minimum where there are thousands of weights.
-    """
-    phi, mean, deviation = expand_and_scale(x)
+def minimise(
+    phi: NDArray[np.float32], targets: NDArray[np.bool_], cost: float, iterations: int
+) -> NDArray[np.float64]:
+    """The weights (columns of phi, rows of targets) of the least objective, by L-BFGS."""
     sign = np.where(targets, 1.0, -1.0).astype(np.float32)
     shape = (phi.shape[1], sign.shape[1])
 
@@ -54,7 +52,16 @@ def fit_together(x: Matrix, targets: NDArray[np.bool_], cost: float, iterations:
     options = {"maxiter": iterations, "maxfun": 2 * iterations, "maxcor": 20}
     start = np.zeros(shape[0] * shape[1])
     found = minimize(loss_and_gradient, start, jac=True, method="L-BFGS-B", options=options)
-    solution = found.x.reshape(shape)
+    return np.asarray(found.x).reshape(shape)
+
+
+def fit_together(x: Matrix, targets: NDArray[np.bool_], cost: float, iterations: int = 60) -> Svm:
+    """One quadratic machine a column of `targets` (samples, rows), on x (samples, features).
+
+    Ends after `iterations` steps of L-BFGS, before the minimum where there are thousands of weights.
+    """
+    phi, mean, deviation = expand_and_scale(x)
+    solution = minimise(phi, targets, cost, iterations)
     weights = solution[:-1].T / deviation
     bias = solution[-1] - weights @ mean
     return Svm(x.shape[1], True, weights.astype(np.float32), bias.astype(np.float32))

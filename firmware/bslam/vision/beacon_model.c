@@ -32,7 +32,6 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
     } parts[] = {
         {&detector->cell, 1, BSLAM_CELL_FEATURES},
         {&detector->screen, 1, BSLAM_BLOB_FEATURES},
-        {&detector->kinds, class_count + 2, BSLAM_BLOB_FEATURES},
         {&detector->fusion, 1, class_count + 3},
     };
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
@@ -40,6 +39,13 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
         if (status != BSLAM_OK) {
             return status;
         }
+    }
+    if (detector->kinds.rows != class_count + 2) {
+        return BSLAM_E_COUNT;
+    }
+    const bslam_status_t status = bslam_additive_check(&detector->kinds, BSLAM_BLOB_FEATURES);
+    if (status != BSLAM_OK) {
+        return status;
     }
     const float limits[] = {detector->screen_threshold, detector->any_threshold, detector->threshold};
     if (!are_numbers(limits, 3) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||

@@ -4,13 +4,14 @@
 #define BSLAM_VISION_BEACON_MODEL_H
 
 #include "bslam/base/status.h"
+#include "bslam/svm/additive.h"
 #include "bslam/svm/svm.h"
 
 /// Lengths of the feature vectors (proposals.h, features.h); a model of other lengths is refused. Not macros,
 /// so that Python sees them.
 enum {
     BSLAM_CELL_FEATURES = 22,
-    BSLAM_BLOB_FEATURES = 80,
+    BSLAM_BLOB_FEATURES = 82,
 };
 
 #define BSLAM_CLASSES_MAX 16
@@ -34,9 +35,9 @@ typedef struct bslam_detector_model {
     const float *blob_offset;  ///< [BSLAM_BLOB_FEATURES], subtracted from a feature,
     const float *blob_scale;   ///< [BSLAM_BLOB_FEATURES], which is then multiplied by it: about unit range
     bslam_svm_t screen;        ///< 1 row, linear, BSLAM_BLOB_FEATURES
-    float screen_threshold;    ///< a proposal below it is dropped before the quadratic machines
+    float screen_threshold;    ///< a proposal below it is dropped before the other machines
     float any_threshold;       ///< and one whose first row is below this before the other rows
-    bslam_svm_t kinds;         ///< class_count + 2 rows, quadratic, BSLAM_BLOB_FEATURES
+    bslam_additive_t kinds;    ///< class_count + 2 rows, BSLAM_BLOB_FEATURES
     bslam_svm_t fusion;        ///< 1 row, linear or quadratic, class_count + 3 inputs
     float threshold;           ///< a proposal whose fusion value is below it is no candidate
 } bslam_detector_model_t;

@@ -10,7 +10,7 @@
 #define OVERLAP_MAX BSLAM_R(0.3)
 #define WITHIN_MAX BSLAM_R(0.7)
 /// Natural logarithm of how many times too high or too low a candidate may be; the floor line errs too.
-#define LOG_SIZE_MAX 0.65f
+#define LOG_SIZE_MAX 1.0f
 
 static float clamped(float value, float limit)
 {
@@ -65,19 +65,6 @@ static bool is_of_another_size(const bslam_view_t *view, const bslam_proposal_t 
     return excess > LOG_SIZE_MAX || excess < -LOG_SIZE_MAX;
 }
 
-/// A view of the rows [first, end) of a machine.
-static bslam_svm_t rows_of(const bslam_svm_t *svm, int32_t first, int32_t end)
-{
-    const int32_t skipped = first * BSLAM_SVM_WEIGHTS(svm->features, svm->quadratic);
-    bslam_svm_t rows = *svm;
-    rows.rows = end - first;
-    rows.weights = svm->weights != NULL ? svm->weights + skipped : NULL;
-    rows.bytes = svm->bytes != NULL ? svm->bytes + skipped : NULL;
-    rows.byte_scale = svm->byte_scale != NULL ? svm->byte_scale + first : NULL;
-    rows.bias = svm->bias + first;
-    return rows;
-}
-
 /// True if the proposal is a candidate: its score, class and outline are then written.
 static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
                       int32_t class_count, const bslam_view_t *view, const bslam_proposal_t *proposal,
@@ -93,14 +80,14 @@ static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_cl
     if (!(*screen >= model->screen_threshold)) {
         return false;
     }
-    const bslam_svm_t any = rows_of(&model->kinds, 0, 1);
-    bslam_svm_decide(&any, features, values);
+    bslam_additive_place_t place;
+    bslam_additive_locate(&model->kinds, features, &place);
+    bslam_additive_decide(&model->kinds, &place, 0, 1, values);
     if (!(values[0] >= model->any_threshold)) {
         return false;
     }
     float score;
-    const bslam_svm_t others = rows_of(&model->kinds, 1, model->kinds.rows);
-    bslam_svm_decide(&others, features, values + 1);
+    bslam_additive_decide(&model->kinds, &place, 1, model->kinds.rows, values + 1);
     clamp_all(values, class_count + 3, BSLAM_FUSION_LIMIT);
     bslam_svm_decide(&model->fusion, values, &score);
     if (!(score >= model->threshold)) {

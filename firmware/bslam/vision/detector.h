@@ -1,5 +1,5 @@
-/// Which of the proposed boxes are beacons, and of which kind: a linear machine screens them, quadratic ones
-/// judge what is left, a last quadratic one weighs their answers; overlapping boxes give way to the best.
+/// Which of the proposed boxes are beacons, and of which kind: a linear machine screens them, additive ones
+/// judge what is left, a quadratic one weighs their answers; overlapping boxes give way to the best.
 #ifndef BSLAM_VISION_DETECTOR_H
 #define BSLAM_VISION_DETECTOR_H
 

@@ -357,7 +357,7 @@ float bslam_log(float x)
         x *= 2.0f;
         halvings -= 1.0f;
     }
-    return 0.6931472f * (halvings + (x - 1.0f) * (1.3465553f - 0.3465553f * x));
+    return 0.6931472f * (halvings + (x - 1.0f) * (1.6931106f - 0.3465553f * x));
 }
 
 /// Mean distance of the floor line over columns [first, end); 0, and *share 0, where no column knows it.
@@ -378,40 +378,76 @@ static float line_distance_m(const bslam_view_t *view, int32_t first, int32_t en
     return known > 0 ? (float)known / inverse : 0.0f;
 }
 
-/// Size and place in metres, by the floor line. 12 features.
-static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p, float *x)
+/// Rays through the middles of a box's sides.
+typedef struct rays {
+    ray_t left, right, top, bottom;
+} rays_t;
+
+static rays_t rays_of(const bslam_view_t *view, const bslam_box_t *box)
 {
-    const bslam_camera_t *camera = view->camera;
-    const bslam_real_t u_px = (p->box.left_px + p->box.right_px) / 2;
-    const bslam_real_t v_px = (p->box.top_px + p->box.bottom_px) / 2;
-    const ray_t top = ray_at(view, u_px, p->box.top_px), bottom = ray_at(view, u_px, p->box.bottom_px);
-    const ray_t left = ray_at(view, p->box.left_px, v_px), right = ray_at(view, p->box.right_px, v_px);
-    const float height_m = (float)camera->z_m;
+    const bslam_real_t u_px = (box->left_px + box->right_px) / 2, v_px = (box->top_px + box->bottom_px) / 2;
+    const rays_t rays = {
+        .left = ray_at(view, box->left_px, v_px),
+        .right = ray_at(view, box->right_px, v_px),
+        .top = ray_at(view, u_px, box->top_px),
+        .bottom = ray_at(view, u_px, box->bottom_px),
+    };
+    return rays;
+}
+
+/// The box's width at a distance of 1.
+static float chord_of(const rays_t *rays)
+{
+    const float x = rays->left.x - rays->right.x, y = rays->left.y - rays->right.y;
+    return sqrtf(x * x + y * y);
+}
+
+/// How far a thing stands whose foot is the box's lower side.
+static float foot_m(const bslam_view_t *view, const rays_t *rays)
+{
+    const bool is_below = rays->bottom.exists && rays->bottom.slope < -0.02f;
+    return is_below ? (float)view->camera->z_m / -rays->bottom.slope : 25.0f;
+}
+
+/// Size and place in metres, by the floor line. 12 features.
+static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p, const rays_t *rays,
+                             float *x)
+{
+    const float top = rays->top.slope, bottom = rays->bottom.slope;
+    const float height_m = (float)view->camera->z_m;
     float share, ignored;
     float wall_m = line_distance_m(view, p->left - STRIP, p->right + STRIP, &share);
     const float left_m = line_distance_m(view, p->left - STRIP, p->left + 1, &ignored);
     const float right_m = line_distance_m(view, p->right - 1, p->right + STRIP, &ignored);
     const bool known = wall_m > 0;
     wall_m = known ? clampf(wall_m, 0.3f, 20.0f) : 1.0f;
-    const float chord_x = left.x - right.x, chord_y = left.y - right.y;
-    const float chord = sqrtf(chord_x * chord_x + chord_y * chord_y);
-    const float base_m = bottom.exists && bottom.slope < -0.02f ? height_m / -bottom.slope : 25.0f;
     const float width_px = (float)(p->box.right_px - p->box.left_px);
     const float height_px = (float)(p->box.bottom_px - p->box.top_px);
 
-    *x++ = bslam_log(wall_m * chord);
-    *x++ = bslam_log(wall_m * (top.slope - bottom.slope));
-    *x++ = clampf(height_m + wall_m * bottom.slope, -1.0f, 3.0f);
-    *x++ = clampf(height_m + wall_m * top.slope, -1.0f, 4.0f);
+    *x++ = bslam_log(wall_m * chord_of(rays));
+    *x++ = bslam_log(wall_m * (top - bottom));
+    *x++ = clampf(height_m + wall_m * bottom, -1.0f, 3.0f);
+    *x++ = clampf(height_m + wall_m * top, -1.0f, 4.0f);
     *x++ = bslam_log(height_px / width_px);
     *x++ = bslam_log(height_px * width_px);
     *x++ = (float)p->cells / (float)((p->right - p->left) * (p->bottom - p->top));
     *x++ = known ? 1.0f / wall_m : 0.0f;
     *x++ = share;
-    *x++ = known ? bslam_log(base_m / wall_m) : 0.0f;
+    *x++ = known ? bslam_log(foot_m(view, rays) / wall_m) : 0.0f;
     const float turn = left_m > 0 && right_m > 0 ? bslam_log(left_m / right_m) : 0.0f;
     *x++ = turn < 0 ? -turn : turn;
-    *x++ = (top.slope + bottom.slope) / 2;
+    *x++ = (top + bottom) / 2;
+    return x;
+}
+
+/// Size and place by the horizon and the foot alone, for where the floor line errs. How high the middle is
+/// above the camera, in heights of the box: of a thing that hangs at a known height it is the same from every
+/// distance. And the width if the box stands on the floor. 2 features.
+static float *upright_features(const bslam_view_t *view, const rays_t *rays, float *x)
+{
+    const float top = rays->top.slope, bottom = rays->bottom.slope;
+    *x++ = top - bottom > 1e-3f ? clampf((top + bottom) / (2.0f * (top - bottom)), -3.0f, 8.0f) : 0.0f;
+    *x++ = bslam_log(foot_m(view, rays) * chord_of(rays));
     return x;
 }
 
@@ -516,7 +552,8 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
     zone_t zones[ZONES * ZONES];
     sums_t inside;
     sum_box(view, p, zones, &inside);
-    float *x = place_features(view, p, features);
+    const rays_t rays = rays_of(view, &p->box);
+    float *x = place_features(view, p, &rays, features);
     const sums_t left = sum_beside(view, p, BSLAM_SIDE_LEFT), right = sum_beside(view, p, BSLAM_SIDE_RIGHT);
     x = contrast_features(&inside, &left, x);
     x = contrast_features(&inside, &right, x);
@@ -529,5 +566,6 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
     x = edge_features(view, p, x);
     *x++ = p->segmentation >= BSLAM_SEGMENTATIONS ? 1.0f : 0.0f;
     x = texture_features(view, &inside, x);
-    (void)zone_features(zones, &inside, x);
+    x = zone_features(zones, &inside, x);
+    (void)upright_features(view, &rays, x);
 }

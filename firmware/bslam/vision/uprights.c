@@ -22,28 +22,81 @@ static const upright_t uprights[] = {
 /// Sides of a kind in a frame, and boxes that come of them.
 #define SIDES_MAX 14
 #define BOXES_MAX 8
+/// Cells across a box and down it, at least.
+#define SIDE_MIN 2
 /// A side is one whose mean step is at least this, in quarters; a cell counts at most STEP_MAX.
 #define STEP_MEAN_MIN (4 * 7)
 #define STEP_MAX 60
 
-/// A column where there may be a side: rows [top, bottom) of the kind there, pixels of a metre, mean step in
-/// quarters.
+/// An upright line on the wall where there may be a side, and what stands there: where its foot, middle and
+/// top fall in the frame; pixels of a metre; mean step in quarters. Through a wide lens it is bent.
 typedef struct side {
-    int16_t column, top, bottom;
+    int16_t column;  ///< of the middle
+    float u_px[3], v_px[3];
     float metre_px;
     float step;
 } side_t;
 
-/// Mean of the sideways steps in a column between two rows, in quarters.
-static uint8_t mean_step(const bslam_view_t *view, int32_t column, int32_t top, int32_t bottom)
+/// The column of cells that a line through foot, middle and top crosses in a row of cells.
+static int32_t column_at(const side_t *side, int32_t row)
+{
+    const float v_px = (float)(row * BSLAM_CELL_PX) + 1.5f;
+    const int32_t part = v_px > side->v_px[1] ? 0 : 1;
+    const float share = (v_px - side->v_px[part]) / (side->v_px[part + 1] - side->v_px[part]);
+    const float u_px = side->u_px[part] + share * (side->u_px[part + 1] - side->u_px[part]);
+    return (int32_t)(u_px / BSLAM_CELL_PX);
+}
+
+static int32_t first_row(const side_t *side)
+{
+    return side->v_px[2] < 0 ? 0 : (int32_t)(side->v_px[2] / BSLAM_CELL_PX);
+}
+
+static int32_t end_row(const side_t *side, int32_t rows)
+{
+    const int32_t end = (int32_t)(side->v_px[0] / BSLAM_CELL_PX + 0.5f);
+    return end < rows ? end : rows;
+}
+
+/// Mean of the sideways steps along a line, in quarters.
+static uint8_t mean_step(const bslam_view_t *view, const side_t *side)
 {
     const int32_t columns = view->frame->columns;
+    const int32_t top = first_row(side), bottom = end_row(side, view->frame->rows);
+    const bool is_straight = side->u_px[0] == side->u_px[2];
     int32_t sum = 0;
     for (int32_t row = top; row < bottom; row++) {
-        const int32_t step = view->step_x[row * columns + column];
+        const int32_t column = is_straight ? side->column : column_at(side, row);
+        const int32_t step = column >= 0 && column < columns ? view->step_x[row * columns + column] : 0;
         sum += step < STEP_MAX ? step : STEP_MAX;
     }
     return (uint8_t)(4 * sum / (bottom - top));
+}
+
+/// A lens that bends uprights: foot, middle and top of the line that crosses the horizon in this column.
+static bool bend(const bslam_view_t *view, const upright_t *kind, side_t *side)
+{
+    const bslam_camera_t *camera = view->camera;
+    const bslam_real_t u_px = (bslam_real_t)(side->column * BSLAM_CELL_PX) + BSLAM_R(1.5);
+    bslam_direction_t ahead;
+    const bslam_real_t v_px = bslam_horizon_px(camera);
+    if (bslam_camera_unproject_as(camera, &view->mounting, u_px, v_px, &ahead) != BSLAM_OK) {
+        return false;
+    }
+    const bslam_real_t flat = bslam_sqrt(ahead.x * ahead.x + ahead.y * ahead.y);
+    const bslam_real_t distance_m = view->floor_line->distance_m[side->column];
+    for (int32_t i = 0; i < 3; i++) {
+        const float height_m = kind->bottom_m + 0.5f * (float)i * (kind->top_m - kind->bottom_m);
+        const bslam_direction_t there = {ahead.x * distance_m / flat, ahead.y * distance_m / flat,
+                                         (bslam_real_t)height_m - camera->z_m};
+        bslam_real_t u = 0, v = 0;
+        if (bslam_camera_project(camera, &there, &u, &v) != BSLAM_OK) {
+            return false;
+        }
+        side->u_px[i] = (float)u;
+        side->v_px[i] = (float)v;
+    }
+    return true;
 }
 
 /// Where the kind would stand in a column. False: it would leave the frame, or the floor line is not known.
@@ -55,18 +108,20 @@ static bool place(const bslam_view_t *view, const upright_t *kind, int32_t colum
     if (!(view->floor_line->distance_m[column] > 0) || below_px < 4.0f) {
         return false;
     }
-    const float metre_px = below_px / camera_m;
-    const float top_px = horizon_px - metre_px * (kind->top_m - camera_m);
-    const float bottom_px = horizon_px - metre_px * (kind->bottom_m - camera_m);
-    if (top_px < -2.0f || bottom_px > (float)view->frame->height_px) {
+    side->column = (int16_t)column;
+    side->metre_px = below_px / camera_m;
+    for (int32_t i = 0; i < 3; i++) {
+        const float height_m = kind->bottom_m + 0.5f * (float)i * (kind->top_m - kind->bottom_m);
+        side->u_px[i] = (float)(column * BSLAM_CELL_PX) + 1.5f;
+        side->v_px[i] = horizon_px - side->metre_px * (height_m - camera_m);
+    }
+    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT && !bend(view, kind, side)) {
         return false;
     }
-    side->column = (int16_t)column;
-    side->top = (int16_t)(top_px < 0 ? 0 : top_px / BSLAM_CELL_PX);
-    side->bottom = (int16_t)(bottom_px / BSLAM_CELL_PX + 0.5f);
-    side->bottom = side->bottom > view->frame->rows ? (int16_t)view->frame->rows : side->bottom;
-    side->metre_px = metre_px;
-    return side->bottom - side->top >= 2;
+    if (side->v_px[2] < -2.0f || side->v_px[0] > (float)view->frame->height_px) {
+        return false;
+    }
+    return end_row(side, view->frame->rows) - first_row(side) >= 2;
 }
 
 /// The strongest sides of a kind, at most SIDES_MAX, in order of columns.
@@ -77,7 +132,7 @@ static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_
     side_t side = {0};
     for (int32_t column = 0; column < columns; column++) {
         const bool stands = place(view, kind, column, &side);
-        steps[column] = stands ? mean_step(view, column, side.top, side.bottom) : 0;
+        steps[column] = stands ? mean_step(view, &side) : 0;
     }
     int32_t count = 0;
     for (int32_t column = 1; column + 1 < columns; column++) {
@@ -113,20 +168,41 @@ static float pair_score(const side_t *left, const side_t *right, const upright_t
     return left->step < right->step ? left->step : right->step;
 }
 
-static bslam_proposal_t box_of(const side_t *left, const side_t *right, int32_t kind)
+static float least_of(const float values[3])
 {
+    const float two = values[0] < values[1] ? values[0] : values[1];
+    return two < values[2] ? two : values[2];
+}
+
+static float most_of(const float values[3])
+{
+    const float two = values[0] > values[1] ? values[0] : values[1];
+    return two > values[2] ? two : values[2];
+}
+
+/// The box round both sides.
+static bslam_proposal_t box_of(const bslam_view_t *view, const side_t *left, const side_t *right,
+                               int32_t kind)
+{
+    const int32_t columns = view->frame->columns, rows = view->frame->rows;
     const bslam_real_t cell_px = BSLAM_CELL_PX, middle_px = BSLAM_R(1.5), edge_px = BSLAM_R(0.5);
-    const int16_t top = left->top < right->top ? left->top : right->top;
-    const int16_t bottom = left->bottom > right->bottom ? left->bottom : right->bottom;
+    const int32_t first = (int32_t)(least_of(left->u_px) / BSLAM_CELL_PX);
+    const int32_t last = (int32_t)(most_of(right->u_px) / BSLAM_CELL_PX);
+    const int16_t from = (int16_t)(first < 0 ? 0 : first);
+    const int16_t to = (int16_t)(last < columns - 1 ? last : columns - 1);
+    const int32_t top_left = first_row(left), top_right = first_row(right);
+    const int32_t bottom_left = end_row(left, rows), bottom_right = end_row(right, rows);
+    const int16_t top = (int16_t)(top_left < top_right ? top_left : top_right);
+    const int16_t bottom = (int16_t)(bottom_left > bottom_right ? bottom_left : bottom_right);
     const bslam_proposal_t proposal = {
-        .left = left->column,
+        .left = from,
         .top = top,
-        .right = (int16_t)(right->column + 1),
+        .right = (int16_t)(to + 1),
         .bottom = bottom,
-        .cells = (uint16_t)((right->column + 1 - left->column) * (bottom - top)),
+        .cells = (uint16_t)((to + 1 - from) * (bottom - top)),
         .segmentation = (uint8_t)(BSLAM_SEGMENTATIONS + kind),
-        .box = {(bslam_real_t)left->column * cell_px + middle_px, (bslam_real_t)top * cell_px - edge_px,
-                (bslam_real_t)right->column * cell_px + middle_px, (bslam_real_t)bottom * cell_px - edge_px},
+        .box = {(bslam_real_t)from * cell_px + middle_px, (bslam_real_t)top * cell_px - edge_px,
+                (bslam_real_t)to * cell_px + middle_px, (bslam_real_t)bottom * cell_px - edge_px},
     };
     return proposal;
 }
@@ -156,8 +232,11 @@ static void propose_pairs(bslam_proposals_t *proposals, const bslam_view_t *view
             return;
         }
         limit = best;
-        const bslam_proposal_t proposal = box_of(&sides[best_left], &sides[best_right], kind);
-        bslam_proposals_add(proposals, view, &proposal);
+        const bslam_proposal_t proposal = box_of(view, &sides[best_left], &sides[best_right], kind);
+        // Bent sides may meet, or leave the frame on the way.
+        if (proposal.right - proposal.left >= SIDE_MIN && proposal.bottom - proposal.top >= SIDE_MIN) {
+            bslam_proposals_add(proposals, view, &proposal);
+        }
     }
 }
 

@@ -16,6 +16,8 @@
 #define SATURATED_PERCENT 60
 /// A frame whose cells' green differs by at most this is of one colour.
 #define FLAT_RANGE 12
+/// An outline that overlaps the detector's box less than this is of something else.
+#define AGREE_MIN BSLAM_R(0.5)
 
 static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
     [BSLAM_VISION_SEEN] = "seen",
@@ -272,6 +274,7 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
 
 /// Measures the candidates; one that has no outline is of no use. Through a wide lens a thing's sides are
 /// bent, and the box around the straight ones that measuring finds is too narrow: there the detector's stays.
+/// So it does where the outline is of something else.
 static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
 {
     const bool is_wide = vision->cameras[vision->camera].lens == BSLAM_LENS_EQUIDISTANT;
@@ -280,7 +283,8 @@ static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
         bslam_candidate_t candidate = vision->candidates[i];
         const bslam_box_t found = candidate.outline;
         if (measure_one(vision, frame, &candidate) == BSLAM_OK) {
-            candidate.outline = is_wide ? found : candidate.outline;
+            const bool agrees = bslam_box_overlap(&found, &candidate.outline) >= AGREE_MIN;
+            candidate.outline = is_wide || !agrees ? found : candidate.outline;
             vision->candidates[kept++] = candidate;
         }
     }

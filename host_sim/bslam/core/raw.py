@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
-from bslam.modelfile import Svm
+from bslam.modelfile import AdditiveSvm, Svm
 
 
 class Library:
@@ -129,6 +129,22 @@ class VisionLibrary:
         else:
             made.bytes = self.table("int8_t", svm.weights, keep)
             made.byte_scale = self.table("float", svm.byte_scale, keep)
+        keep.append(made)
+        return made[0]
+
+    def additive(self, machine: AdditiveSvm, keep: list[Any]) -> Any:
+        """A bslam_additive_t; `keep` keeps its tables alive."""
+        made = self.new_filled(
+            "bslam_additive_t",
+            rows=machine.rows,
+            features=machine.features,
+            knots=self.table("float", machine.knots, keep),
+            crossed_count=len(machine.crossed),
+            crossed=self.table("uint8_t", machine.crossed, keep),
+            bytes=self.table("int8_t", machine.weights, keep),
+            byte_scale=self.table("float", machine.byte_scale, keep),
+            bias=self.table("float", machine.bias, keep),
+        )
         keep.append(made)
         return made[0]
 

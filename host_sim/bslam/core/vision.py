@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.core.raw import vision_library
 from bslam.errors import BslamError
-from bslam.modelfile import BeaconClass, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, Recogniser, Svm
 from bslam.rig import Camera
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
@@ -33,7 +33,7 @@ class DetectorModel:
     screen: Svm
     screen_threshold: float
     any_threshold: float
-    kinds: Svm
+    kinds: AdditiveSvm
     fusion: Svm
     threshold: float
 
@@ -313,7 +313,7 @@ class FrontEnd:
             screen=library.svm(model.screen, keep),
             screen_threshold=model.screen_threshold,
             any_threshold=model.any_threshold,
-            kinds=library.svm(model.kinds, keep),
+            kinds=library.additive(model.kinds, keep),
             fusion=library.svm(model.fusion, keep),
             threshold=model.threshold,
         )

@@ -79,12 +79,12 @@ def test_see_packed_picture_is_as_the_unpacked_one(camera: Camera) -> None:
 
 def test_see_finds_beacons_of_a_rendered_world_where_they_are(camera: Camera) -> None:
     found, hits = 0, 0
-    for seed in (11, 12, 13):
+    for seed in range(11, 27):
         scene = make_world(seed, "train")
         renderer = Renderer(scene, camera, seed)
         front_end = FrontEnd([camera])
-        for index, pose in enumerate(walk(scene, np.random.default_rng(seed), 10, hz=5)):
-            picture = renderer.render(pose, index / 5)
+        for index, pose in enumerate(walk(scene, np.random.default_rng(seed), 6, hz=1)):
+            picture = renderer.render(pose, float(index))
             for candidate in front_end.see(picture.rgb).candidates:
                 left, top, right, bottom = (round(edge) for edge in candidate.outline)
                 inside = picture.identity[max(top, 0) : bottom, max(left, 0) : right]
@@ -92,7 +92,7 @@ def test_see_finds_beacons_of_a_rendered_world_where_they_are(camera: Camera) ->
                 hits += (inside >= 0).mean() > 0.4
                 assert candidate.range_m is None or candidate.range_m > 0.0
     # Worlds of the training set: nearly everything said is on a beacon.
-    assert found >= 15
+    assert found >= 60
     assert hits >= 0.85 * found
 
 

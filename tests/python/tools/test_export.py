@@ -61,17 +61,14 @@ def test_header_bytes_decide_as_the_quantised_machine() -> None:
 
 
 @pytest.mark.parametrize("lens", ["pinhole", "wide"])
-@pytest.mark.parametrize("part", ["cell", "screen", "kinds", "fusion"])
+@pytest.mark.parametrize("part", ["cell", "screen", "fusion"])
 def test_machines_that_come_with_the_library_decide_by_their_tables(lens: str, part: str) -> None:
     machine = CompiledSvm('#include "models/beacons.h"\n', f"bslam_beacons_model.{lens}.{part}")
     assert machine.check(machine.features) == 0
     x = np.random.default_rng(5).standard_normal((200, machine.features)).astype(np.float32)
     zero = machine.decide(np.zeros((1, machine.features), np.float32))
     wanted = fit.expand(x, machine.quadratic) @ machine.weights().T.astype(np.float64) + zero
-    if part == "kinds":
-        assert worst_byte_difference(machine, x, wanted) <= 1.5
-    else:
-        assert worst_difference(machine, x, wanted) <= TOLERANCE
+    assert worst_difference(machine, x, wanted) <= TOLERANCE
 
 
 def recogniser(seed: int = 3) -> Recogniser:

@@ -1,0 +1,154 @@
+#include "support.h"
+
+#include "blank_model.h"
+#include "made_view.h"
+
+#include "bslam/vision/detector.h"
+
+/// Place of the logarithm of a box's area among the features.
+#define LOG_AREA 5
+
+static unit_detector_t detector;
+static bslam_beacon_model_t model;
+static made_view_t made;
+static bslam_proposals_t proposals;
+static bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];
+static uint32_t dropped;
+
+/// A detector that takes every box, the larger the surer.
+static int setup(void **state)
+{
+    model = unit_blank_model(&detector);
+    detector.blob_scale[LOG_AREA] = 0.2f;
+    detector.screen_weights[LOG_AREA] = 1;
+    detector.fusion_weights[UNIT_MODEL_CLASSES + 2] = 1;
+    unit_made_view(&made, 0);
+    memset(&proposals, 0, sizeof proposals);
+    dropped = 0;
+    return 0;
+}
+
+static void add(int16_t left, int16_t top, int16_t right, int16_t bottom)
+{
+    proposals.items[proposals.count++] = (bslam_proposal_t){
+        .left = left,
+        .top = top,
+        .right = right,
+        .bottom = bottom,
+        .cells = 1,
+        .box = {left * BSLAM_CELL_PX, top * BSLAM_CELL_PX, right * BSLAM_CELL_PX, bottom * BSLAM_CELL_PX},
+    };
+}
+
+static int32_t judge(void)
+{
+    return bslam_detector_judge(&model.pinhole, model.classes, model.class_count, &made.view, &proposals,
+                                candidates, &dropped);
+}
+
+static int32_t left_column(int32_t candidate)
+{
+    return (int32_t)candidates[candidate].outline.left_px / BSLAM_CELL_PX;
+}
+
+static void test_detector_of_boxes_that_overlap_the_surest_stays(void **state)
+{
+    add(10, 10, 20, 20);
+    add(12, 10, 24, 20);  // larger; overlap 80 / 140
+    assert_int_equal(judge(), 1);
+    assert_int_equal(left_column(0), 12);
+}
+
+static void test_detector_order_of_proposals_does_not_matter(void **state)
+{
+    add(12, 10, 24, 20);
+    add(10, 10, 20, 20);
+    assert_int_equal(judge(), 1);
+    assert_int_equal(left_column(0), 12);
+}
+
+static void test_detector_boxes_side_by_side_both_stay_surest_first(void **state)
+{
+    add(10, 10, 20, 20);
+    add(22, 10, 40, 20);
+    add(50, 10, 55, 20);
+    assert_int_equal(judge(), 3);
+    assert_int_equal(left_column(0), 22);
+    assert_int_equal(left_column(1), 10);
+    assert_int_equal(left_column(2), 50);
+    assert_true(candidates[0].score > candidates[1].score && candidates[1].score > candidates[2].score);
+}
+
+static void test_detector_a_part_gives_way_to_the_whole(void **state)
+{
+    add(10, 10, 30, 30);
+    add(12, 12, 16, 16);  // overlap only 16 / 400, but all of it lies within
+    assert_int_equal(judge(), 1);
+    assert_int_equal(left_column(0), 10);
+}
+
+static void test_detector_a_surer_box_takes_the_place_of_several(void **state)
+{
+    add(10, 10, 20, 20);
+    add(20, 10, 30, 20);
+    add(60, 10, 64, 20);
+    add(10, 10, 30, 22);
+    assert_int_equal(judge(), 2);
+    assert_int_equal(left_column(0), 10);
+    assert_near(candidates[0].outline.bottom_px, 88, 0);
+    assert_int_equal(left_column(1), 60);
+}
+
+static void test_detector_keeps_the_surest_where_there_is_no_room(void **state)
+{
+    for (int16_t i = 0; i < BSLAM_CANDIDATES_MAX + 3; i++) {
+        const int16_t left = (int16_t)(i % 10 * 8), top = (int16_t)(i / 10 * 8);
+        add(left, top, (int16_t)(left + 2 + i % 5), (int16_t)(top + 2 + i / 10));
+    }
+    assert_int_equal(judge(), BSLAM_CANDIDATES_MAX);
+    assert_int_equal(dropped, 3);
+    for (int32_t i = 1; i < BSLAM_CANDIDATES_MAX; i++) {
+        assert_true(candidates[i - 1].score >= candidates[i].score);
+    }
+}
+
+static void test_detector_asks_screen_first_machine_and_threshold(void **state)
+{
+    add(10, 10, 20, 20);
+    assert_int_equal(judge(), 1);
+    model.pinhole.screen_threshold = 10;
+    assert_int_equal(judge(), 0);
+    model.pinhole.screen_threshold = -10;
+    model.pinhole.any_threshold = 0.5f;
+    assert_int_equal(judge(), 0);
+    detector.kind_bias[0] = 1;  // the first row: any beacon
+    assert_int_equal(judge(), 1);
+    model.pinhole.threshold = 100;
+    assert_int_equal(judge(), 0);
+}
+
+static void test_detector_class_is_the_surest_kind_and_by_how_much(void **state)
+{
+    add(10, 10, 20, 20);
+    detector.kind_bias[1] = 0.25f;
+    detector.kind_bias[2] = 1.5f;
+    detector.kind_bias[3] = 3;  // clutter is no class
+    assert_int_equal(judge(), 1);
+    assert_int_equal(candidates[0].beacon_class, 2);
+    assert_near(candidates[0].class_margin, 1.25, 1e-6);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_detector_of_boxes_that_overlap_the_surest_stays, setup),
+        cmocka_unit_test_setup(test_detector_order_of_proposals_does_not_matter, setup),
+        cmocka_unit_test_setup(test_detector_boxes_side_by_side_both_stay_surest_first, setup),
+        cmocka_unit_test_setup(test_detector_a_part_gives_way_to_the_whole, setup),
+        cmocka_unit_test_setup(test_detector_a_surer_box_takes_the_place_of_several, setup),
+        cmocka_unit_test_setup(test_detector_keeps_the_surest_where_there_is_no_room, setup),
+        cmocka_unit_test_setup(test_detector_asks_screen_first_machine_and_threshold, setup),
+        cmocka_unit_test_setup(test_detector_class_is_the_surest_kind_and_by_how_much, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
