@@ -26,7 +26,7 @@ STAGES = {
     "cells": ("bslam_cells_step", "bslam_cells_decide"),
     "boxes": ("bslam_proposals_find", "bslam_uprights_propose"),
     "features": ("bslam_blob_features", "bslam_detector_normalise"),
-    "machines": ("bslam_svm_decide",),
+    "machines": ("bslam_svm_decide", "bslam_additive_locate", "bslam_additive_decide"),
     "measuring": ("bslam_measure",),
 }
 """Functions of the core whose instructions, with those of what they call, make up a stage."""
