@@ -33,7 +33,7 @@ ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
     "untrained": (("learn_budget", 0),),
     "position": (("looks_weight", 0.0),),
 }
-METHODS = ("known", "nearest", "mahalanobis", "svm", *ABLATIONS)
+METHODS = ("known", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
 VIEWS = (1, 2, 4, 10)
 TEST_VIEWS, FAR_M = 30, 6.5
 

@@ -171,6 +171,7 @@ void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_matc
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params)
 {
     static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
-                                                 bslam_associate_mahalanobis, bslam_associate_svm};
+                                                 bslam_associate_mahalanobis, bslam_associate_svm,
+                                                 bslam_associate_joint};
     return methods[params->association];
 }

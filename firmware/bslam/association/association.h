@@ -11,7 +11,8 @@ enum {
     BSLAM_ASSOCIATION_KNOWN = 0,
     BSLAM_ASSOCIATION_NEAREST = 1,
     BSLAM_ASSOCIATION_MAHALANOBIS = 2,
-    BSLAM_ASSOCIATION_SVM = 3
+    BSLAM_ASSOCIATION_SVM = 3,
+    BSLAM_ASSOCIATION_JOINT = 4
 };
 
 /// Why a sighting was not used.
@@ -74,6 +75,11 @@ void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_matc
 /// Without looks or signatures by position alone. O(count * beacons), and again where two sightings want one
 /// beacon.
 void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+
+/// Joint compatibility branch and bound: the pairing that explains the most sightings together, within
+/// match_d2 each; what is in no pair is new beyond new_d2. At most BSLAM_GIVEN_MAX sightings are paired
+/// together, the next after them, and at most joint_nodes choices are tried for each such group.
+void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
 /// The method that params->association names.
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params);

@@ -78,3 +78,12 @@ bool bslam_given_add(const bslam_ekf_t *ekf, bslam_given_t *given, const bslam_i
     }
     return true;
 }
+
+bslam_real_t bslam_given_distance2(const bslam_given_t *given)
+{
+    bslam_real_t sum = 0;
+    for (int32_t i = 0; i < given->count; i++) {
+        sum += given->white[i] * given->white[i];
+    }
+    return sum;
+}

@@ -39,4 +39,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_given_weigh(const bslam_ekf_t *ekf, bslam_
 /// Adds an innovation to what is given. False, and no change, if there is no room or S is singular.
 bool bslam_given_add(const bslam_ekf_t *ekf, bslam_given_t *given, const bslam_innovation_t *innovation);
 
+/// Squared Mahalanobis distance of all that is given together. O(count).
+bslam_real_t bslam_given_distance2(const bslam_given_t *given);
+
 #endif

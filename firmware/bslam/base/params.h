@@ -84,13 +84,16 @@
     REAL(ray_linear_limit, 0.1, 1e-4, 10.0, \
          "a ray becomes a point when its linearity index falls below this") \
     /* association and map */ \
-    INTEGER(association, 0, 0, 3, \
-            "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm: position and looks") \
+    INTEGER(association, 0, 0, 4, \
+            "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
     REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, direction only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \
     REAL(new_d2, 40.0, 1e-3, 1e6, \
          "mahalanobis: farther than this from any beacon is a new one, between: rejected") \
+    REAL(joint_sd, 3.09, 0.0, 10.0, \
+         "joint: sightings fit together up to this many normal deviations (3.09: one in 1000 does not)") \
+    INTEGER(joint_nodes, 3000, 1, 10000000, "joint: choices that are tried for at most 5 sightings") \
     REAL(candidate_d2, 30.0, 1e-3, 1e6, "svm: beacons nearer than this are candidates") \
     REAL(new_per_m2, 0.02, 1e-9, 1e3, "svm: density of beacons not yet in the map") \
     REAL(new_per_rad, 0.3, 1e-9, 1e3, "svm: the same, direction only") \

@@ -10,7 +10,7 @@ from bslam.experiment import defaults
 from bslam.log import Log, Robot
 
 OBSERVATIONS = ("distance", "direction")
-ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm")
+ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
 FILTERS = ("standard", "invariant")
 MOTIONS = ("euler", "arc")
 SENSORS = ("simulated", "camera")

@@ -1,0 +1,180 @@
+// Joint compatibility branch and bound: the pairing of a frame that explains the most sightings together.
+// MATH "Association".
+#include <string.h>
+
+#include "bslam/association/association.h"
+#include "bslam/association/given.h"
+#include "bslam/association/internal.h"
+
+/// A search through the pairings of up to BSLAM_GIVEN_MAX sightings: level i chooses for the i-th of them.
+typedef struct search {
+    bslam_given_t given;
+    int32_t sightings[BSLAM_GIVEN_MAX];
+    int32_t next[BSLAM_GIVEN_MAX];    ///< what a level tries next: a beacon, or none at all
+    int32_t choice[BSLAM_GIVEN_MAX];  ///< a beacon, or -1
+    int32_t scalars[BSLAM_GIVEN_MAX + 1];
+    int32_t pairs[BSLAM_GIVEN_MAX + 1];
+    int32_t best[BSLAM_GIVEN_MAX];
+    int32_t count;
+    int32_t best_pairs;
+    bslam_real_t best_distance2;
+} search_t;
+
+/// The chi-squared value of `freedoms` that is exceeded as rarely as the normal deviation joint_sd
+/// (Wilson and Hilferty).
+static bslam_real_t joint_limit(const bslam_params_t *params, int32_t freedoms)
+{
+    const bslam_real_t n = (bslam_real_t)freedoms;
+    const bslam_real_t spread = 2 / (9 * n);
+    const bslam_real_t root = 1 - spread + params->joint_sd * bslam_sqrt(spread);
+    return n * root * root * root;
+}
+
+static bool is_free(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, const search_t *search,
+                    int32_t level, int32_t beacon)
+{
+    for (int32_t i = 0; i < level; i++) {
+        if (search->choice[i] == beacon) {
+            return false;
+        }
+    }
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].verdict == BSLAM_VERDICT_MATCH && matches[i].beacon == beacon) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Pairs the sighting of a level with a beacon, if both alone and with the pairs before it that is possible.
+static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t level, int32_t beacon)
+{
+    const bslam_sighting_t *sighting = &frame->sightings[search->sightings[level]];
+    bslam_innovation_t innovation;
+    bslam_real_t distance2;
+    if (bslam_classes_differ(sighting, &frame->ekf->beacons[beacon]) ||
+        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+            BSLAM_OK ||
+        bslam_ekf_distance2(frame->ekf, &innovation, &distance2) != BSLAM_OK ||
+        distance2 > frame->params->match_d2 || !bslam_given_add(frame->ekf, &search->given, &innovation)) {
+        return false;
+    }
+    return bslam_given_distance2(&search->given) <= joint_limit(frame->params, search->given.count);
+}
+
+/// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better.
+static void keep_if_better(search_t *search)
+{
+    const int32_t pairs = search->pairs[search->count];
+    const bslam_real_t distance2 = bslam_given_distance2(&search->given);
+    if (pairs > search->best_pairs || (pairs == search->best_pairs && distance2 < search->best_distance2)) {
+        search->best_pairs = pairs;
+        search->best_distance2 = distance2;
+        memcpy(search->best, search->choice, sizeof search->best);
+    }
+}
+
+/// Tries the next choice of a level. True if the search may go one level deeper.
+static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, search_t *search,
+                     int32_t level)
+{
+    const int32_t beacon = search->next[level]++;
+    const int32_t left = search->count - level - 1;
+    search->given.count = search->scalars[level];
+    if (beacon == frame->ekf->beacon_count) {
+        search->choice[level] = -1;
+        search->pairs[level + 1] = search->pairs[level];
+    } else {
+        if (!is_free(frame, matches, search, level, beacon) || !pair(frame, search, level, beacon)) {
+            return false;
+        }
+        search->choice[level] = beacon;
+        search->pairs[level + 1] = search->pairs[level] + 1;
+    }
+    search->scalars[level + 1] = search->given.count;
+    return search->pairs[level + 1] + left >= search->best_pairs;
+}
+
+/// Depth first, until all is tried or joint_nodes choices were.
+static void run(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, search_t *search)
+{
+    int32_t level = 0;
+    search->next[0] = 0;
+    for (int32_t node = 0; node < frame->params->joint_nodes && level >= 0; node++) {
+        if (search->next[level] > frame->ekf->beacon_count) {
+            level--;
+        } else if (try_next(frame, matches, search, level)) {
+            if (level + 1 == search->count) {
+                keep_if_better(search);
+            } else {
+                level++;
+                search->next[level] = 0;
+            }
+        }
+    }
+}
+
+/// What becomes of a sighting that is in no pair: new far from every beacon, else it is left alone.
+static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_match_t *match)
+{
+    for (int b = 0; b < frame->ekf->beacon_count; b++) {
+        bslam_innovation_t innovation;
+        bslam_real_t distance2;
+        if (!bslam_classes_differ(&frame->sightings[i], &frame->ekf->beacons[b]) &&
+            bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &frame->sightings[i], b,
+                                 &innovation) == BSLAM_OK &&
+            bslam_ekf_distance2(frame->ekf, &innovation, &distance2) == BSLAM_OK &&
+            (match->distance2 < 0 || distance2 < match->distance2)) {
+            match->distance2 = distance2;
+        }
+    }
+    const bool is_new = match->distance2 < 0 || match->distance2 > frame->params->new_d2;
+    match->verdict = is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_REJECT;
+    match->reason = is_new ? BSLAM_REASON_NONE : BSLAM_REASON_AMBIGUOUS;
+}
+
+/// Searches for the sightings that were gathered, and writes down what was found.
+static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_match_t *matches)
+{
+    bslam_given_nothing(&search->given);
+    search->scalars[0] = 0;
+    search->pairs[0] = 0;
+    search->best_pairs = 0;
+    search->best_distance2 = 0;
+    for (int32_t k = 0; k < BSLAM_GIVEN_MAX; k++) {
+        search->best[k] = -1;
+    }
+    run(frame, matches, search);
+    for (int32_t k = 0; k < search->count; k++) {
+        bslam_match_t *match = &matches[search->sightings[k]];
+        match->beacon = search->best[k];
+        if (match->beacon >= 0) {
+            match->verdict = BSLAM_VERDICT_MATCH;
+        } else {
+            decide_rest(frame, search->sightings[k], match);
+        }
+    }
+    search->count = 0;
+}
+
+void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+{
+    search_t search;
+    search.count = 0;
+    for (int i = 0; i < frame->count; i++) {
+        (void)bslam_is_mappable(&frame->sightings[i], &matches[i]);
+    }
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].reason == BSLAM_REASON_CLASS) {
+            continue;
+        }
+        search.sightings[search.count] = i;
+        search.count++;
+        if (search.count == BSLAM_GIVEN_MAX) {
+            settle(frame, &search, matches);
+        }
+    }
+    if (search.count > 0) {
+        settle(frame, &search, matches);
+    }
+}
