@@ -67,7 +67,7 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
         made: list[Noting] = []
 
         def factory(params: Any, beacons: int) -> Noting:
-            made.append(NotingHost(Slam(params, beacons_max=beacons, looks=looks)))
+            made.append(NotingHost(Slam(params, beacons_max=beacons, looks=looks, seeds=log.seeds)))
             return made[0]
 
         run_log(log, options, factory)
@@ -75,7 +75,7 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
     opened: list[NotingTarget] = []
 
     def connected(params: Any, beacons: int) -> Noting:
-        slam = connect(options.target, params, beacons, fingerprints=True, looks=looks)
+        slam = connect(options.target, params, beacons, fingerprints=True, looks=looks, seeds=log.seeds)
         opened.append(NotingTarget(slam))
         return opened[0]
 

@@ -97,23 +97,23 @@ def costs(board: str) -> dict[tuple[str, int], int]:
     return {(name, int(size)): round(int(ticks) * INSTRUCTIONS_A_TICK) for name, size, ticks in lines}
 
 
-def pictures(lens: str, is_wide: bool, folder: Path) -> Path:
-    """A short walk through a rendered world, as firmware/app/cost_vision.c reads it."""
+def picture_loader(lens: str, folder: Path) -> tuple[str, str]:
+    """QEMU's arguments to put a short walk through a rendered world where cost_vision.c looks for it."""
     frames = render_world(WORLD_SEED, "test", camera_of(lens, WORLD_SEED), FRAMES).pictures
     path = folder / f"{lens}.bin"
-    path.write_bytes(np.array([is_wide, len(frames)], "<u4").tobytes() + frames.astype("<u2").tobytes())
-    return path
+    head = np.array([lens == "wide", len(frames)], "<u4")
+    path.write_bytes(head.tobytes() + frames.astype("<u2").tobytes())
+    return "-device", f"loader,file={path},addr={PICTURES_AT:#x},force-raw=on"
 
 
 def vision_costs() -> dict[tuple[str, str], int]:
     """Instructions of a frame, mean, by core and lens."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
-        for number, lens in enumerate(RIGS):
-            path = pictures(lens, number == 1, Path(folder))
-            loader = f"loader,file={path},addr={PICTURES_AT:#x},force-raw=on"
+        for lens in RIGS:
+            loader = picture_loader(lens, Path(folder))
             for core, board in COST_BOARDS.items():
-                ended = run_image(board, "cost_vision", "-device", loader)
+                ended = run_image(board, "cost_vision", *loader)
                 ticks = [int(one) for one in re.findall(r"^frame \d+ (\d+) ", ended.output, re.MULTILINE)]
                 if ended.status != 0 or len(ticks) != FRAMES:
                     raise SystemExit(f"cost_vision on {board}: status {ended.status}: {ended.output}")
@@ -217,7 +217,9 @@ Counted by QEMU (`-icount`), the same at every run; instructions are not cycles.
 {table(("part", "beacons", *COST_BOARDS), cost_rows(measured))}
 {parts}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
-world (seed {WORLD_SEED}; firmware/app/cost_vision.c):
+world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
+`.venv/bin/python tools/profile_image.py cost_vision`.
+
 
 {table(("lens", *COST_BOARDS), vision_rows(seeing))}
 ## A second on a Cortex-M4F

@@ -60,6 +60,7 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         session->open = true;
         session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
         session->uses_looks = (flags & FLAG_LOOKS) != 0;
+        session->seed_count = 0;
         bslam_params_default(&session->params);
         keep(session, BSLAM_OK);
     }
@@ -70,7 +71,7 @@ static bslam_status_t attach_looks(session_t *session)
     if (!session->uses_looks) {
         return BSLAM_OK;
     }
-    const bslam_status_t status = bslam_looks_init(&session->looks, NULL, 0);
+    const bslam_status_t status = bslam_looks_init(&session->looks, session->seeds, session->seed_count);
     if (status == BSLAM_OK) {
         bslam_slam_attach_looks(&session->slam, &session->looks);
     }
@@ -113,6 +114,13 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+static void read_signature(bslam_link_reader_t *reader, float signature[BSLAM_SAMPLE_FEATURES])
+{
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        signature[k] = (float)bslam_link_get_real(reader);
+    }
+}
+
 static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
 {
     const int first = bslam_link_get_u8(reader);
@@ -121,12 +129,28 @@ static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
         keep(session, BSLAM_E_COUNT);
         return;
     }
-    for (int i = 0; i < count; i++) {
-        for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
-            session->signatures[first + i][k] = (float)bslam_link_get_real(reader);
-        }
+    for (int i = first; i < first + count; i++) {
+        read_signature(reader, session->signatures[i]);
     }
     if (is_whole(session, reader)) {
+        keep(session, BSLAM_OK);
+    }
+}
+
+static void apply_seeds(session_t *session, bslam_link_reader_t *reader)
+{
+    const int first = bslam_link_get_u8(reader);
+    const int count = bslam_link_get_u8(reader);
+    bslam_status_t status = first + count > BSLAM_SEEDS_MAX ? BSLAM_E_COUNT : BSLAM_OK;
+    for (int i = first; i < first + count && status == BSLAM_OK; i++) {
+        float signature[BSLAM_SAMPLE_FEATURES];
+        read_signature(reader, signature);
+        status = bslam_sample_encode(signature, &session->seeds[i]);
+    }
+    if (status != BSLAM_OK) {
+        keep(session, status);
+    } else if (is_whole(session, reader)) {
+        session->seed_count = first + count;
         keep(session, BSLAM_OK);
     }
 }
@@ -376,6 +400,7 @@ static const exchange_t exchanges[] = {
     {SESSION_MAP, apply_nothing, answer_map},
     {SESSION_COUNTERS, apply_nothing, answer_counters},
     {SESSION_SIGNATURES, apply_signatures, answer_nothing},
+    {SESSION_SEEDS, apply_seeds, answer_nothing},
 };
 
 static const exchange_t *find_exchange(uint8_t type)

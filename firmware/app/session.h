@@ -25,6 +25,7 @@ typedef enum session_message {
     SESSION_MAP = 0x0b,  ///< asks for a part of the map
     SESSION_COUNTERS = 0x0c,
     SESSION_SIGNATURES = 0x0d,  ///< how some of the next frame's sightings look
+    SESSION_SEEDS = 0x0e,       ///< signatures of things that are no beacon, for the next SESSION_RESET
     SESSION_ANSWER = 0x80
 } session_message_t;
 
@@ -61,6 +62,8 @@ typedef struct session {
     uint64_t fingerprint;
     bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
     float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
+    bslam_sample_t seeds[BSLAM_SEEDS_MAX];
+    int32_t seed_count;
     uint8_t out[BSLAM_LINK_FRAME_MAX];
 } session_t;
 

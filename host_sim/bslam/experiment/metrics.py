@@ -75,10 +75,11 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         "refused_inputs": sum(trace.refusals.values()),
         "counters": trace.counters,
         "diverged": not np.isfinite(trace.pose).all(),
-        "step_us_median": trace.step_us_median,
     }
     if trace.target:
         entry["target_image"] = trace.target
+    else:
+        entry["step_us_median"] = trace.step_us_median
     if log.beacons is not None:
         entry["beacons_true"] = _beacons_true(log)
     if evaluation is not None:

@@ -42,7 +42,10 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
     """
     params, beacons = core_params(options, log), _beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
-        with connect(options.target, params, beacons, looks=_uses_looks(options)) as slam:
+        if options.real != "float":
+            raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
+        looks = _uses_looks(options)
+        with connect(options.target, params, beacons, looks=looks, seeds=log.seeds) as slam:
             return _Run(slam, log, options).finish(slam.target_description())
     factory = slam_factory or partial(_make_slam, options, log)
     return _Run(factory(params, beacons), log, options).finish()

@@ -30,6 +30,7 @@ class Message(IntEnum):
     MAP = 0x0B
     COUNTERS = 0x0C
     SIGNATURES = 0x0D
+    SEEDS = 0x0E
 
 
 class Report(IntEnum):
@@ -94,7 +95,7 @@ def signatures_a_frame(sightings_max: int) -> int:
 
 
 def signatures(first: int, part: NDArray[np.float32]) -> bytes:
-    """How the sightings from `first` on look, (n, features)."""
+    """SIGNATURES or SEEDS from number `first` on, (n, features)."""
     return bytes((first, len(part))) + part.astype("<f4").tobytes()
 
 

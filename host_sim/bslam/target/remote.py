@@ -22,8 +22,9 @@ from bslam.target.lines import Line, TargetError, open_line
 class RemoteSlam:
     """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
 
-    params, beacons_max as for `Slam`; `line` is taken over. Raises BslamError for parameters that the library
-    refuses and for an image that is too small or has others, TargetError if the robot does not answer.
+    params, beacons_max, looks, seeds as for `Slam`; `line` is taken over. Raises BslamError for parameters
+    that the library refuses and for an image that is too small or has others, TargetError if the robot does
+    not answer.
     """
 
     def __init__(
@@ -34,6 +35,7 @@ class RemoteSlam:
         *,
         fingerprints: bool = False,
         looks: bool = False,
+        seeds: NDArray[np.float32] | None = None,
     ) -> None:
         self._line = line
         self._raw = library("float", 1)
@@ -47,6 +49,8 @@ class RemoteSlam:
         self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
         self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
         self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
+        if looks and seeds is not None:
+            self._send_signatures(Message.SEEDS, seeds)
         self._set_params()
 
     def _check_image(self, beacons_max: int) -> None:
@@ -118,17 +122,17 @@ class RemoteSlam:
         signed, most = signature is not None, self._client.info.sightings_max
         payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
         if signature is not None:
-            self._send_signatures(signature[:most])
+            self._send_signatures(Message.SIGNATURES, signature[:most])
         answer = self._client.ask(Message.SIGHTINGS, payload, time_us)
         which = f"{len(rows)} sightings" if answer.detail == NO_DETAIL else f"sighting {answer.detail}"
         self._take_step(answer, f"frame at {time_us} us, {which}")
         return [self._account(one) for one in messages.read_accounts(answer.body)]
 
-    def _send_signatures(self, signature: NDArray[np.float32]) -> None:
+    def _send_signatures(self, message: Message, signature: NDArray[np.float32]) -> None:
         step = messages.signatures_a_frame(self._client.info.sightings_max)
         for first in range(0, len(signature), step):
             payload = messages.signatures(first, signature[first : first + step])
-            self._ensure(self._client.ask(Message.SIGNATURES, payload), "signatures")
+            self._ensure(self._client.ask(message, payload), message.name.lower())
 
     def _account(self, raw: messages.RawAccount) -> Account:
         return Account(
@@ -255,11 +259,12 @@ def connect(
     *,
     fingerprints: bool = False,
     looks: bool = False,
+    seeds: NDArray[np.float32] | None = None,
 ) -> RemoteSlam:
     """The pipeline on the target that a word of `--target` names; close it, or use it in a `with`."""
     line = open_line(target)
     try:
-        return RemoteSlam(line, params, beacons_max, fingerprints=fingerprints, looks=looks)
+        return RemoteSlam(line, params, beacons_max, fingerprints=fingerprints, looks=looks, seeds=seeds)
     except BaseException:
         line.close()
         raise
