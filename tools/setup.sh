@@ -80,6 +80,7 @@ find_missing() {
         #include <cmocka.h>" | ${CC:-cc} -E -o /dev/null -'
     need gcc-arm-none-eabi "the firmware build" command -v arm-none-eabi-gcc
     need libnewlib-arm-none-eabi "the firmware build" arm_headers
+    need cmake "the CMake build" command -v cmake
     need qemu-system-arm "running the firmware" command -v qemu-system-arm
     [[ $part == test ]] && return
     need valgrind "counting instructions" command -v valgrind

@@ -49,7 +49,8 @@ def test_setup_no_install_prints_the_command_and_exits_2(machine: Path) -> None:
     assert first.startswith("setup: missing: gcc for the C compiler")
     assert command == (
         "setup: install with: apt-get install -y --no-install-recommends"
-        " gcc libc6-dev pkg-config libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
+        " gcc libc6-dev pkg-config libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi"
+        " cmake qemu-system-arm"
     )
 
 

@@ -1,0 +1,59 @@
+"""firmware/CMakeLists.txt: a program on this computer links the library, a core's library is clean."""
+
+import subprocess
+from pathlib import Path
+
+import check_symbols
+
+FIRMWARE = Path(__file__).parents[3] / "firmware"
+
+
+def cmake(*words):
+    done = subprocess.run(["cmake", *map(str, words)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_a_program_links_the_library(tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES C)\n"
+        f"add_subdirectory({FIRMWARE} bslam)\nadd_executable(user main.c)\n"
+        "target_link_libraries(user PRIVATE bslam::bslam)\n"
+        "target_compile_definitions(bslam PUBLIC BSLAM_BEACONS_MAX=7)\n"
+    )
+    (tmp_path / "main.c").write_text(
+        '#include "bslam/bslam.h"\nstatic bslam_slam_t slam;\n'
+        "int main(void)\n{\n    bslam_params_t params;\n    int bad_id;\n    bslam_params_default(&params);\n"
+        "    const bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);\n"
+        "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
+    )
+    cmake("-S", tmp_path, "-B", tmp_path / "build")
+    cmake("--build", tmp_path / "build")
+    assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
+
+
+def test_the_toolchain_file_builds_for_a_core(tmp_path):
+    toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
+    words = [f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DBSLAM_CORE=m0plus", "-DCMAKE_BUILD_TYPE=MinSizeRel"]
+    cmake("-S", FIRMWARE, "-B", tmp_path, *words)
+    cmake("--build", tmp_path)
+    archive = tmp_path / "libbslam.a"
+    assert check_symbols.main([str(archive), "--nm", "arm-none-eabi-nm"]) == 0
+    shown = subprocess.run(["arm-none-eabi-readelf", "-A", archive], capture_output=True, text=True).stdout
+    assert "Tag_CPU_arch: v6S-M" in shown
+
+
+def test_a_core_that_does_not_exist_is_refused(tmp_path):
+    toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
+    words = [
+        "cmake",
+        "-S",
+        FIRMWARE,
+        "-B",
+        tmp_path,
+        f"-DCMAKE_TOOLCHAIN_FILE={toolchain}",
+        "-DBSLAM_CORE=z80",
+    ]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "allowed: m0plus, m4f, m7, m33" in done.stderr
