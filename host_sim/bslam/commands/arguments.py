@@ -26,7 +26,7 @@ from bslam.experiment.options import (
 )
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
-from bslam.target.lines import TARGET_KINDS, allowed_targets
+from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 
 T = TypeVar("T")
 
@@ -253,8 +253,9 @@ def _association(text: str) -> tuple[str, float]:
 
 
 def _target(text: str) -> str:
-    kind, colon, name = text.partition(":")
-    if text != "host" and not (colon and name and kind in TARGET_KINDS):
+    kind, _, name = text.partition(":")
+    there = kind in TARGET_KINDS and name and (kind != "qemu" or name in qemu_machines())
+    if text != "host" and not there:
         raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {allowed_targets()}")
     return text
 

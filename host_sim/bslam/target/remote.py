@@ -59,7 +59,7 @@ class RemoteSlam:
         crc = crc16(b"".join(name.encode() + b"\0" for name in names))
         if (info.params_count, info.params_crc) != (len(names), crc):
             raise BslamError(
-                "the image has other parameters than this program: `make setup` builds one, `make images` the other"
+                "the image has other parameters than this program: `make setup images` builds both anew"
             )
         if beacons_max > info.beacons_max:
             raise BslamError(
