@@ -240,3 +240,27 @@ def test_without_qemu_it_fails_with_what_to_install(monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     with pytest.raises(BslamError, match="apt-get install qemu-system-arm"):
         open_line("qemu:mps2_an386")
+
+
+def test_any_message_is_answered_or_dropped_and_never_a_crash(robot_line):
+    """Whole frames of arbitrary messages, under the sanitizers: most payloads as long as their message's."""
+    random_ = random.Random(11)
+    lengths = {0x01: 5, 0x02: 0, 0x03: 14, 0x05: 8, 0x06: 12, 0x07: 4, 0x08: 6, 0x09: 2, 0x0B: 1}
+    line = robot_line()
+    first = Client(line)._sequence + 1
+    for step in range(1500):
+        kind = random_.choice([*Message, *Message, 0x3F])
+        length = lengths.get(kind, random_.choice([0, 1, 23, 45, 286, 300]))
+        payload = bytearray(random_.randbytes(length))
+        if kind == Message.SIGHTINGS and length > 1:
+            payload[0] = length // 22
+        if kind in (Message.SIGNATURES, Message.SEEDS) and length == 286:
+            payload[:2] = random_.choice([b"\0\1", b"\x0f\1", b"\x7f\1", b"\xff\1", b"\xff\xff"])
+        time_us = random_.choice([step * 40_000, random_.randrange(-(2**63), 2**63)])
+        line.write(encode(Frame(kind, (first + step) % 65536, time_us, bytes(payload))))
+        if step % 50 == 0:
+            while line.read(0.001):
+                pass
+    robot = RemoteSlam(line, {}, 6)
+    robot.odometry("wheels", 40_000, 0.01, 0.01)
+    assert robot.counters()["odometry"] == 1
