@@ -1,5 +1,8 @@
 """The images in QEMU: the same bits as here on every core, the same instructions at every run."""
 
+import re
+import subprocess
+
 import pytest
 
 import run_image
@@ -8,7 +11,7 @@ from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import first_steps
-from bslam.target.lines import qemu_machines
+from bslam.target.lines import ROOT, qemu_machines
 from bslam.world.simulate import load_scenario, simulate
 
 STEPS = 120
@@ -66,3 +69,17 @@ def test_a_run_names_its_image_and_counts_the_same_instructions_twice(log):
     assert one["image"] == "mps2_an386/robot.elf"
     assert len(one["image_sha256"]) == 64
     assert len(one["build_id"]) == 40
+
+
+def test_an_image_that_does_not_fit_is_refused_by_the_linker(tmp_path):
+    """The STM32F405's objects, and a stack as large as its RAM."""
+    objects = [str(path) for path in (ROOT / "build" / "stm32f405").rglob("*.o")]
+    robot = [path for path in objects if not path.endswith("selftest.o")]
+    core = ["-mthumb", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+    script = ["-T", "firmware/port/stm32f405/memory.ld", "-Wl,--defsym=STACK=0x20000"]
+    command = ["arm-none-eabi-gcc", *core, "-nostartfiles", "--specs=nano.specs", *script, *robot, "-lm"]
+    done = subprocess.run(
+        [*command, "-o", str(tmp_path / "x.elf")], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert re.search(r"region `RAM' overflowed by \d+ bytes", done.stderr), done.stderr
