@@ -65,15 +65,24 @@ static bool is_of_another_size(const bslam_view_t *view, const bslam_proposal_t 
     return excess > LOG_SIZE_MAX || excess < -LOG_SIZE_MAX;
 }
 
-/// True if the proposal is a candidate: its score, class and outline are then written.
-static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
-                      int32_t class_count, const bslam_view_t *view, const bslam_proposal_t *proposal,
-                      bslam_candidate_t *candidate)
+/// What the machines say of a proposal: the score, and of the size what is_of_another_size needs.
+typedef struct opinion {
+    float values[BSLAM_CLASSES_MAX + 3];
+    float score;
+    float log_height;
+    float per_metre;
+} opinion_t;
+
+/// False if a machine refuses it. Not to be inlined: its kilobyte of stack is then free for what follows.
+__attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t *model, int32_t class_count,
+                                                   const bslam_view_t *view, const bslam_proposal_t *proposal,
+                                                   opinion_t *opinion)
 {
     float features[BSLAM_BLOB_FEATURES];
-    float values[BSLAM_CLASSES_MAX + 3];
+    float *values = opinion->values;
     bslam_blob_features(view, proposal, features);
-    const float log_height = features[BSLAM_BLOB_LOG_HEIGHT], per_metre = features[BSLAM_BLOB_PER_METRE];
+    opinion->log_height = features[BSLAM_BLOB_LOG_HEIGHT];
+    opinion->per_metre = features[BSLAM_BLOB_PER_METRE];
     bslam_detector_normalise(model, features);
     float *screen = &values[class_count + 2];
     bslam_svm_decide(&model->screen, features, screen);
@@ -86,19 +95,27 @@ static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_cl
     if (!(values[0] >= model->any_threshold)) {
         return false;
     }
-    float score;
     bslam_additive_decide(&model->kinds, &place, 1, model->kinds.rows, values + 1);
     clamp_all(values, class_count + 3, BSLAM_FUSION_LIMIT);
-    bslam_svm_decide(&model->fusion, values, &score);
-    if (!(score >= model->threshold)) {
+    bslam_svm_decide(&model->fusion, values, &opinion->score);
+    return opinion->score >= model->threshold;
+}
+
+/// True if the proposal is a candidate: its score, class and outline are then written.
+static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
+                      int32_t class_count, const bslam_view_t *view, const bslam_proposal_t *proposal,
+                      bslam_candidate_t *candidate)
+{
+    opinion_t opinion;
+    if (!ask_machines(model, class_count, view, proposal, &opinion)) {
         return false;
     }
     memset(candidate, 0, sizeof *candidate);
     candidate->outline = proposal->box;
-    candidate->score = score;
-    choose_class(values + 1, class_count, candidate);
+    candidate->score = opinion.score;
+    choose_class(opinion.values + 1, class_count, candidate);
     const float height_m = classes[candidate->beacon_class - 1].height_m;
-    return !is_of_another_size(view, proposal, log_height, per_metre, height_m);
+    return !is_of_another_size(view, proposal, opinion.log_height, opinion.per_metre, height_m);
 }
 
 static bslam_real_t area_px2(const bslam_box_t *box)
