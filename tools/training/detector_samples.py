@@ -19,7 +19,7 @@ from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
-    BeaconClass("extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01),  # round: it shows no flank
+    BeaconClass("extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01, 0.18),  # round: it shows no flank
     BeaconClass("radiator", 0.60, 0.12, 0.70, 0.70, 0.08),
     BeaconClass("door", 2.00, 0.035, 2.00, 2.00, 0.01),
     BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.03),

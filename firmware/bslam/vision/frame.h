@@ -99,7 +99,7 @@ enum {
     BSLAM_MARK_CUT_BOTTOM = 8,
     BSLAM_MARK_SMALL = 16,       ///< too few pixels for a distance or a signature
     BSLAM_MARK_SLANTED = 32,     ///< seen too obliquely
-    BSLAM_MARK_MISPLACED = 128,  ///< by its height it would hang where its kind does not: no distance
+    BSLAM_MARK_MISPLACED = 128,  ///< its height contradicts its place or its width: no distance
     BSLAM_MARK_PART = 64,        ///< its level sides go on beyond it: the outline is that of a part
 };
 

@@ -3,8 +3,8 @@
 #include <string.h>
 
 #include "bslam/math/trig.h"
+#include "bslam/vision/part.h"
 #include "bslam/vision/signature.h"
-#include "bslam/vision/whole.h"
 
 static const bslam_real_t SIZE_MAX_M = 10;
 // What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels,
@@ -34,6 +34,9 @@ static const bslam_real_t RANGE_SD_MAX = BSLAM_R(0.15);
 static const bslam_real_t MISPLACED_SDS = 3;
 static const bslam_real_t BAND_SD_M = BSLAM_R(0.015);
 static const bslam_real_t HORIZON_SD_PX = BSLAM_R(0.7);
+// A round thing's width may be off by this part, and contradict its height by so many standard deviations.
+static const bslam_real_t WIDTH_SD = BSLAM_R(0.04);
+static const bslam_real_t WIDTH_SDS = 2;
 // Seen more obliquely than this, tangent, an object is marked and not measured.
 static const bslam_real_t TURN_MAX = BSLAM_R(1.5);
 
@@ -45,10 +48,11 @@ static bool box_is_number(const bslam_box_t *box)
 
 static bslam_status_t check_size(const bslam_size_t *size)
 {
-    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m, size->top_low_m, size->top_high_m};
+    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m, size->top_low_m, size->top_high_m,
+                                      size->width_m};
     bool in_range = size->top_low_m <= size->top_high_m && bslam_in_range(size->looks_sd, 0, 1);
     bool are_numbers = bslam_is_number(size->looks_sd);
-    for (int32_t i = 0; i < 4; i++) {
+    for (int32_t i = 0; i < (int32_t)(sizeof lengths_m / sizeof lengths_m[0]); i++) {
         in_range = in_range && bslam_in_range(lengths_m[i], 0, SIZE_MAX_M);
         are_numbers = are_numbers && bslam_is_number(lengths_m[i]);
     }
@@ -77,12 +81,12 @@ static unsigned mark_if(bool is, unsigned mark)
 }
 
 /// Marks of what the rough box, or the outline found near it, tells.
-static unsigned marks_of(const bslam_frame_t *frame, const bslam_whole_t *whole, const bslam_box_t *found)
+static unsigned marks_of(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_box_t *rough,
+                         const bslam_outline_t *outline, const bslam_box_t *found)
 {
-    return cuts_of(frame, &whole->rough) | cuts_of(frame, found) |
-           mark_if(is_small(&whole->rough), BSLAM_MARK_SMALL) |
-           mark_if(bslam_abs(whole->outline.turn) > TURN_MAX, BSLAM_MARK_SLANTED) |
-           mark_if(whole->left_goes_on || whole->right_goes_on, BSLAM_MARK_PART);
+    return cuts_of(frame, rough) | cuts_of(frame, found) | mark_if(is_small(rough), BSLAM_MARK_SMALL) |
+           mark_if(bslam_abs(outline->turn) > TURN_MAX, BSLAM_MARK_SLANTED) |
+           mark_if(bslam_outline_is_part(frame, camera, rough, outline), BSLAM_MARK_PART);
 }
 
 static bslam_box_t box_around(const bslam_quad_t *quad)
@@ -152,6 +156,20 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
     return (ahead_t){inverse, determinant / (information * inverse * inverse), bslam_sqrt(distance2)};
 }
 
+/// False if the width of something round contradicts that: of an extinguisher without its neck, say.
+static bool agrees_with_width(const bslam_outline_t *o, const bslam_size_t *size, bslam_real_t point_var,
+                              const ahead_t *ahead)
+{
+    if (!(size->width_m > 0)) {
+        return true;
+    }
+    const bslam_real_t width = o->left - o->right;
+    const bslam_real_t ratio = width / (size->width_m * ahead->inverse);
+    const bslam_real_t variance = WIDTH_SD * WIDTH_SD + ahead->relative_var +
+                                  (2 * point_var + o->left_var + o->right_var) / (width * width);
+    return (ratio - 1) * (ratio - 1) <= WIDTH_SDS * WIDTH_SDS * variance;
+}
+
 /// Direction, and distance if the height is known, with what is left of their errors when the outline is
 /// known.
 static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
@@ -167,7 +185,8 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     const ahead_t ahead = ahead_of(o, camera, size, point_var);
     const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var;
     candidate->misplaced_sds = (float)ahead.residual_sds;
-    if (ahead.residual_sds > MISPLACED_SDS || !(ahead.inverse > 0)) {
+    if (ahead.residual_sds > MISPLACED_SDS || !(ahead.inverse > 0) ||
+        !agrees_with_width(o, size, point_var, &ahead)) {
         candidate->marks |= BSLAM_MARK_MISPLACED;
         return;
     }
@@ -186,14 +205,14 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
         return BSLAM_E_PARAMETER;
     }
-    bslam_whole_t whole;
+    bslam_outline_t outline;
     if (bad_size != BSLAM_OK ||
-        bslam_whole_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
-                         &whole) != BSLAM_OK) {
+        bslam_outline_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
+                           &outline) != BSLAM_OK) {
         return BSLAM_E_RANGE;
     }
-    const bslam_box_t found = box_around(&whole.outline.quad);
-    const unsigned marks = marks_of(frame, &whole, &found);
+    const bslam_box_t found = box_around(&outline.quad);
+    const unsigned marks = marks_of(frame, camera, rough, &outline, &found);
     const unsigned sideways =
         BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED | BSLAM_MARK_PART;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
@@ -202,10 +221,10 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     candidate->misplaced_sds = 0;
     candidate->marks = (uint16_t)marks;
     if ((marks & sideways) == 0U) {
-        measure_outline(&whole.outline, camera, size, (marks & upright) == 0U, candidate);
+        measure_outline(&outline, camera, size, (marks & upright) == 0U, candidate);
     }
     candidate->outline = found;
-    if (bslam_signature(frame, &whole.outline.quad, candidate->signature) != BSLAM_OK) {
+    if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {
         memset(candidate->signature, 0, sizeof candidate->signature);
     }
     return BSLAM_OK;

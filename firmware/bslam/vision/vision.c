@@ -216,6 +216,7 @@ static bslam_size_t size_of(const bslam_beacon_class_t *kind)
         .top_low_m = (bslam_real_t)kind->top_low_m,
         .top_high_m = (bslam_real_t)kind->top_high_m,
         .looks_sd = (bslam_real_t)kind->looks_sd,
+        .width_m = (bslam_real_t)kind->width_m,
     };
 }
 

@@ -29,14 +29,14 @@ from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
-# What the front end gets wrong of an object comes from its looks, and stays alike for two or three metres of
-# way: tools/measure_outline.py --correlation.
-CORRELATION_M = 3.0
-# What a beacon's sightings have in common for a whole drive, and no front end can know: its distance is
-# biased by its looks (a pale rim taken for wall), its kind may be mistaken. Added to the front end's own
-# noise; tried on paper_room, seeds 0:4.
+# What the front end gets wrong of an object comes from its looks, and stays alike for a metre of way and more:
+# tools/measure_outline.py --correlation. Tried on paper_room, seeds 0:4, as are the other two.
+CORRELATION_M = 1.0
+# What a beacon's directions have in common for a whole drive, and no front end can know. Added to its noise.
 _BEARING_BIAS_RAD = 0.005
-_RANGE_BIAS = 0.3
+# Of a candidate's score. Lower than where training has a precision of .95: a filter makes more of a sighting
+# than it loses by a false one, which nobody sees again where the map would have it.
+_THRESHOLD = 0.0
 NO_BEACON = -1  # identity of a sighting whose box no beacon fills
 _COVER = 0.3  # a beacon that fills less of a box than this is not what the box shows
 
@@ -132,7 +132,7 @@ def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig) -> Iterator[tu
     """A row of SEEN for each thing in a frame that has a direction."""
     path = true_drive(scenario, seed)
     renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
-    front_end, aim = FrontEnd(rig.cameras), Aim(rig)
+    front_end, aim = FrontEnd(rig.cameras, threshold=_THRESHOLD), Aim(rig)
     step_s = scenario.step_us * 1e-6
     poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1).tolist()
     for step, (x_m, y_m, theta_rad) in enumerate(poses):
@@ -170,7 +170,7 @@ def _row(step: int, one: Candidate, identity: NDArray[np.int16]) -> tuple[Any, .
     bearing_sd_rad = math.hypot(one.bearing_sd_rad, _BEARING_BIAS_RAD)
     range_m, range_sd_m = math.nan, 0.0
     if one.range_m is not None and one.range_sd_m is not None:
-        range_m, range_sd_m = one.range_m, math.hypot(one.range_sd_m, _RANGE_BIAS * one.range_m)
+        range_m, range_sd_m = one.range_m, one.range_sd_m
     beacon_id = covering_beacon(one.outline, identity)
     return step, beacon_id, one.bearing_rad, bearing_sd_rad, range_m, range_sd_m, one.signature
 

@@ -153,15 +153,14 @@ static void test_measure_marks_what_ends_close_to_the_frames_edge(void **state)
 }
 
 /// A detector's box that holds only the right half, the left half, or a slice.
-static void test_measure_widens_a_box_to_the_whole_object(void **state)
+static void test_measure_marks_a_part(void **state)
 {
     const unit_panel_t panel = poster(3, 0, 0.3);
     const bslam_box_t parts[] = {{158, 27, 192, 102}, {127, 27, 150, 102}, {150, 27, 170, 102}};
     for (int i = 0; i < COUNT_OF(parts); i++) {
         const bslam_candidate_t found = measured_in(&panel, parts[i]);
-        assert_int_equal(found.marks, 0);
-        assert_near(found.bearing_rad, 0, 2.0 / 277);  // a smooth panel tells little of where it ends
-        assert_near(found.range_m, 3, 0.06);
+        assert_int_equal(found.marks, BSLAM_MARK_PART);
+        assert_true(!found.has_bearing && !found.has_range);
     }
 }
 
@@ -203,6 +202,20 @@ static void test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim(void *
     assert_near(by_height.range_m, 3 * 0.8 / 0.64, 0.05);
     assert_true(by_place.range_m > 2.9f && by_place.range_m < 3.35f);
     assert_true(by_place.range_sd_m < by_height.range_sd_m / 2);
+}
+
+/// Of something round, as wide from every side, the width is a second distance.
+static void test_measure_takes_no_distance_where_height_and_width_contradict_each_other(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0, 0);  // 0.8 m high, 0.7 m wide
+    bslam_size_t size = POSTER_SIZE;
+    size.width_m = BSLAM_R(0.7);
+    const bslam_candidate_t whole = measured(&camera, &panel, &size);
+    size.height_m = BSLAM_R(1.0);  // as if a fifth of it were not seen
+    const bslam_candidate_t headless = measured(&camera, &panel, &size);
+    assert_true(whole.has_range && whole.marks == 0);
+    assert_true(headless.has_bearing && !headless.has_range && headless.marks == BSLAM_MARK_MISPLACED);
 }
 
 static void test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow(void **state)
@@ -295,10 +308,11 @@ int main(void)
         cmocka_unit_test(test_measure_is_less_sure_of_what_is_farther_or_fainter),
         cmocka_unit_test(test_measure_marks_what_is_cut_off),
         cmocka_unit_test(test_measure_marks_what_ends_close_to_the_frames_edge),
-        cmocka_unit_test(test_measure_widens_a_box_to_the_whole_object),
+        cmocka_unit_test(test_measure_marks_a_part),
         cmocka_unit_test(test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked),
         cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
         cmocka_unit_test(test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim),
+        cmocka_unit_test(test_measure_takes_no_distance_where_height_and_width_contradict_each_other),
         cmocka_unit_test(test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow),
         cmocka_unit_test(test_measure_marks_what_is_small),
         cmocka_unit_test(test_measure_marks_what_is_slanted),
