@@ -29,8 +29,8 @@ from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
-# What the front end gets wrong of an object comes from its looks, and stays alike for a metre of way and more:
-# tools/measure_outline.py --correlation. Tried on paper_room, seeds 0:4, as are the other two.
+# What the front end gets wrong of an object comes from its looks, and stays alike for a metre or more of
+# way: tools/measure_outline.py --correlation. Tried on paper_room, seeds 0:4, as are the other two.
 CORRELATION_M = 1.0
 # What a beacon's directions have in common for a whole drive, and no front end can know. Added to its noise.
 _BEARING_BIAS_RAD = 0.005
