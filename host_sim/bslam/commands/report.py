@@ -73,7 +73,9 @@ def table(entries: Sequence[dict[str, Any]], means: bool = True) -> str:
         rows.append([f"... {len(entries) - _MOST_ROWS} more in summary.json", *("" for _ in _COLUMNS)])
     if means and len(entries) > 1:
         rows.append(mean_row(f"mean of {len(entries)}", entries))
-    return table_of([["run", *HEADINGS], *rows])
+    associations = {str(entry["association"]) for entry in entries}
+    title = f"run, {associations.pop()}" if len(associations) == 1 else "run"
+    return table_of([[title, *HEADINGS], *rows])
 
 
 def table_of(rows: Sequence[Sequence[str]]) -> str:
