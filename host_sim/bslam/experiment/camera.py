@@ -102,7 +102,10 @@ class CameraStore:
 def camera_log(
     scenario: Scenario, seed: int, sigma_mps: float | None, noise: str | None, rig: Rig, store: CameraStore
 ) -> Log:
-    """As `simulate`, but with sightings from images. Raises BslamError as that does."""
+    """As `simulate`, but with sightings from images. Raises BslamError as that does.
+
+    Its machines start from the same generic looks: they do as well as signatures of rendered things.
+    """
     first = rig.cameras[0]
     if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
         raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
