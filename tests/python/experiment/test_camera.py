@@ -41,8 +41,8 @@ class FakeFrontEnd:
     looks: ClassVar[tuple[Candidate, ...]] = ()
     calls: ClassVar[list[tuple[int, bool]]] = []
 
-    def __init__(self, cameras):
-        assert len(cameras) == 3
+    def __init__(self, cameras, threshold):
+        assert len(cameras) == 3 and threshold == camera._THRESHOLD
 
     def see(self, rgb, camera, moved):
         assert rgb.shape == (240, 320, 3)
@@ -73,7 +73,7 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     assert seen.bearing_rad.tolist() == [0.1] * 16
     np.testing.assert_array_equal(seen.range_m, [2.0, math.nan] * 8)
     np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.005))
-    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.05, 0.6), 0.0] * 8)
+    np.testing.assert_allclose(seen.range_sd_m, [0.05, 0.0] * 8)
     assert log.robot.wheel_speed_sigma_mps == 0.6
 
 
