@@ -88,10 +88,9 @@ def measured(
     by_name = {one.name: one for one in CLASSES}
     for seen in filter(is_counted, frame.seen):
         if jitter_px >= 0.0:
-            size = by_name[seen.kind]
             yield (
                 seen,
-                front_end.measure(rough_box(seen, frame, jitter_px, random), size.height_m, size.depth_m),
+                front_end.measure(rough_box(seen, frame, jitter_px, random), by_name[seen.kind]),
             )
             continue
         near = [one for one in found if overlap(one.outline, seen.box) >= OVERLAP_MIN]

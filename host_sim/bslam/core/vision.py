@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,9 @@ Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
 SIGNATURE_SIZE = 71
 """Values of a signature."""
+
+UNKNOWN = BeaconClass("")
+"""A kind of which no size is known."""
 
 MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "part", "misplaced")
 """Names of the bits of a candidate's marks, lowest first."""
@@ -144,26 +147,27 @@ class FrontEnd:
 
         None: none can be taken there, the box is too small, dark or outside.
         """
-        found = self._measured(box, 0.0, 0.0)
+        found = self._measured(box, UNKNOWN)
         if found is None:
             return None
         signature = self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32)
         return signature if signature.any() else None
 
     def measure(
-        self, box: tuple[float, float, float, float], height_m: float = 0.0, depth_m: float = 0.0
+        self, box: tuple[float, float, float, float], kind: BeaconClass = UNKNOWN
     ) -> Candidate | None:
         """What is measured of a rough box (left, top, right, bottom, px) in the last frame, of an object of
-        known height and depth (0: not known). It has no class. None: nothing can be measured there.
+        the kind's size and place. It has no class. None: nothing can be measured there.
         """
-        found = self._measured(box, height_m, depth_m)
+        found = self._measured(box, kind)
         return None if found is None else self._candidate(found)
 
-    def _measured(self, box: tuple[float, float, float, float], height_m: float, depth_m: float) -> Any:
+    def _measured(self, box: tuple[float, float, float, float], kind: BeaconClass) -> Any:
         library = self._library
         sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))
         rough = library.new_filled("bslam_box_t", **sides)
-        size = library.new_filled("bslam_size_t", height_m=height_m, depth_m=depth_m)
+        sizes = {name: value for name, value in asdict(kind).items() if name != "name"}
+        size = library.new_filled("bslam_size_t", **sizes)
         found = library.new_filled("bslam_candidate_t", object=-1)
         status = library.lib.bslam_vision_measure(self._vision, rough, size, found)
         return found if status == library.lib.BSLAM_OK else None
