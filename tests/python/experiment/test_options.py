@@ -145,7 +145,7 @@ def test_parse_association_reads(text, expected):
     assert parse_association(text) == expected
 
 
-@pytest.mark.parametrize("text", ["joint", "known:", "known:2", "known:nan", "known:x", "nearest:0.1", ""])
+@pytest.mark.parametrize("text", ["jcbb", "known:", "known:2", "known:nan", "known:x", "nearest:0.1", ""])
 def test_parse_association_says_what_is_allowed(text):
     with pytest.raises(
         BslamError, match=r"allowed: known, known:RATE with RATE from 0 to 1, nearest, mahalanobis"

@@ -138,7 +138,7 @@ def test_model_file_recognises_as_the_header(user, tmp_path):
 
 def test_front_end_with_the_model_file_names_what_it_finds(user, tmp_path):
     _, out = user
-    example_pictures.take(tmp_path, WORLD, 40, seed=1)
+    example_pictures.take(tmp_path, WORLD, 60, seed=1)
     folder = read_folder(tmp_path)
     frames = [load_picture(picture.path) for picture in folder.pictures]
     recogniser = read_recogniser(out / "my_beacons.json", SIGNATURE)
