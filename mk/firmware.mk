@@ -35,7 +35,6 @@ library-$(1): build/$(1)/libbslam.a
 
 build/$(1)/libbslam.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
-	@rm -f $$@  # or members whose source is gone would stay
 	@$$(ARM)ar rcs $$@ $$^
 
 $$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk
