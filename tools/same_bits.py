@@ -9,6 +9,7 @@ Exit status 0: all the same. 1: some differ.
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,8 @@ START = 0xCBF29CE484222325
 class Noting:
     """A pipeline that keeps a fingerprint after every reading and frame."""
 
-    def __init__(self, slam: Any) -> None:
-        self._slam = slam
+    def __init__(self, slam: Any, fingerprint: Callable[[Any, int], int]) -> None:
+        self._slam, self._fingerprint = slam, fingerprint
         self.notes: list[int] = []
 
     def __getattr__(self, name: str) -> Any:
@@ -47,17 +48,7 @@ class Noting:
             self._note()
 
     def _note(self) -> None:
-        raise NotImplementedError
-
-
-class NotingHost(Noting):
-    def _note(self) -> None:
-        self.notes.append(self._slam.fingerprint(self.notes[-1] if self.notes else START))
-
-
-class NotingTarget(Noting):
-    def _note(self) -> None:
-        self.notes.append(self._slam.fingerprint)
+        self.notes.append(self._fingerprint(self._slam, self.notes[-1] if self.notes else START))
 
 
 def fingerprints(log: Log, options: RunOptions) -> list[int]:
@@ -67,16 +58,17 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
         made: list[Noting] = []
 
         def factory(params: Any, beacons: int) -> Noting:
-            made.append(NotingHost(Slam(params, beacons_max=beacons, looks=looks, seeds=log.seeds)))
+            slam = Slam(params, beacons_max=beacons, looks=looks, seeds=log.seeds)
+            made.append(Noting(slam, lambda slam, before: slam.fingerprint(before)))
             return made[0]
 
         run_log(log, options, factory)
         return made[0].notes
-    opened: list[NotingTarget] = []
+    opened: list[Noting] = []
 
     def connected(params: Any, beacons: int) -> Noting:
         slam = connect(options.target, params, beacons, fingerprints=True, looks=looks, seeds=log.seeds)
-        opened.append(NotingTarget(slam))
+        opened.append(Noting(slam, lambda slam, _: slam.fingerprint))  # chained over there
         return opened[0]
 
     try:

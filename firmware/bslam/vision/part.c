@@ -33,12 +33,10 @@ static float level_contrast(const bslam_frame_t *frame, const bslam_facing_t *fa
     return bslam_side_contrast(&side, &stance);
 }
 
-/// True if a level side goes on in the strip as it is within the outline.
+/// True if a level side goes on in the strip as it is within the outline, where its contrast is `inside`.
 static bool goes_on(const bslam_frame_t *frame, const bslam_facing_t *facing, const bslam_outline_t *o,
-                    bslam_side_name_t name, strip_t beyond)
+                    bslam_side_name_t name, float inside, strip_t beyond)
 {
-    const strip_t within = {o->left, o->right};
-    const float inside = level_contrast(frame, facing, o, name, within);
     return inside > CONTRAST_MIN && level_contrast(frame, facing, o, name, beyond) > BEYOND_MAX * inside;
 }
 
@@ -59,24 +57,25 @@ static strip_t strip_beyond(const bslam_frame_t *frame, const bslam_outline_t *o
 
 /// Both level sides must go on: beneath things on the floor its line always does. Of something cut off above,
 /// the lower side counts alone if it is above the horizon, where no floor is.
-static bool goes_on_beyond(const bslam_frame_t *frame, const bslam_facing_t *facing, const bslam_box_t *rough,
-                           const bslam_outline_t *o, bool left)
-{
-    const strip_t beyond = strip_beyond(frame, o, left);
-    const bool has_top = rough->top_px > CUT_PX;
-    const bool has_bottom = rough->bottom_px < (bslam_real_t)frame->height_px - 1 - CUT_PX;
-    if ((has_top && !goes_on(frame, facing, o, BSLAM_SIDE_TOP, beyond)) ||
-        (has_bottom && !goes_on(frame, facing, o, BSLAM_SIDE_BOTTOM, beyond))) {
-        return false;
-    }
-    return has_top ? has_bottom : has_bottom && o->bottom > 0;
-}
-
 bool bslam_outline_is_part(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_box_t *rough,
                            const bslam_outline_t *outline)
 {
+    const bool has_top = rough->top_px > CUT_PX;
+    const bool has_bottom = rough->bottom_px < (bslam_real_t)frame->height_px - 1 - CUT_PX;
+    if (!has_bottom || (!has_top && outline->bottom <= 0)) {
+        return false;
+    }
     bslam_facing_t facing = {.camera = camera};
     bslam_sin_cos(outline->facing_rad, &facing.sine, &facing.cosine);
-    return goes_on_beyond(frame, &facing, rough, outline, true) ||
-           goes_on_beyond(frame, &facing, rough, outline, false);
+    const strip_t within = {outline->left, outline->right};
+    const float top = has_top ? level_contrast(frame, &facing, outline, BSLAM_SIDE_TOP, within) : 0;
+    const float bottom = level_contrast(frame, &facing, outline, BSLAM_SIDE_BOTTOM, within);
+    for (int32_t end = 0; end < 2; end++) {
+        const strip_t beyond = strip_beyond(frame, outline, end == 0);
+        if ((!has_top || goes_on(frame, &facing, outline, BSLAM_SIDE_TOP, top, beyond)) &&
+            goes_on(frame, &facing, outline, BSLAM_SIDE_BOTTOM, bottom, beyond)) {
+            return true;
+        }
+    }
+    return false;
 }

@@ -1,3 +1,4 @@
+#include "known_map.h"
 #include "support.h"
 
 #include <math.h>
@@ -21,27 +22,19 @@ static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, cons
     return decision;
 }
 
-static void assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
-                           int beacon)
-{
-    assert_int_equal(match->verdict, verdict);
-    assert_int_equal(match->reason, reason);
-    assert_int_equal(match->beacon, beacon);
-}
-
 static void assert_match(const bslam_match_t *match, int beacon)
 {
-    assert_decided(match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, beacon);
+    unit_assert_decided(match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, beacon);
 }
 
 static void assert_new(const bslam_match_t *match)
 {
-    assert_decided(match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void assert_rejected(const bslam_match_t *match, bslam_reason_t reason)
 {
-    assert_decided(match, BSLAM_VERDICT_REJECT, reason, -1);
+    unit_assert_decided(match, BSLAM_VERDICT_REJECT, reason, -1);
 }
 
 static bslam_sighting_t of_class(bslam_sighting_t sighting, uint8_t beacon_class)

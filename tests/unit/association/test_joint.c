@@ -1,3 +1,4 @@
+#include "known_map.h"
 #include "support.h"
 
 #include <math.h>
@@ -18,23 +19,10 @@ static bslam_params_t joint_params(void)
     return params;
 }
 
-/// Robot at the origin with a doubtful heading; beacons with deviations of 0.1 m in each coordinate.
+/// Robot at the origin with a doubtful heading.
 static bslam_ekf_t map_of(const bslam_params_t *params, const double (*places)[2], int count)
 {
-    bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, params);
-    for (int i = 0; i < count; i++) {
-        const bslam_sighting_t sighting = unit_polar(0, 1, -1);
-        int index;
-        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
-        const int at = ekf.beacons[index].at;
-        for (int k = 0; k < 2; k++) {
-            ekf.mean[at + k] = real(places[i][k]);
-            for (int j = 0; j < ekf.dim; j++) {
-                bslam_symmat_set(ekf.covariance, at + k, j, j == at + k ? BSLAM_R(0.01) : 0);
-            }
-        }
-    }
+    bslam_ekf_t ekf = unit_map_of(params, places, count);
     bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
     return ekf;
 }

@@ -1,3 +1,4 @@
+#include "known_map.h"
 #include "support.h"
 
 #include <math.h>
@@ -10,26 +11,6 @@ static const bslam_pose_t on_axle = {0, 0, 0};
 static const float PLAIN[BSLAM_SAMPLE_FEATURES] = {0.0f};
 
 static bslam_looks_t looks;
-
-/// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
-static bslam_ekf_t map_of(const bslam_params_t *params, const double (*places)[2], int count)
-{
-    bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, params);
-    for (int i = 0; i < count; i++) {
-        const bslam_sighting_t sighting = unit_polar(0, 1, -1);
-        int index;
-        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
-        const int at = ekf.beacons[index].at;
-        for (int k = 0; k < 2; k++) {
-            ekf.mean[at + k] = real(places[i][k]);
-            for (int j = 0; j < ekf.dim; j++) {
-                bslam_symmat_set(ekf.covariance, at + k, j, j == at + k ? BSLAM_R(0.01) : 0);
-            }
-        }
-    }
-    return ekf;
-}
 
 /// A machine for beacon `index` that has learned from `samples`, and answers value * first feature.
 static void give_machine(int index, double value, int samples)
@@ -88,14 +69,6 @@ static decision_t decide(const bslam_ekf_t *ekf, const bslam_params_t *params, c
     return decision;
 }
 
-static void assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
-                           int beacon)
-{
-    assert_int_equal(match->verdict, verdict);
-    assert_int_equal(match->reason, reason);
-    assert_int_equal(match->beacon, beacon);
-}
-
 static int setup(void **state)
 {
     return bslam_looks_init(&looks, NULL, 0) == BSLAM_OK ? 0 : -1;
@@ -119,17 +92,17 @@ static const double ahead[1][2] = {{4, 0}};
 static void test_score_is_equation_47_without_looks(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
     assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01), 1e-4);
 }
 
 static void test_score_adds_what_looks_say_as_samples_come(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 0.75, 3);
@@ -144,7 +117,7 @@ static void test_score_adds_what_looks_say_as_samples_come(void **state)
 static void test_score_of_looks_is_clipped(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
@@ -156,7 +129,7 @@ static void test_score_of_looks_is_clipped(void **state)
 static void test_a_machine_without_rivals_says_nothing(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
@@ -167,7 +140,7 @@ static void test_a_machine_without_rivals_says_nothing(void **state)
 static void test_between_match_and_new_a_sighting_waits(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const double waits_m = 4.72;
     const double is_new_m = 4.98;
     assert_true(position_score(&params, waits_m, 0) < 0 && position_score(&params, waits_m, 0) > -4);
@@ -175,38 +148,38 @@ static void test_between_match_and_new_a_sighting_waits(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0, waits_m, -1)};
     const bslam_sighting_t other[] = {unit_polar(0, is_new_m, -1)};
     decision_t d = decide(&ekf, &params, seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     d = decide(&ekf, &params, other, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, 3, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
     const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     assert_int_equal(d.matches[0].near, 0);
 }
 
 static void test_far_but_clearly_alike_is_not_new(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     const bslam_sighting_t plain = seen_with(unit_polar(0.2, 4.4, -1), PLAIN);
     const bslam_sighting_t farther = seen_with(unit_polar(1.5, 4.4, -1), alike);
     decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
     d = decide(&ekf, &params, &plain, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     d = decide(&ekf, &params, &farther, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static const double pair[2][2] = {{4, 0}, {4, 0.4}};
@@ -214,45 +187,45 @@ static const double pair[2][2] = {{4, 0}, {4, 0.4}};
 static void test_one_to_one_the_clearest_choice_first(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, pair, 2);
+    const bslam_ekf_t ekf = unit_map_of(&params, pair, 2);
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4.02, -1), unit_polar(0, 4, -1)};
     const decision_t d = decide(&ekf, &params, seen, 2);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
-    assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen[] = {unit_polar(0.05, 4.4, -1), unit_polar(0, 4, -1)};
     assert_true(position_score(&params, 4.4, 0.05) > 0);
     const decision_t d = decide(&ekf, &params, seen, 2);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
-    assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
+    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4, -1), unit_polar(-0.02, 4, -1)};
     const decision_t d = decide(&ekf, &params, seen, 2);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
-    assert_decided(&d.matches[1], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 static void test_looks_decide_between_two_in_the_gate(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, pair, 2);
+    const bslam_ekf_t ekf = unit_map_of(&params, pair, 2);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, -1.5, 16);
     give_machine(1, 1.5, 16);
     // Half way between them, a little nearer to the first.
     const bslam_sighting_t seen = seen_with(unit_polar(0.045, 4, -1), signature);
     const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
     bslam_sighting_t blind = seen;
     blind.signature = NULL;
     assert_int_equal(decide(&ekf, &params, &blind, 1).matches[0].beacon, 0);
@@ -261,7 +234,7 @@ static void test_looks_decide_between_two_in_the_gate(void **state)
 static void test_sure_enough_to_learn_from(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t near = seen_with(unit_polar(0, 4, -1), signature);
     const bslam_sighting_t far = seen_with(unit_polar(0.05, 4.4, -1), signature);
@@ -278,7 +251,7 @@ static void test_sure_enough_to_learn_from(void **state)
 static void test_directions_alone_have_their_own_density_of_new(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_direction(0.01, -1);
     bslam_innovation_t innovation;
     assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);
@@ -286,18 +259,18 @@ static void test_directions_alone_have_their_own_density_of_new(void **state)
     const double expected =
         -0.5 * 0.01 * 0.01 / variance - 0.5 * log(6.283185307179586 * variance) - log(0.3);
     const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
     assert_near(d.matches[0].score, expected, 1e-4);
 }
 
 static void test_an_unmappable_sighting_is_rejected(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = BSLAM_CLASS_NOT_MAPPABLE;
     const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
 }
 
 /// A heading that is 0.1 rad off displaces all sightings alike: given one, the other is where it should be.
@@ -305,7 +278,7 @@ static void test_given_a_match_the_others_are_surer(void **state)
 {
     const bslam_params_t params = svm_params();
     static const double places[2][2] = {{4, 0}, {0, 4}};
-    bslam_ekf_t ekf = map_of(&params, places, 2);
+    bslam_ekf_t ekf = unit_map_of(&params, places, 2);
     bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1), unit_polar(1.570796 + 0.1, 4, -1)};
     bslam_innovation_t innovations[2];
@@ -335,7 +308,7 @@ static void test_given_a_match_the_others_are_surer(void **state)
 static void test_given_takes_no_more_than_it_has_room_for(void **state)
 {
     const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = map_of(&params, ahead, 1);
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0, 4, -1);
     bslam_innovation_t innovation;
     assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);

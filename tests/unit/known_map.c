@@ -1,0 +1,32 @@
+#include "known_map.h"
+
+#include "support.h"
+
+static const bslam_pose_t on_axle = {0, 0, 0};
+
+bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2], int count)
+{
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, params);
+    for (int i = 0; i < count; i++) {
+        const bslam_sighting_t sighting = unit_polar(0, 1, -1);
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
+        const int at = ekf.beacons[index].at;
+        for (int k = 0; k < 2; k++) {
+            ekf.mean[at + k] = real(places[i][k]);
+            for (int j = 0; j < ekf.dim; j++) {
+                bslam_symmat_set(ekf.covariance, at + k, j, j == at + k ? BSLAM_R(0.01) : 0);
+            }
+        }
+    }
+    return ekf;
+}
+
+void unit_assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
+                         int beacon)
+{
+    assert_int_equal(match->verdict, verdict);
+    assert_int_equal(match->reason, reason);
+    assert_int_equal(match->beacon, beacon);
+}

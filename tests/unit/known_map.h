@@ -1,0 +1,13 @@
+/// Maps that tests of association decide in.
+#ifndef UNIT_KNOWN_MAP_H
+#define UNIT_KNOWN_MAP_H
+
+#include "bslam/association/association.h"
+
+/// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
+bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2], int count);
+
+void unit_assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
+                         int beacon);
+
+#endif
