@@ -41,14 +41,15 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "errors": frozenset(),
     "parsing": frozenset({"errors"}),
     "log": LOG,
+    "moment": frozenset(),
     "rig": frozenset({"errors", "parsing"}),
     "modelfile": frozenset({"errors"}),
     "core": frozenset({"errors", "modelfile", "rig"}),
     "world": LOG | {"rig"},
     "link": frozenset({"errors"}),
     "target": frozenset({"errors", "core", "link"}),
-    "experiment": LOG | {"rig", "core", "world", "target"},
-    "view": LOG,
+    "experiment": LOG | {"moment", "rig", "core", "world", "target"},
+    "view": LOG | {"moment"},
 }
 # The command line ties the parts together and may import them all.
 PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})

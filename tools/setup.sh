@@ -2,7 +2,7 @@
 # Makes this machine ready: system packages, then .venv with pinned Python packages and the command `bslam`.
 #
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
-#   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, QEMU, linters
+#   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, QEMU, browser, linters
 #   tools/setup.sh bench   that, and what `make bench` needs: valgrind
 #
 # Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
@@ -55,6 +55,10 @@ arm_headers() { # arm-none-eabi-gcc is there and finds a C library
     echo '#include <math.h>' | arm-none-eabi-gcc -E -o /dev/null -
 }
 
+has_browser() { # one of those that tests/python/browser/conftest.py looks for
+    command -v chromium-headless-shell || command -v chromium || command -v google-chrome
+}
+
 find_missing() {
     packages=() reasons=()
     if python=$(find_python); then
@@ -82,6 +86,7 @@ find_missing() {
     need libnewlib-arm-none-eabi "the firmware build" arm_headers
     need cmake "the CMake build" command -v cmake
     need qemu-system-arm "running the firmware" command -v qemu-system-arm
+    need chromium-headless-shell "trying the pages in a browser" has_browser
     [[ $part == test ]] && return
     need valgrind "counting instructions" command -v valgrind
 }

@@ -152,7 +152,7 @@ def add_batch_options(
     )
     group.add_argument(
         "--pictures",
-        type=_whole,
+        type=whole_number,
         default=pictures,
         metavar="N",
         help=f"draw the first N runs (default: {pictures})",
@@ -277,7 +277,8 @@ def _seeds(text: str) -> range:
     return range(int(first), int(end))
 
 
-def _whole(text: str) -> int:
+def whole_number(text: str) -> int:
+    """A whole number from 0, as an option's value."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number from 0")
     return int(text)

@@ -25,12 +25,12 @@ csv: DIR is a folder with odometry.csv, sightings.csv, robot.toml and, if known,
 mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mapping data; all robots without
 --robot; figures after rigid alignment.
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
-_COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam"}  # folders of the data directory
+COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam"}  # folders of the data directory
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("kind", choices=tuple(_COLLECTIONS), help="format of the logs")
+    parser.add_argument("kind", choices=tuple(COLLECTIONS), help="format of the logs")
     parser.add_argument(
         "directories", nargs="+", metavar="DIR", help="one log (csv) or one data set (mrclam) each"
     )
@@ -57,7 +57,7 @@ def log_sources(kind: str, directories: list[str], robot: int | None) -> list[So
     """The logs that the words of a command line name. Raises BslamError."""
     if robot is not None and kind != "mrclam":
         raise BslamError(f"--robot {robot}: a {kind} log is of one robot; allowed: --robot with mrclam")
-    folders = [find_directory(name, _COLLECTIONS[kind]) for name in directories]
+    folders = [find_directory(name, COLLECTIONS[kind]) for name in directories]
     if kind == "csv":
         return [FolderSource(folder) for folder in folders]
     return [MrclamSource(folder, number) for folder in folders for number in _robots(folder, robot)]

@@ -138,7 +138,11 @@ def _execute(job: Job, out: Path) -> Outcome:
     log = job.source.load()
     if job.record:
         write_folder(log, out / job.name)
-    trace = run_log(log, job.options)
+    return write_files(job, out, log, run_log(log, job.options))
+
+
+def write_files(job: Job, out: Path, log: Log, trace: Trace) -> Outcome:
+    """Judge a run that is over, and write its files. Raises BslamError."""
     evaluation = evaluate(log, trace, job.options, job.source.align)
     write_run(out, job.name, trace, evaluation)
     if job.draw is not None:

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,21 @@ UNSEEN_POSITION_SD_MAX_M = 30.0
 UNSEEN_HEADING_SD_RAD = 3.0
 
 
-def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = None) -> Trace:
+class Watcher(Protocol):
+    """Is told what a run does while it does it; the run waits meanwhile, and ends with what it raises."""
+
+    def frame(
+        self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
+    ) -> None:
+        """The filter has worked off a frame (columns: `_columns_for_filter`); accounts None: refused it."""
+
+    def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
+        """A row of the trace is done; `slam` may be asked anything."""
+
+
+def run_log(
+    log: Log, options: RunOptions, slam_factory: SlamFactory | None = None, watcher: Watcher | None = None
+) -> Trace:
     """Run the filter over the log. Raises BslamError if the core does not accept the parameters.
 
     What the core refuses on the way (an impossible time stamp, say) is counted in `Trace.refusals` and the
@@ -46,9 +60,9 @@ def run_log(log: Log, options: RunOptions, slam_factory: SlamFactory | None = No
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
         looks = _uses_looks(options)
         with connect(options.target, params, beacons, looks=looks, seeds=log.seeds) as slam:
-            return _Run(slam, log, options).finish(slam.target_description())
+            return _Run(slam, log, options, watcher).finish(slam.target_description())
     factory = slam_factory or partial(_make_slam, options, log)
-    return _Run(factory(params, beacons), log, options).finish()
+    return _Run(factory(params, beacons), log, options, watcher).finish()
 
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Slam:
@@ -71,8 +85,8 @@ def _beacons_to_hold(log: Log, options: RunOptions) -> int:
 class _Run:
     """One pass over a log; lists rather than small arrays inside, since the loop runs some thousand times."""
 
-    def __init__(self, slam: Any, log: Log, options: RunOptions) -> None:
-        self.slam = slam
+    def __init__(self, slam: Any, log: Log, options: RunOptions, watcher: Watcher | None) -> None:
+        self.slam, self.watcher = slam, watcher
         self.frames = _Frames(log.sightings, options)
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
@@ -154,6 +168,8 @@ class _Run:
                 self.ledger.book_refused(true_id, columns[MAPPABLE])
             else:
                 self.ledger.book(true_id, columns[MAPPABLE], accounts)
+            if self.watcher is not None:
+                self.watcher.frame(time_us, true_id, columns, accounts)
         self.seen.append(seen)
         return core_ns
 
@@ -172,6 +188,8 @@ class _Run:
             pose = self._pose_in_past(time_us - self.lead_us)
         self.poses.append(pose or slam.pose())
         self.covariances.append(slam.pose_covariance_lower())
+        if self.watcher is not None:
+            self.watcher.step(time_us, self.poses[-1], slam)
 
     def _pose_in_past(self, time_us: int) -> tuple[float, float, float] | None:
         """None before the history reaches back that far."""

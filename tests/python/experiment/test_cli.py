@@ -69,6 +69,10 @@ def runs(out):
         (["replay", "mrclam", "/no/such/set", "--robot", "9"], ["--robot", "9", "1, 2, 3, 4, 5"]),
         (["tables", "--filter", "standard,invariant"], ["--filter", "standard,invariant"]),
         (["sweep", "paper_room", "--filter", "standard,x"], ["--filter", "'x'", "standard, invariant"]),
+        (["live", "paper_room", "pairs"], ["'pairs' after paper_room", "one SCENARIO"]),
+        (["live", "csv", "/no/such/log"], ["/no/such/log", "allowed"]),
+        (["live", "paper_room", "--speed", "0"], ["--speed", "'0'", "above 0, or inf"]),
+        (["live", "paper_room", "--port", "70000"], ["--port", "'70000'", "65535"]),
         (["calibrate", "csv", "/no/such/log"], ["/no/such/log", "allowed"]),
     ],
 )  # fmt: skip

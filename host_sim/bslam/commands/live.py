@@ -1,0 +1,196 @@
+"""`bslam live`: watch the filter at work in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from bslam.commands.arguments import (
+    add_filter_options,
+    add_sensor_options,
+    run_options,
+    scenario_source,
+    whole_number,
+)
+from bslam.commands.drawing import draw
+from bslam.commands.replay import COLLECTIONS, log_sources
+from bslam.commands.report import finish
+from bslam.errors import BslamError
+from bslam.experiment.batch import BatchResult, Job, Outcome, make_jobs, write_files
+from bslam.experiment.output import write_summary
+from bslam.experiment.player import Player
+from bslam.experiment.trace import Trace
+from bslam.experiment.truth import step_times_us
+from bslam.log import Log
+from bslam.moment import FAILED, Stage
+from bslam.world.simulate import load_scenario
+
+SUMMARY = "watch the filter at work in the browser: pause it, step it, see why each sighting was taken"
+EXAMPLES = """examples:
+  bslam live paper_room
+  bslam live paper_room --seed 3 --observation direction --speed 4
+  bslam live pairs --association mahalanobis --paused
+  bslam live csv out/run/paper_room_seed0
+  bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
+  bslam live paper_room --target qemu:mps2_an386
+  ssh -L 5006:127.0.0.1:5006 HOST bslam live paper_room     then open http://127.0.0.1:5006/ here
+
+The page is served to this machine alone, and needs no network. A run that comes to its end leaves in --out
+what `bslam run` leaves. Ctrl-C ends it."""
+PORT = 5006
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "words",
+        nargs="+",
+        metavar="SCENARIO",
+        help=f"name, or path of a TOML file; or a recorded log: {{{','.join(COLLECTIONS)}}} DIR",
+    )
+    parser.add_argument("--robot", type=int, help="mrclam: whose log")
+    add_sensor_options(parser)
+    add_filter_options(parser)
+    group = parser.add_argument_group("page")
+    group.add_argument(
+        "--port", type=_port, default=PORT, metavar="N", help=f"default: {PORT}; 0: any that is free"
+    )
+    group.add_argument("--no-browser", action="store_true", help="print the address, open nothing")
+    group.add_argument(
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="TIMES",
+        help="so many times as fast as the robot drives, or inf: as fast as it goes (default: 1)",
+    )
+    group.add_argument("--paused", action="store_true", help="wait at the start for Play or Step")
+    group = parser.add_argument_group("run")
+    group.add_argument("--seed", type=whole_number, default=0, metavar="N", help="default: 0")
+    group.add_argument(
+        "--out",
+        type=Path,
+        default=Path("out") / "live",
+        metavar="DIR",
+        help="where files go; what is there is replaced (default: out/live)",
+    )
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    try:
+        from bslam.view.live import Page  # here: it takes a second, which no other command need wait
+        from bslam.view.serve import has_screen, serve
+    except ImportError as error:
+        raise BslamError(f"{error}; allowed: pip install 'bslam[live]'") from error
+    job = _job(arguments)
+    log = job.source.load()
+    show = _Show(job, log, arguments.out.absolute(), arguments.speed)
+
+    def open_page(document) -> None:  # type: ignore[no-untyped-def]
+        Page(document, show.stage, lambda: show.player.moment, show.player.pace)
+        if not arguments.paused and not show.opened:
+            show.player.pace.play()
+        show.opened = True
+
+    def say(url: str) -> None:
+        print(f"watch it at {url}; Ctrl-C ends it", flush=True)
+        if not has_screen():
+            port = url.rstrip("/").rpartition(":")[2]
+            print(f"from another machine: ssh -L {port}:127.0.0.1:{port} {os.uname().nodename}", flush=True)
+        show.player.start()
+
+    try:
+        serve(open_page, arguments.port, say, browse=not arguments.no_browser)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        show.player.stop()
+    return show.end()
+
+
+class _Show:
+    """The run behind the page, and what it leaves."""
+
+    def __init__(self, job: Job, log: Log, out: Path, speed: float) -> None:
+        self.stage = _stage(job, log)
+        self.opened = False
+        self._job, self._log, self._out = job, log, out
+        self._outcome: Outcome | None = None
+        self.player = Player(log, job.options, align=job.source.align, speed=speed, finished=self._finished)
+
+    def _finished(self, trace: Trace) -> None:
+        self._outcome = write_files(self._job, self._out, self._log, trace)
+        write_summary(self._out, [self._outcome.entry])
+
+    def end(self) -> int:
+        """Say how it ended; the exit status. Raises BslamError if the run failed."""
+        moment = self.player.moment
+        if moment.state == FAILED:
+            raise BslamError(moment.message)
+        if self._outcome is None:
+            print(f"stopped at step {moment.step} of {self.stage.steps}: nothing was written")
+            return 1
+        return finish(BatchResult((self._outcome,), interrupted=False), self._out)
+
+
+def _job(arguments: argparse.Namespace) -> Job:
+    kind, *rest = arguments.words
+    if kind in COLLECTIONS:
+        sources = log_sources(kind, rest, arguments.robot)
+        if len(sources) != 1:
+            raise BslamError(f"{kind}: {len(sources)} logs; allowed: one DIR, and --robot N with mrclam")
+        source = sources[0]
+        options = run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=arguments.seed)
+    else:
+        if rest:
+            raise BslamError(f"'{rest[0]}' after {kind}; allowed: one SCENARIO, or {{csv,mrclam}} DIR")
+        wheels = load_scenario(kind).wheels
+        noise = arguments.noise or wheels.noise
+        sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
+        arguments.scenario = kind
+        source = scenario_source(arguments, arguments.seed, sigma_mps, noise)
+        options = run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=arguments.seed)
+    return make_jobs([source], [options], draw, pictures=1)[0]
+
+
+def _stage(job: Job, log: Log) -> Stage:
+    walls_m = job.source.walls_m()
+    points = [walls_m.reshape(-1, 2), np.zeros((1, 2))]
+    if log.truth is not None and not job.source.align:
+        points.append(np.column_stack([log.truth.x_m, log.truth.y_m]))
+    if log.beacons is not None and not job.source.align:
+        points.append(np.column_stack([log.beacons.x_m, log.beacons.y_m]))
+    robot = log.robot
+    low_m, high_m = np.nanmin(np.concatenate(points), axis=0), np.nanmax(np.concatenate(points), axis=0)
+    margin_m = 0.5 if len(points) > 2 else 8.0  # of a log whose truth has its own frame nobody knows
+    extent_m = (*(low_m - margin_m).tolist(), *(high_m + margin_m).tolist())
+    return Stage(
+        title=f"{job.name}, {job.options.association_name}, {job.options.filter}",
+        steps=len(step_times_us(log)) - 1,
+        walls_m=walls_m,
+        beacon_id=np.empty(0, np.int64) if log.beacons is None else log.beacons.beacon_id,
+        sensor=(robot.sensor_x_m, robot.sensor_y_m, robot.sensor_yaw_rad),
+        aligned=job.source.align,
+        has_camera=job.options.sensor == "camera",
+        extent_m=extent_m,
+    )
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number up to 65535")
+    return int(text)
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not speed > 0.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a number above 0, or inf")
+    return speed

@@ -1,0 +1,319 @@
+"""The page that `bslam live` serves: a Bokeh document that follows a run, and tells it to wait or go on.
+
+A browser holds one document, a second one another; all show the same run. A document asks for the newest
+moment many times a second and sends what is new: of the paths only the rows that were added.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final, Protocol
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.layouts import column, row
+from bokeh.models import Button, ColumnDataSource, Div, HoverTool, RadioButtonGroup, Range1d
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from bslam.moment import FAILED, FINISHED, Moment, Shown, Spot, Stage, Told
+from bslam.view.frames import Mark, annotate
+from bslam.view.style import BAND, BEACON, ESTIMATE, SECOND, TRUTH, WALL
+
+SPEEDS: Final[dict[str, float]] = {
+    "1/4": 0.25,
+    "1": 1.0,
+    "4": 4.0,
+    "16": 16.0,
+    "as fast as it goes": math.inf,
+}
+RESULT_COLOURS: Final = {
+    "matched": BAND,
+    "new": ESTIMATE,
+    "deferred": "#e08e0b",
+    "rejected": SECOND,
+    "refused": SECOND,
+}
+RESULT_WORDS: Final = {"matched": "fused", "new": "new beacon"}
+_REFRESH_MS: Final = 20
+_ROWS_MOST: Final = 4000  # of a path: more than a screen has pixels only costs time
+_SIGMAS: Final = 2.0  # size of the ellipses
+_RAY_M: Final = 3.0  # of a sighting without a distance and without a beacon
+_TOLD_SHOWN: Final = 14
+_ROOM_PX: Final = 640
+_SIDE_PX: Final = 560
+
+
+class Controls(Protocol):
+    """What the page tells the run."""
+
+    @property
+    def playing(self) -> bool:
+        """It goes on by itself."""
+
+    @property
+    def speed(self) -> float:
+        """So many times as fast as the robot drives."""
+
+    def play(self) -> None:
+        """Go on by itself."""
+
+    def pause(self) -> None:
+        """Stand still after the step that is under way."""
+
+    def step(self) -> None:
+        """Go one step and stand still."""
+
+    def set_speed(self, speed: float) -> None:
+        """So many times as fast as the robot drives."""
+
+
+class Page:
+    """One document. moment: gives the newest state of the run."""
+
+    def __init__(
+        self, document: Document, stage: Stage, moment: Callable[[], Moment], controls: Controls
+    ) -> None:
+        self._stage, self._moment, self._controls = stage, moment, controls
+        self._drawn: Moment | None = None
+        self._rows = 0  # of the course that are in the document
+        self._truth: NDArray[np.float64] | None = None
+        self._sources = {name: ColumnDataSource(columns) for name, columns in _EMPTY.items()}
+        self._sources["walls"].data = dict(zip(("x0", "y0", "x1", "y1"), stage.walls_m.T, strict=True))
+        self._status, self._told = Div(), Div(width=_SIDE_PX)
+        self._camera = Div(width=_SIDE_PX, height=440, visible=stage.has_camera)
+        self._pause = Button(label="Play", button_type="primary", width=90)
+        step = Button(label="Step", width=90)
+        speed = RadioButtonGroup(labels=list(SPEEDS))
+        if controls.speed in SPEEDS.values():
+            speed.active = list(SPEEDS.values()).index(controls.speed)
+        self._pause.on_click(self._toggle)
+        step.on_click(controls.step)
+        speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
+        bar = row(self._pause, step, Div(text="times real speed:"), speed)
+        side = column(self._camera, self._error_plot(), self._told)
+        document.add_root(column(bar, self._status, row(self._room_plot(), side)))
+        document.title = f"bslam: {stage.title}"
+        document.add_periodic_callback(self.refresh, _REFRESH_MS)
+        self.refresh()
+
+    def _toggle(self) -> None:
+        if self._controls.playing:
+            self._controls.pause()
+        else:
+            self._controls.play()
+
+    def _room_plot(self) -> Any:
+        """Everything in the plane; as much of it as the walls and the truth take."""
+        x_low, y_low, x_high, y_high = self._stage.extent_m
+        tall_px = min(max(int(_ROOM_PX * (y_high - y_low) / (x_high - x_low)), 300), 760)
+        plot = figure(
+            width=_ROOM_PX,
+            height=tall_px + 90,
+            match_aspect=True,
+            x_range=Range1d(x_low, x_high),
+            y_range=Range1d(y_low, y_high),
+            tools="pan,wheel_zoom,box_zoom,reset,save",
+            active_scroll="wheel_zoom",
+            x_axis_label="x, m",
+            y_axis_label="y, m",
+            title=self._stage.title,
+        )
+        source = self._sources
+        plot.segment("x0", "y0", "x1", "y1", source=source["walls"], color=WALL, line_width=3)
+        line = {"legend_label": "true path", "line_width": 3, "line_alpha": 0.5, "color": TRUTH}
+        plot.line("x", "y", source=source["truth"], **line)
+        plot.line("x", "y", source=source["path"], color=ESTIMATE, legend_label="estimated path")
+        plot.segment("x0", "y0", "x1", "y1", source=source["rays"], color="colour", line_width=1.5)
+        star = {"color": BEACON, "line_color": "#6b4b00", "size": 16, "legend_label": "true beacon"}
+        plot.scatter("x", "y", source=source["beacons"], marker="star", **star)
+        outline = {"fill_color": None, "line_color": SECOND, "line_alpha": "alpha", "line_width": 1.5}
+        plot.ellipse("x", "y", "width", "height", "angle", source=source["map"], **outline)
+        label = {"legend_label": "mapped beacon, 2 sigma", "color": SECOND, "alpha": "alpha", "size": 11}
+        crosses = plot.scatter("x", "y", source=source["map"], marker="cross", **label)
+        plot.ellipse(
+            "x", "y", "width", "height", "angle", source=source["doubt"], fill_alpha=0.2, color=ESTIMATE
+        )
+        robot = {"marker": "triangle", "size": 15, "angle": "angle", "color": "colour", "line_color": "white"}
+        plot.scatter("x", "y", source=source["robots"], **robot)
+        tips = [("beacon", "@name"), ("sightings", "@sightings"), ("sd, m", "@sd_m{0.000}")]
+        plot.add_tools(HoverTool(renderers=[crosses], tooltips=tips))
+        plot.legend.location = "bottom_center"
+        plot.legend.orientation = "horizontal"
+        plot.add_layout(plot.legend[0], "below")
+        return plot
+
+    def _error_plot(self) -> Any:
+        plot = figure(
+            width=_SIDE_PX,
+            height=230,
+            tools="pan,wheel_zoom,box_zoom,reset,save",
+            x_axis_label="time, s",
+            y_axis_label="m",
+            title="position error" + (" after alignment so far" if self._stage.aligned else ""),
+        )
+        plot.line("t", "sd", source=self._sources["path"], color=BAND, legend_label="2 sigma, by the filter")
+        plot.line("t", "error", source=self._sources["path"], color=ESTIMATE, legend_label="error")
+        plot.legend.location = "top_left"
+        plot.legend.background_fill_alpha = 0.5
+        return plot
+
+    def refresh(self) -> None:
+        """Send what is new since the last time."""
+        moment = self._moment()
+        if moment is self._drawn:
+            return
+        self._drawn = moment
+        self._pause.label = "Pause" if self._controls.playing else "Play"
+        self._pause.disabled = moment.state in (FINISHED, FAILED)
+        self._status.text = self._words(moment)
+        self._send_course(moment)
+        self._send_robot(moment)
+        self._sources["beacons"].data = _columns(("x", "y"), moment.true_beacons_m)
+        self._sources["map"].data = _map_columns(moment.beacons)
+        self._told.text = _told_table(moment.told[:_TOLD_SHOWN])
+        if moment.shown is not None:
+            self._camera.text = _camera_html(moment.shown)
+
+    def _words(self, moment: Moment) -> str:
+        course = moment.course
+        words = [moment.state, f"step {moment.step} of {self._stage.steps}"]
+        if len(course.time_s):
+            words.append(f"time {course.time_s[-1]:.2f} s")
+            words.append("pose ({:.2f} m, {:.2f} m, {:.3f} rad)".format(*course.estimate[-1]))
+            if np.isfinite(course.error_m[-1]):
+                words.append(f"error {100.0 * course.error_m[-1]:.1f} cm")
+        text = html.escape(" · ".join(words))
+        if moment.message:
+            text += f"<br><b>{html.escape(moment.message)}</b>"
+        return text
+
+    def _send_course(self, moment: Moment) -> None:
+        """The rows that were added; all of them where the truth was moved."""
+        course, thin = moment.course, max(1, self._stage.steps // _ROWS_MOST)
+        end = len(course.time_s)
+        moved, self._truth = course.truth.base is not self._truth, course.truth.base
+        first = 0 if moved else -(-self._rows // thin) * thin
+        self._rows = end
+        new = slice(first, end, thin)
+        xy, sd_m = course.estimate[new, :2], _SIGMAS * course.sd_m[new]
+        path = np.column_stack([xy, course.time_s[new], course.error_m[new], sd_m])
+        tables = {"path": path, "truth": course.truth[new, :2]}
+        for name, table in tables.items():
+            columns = _columns(_EMPTY[name], table)
+            if moved:
+                self._sources[name].data = columns
+            else:
+                self._sources[name].stream(columns)
+
+    def _send_robot(self, moment: Moment) -> None:
+        course = moment.course
+        if not len(course.time_s):
+            return
+        estimate, truth = course.estimate[-1], course.truth[-1]
+        poses = [(*estimate, ESTIMATE)]
+        if np.isfinite(truth).all():
+            poses.insert(0, (*truth, TRUTH))
+        columns = list(zip(*poses, strict=True))
+        angle = [theta_rad - 0.5 * math.pi for theta_rad in columns[2]]  # the marker points up
+        self._sources["robots"].data = {
+            "x": columns[0],
+            "y": columns[1],
+            "angle": angle,
+            "colour": columns[3],
+        }
+        self._sources["doubt"].data = _ellipses([(estimate[0], estimate[1], moment.covariance_m2)])
+        self._sources["rays"].data = self._rays(estimate, moment)
+
+    def _rays(self, pose: NDArray[np.float64], moment: Moment) -> dict[str, Any]:
+        """From the sensor along each bearing of the newest frame, as far as the sighting says."""
+        x_m, y_m, yaw_rad = self._stage.sensor
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        x0, y0 = pose[0] + c * x_m - s * y_m, pose[1] + s * x_m + c * y_m
+        spots = {one.uid: one for one in moment.beacons}
+        rays: dict[str, list[Any]] = {name: [] for name in _EMPTY["rays"]}
+        for told in moment.frame:
+            spot = spots.get(-1 if told.beacon_uid is None else told.beacon_uid)
+            reach_m = told.range_m
+            if reach_m is None:
+                reach_m = _RAY_M if spot is None else math.hypot(spot.x_m - x0, spot.y_m - y0)
+            course_rad = pose[2] + yaw_rad + told.bearing_rad
+            ends = (x0, y0, x0 + reach_m * math.cos(course_rad), y0 + reach_m * math.sin(course_rad))
+            for name, value in zip(rays, (*ends, RESULT_COLOURS[told.result]), strict=True):
+                rays[name].append(value)
+        return rays
+
+
+_EMPTY: Final[dict[str, dict[str, list[Any]]]] = {
+    "walls": {"x0": [], "y0": [], "x1": [], "y1": []},
+    "truth": {"x": [], "y": []},
+    "path": {"x": [], "y": [], "t": [], "error": [], "sd": []},
+    "beacons": {"x": [], "y": []},
+    "map": {
+        name: [] for name in ("x", "y", "width", "height", "angle", "alpha", "name", "sightings", "sd_m")
+    },
+    "rays": {"x0": [], "y0": [], "x1": [], "y1": [], "colour": []},
+    "robots": {"x": [], "y": [], "angle": [], "colour": []},
+    "doubt": {"x": [], "y": [], "width": [], "height": [], "angle": []},
+}
+
+
+def _columns(names: Iterable[str], table: NDArray[np.float64]) -> dict[str, Any]:
+    return {name: table[:, index] for index, name in enumerate(names)}
+
+
+def _ellipses(parts: Sequence[tuple[float, float, NDArray[np.float64]]]) -> dict[str, list[Any]]:
+    """Centres and covariances as the columns of an ellipse, at _SIGMAS."""
+    columns: dict[str, list[Any]] = {"x": [], "y": [], "width": [], "height": [], "angle": []}
+    for x_m, y_m, covariance_m2 in parts:
+        variances, directions = np.linalg.eigh(covariance_m2)
+        minor_m, major_m = 2.0 * _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
+        angle_rad = math.atan2(directions[1, 1], directions[0, 1])
+        for name, value in zip(columns, (x_m, y_m, major_m, minor_m, angle_rad), strict=True):
+            columns[name].append(float(value))
+    return columns
+
+
+def _map_columns(beacons: Sequence[Spot]) -> dict[str, Any]:
+    columns = _ellipses([(one.x_m, one.y_m, one.covariance_m2) for one in beacons])
+    return columns | {
+        "alpha": [0.95 if one.confirmed else 0.35 for one in beacons],
+        "name": [str(one.label if one.label >= 0 else one.uid) for one in beacons],
+        "sightings": [one.sightings for one in beacons],
+        "sd_m": [math.sqrt(max(float(np.trace(one.covariance_m2)), 0.0)) for one in beacons],
+    }
+
+
+def _told_table(told: Sequence[Told]) -> str:
+    """What became of the newest sightings, and why."""
+    heads = ("time, s", "bearing, rad", "range, m", "true beacon", "became", "why", "beacon", "test ratio")
+    rows = "".join(_told_row(one) for one in told)
+    cells = "".join(f"<th style='padding: 0 0.6em'>{head}</th>" for head in heads)
+    return f"<table style='text-align: right; font-size: 12px'><tr>{cells}</tr>{rows}</table>"
+
+
+def _told_row(one: Told) -> str:
+    cells = (
+        f"{one.time_s:.2f}",
+        f"{one.bearing_rad:.3f}",
+        "-" if one.range_m is None else f"{one.range_m:.2f}",
+        "-" if one.true_id < 0 else str(one.true_id),
+        RESULT_WORDS.get(one.result, one.result),
+        "" if one.reason == "none" else one.reason,
+        "" if one.beacon_uid is None else str(one.beacon_uid),
+        "" if one.test_ratio is None else f"{one.test_ratio:.2f}",
+    )
+    style = f"color: {RESULT_COLOURS[one.result]}"
+    return f"<tr style='{style}'>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"
+
+
+def _camera_html(shown: Shown) -> str:
+    marks = [Mark(one.outline, tuple(one.lines), SECOND) for one in shown.boxes]
+    buffer = io.BytesIO()
+    annotate(shown.rgb, marks, shown.caption).save(buffer, format="JPEG", quality=80)
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return f'<img alt="camera" width="{_SIDE_PX}" src="data:image/jpeg;base64,{data}">'

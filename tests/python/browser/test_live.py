@@ -1,0 +1,117 @@
+"""`bslam live`, clicked on in a real browser."""
+
+import contextlib
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from bslam.cli import main
+
+STATUS = re.compile(r"(running|paused|finished|failed) · step (\d+) of (\d+)")
+
+
+@dataclass(frozen=True)
+class Command:
+    process: "subprocess.Popen[str]"
+    url: str
+
+    def end(self) -> tuple[int, str]:
+        """Exit status after Ctrl-C, and all that was printed since the address."""
+        self.process.send_signal(signal.SIGINT)
+        output, _ = self.process.communicate(timeout=30)
+        return self.process.returncode, output
+
+
+@contextlib.contextmanager
+def live(*words: object, out: Path) -> Iterator[Command]:
+    """The command with these words, on any port, from its address on."""
+    arguments = [sys.executable, "-m", "bslam", "live", *map(str, words)]
+    arguments += ["--port", "0", "--no-browser", "--out", str(out)]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        assert process.stdout is not None
+        found = re.search(r"http://\S+", line := process.stdout.readline())
+        assert found, line
+        yield Command(process, found[0].rstrip(";"))
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def status(page: Page) -> tuple[str, int]:
+    """State and step, as the page says."""
+    found = STATUS.search(page.get_by_text(STATUS).inner_text())
+    assert found
+    return found[1], int(found[2])
+
+
+def click(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def test_live_pause_step_and_speed_act_on_the_running_filter(page: Page, tmp_path: Path) -> None:
+    with live("paper_room", "--paused", "--association", "known", out=tmp_path) as command:
+        page.goto(command.url)
+        expect(page.get_by_text("paused · step 0 of 5000")).to_be_visible()
+        for step in (1, 2, 3):
+            click(page, "Step")
+            expect(
+                page.get_by_text(f"paused · step {step} of 5000 · time {0.04 * step:.2f} s")
+            ).to_be_visible()
+        click(page, "Play")
+        expect(page.get_by_text(re.compile(r"running · step \d\d"))).to_be_visible()
+        click(page, "Pause")
+        expect(page.get_by_text("paused · step")).to_be_visible()
+        state, paused_at = status(page)
+        page.wait_for_timeout(300)
+        assert status(page) == (state, paused_at)
+        assert page.get_by_text("fused").count() > 0  # the account of each sighting
+        click(page, "Step")
+        expect(page.get_by_text(f"paused · step {paused_at + 1} of")).to_be_visible()
+        click(page, "as fast as it goes")
+        click(page, "Play")
+        expect(page.get_by_text("finished · step 5000 of 5000")).to_be_visible()
+        returned, output = command.end()
+    assert returned == 0
+    assert "paper_room_seed0" in output
+    # What was watched is what `bslam run` gives.
+    run = ["run", "paper_room", "--association", "known", "--pictures", "0", "--out", str(tmp_path / "run")]
+    assert main(run) == 0
+    watched, alone = (
+        (folder / "paper_room_seed0.estimate.tum").read_text() for folder in (tmp_path, tmp_path / "run")
+    )
+    assert watched == alone
+    assert json.loads((tmp_path / "summary.json").read_text())["runs"][0]["steps"] == 5000
+
+
+def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
+    with live("paper_room", "--paused", out=tmp_path) as command:
+        page.goto(command.url)
+        second = page.context.new_page()
+        second.goto(command.url)
+        expect(second.get_by_text("paused · step 0 of 5000")).to_be_visible()
+        click(page, "Step")
+        expect(second.get_by_text("paused · step 1 of 5000")).to_be_visible()
+        returned, output = command.end()
+    assert returned == 1
+    assert "stopped at step 1 of 5000" in output
+
+
+def test_live_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        words = ["live", "paper_room", "--no-browser", "--port", str(port), "--out", str(tmp_path)]
+        assert main(words) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith(f"bslam live: error: --port {port}: another program has it; allowed: ")
