@@ -48,7 +48,8 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "world": LOG | {"rig"},
     "link": frozenset({"errors"}),
     "target": frozenset({"errors", "core", "link"}),
-    "experiment": LOG | {"moment", "rig", "core", "world", "target"},
+    "recording": LOG | {"core"},
+    "experiment": LOG | {"moment", "rig", "core", "world", "target", "recording"},
     "view": LOG | {"moment"},
 }
 # The command line ties the parts together and may import them all.

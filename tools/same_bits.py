@@ -9,7 +9,6 @@ Exit status 0: all the same. 1: some differ.
 
 import argparse
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +16,17 @@ from bslam.core.slam import Slam
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import Log, first_steps, read_folder
+from bslam.recording.recorder import FINGERPRINT_START
 from bslam.target.lines import qemu_machines
 from bslam.target.remote import connect
 from bslam.world.simulate import load_scenario, simulate
-
-START = 0xCBF29CE484222325
-"""BSLAM_FINGERPRINT_START."""
 
 
 class Noting:
     """A pipeline that keeps a fingerprint after every reading and frame."""
 
-    def __init__(self, slam: Any, fingerprint: Callable[[Any, int], int]) -> None:
-        self._slam, self._fingerprint = slam, fingerprint
+    def __init__(self, slam: Any) -> None:
+        self._slam = slam
         self.notes: list[int] = []
 
     def __getattr__(self, name: str) -> Any:
@@ -48,7 +45,7 @@ class Noting:
             self._note()
 
     def _note(self) -> None:
-        self.notes.append(self._fingerprint(self._slam, self.notes[-1] if self.notes else START))
+        self.notes.append(self._slam.fingerprint(self.notes[-1] if self.notes else FINGERPRINT_START))
 
 
 def fingerprints(log: Log, options: RunOptions) -> list[int]:
@@ -59,7 +56,7 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
 
         def factory(params: Any, beacons: int) -> Noting:
             slam = Slam(params, beacons_max=beacons, looks=looks, seeds=log.seeds)
-            made.append(Noting(slam, lambda slam, before: slam.fingerprint(before)))
+            made.append(Noting(slam))
             return made[0]
 
         run_log(log, options, factory)
@@ -68,7 +65,7 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
 
     def connected(params: Any, beacons: int) -> Noting:
         slam = connect(options.target, params, beacons, fingerprints=True, looks=looks, seeds=log.seeds)
-        opened.append(Noting(slam, lambda slam, _: slam.fingerprint))  # chained over there
+        opened.append(Noting(slam))  # chained over there
         return opened[0]
 
     try:

@@ -218,7 +218,7 @@ def write_folder(log: Log, path: str | Path) -> None:
             (folder / name).unlink(missing_ok=True)
             if values is not None:
                 np.save(folder / name, values, allow_pickle=False)
-        (folder / "robot.toml").write_text(_robot_text(log.robot), encoding="utf-8")
+        (folder / "robot.toml").write_text(robot_text(log.robot), encoding="utf-8")
     except OSError as error:
         raise BslamError(f"{folder}: cannot write the log there: {error}") from error
 
@@ -280,7 +280,8 @@ def _write_csv(path: Path, columns: dict[str, list[str]]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _robot_text(robot: Robot) -> str:
+def robot_text(robot: Robot) -> str:
+    """The text of a robot.toml."""
     return "".join(f"{key} = {value!r}\n" for key, value in asdict(robot).items() if value is not None)
 
 

@@ -4,46 +4,65 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from bslam.commands.arguments import add_batch_options, add_filter_options, run_options
+from bslam.commands.arguments import add_batch_options, add_filter_options, core_parameters, run_options
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
 from bslam.errors import BslamError
 from bslam.experiment.batch import make_jobs, run_batch
 from bslam.experiment.datasets import find_directory
 from bslam.experiment.mrclam import ROBOTS, robots_in
-from bslam.experiment.sources import FolderSource, MrclamSource, Source
+from bslam.experiment.rerun import options_of
+from bslam.experiment.sources import FolderSource, MrclamSource, RecordingSource, Source
+from bslam.recording.reader import SUFFIX
 
 SUMMARY = "run the filter on recorded logs"
 EXAMPLES = """examples:
+  bslam replay out/run/paper_room_seed0.mcap
+  bslam replay drive.mcap --target qemu:mps2_an386
   bslam replay csv out/run/paper_room_seed0
   bslam replay csv recordings/* --filter standard --out out/standard
   bslam replay mrclam MRCLAM_Dataset6 --robot 3
   bslam replay mrclam MRCLAM_Dataset1 MRCLAM_Dataset6 --set huber_d=3
 
+A recording (.mcap) runs again as it ran: its own inputs in their order with its own parameters, and every
+state is held against the recorded one; exit status 1 if a bit differs. With --set or --params it runs
+otherwise, and nothing is compared.
 csv: DIR is a folder with odometry.csv, sightings.csv, robot.toml and, if known, truth.csv and beacons.csv.
 mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mapping data; all robots without
 --robot; figures after rigid alignment.
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
 COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam"}  # folders of the data directory
+_OF_THE_RECORDING = ("observation", "association", "filter", "sigma", "motion", "velocity_states", "noise")
+"""Options that a recording has decided."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("kind", choices=tuple(COLLECTIONS), help="format of the logs")
     parser.add_argument(
-        "directories", nargs="+", metavar="DIR", help="one log (csv) or one data set (mrclam) each"
+        "logs", nargs="+", metavar="LOG", help="recordings; or csv DIR..., one log each; or mrclam DIR..."
     )
     parser.add_argument(
         "--robot", type=int, choices=range(1, ROBOTS + 1), help="mrclam: one robot (default: all)"
     )
     add_filter_options(parser)
     add_batch_options(parser, "replay")
+    parser.set_defaults(defaults={name: parser.get_default(name) for name in _OF_THE_RECORDING})
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    logs = log_sources(arguments.kind, arguments.directories, arguments.robot)
+    first, *rest = arguments.logs
+    if first in COLLECTIONS:
+        if not rest:
+            raise BslamError(f"{first}: no DIR; allowed: bslam replay {first} DIR...")
+        return _replay_logs(arguments, first, rest)
+    return _replay_recordings(arguments, arguments.logs)
+
+
+def _replay_logs(arguments: argparse.Namespace, kind: str, directories: list[str]) -> int:
+    logs = log_sources(kind, directories, arguments.robot)
     pairs = [
         (source, run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed))
         for source in logs
@@ -51,6 +70,46 @@ def execute(arguments: argparse.Namespace) -> int:
     ]
     jobs = make_jobs([source for source, _ in pairs], [one for _, one in pairs], draw, arguments.pictures)
     return finish(run_batch(jobs, arguments.out, arguments.jobs), arguments.out)
+
+
+def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:
+    for path in paths:
+        if not path.endswith(SUFFIX):
+            raise BslamError(f"'{path}': allowed: csv DIR, mrclam DIR, or recordings, FILE{SUFFIX}")
+    for name, default in arguments.defaults.items():
+        if getattr(arguments, name) != default:
+            option = f"--{name.replace('_', '-')}"
+            raise BslamError(f"{option}: a recording runs with its own parameters; allowed: --set KEY=VALUE")
+    changes = core_parameters(arguments)
+    sources = [RecordingSource(Path(path)) for path in paths]
+    options = [options_of(source.recording(), arguments.target, changes) for source in sources]
+    jobs = make_jobs(sources, options, draw, arguments.pictures)
+    result = run_batch(jobs, arguments.out, arguments.jobs)
+    status = finish(result, arguments.out)
+    if changes:
+        return status
+    same = [_say_how_it_compares(entry) for entry in (outcome.entry for outcome in result.outcomes)]
+    return status if all(same) else 1
+
+
+def _say_how_it_compares(entry: dict[str, Any]) -> bool:
+    """Whether the rerun is the recorded run to the bit."""
+    found = entry.get("recording")
+    if found is None:
+        return False
+    same = not found["different"] and not found["answers"]
+    said = f"all {found['states']} states are the recorded ones to the bit" if same else _difference(found)
+    lost = f"; the recording lacks {found['lost']} reports" if found["lost"] else ""
+    print(f"{entry['name']}: {said}, fingerprint {found['fingerprint']:016x}{lost}")
+    return same
+
+
+def _difference(found: dict[str, Any]) -> str:
+    if found["first_us"] is None:
+        return f"{found['answers']} inputs are refused now and were not, or the other way round"
+    return (
+        f"{found['different']} of {found['states']} states differ, from {found['first_us'] * 1e-6:.6f} s on"
+    )
 
 
 def log_sources(kind: str, directories: list[str], robot: int | None) -> list[Source]:

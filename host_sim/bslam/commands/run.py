@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("scenario", metavar="SCENARIO", help="name, or path of a TOML file")
     parser.add_argument(
-        "--record", action="store_true", help="write each log as a folder NAME, too (see `replay csv`)"
+        "--record",
+        action="store_true",
+        help="write each log as a folder NAME and each run as NAME.mcap, too (see `replay`)",
     )
     add_sensor_options(parser)
     add_filter_options(parser)

@@ -7,10 +7,11 @@ import itertools
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import joblib
@@ -22,14 +23,18 @@ from bslam.errors import BslamError
 from bslam.experiment.metrics import Evaluation, describe, evaluate, summarise
 from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_run, write_summary
+from bslam.experiment.rerun import rerun
 from bslam.experiment.runner import run_log
-from bslam.experiment.sources import ScenarioSource, Source
+from bslam.experiment.sources import RecordingSource, ScenarioSource, Source
 from bslam.experiment.trace import Trace
 from bslam.log import Log, write_folder
 
 _LOST = (
     "a process died (killed, or out of memory) before this run was finished; fewer --jobs need less memory"
 )
+
+_BY_IDENTITY = ("wrong_associations", "false_new", "missed", "beacons_true")
+"""Figures that rest on the sightings' true identities."""
 
 # Draws the pictures of a run: out directory, name, source, log, trace, evaluation.
 Draw = Callable[[Path, str, Source, Log, Trace, Evaluation | None], None]
@@ -43,7 +48,7 @@ class Job:
     source: Source
     options: RunOptions
     draw: Draw | None = None
-    record: bool = False  # write the log as a folder NAME, too
+    record: bool = False  # write the log as a folder NAME and the run as NAME.mcap, too
 
 
 @dataclass(frozen=True)
@@ -134,15 +139,29 @@ def execute(job: Job, out: Path) -> Outcome:
         return Outcome(job.name, entry, crash=traceback.format_exc())
 
 
+def _run(job: Job, log: Log, out: Path) -> tuple[Trace, dict[str, Any]]:
+    """The trace of the run, and what the entry of a recording says otherwise."""
+    if isinstance(job.source, RecordingSource):
+        trace, comparison = rerun(job.source.recording(), job.options)
+        nameless = not (log.sightings.beacon_id >= 0).any()
+        unknown = dict.fromkeys([*_BY_IDENTITY, "step_us_median"] if nameless else ["step_us_median"])
+        return trace, unknown | {"recording": asdict(comparison)}
+    record = out / f"{job.name}.mcap" if job.record else None
+    return run_log(log, job.options, record=record), {}
+
+
 def _execute(job: Job, out: Path) -> Outcome:
     log = job.source.load()
     if job.record:
         write_folder(log, out / job.name)
-    return write_files(job, out, log, run_log(log, job.options))
+    trace, more = _run(job, log, out)
+    return write_files(job, out, log, trace, more)
 
 
-def write_files(job: Job, out: Path, log: Log, trace: Trace) -> Outcome:
-    """Judge a run that is over, and write its files. Raises BslamError."""
+def write_files(
+    job: Job, out: Path, log: Log, trace: Trace, more: Mapping[str, Any] = MappingProxyType({})
+) -> Outcome:
+    """Judge a run that is over, and write its files; `more` goes into its entry. Raises BslamError."""
     evaluation = evaluate(log, trace, job.options, job.source.align)
     write_run(out, job.name, trace, evaluation)
     if job.draw is not None:
@@ -151,7 +170,9 @@ def write_files(job: Job, out: Path, log: Log, trace: Trace) -> Outcome:
         "name": job.name,
         "scenario": job.source.name,
         "truth": job.source.truth_kind if log.truth is not None else "none",
+        **more,
     }
+    entry = {key: value for key, value in entry.items() if value is not None}
     if evaluation is None:
         return Outcome(job.name, entry)
     return Outcome(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +21,8 @@ from bslam.experiment.options import Number, RunOptions, core_params, odometry_l
 from bslam.experiment.trace import MapBeacon, Trace
 from bslam.experiment.truth import step_times_us
 from bslam.log import Log, Odometry, Sightings
+from bslam.recording import Recorder, RecordingWriter
+from bslam.recording.aslog import start_of, true_poses
 from bslam.target.remote import connect
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
@@ -46,23 +50,48 @@ class Watcher(Protocol):
 
 
 def run_log(
-    log: Log, options: RunOptions, slam_factory: SlamFactory | None = None, watcher: Watcher | None = None
+    log: Log,
+    options: RunOptions,
+    slam_factory: SlamFactory | None = None,
+    watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> Trace:
     """Run the filter over the log. Raises BslamError if the core does not accept the parameters.
 
     What the core refuses on the way (an impossible time stamp, say) is counted in `Trace.refusals` and the
     run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
-    beacons to hold.
+    beacons to hold. `record` is the file of the recording to make.
     """
     params, beacons = core_params(options, log), _beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
         if options.real != "float":
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
         looks = _uses_looks(options)
-        with connect(options.target, params, beacons, looks=looks, seeds=log.seeds) as slam:
-            return _Run(slam, log, options, watcher).finish(slam.target_description())
+        with connect(
+            options.target, params, beacons, fingerprints=record is not None, looks=looks, seeds=log.seeds
+        ) as slam:
+            return _run(slam, log, options, watcher, record, slam.target_description)
     factory = slam_factory or partial(_make_slam, options, log)
-    return _Run(factory(params, beacons), log, options, watcher).finish()
+    return _run(factory(params, beacons), log, options, watcher, record)
+
+
+def _run(
+    slam: Any,
+    log: Log,
+    options: RunOptions,
+    watcher: Watcher | None,
+    record: Path | None,
+    target: Callable[[], Mapping[str, Any]] | None = None,
+) -> Trace:
+    """`target` tells of what it runs on, if not here."""
+    if record is None:
+        return _Run(slam, log, options, watcher).finish(target and target())
+    start = start_of(log, slam.params, _beacons_to_hold(log, options), _uses_looks(options), options.real)
+    with RecordingWriter(record, start) as writer:
+        recorder = Recorder(slam, writer, true_poses(log))
+        trace = _Run(recorder, log, options, watcher).finish(target and target())
+        recorder.finish()
+    return trace
 
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Slam:
@@ -87,6 +116,7 @@ class _Run:
 
     def __init__(self, slam: Any, log: Log, options: RunOptions, watcher: Watcher | None) -> None:
         self.slam, self.watcher = slam, watcher
+        self.recorded = isinstance(slam, Recorder)
         self.frames = _Frames(log.sightings, options)
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
@@ -115,7 +145,7 @@ class _Run:
 
     def _run(self, odometry: Odometry) -> None:
         """Feed everything, and keep what there is to say at each of the steps' times."""
-        slam, kind, clock, times_us = self.slam, odometry.kind, time.thread_time_ns, self.times_us
+        slam, kind, clock, times_us = self.slam, odometry.kind, self._clock, self.times_us
         number = np.int64 if kind == "ticks" else np.float64
         a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
         rows = list(zip(odometry.time_us.tolist(), a, b, strict=True))
@@ -156,11 +186,13 @@ class _Run:
 
     def _frames_until(self, until_us: int | None) -> int:
         """Feed the frames stamped before `until_us` (None: all that are left); CPU time of the core, ns."""
-        clock, core_ns, frames = time.thread_time_ns, 0, self.frames
+        clock, core_ns, frames = self._clock, 0, self.frames
         seen = False
         while frames.waiting_before(until_us):
             seen = True
             time_us, true_id, columns = frames.take()
+            if self.recorded:
+                self.slam.true_id = true_id
             began = clock()
             accounts = self._try(self.slam.sightings, time_us, *columns)
             core_ns += clock() - began
@@ -172,6 +204,10 @@ class _Run:
                 self.watcher.frame(time_us, true_id, columns, accounts)
         self.seen.append(seen)
         return core_ns
+
+    def _clock(self) -> int:
+        """CPU time, ns, without what a recorder took."""
+        return time.thread_time_ns() - (self.slam.noting_ns if self.recorded else 0)
 
     def _try(self, call: Callable[..., Any], *inputs: Any) -> Any:
         """The answer of the core; None, and a count, where it refuses the input and stays as it was."""
@@ -200,38 +236,64 @@ class _Run:
 
     def finish(self, target: Mapping[str, Any] | None = None) -> Trace:
         """The trace of the run; `target` is what it ran on, if not here."""
-        return Trace(
-            time_us=np.array(self.times_us, dtype=np.int64),
-            pose=np.array(self.poses, dtype=np.float64),
-            covariance=np.array(self.covariances, dtype=np.float64)[:, _FROM_LOWER],
-            seen=np.array(self.seen, dtype=np.bool_),
-            counts=self.ledger.counts(),
-            beacons=tuple(self._map_beacon(beacon) for beacon in self.slam.beacons()),
-            parameters=self._changed_parameters(),
-            counters=dict(self.slam.counters()),
-            refusals=dict(self.refusals),
-            target=dict(target or {}),
-            step_us_median=float(np.median(self.step_ns)) * 1e-3 if self.step_ns else 0.0,
-        )
+        rows = Rows(self.poses, self.covariances, self.seen)
+        step_us = float(np.median(self.step_ns)) * 1e-3 if self.step_ns else 0.0
+        return make_trace(self.slam, self.times_us, rows, self.ledger, self.refusals, target, step_us)
 
-    def _changed_parameters(self) -> dict[str, Number]:
-        defaults = self.slam.defaults()
-        params = {name: _as_written(value) for name, value in self.slam.params.items()}
-        return {name: value for name, value in params.items() if value != defaults[name]}
 
-    def _map_beacon(self, beacon: Any) -> MapBeacon:
-        return MapBeacon(
-            uid=beacon.uid,
-            label=beacon.label,
-            true_id=self.ledger.identity(beacon.uid),
-            x_m=beacon.x_m,
-            y_m=beacon.y_m,
-            covariance_m2=np.array(beacon.covariance, dtype=np.float64),
-            sightings=beacon.sightings,
-            confirmed=beacon.confirmed,
-            range_m=beacon.range_m,
-            phi_rad=beacon.phi_rad,
-        )
+@dataclass
+class Rows:
+    """What a trace has a row of for each step, as lists."""
+
+    poses: list[tuple[float, float, float]] = field(default_factory=list)
+    covariances: list[tuple[float, ...]] = field(default_factory=list)  # lower triangles
+    seen: list[bool] = field(default_factory=list)
+
+
+def make_trace(
+    slam: Any,
+    times_us: Sequence[int],
+    rows: Rows,
+    ledger: Ledger,
+    refusals: Mapping[str, int],
+    target: Mapping[str, Any] | None,
+    step_us_median: float = 0.0,
+) -> Trace:
+    """The trace of a run that has ended; `target` is what it ran on, if not here."""
+    return Trace(
+        time_us=np.array(times_us, dtype=np.int64),
+        pose=np.array(rows.poses, dtype=np.float64),
+        covariance=np.array(rows.covariances, dtype=np.float64)[:, _FROM_LOWER],
+        seen=np.array(rows.seen, dtype=np.bool_),
+        counts=ledger.counts(),
+        beacons=tuple(_map_beacon(beacon, ledger) for beacon in slam.beacons()),
+        parameters=_changed_parameters(slam),
+        counters=dict(slam.counters()),
+        refusals=dict(refusals),
+        target=dict(target or {}),
+        step_us_median=step_us_median,
+    )
+
+
+def _changed_parameters(slam: Any) -> dict[str, Number]:
+    defaults = slam.defaults()
+    params = {name: _as_written(value) for name, value in slam.params.items()}
+    return {name: value for name, value in params.items() if value != defaults[name]}
+
+
+def _map_beacon(beacon: Any, ledger: Ledger) -> MapBeacon:
+    return MapBeacon(
+        uid=beacon.uid,
+        label=beacon.label,
+        true_id=ledger.identity(beacon.uid),
+        x_m=beacon.x_m,
+        y_m=beacon.y_m,
+        covariance_m2=np.array(beacon.covariance, dtype=np.float64),
+        sightings=beacon.sightings,
+        confirmed=beacon.confirmed,
+        range_m=beacon.range_m,
+        phi_rad=beacon.phi_rad,
+    )
 
 
 def _as_written(value: Number) -> Number:

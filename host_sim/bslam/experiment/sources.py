@@ -14,6 +14,8 @@ from bslam.experiment.align import Rigid
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.mrclam import best_truth, load_mrclam
 from bslam.log import SIGNATURES, Log, read_folder
+from bslam.recording import Recording, load
+from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario, simulate
 
@@ -152,6 +154,31 @@ class MrclamSource(_Unshared):
 
     def load(self) -> Log:
         return load_mrclam(self.directory, self.robot)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class RecordingSource(_Unshared):
+    """A recording; its truth is in the frame of the start pose."""
+
+    path: Path
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "recorded"
+    has_looks: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:
+        return self.path.stem
+
+    def recording(self) -> Recording:
+        """All of it."""
+        return load(self.path)
+
+    def load(self) -> Log:
+        return as_log(self.recording())
 
     def walls_m(self) -> NDArray[np.float64]:
         return np.empty((0, 4))

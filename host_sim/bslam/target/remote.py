@@ -206,9 +206,8 @@ class RemoteSlam:
 
     # ---- what only a target has ----------------------------------------------------------------------------
 
-    @property
-    def fingerprint(self) -> int:
-        """Of all states so far, chained (`bslam_slam_fingerprint`)."""
+    def fingerprint(self, before: int) -> int:
+        """Of all states so far (`bslam_slam_fingerprint`), as the target has chained them."""
         return self._last_step().fingerprint
 
     @property

@@ -1,0 +1,268 @@
+"""What a recording is made of, and each entry as JSON. Numbers come back as they were, to the last bit.
+
+An input (Reading, Frame, Call) is followed by the State that it led to. Frame of all poses: the map's, whose
+origin is the start pose. Times are the robot's own, in us.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.learner import SIGNATURE_SIZE
+from bslam.core.slam import Account, Beacon
+from bslam.log import ODOMETRY_COLUMNS
+
+Json = dict[str, Any]
+Pose = tuple[float, float, float]
+"""x_m, y_m, theta_rad."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """The robot at the start of the recording: it stands at the origin, and its map is empty."""
+
+    name: str
+    params: dict[str, int | float]  # all of them
+    beacons_max: int  # the map has room for
+    looks: bool = False  # it learns what beacons look like
+    seeds: NDArray[np.float32] | None = None  # (k, 71) signatures of what is no beacon
+    robot: str | None = None  # the text of robot.toml, where the log has one
+    true_beacons: tuple[tuple[int, float, float], ...] = ()  # beacon_id, x_m, y_m, where somebody knows them
+    real: str = "float"  # the core's scalar type
+    about: Json = field(default_factory=dict)  # of the target: image, build
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Odometry: the arguments of `Slam.odometry`. refused: the status of a core that did not take it."""
+
+    kind: str
+    time_us: int
+    a: int | float
+    b: int | float
+    gyro_radps: float | None = None
+    refused: str | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What one image shows: the arguments of `Slam.sightings`, and what became of each sighting."""
+
+    time_us: int
+    bearing_rad: list[float]
+    range_m: list[float]  # NaN: none
+    label: list[int]
+    mappable: list[bool]
+    bearing_sd_rad: list[float] | None = None
+    range_sd_m: list[float] | None = None
+    signature: NDArray[np.float32] | None = None  # (m, 71)
+    true_id: list[int] | None = None  # beacon_id of each, -1: of none; None: nobody knows
+    accounts: list[Account] | None = None  # None: the frame was refused
+    refused: str | None = None
+
+
+@dataclass(frozen=True)
+class Call:
+    """Another input: the name of a method of `Slam` and its arguments."""
+
+    name: str
+    arguments: tuple[int | float, ...]
+    refused: str | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the robot stands now. fingerprint: of all states so far, chained."""
+
+    time_us: int
+    pose: Pose
+    covariance: tuple[float, ...]  # xx, yx, yy, tx, ty, tt in m2, m rad, rad2
+    fingerprint: int | None = None
+
+
+@dataclass(frozen=True)
+class Map:
+    """All beacons as they stand now."""
+
+    beacons: list[Beacon]
+
+
+@dataclass(frozen=True)
+class Counters:
+    """The core's own counters, by name."""
+
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class TruePose:
+    """Where the robot really was, where somebody knows it."""
+
+    time_us: int
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class Gap:
+    """So many reports of the robot's own inputs were lost on the line: from here on no replay is exact."""
+
+    lost: int
+
+
+Entry = Start | Reading | Frame | Call | State | Map | Counters | TruePose | Gap
+
+# ---- to JSON and back --------------------------------------------------------------------------------------
+
+
+def _start_to(one: Start) -> Json:
+    return asdict(one) | {"seeds": _text(one.seeds)}
+
+
+def _start_from(content: Json) -> Start:
+    true_beacons = tuple((int(i), float(x), float(y)) for i, x, y in content["true_beacons"])
+    return Start(**content | {"seeds": _signatures(content["seeds"]), "true_beacons": true_beacons})
+
+
+def _reading_to(one: Reading) -> Json:
+    a_name, b_name = ODOMETRY_COLUMNS[one.kind]
+    words = {"time_us": one.time_us, "kind": one.kind, a_name: one.a, b_name: one.b}
+    return words | {"gyro_radps": one.gyro_radps, "refused": one.refused}
+
+
+def _reading_from(content: Json) -> Reading:
+    a, b = (content[name] for name in ODOMETRY_COLUMNS[content["kind"]])
+    return Reading(content["kind"], content["time_us"], a, b, content["gyro_radps"], content["refused"])
+
+
+def _frame_to(one: Frame) -> Json:
+    rows: list[Json] = []
+    for i, bearing_rad in enumerate(one.bearing_rad):
+        row: Json = {"bearing_rad": bearing_rad, "range_m": _number_or_none(one.range_m[i])}
+        row |= {"label": one.label[i], "mappable": bool(one.mappable[i])}
+        if one.bearing_sd_rad is not None and one.range_sd_m is not None:
+            row |= {"bearing_sd_rad": one.bearing_sd_rad[i], "range_sd_m": one.range_sd_m[i]}
+        if one.true_id is not None:
+            row["true_id"] = one.true_id[i]
+        if one.signature is not None:
+            row["signature"] = _text(one.signature[i])
+        if one.accounts is not None:
+            row["account"] = asdict(one.accounts[i])
+        rows.append(row)
+    words = {"signed": one.signature is not None, "noisy": one.bearing_sd_rad is not None}
+    return {"time_us": one.time_us, "refused": one.refused, **words, "sightings": rows}
+
+
+def _frame_from(content: Json) -> Frame:
+    rows = content["sightings"]
+    range_m = [math.nan if row["range_m"] is None else row["range_m"] for row in rows]
+    identified = bool(rows) and "true_id" in rows[0]
+    return Frame(
+        content["time_us"],
+        _column(rows, "bearing_rad"),
+        range_m,
+        _column(rows, "label"),
+        _column(rows, "mappable"),
+        _column(rows, "bearing_sd_rad") if content["noisy"] else None,
+        _column(rows, "range_sd_m") if content["noisy"] else None,
+        _stacked(_column(rows, "signature")) if content["signed"] else None,
+        _column(rows, "true_id") if identified else None,
+        None if content["refused"] else [Account(**one) for one in _column(rows, "account")],
+        content["refused"],
+    )
+
+
+def _column(rows: list[Json], name: str) -> list[Any]:
+    return [row[name] for row in rows]
+
+
+def _call_from(content: Json) -> Call:
+    return Call(content["name"], tuple(content["arguments"]), content["refused"])
+
+
+def _state_to(one: State) -> Json:
+    x_m, y_m, theta_rad = one.pose
+    chain = None if one.fingerprint is None else f"{one.fingerprint:016x}"
+    pose = {"x_m": x_m, "y_m": y_m, "theta_rad": theta_rad}
+    return {"time_us": one.time_us, **pose, "covariance": list(one.covariance), "fingerprint": chain}
+
+
+def _state_from(content: Json) -> State:
+    chain = None if content["fingerprint"] is None else int(content["fingerprint"], 16)
+    return State(content["time_us"], _pose(content), tuple(content["covariance"]), chain)
+
+
+def _map_to(one: Map) -> Json:
+    rows = []
+    for beacon in one.beacons:
+        words = {name: value for name, value in vars(beacon).items() if name != "covariance"}
+        rows.append(words | {"covariance": beacon.covariance.tolist()})
+    return {"beacons": rows}
+
+
+def _map_from(content: Json) -> Map:
+    return Map([Beacon(**row | {"covariance": np.array(row["covariance"])}) for row in content["beacons"]])
+
+
+def _true_pose_to(one: TruePose) -> Json:
+    x_m, y_m, theta_rad = one.pose
+    return {"time_us": one.time_us, "x_m": x_m, "y_m": y_m, "theta_rad": theta_rad}
+
+
+def _pose(content: Json) -> Pose:
+    return content["x_m"], content["y_m"], content["theta_rad"]
+
+
+def _text(values: NDArray[np.float32] | None) -> str | None:
+    return None if values is None else base64.b64encode(values.astype("<f4").tobytes()).decode()
+
+
+def _signatures(text: str | None) -> NDArray[np.float32] | None:
+    if text is None:
+        return None
+    return np.frombuffer(base64.b64decode(text), "<f4").astype(np.float32).reshape(-1, SIGNATURE_SIZE)
+
+
+def _stacked(texts: list[str]) -> NDArray[np.float32]:
+    made = np.empty((len(texts), SIGNATURE_SIZE), np.float32)
+    for i, text in enumerate(texts):
+        made[i] = _signatures(text)
+    return made
+
+
+def _number_or_none(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a kind of entry stands in the file."""
+
+    topic: str
+    schema: str
+    write: Callable[[Any], Json]
+    read: Callable[[Json], Entry]
+
+
+FORMATS: dict[type, Format] = {
+    Start: Format("/start", "bslam.Start", _start_to, _start_from),
+    Reading: Format("/odometry", "bslam.Odometry", _reading_to, _reading_from),
+    Frame: Format("/sightings", "bslam.Sightings", _frame_to, _frame_from),
+    Call: Format("/call", "bslam.Call", asdict, _call_from),
+    State: Format("/state", "bslam.State", _state_to, _state_from),
+    Map: Format("/map", "bslam.Map", _map_to, _map_from),
+    Counters: Format("/counters", "bslam.Counters", lambda one: one.counts, Counters),
+    TruePose: Format(
+        "/truth",
+        "bslam.TruePose",
+        _true_pose_to,
+        lambda content: TruePose(content["time_us"], _pose(content)),
+    ),
+    Gap: Format("/gap", "bslam.Gap", asdict, lambda content: Gap(**content)),
+}
