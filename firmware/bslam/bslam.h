@@ -11,6 +11,7 @@
 
 #include "bslam/link/parser.h"
 #include "bslam/slam/fingerprint.h"
+#include "bslam/store/slots.h"
 #include "bslam/svm/learner.h"
 
 #endif

@@ -115,6 +115,12 @@ bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
                       bslam_real_t heading_var_rad2);
 
+/// Puts the robot somewhere, whatever was thought before: its pose has these variances (each axis) and is
+/// independent of the map, of which nothing changes. Velocity states become as at the start, scales stay.
+/// O(n).
+void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *pose,
+                        bslam_real_t position_var_m2, bslam_real_t heading_var_rad2);
+
 // ---- sightings --------------------------------------------------------------------------------------------
 
 /// A row of H: not zero only at the robot's own values and at `dim` neighbouring state values from `at` on.
@@ -183,6 +189,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
+
+/// Takes all beacons out. The robot stays as it is. O(n).
+void bslam_ekf_forget_map(bslam_ekf_t *ekf);
 
 /// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH
 /// "Direction only"). True if it did. O(n²) then.

@@ -175,6 +175,15 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
             (size_t)(ekf->beacon_count - index) * sizeof ekf->beacons[0]);
 }
 
+void bslam_ekf_forget_map(bslam_ekf_t *ekf)
+{
+    memset(&ekf->mean[ekf->base_dim], 0, (size_t)(ekf->dim - ekf->base_dim) * sizeof ekf->mean[0]);
+    memset(ekf->beacons, 0, (size_t)ekf->beacon_count * sizeof ekf->beacons[0]);
+    ekf->dim = ekf->base_dim;
+    ekf->beacon_count = 0;
+    ekf->ray_count = 0;
+}
+
 // ---- rays -------------------------------------------------------------------------------------------------
 
 /// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the

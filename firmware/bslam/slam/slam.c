@@ -111,11 +111,16 @@ bslam_status_t bslam_slam_odometry(bslam_slam_t *slam, const bslam_odometry_read
     return status;
 }
 
+static bool are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
+{
+    return bslam_in_range(position_sd_m, 0, POSITION_SD_MAX_M) &&
+           bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD);
+}
+
 bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
                                           bslam_real_t heading_sd_rad)
 {
-    if (!bslam_in_range(position_sd_m, 0, POSITION_SD_MAX_M) ||
-        !bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD)) {
+    if (!are_doubts(position_sd_m, heading_sd_rad)) {
         return BSLAM_E_RANGE;
     }
     predict_until(slam, 0);
@@ -124,6 +129,20 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
     bslam_odometry_restart(&slam->odometry);
     bslam_history_clear(&slam->history);
     slam->has_frame = false;
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bslam_real_t position_sd_m,
+                                   bslam_real_t heading_sd_rad)
+{
+    if (!bslam_is_number(pose->x_m) || !bslam_is_number(pose->y_m) || !bslam_is_number(pose->theta_rad)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    if (!are_doubts(position_sd_m, heading_sd_rad)) {
+        return BSLAM_E_RANGE;
+    }
+    bslam_ekf_set_pose(&slam->ekf, &slam->params, pose, position_sd_m * position_sd_m,
+                       heading_sd_rad * heading_sd_rad);
     return BSLAM_OK;
 }
 
@@ -249,6 +268,7 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
     slam->counters.duplicates += reason == BSLAM_REASON_DUPLICATE ? 1u : 0u;
     slam->counters.unidentified += reason == BSLAM_REASON_NO_IDENTITY ? 1u : 0u;
     slam->counters.unmappable += reason == BSLAM_REASON_CLASS ? 1u : 0u;
+    slam->counters.frozen += reason == BSLAM_REASON_FROZEN ? 1u : 0u;
 }
 
 /// Fuses a sighting with the beacon that association chose.
@@ -330,7 +350,12 @@ static void use_matches(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t 
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
     for (int i = 0; i < count; i++) {
-        if (slam->matches[i].verdict == BSLAM_VERDICT_NEW) {
+        if (slam->matches[i].verdict != BSLAM_VERDICT_NEW) {
+            continue;
+        }
+        if (slam->is_frozen) {
+            reject(slam, BSLAM_REASON_FROZEN, NULL, &slam->accounts[i]);
+        } else {
             add_new(slam, time_us, mount, &sightings[i], &slam->accounts[i]);
         }
     }
@@ -415,7 +440,7 @@ static void doubt(bslam_slam_t *slam, int index, uint32_t near_uid)
 /// Machines learn from what a frame surely showed, and train for a bounded time.
 static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
 {
-    if (slam->looks == NULL || slam->params.association != BSLAM_ASSOCIATION_SVM) {
+    if (slam->looks == NULL || slam->is_frozen || slam->params.association != BSLAM_ASSOCIATION_SVM) {
         return;
     }
     for (int i = 0; i < count; i++) {
@@ -538,6 +563,15 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
         slam->ekf.beacons[index].label = label;
     }
     return status;
+}
+
+void bslam_slam_forget_map(bslam_slam_t *slam)
+{
+    if (slam->looks != NULL) {
+        bslam_looks_clear(slam->looks);
+    }
+    bslam_ekf_forget_map(&slam->ekf);
+    slam->is_frozen = false;
 }
 
 bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)

@@ -41,6 +41,7 @@ typedef struct bslam_counters {
     uint32_t deferred;          ///< left undecided
     uint32_t removed;           ///< provisional beacons taken out
     uint32_t settled;           ///< rays that became points
+    uint32_t frozen;            ///< of the rejected, new in a frozen map
     uint32_t insane;  ///< times the state was found not finite or with a negative variance: must stay 0
 } bslam_counters_t;
 
@@ -70,6 +71,7 @@ typedef struct bslam_slam {
     uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
+    bool is_frozen;        ///< the map: no beacon is added, learned or taken out by itself
     bslam_looks_t *looks;  ///< the caller's; NULL: none attached
     bslam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
@@ -103,6 +105,13 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_odometry(bslam_slam_t *slam,
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
                                                            bslam_real_t heading_sd_rad);
 
+/// Puts the robot somewhere in the map, as of the last frame, this doubtful: at a charging station, in a kept
+/// map, found again (recovery/recovery.h). The map stays as it is, odometry that waits is gone through from
+/// there. BSLAM_E_NOT_FINITE; BSLAM_E_RANGE: position_sd_m outside 0 to 30 or heading_sd_rad outside 0
+/// to 3.2.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
+                                                    bslam_real_t position_sd_m, bslam_real_t heading_sd_rad);
+
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²), after a prediction for each reading that
 /// waited up to then: BSLAM_HISTORY_MAX of O(n), or of O(n²) with velocity states, after a long time without
@@ -121,6 +130,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, 
 
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid);
+
+/// Takes all beacons out, with what is known of their looks; the map is no longer frozen.
+void bslam_slam_forget_map(bslam_slam_t *slam);
 
 // ---- results ----------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -282,6 +283,51 @@ class Slam:
         """A beacon whose position is given and never changes. Raises CoreError."""
         status = self._lib.bslam_slam_add_known_beacon(self._slam, label, x_m, y_m)
         self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})")
+
+    def set_pose(
+        self, x_m: float, y_m: float, theta_rad: float, position_sd_m: float, heading_sd_rad: float
+    ) -> None:
+        """Puts the robot somewhere in the map, as of the last frame.
+
+        Raises CoreError if it is not finite, or a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
+        """
+        pose = self._ffi.new("bslam_pose_t *", (x_m, y_m, theta_rad))
+        status = self._lib.bslam_slam_set_pose(self._slam, pose, position_sd_m, heading_sd_rad)
+        doubt = f"sd {position_sd_m} m, {heading_sd_rad} rad"
+        self._raw.ensure(status, f"pose ({x_m}, {y_m}, {theta_rad}) with {doubt}")
+
+    def save_map(self) -> bytes:
+        """The confirmed beacons with covariance, and the machines, as docs/MAP.md has it."""
+        size = self._lib.bslam_map_size(self._slam)
+        room = self._ffi.new("uint8_t[]", size)
+        memory = self._ffi.new("bslam_map_memory_t *", (room, size, 0))
+        sink = self._ffi.new("bslam_map_sink_t *", self._lib.bslam_map_to_memory(memory))
+        fault = self._ffi.new("bslam_map_fault_t *")
+        self._raw.ensure(self._lib.bslam_map_write(self._slam, sink, fault), f"map of {size} bytes")
+        return bytes(self._ffi.buffer(room, memory.count))
+
+    def load_map(self, blob: bytes, *, frozen: bool = False) -> None:
+        """Takes a map in place of its own; the robot does not know where it is in it (`set_pose`).
+
+        frozen: nothing changes a beacon and none is added. Raises CoreError, and changes nothing, for a blob
+        that is no whole map or that this build has no room for; the message says why.
+        """
+        source = self._source(blob)
+        mode = self._lib.BSLAM_MAP_FROZEN if frozen else self._lib.BSLAM_MAP_LIVING
+        fault = self._ffi.new("bslam_map_fault_t *")
+        status = self._lib.bslam_map_load(self._slam, source[0], mode, fault)
+        reason = self._raw.text(self._lib.bslam_map_fault_name(fault[0]))
+        self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
+
+    def map_fault(self, blob: bytes) -> str:
+        """What `load_map` would say of a blob: "fine", "bad crc", ..."""
+        source = self._source(blob)
+        return self._raw.text(self._lib.bslam_map_fault_name(self._lib.bslam_map_check(source[0])))
+
+    def _source(self, blob: bytes) -> tuple[Any, Any]:
+        """A source, and what must live as long as it is used."""
+        held = self._ffi.from_buffer("uint8_t[]", blob)
+        return self._ffi.new("bslam_map_source_t *", self._lib.bslam_map_from_memory(held, len(blob))), held
 
     def remove_beacon(self, uid: int) -> None:
         """Takes a beacon out of the map. Raises CoreError if there is none."""

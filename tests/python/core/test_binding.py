@@ -180,6 +180,8 @@ REFUSALS: list[tuple[str, Callable[[], Slam], Callable[[Slam], object], str]] = 
     ("BSLAM_E_COUNT", started, lambda s: s.sightings(40_000, *([v[0]] * 65 for v in ONE)), "65 sightings"),
     ("BSLAM_E_MAP_FULL", started, fill, "known beacon 119"),
     ("BSLAM_E_NO_BEACON", started, lambda s: s.remove_beacon(77), "beacon 77"),
+    ("BSLAM_E_MAP", started, lambda s: s.load_map(b"BSLM"), "map of 4 bytes: truncated"),
+    ("BSLAM_E_RANGE", started, lambda s: s.set_pose(0.0, 0.0, 0.0, 31.0, 0.1), "sd 31.0 m"),
     ("BSLAM_E_DUPLICATE", started, lambda s: s.add_known_beacon(3, 0.0, 0.0), "known beacon 3"),
     (
         "BSLAM_E_SINGULAR",

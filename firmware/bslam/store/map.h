@@ -1,0 +1,82 @@
+/// A map as bytes: beacons with their covariance, and the machines with their samples, to come back to
+/// tomorrow or to carry to another robot. Every byte is in docs/MAP.md.
+///
+/// The same bytes load into a float build, a double build, and builds of other sizes as long as there is
+/// room. What is refused is refused whole: the pipeline is as it was, to the bit, and the fault says why.
+///
+/// A CRC is no signature: whoever can write the blob is trusted.
+#ifndef BSLAM_STORE_MAP_H
+#define BSLAM_STORE_MAP_H
+
+#include "bslam/slam/slam.h"
+
+#define BSLAM_MAP_VERSION 1
+
+/// Why a blob is refused.
+typedef enum bslam_map_fault {
+    BSLAM_MAP_FINE = 0,
+    BSLAM_MAP_TRUNCATED,   ///< fewer bytes than it says of itself, or than a header has
+    BSLAM_MAP_TOO_LONG,    ///< more bytes than it says of itself
+    BSLAM_MAP_NO_MAP,      ///< it does not begin as a map does
+    BSLAM_MAP_BYTE_ORDER,  ///< written high byte first
+    BSLAM_MAP_OTHER_VERSION,
+    BSLAM_MAP_BAD_CRC,
+    BSLAM_MAP_BEACONS,     ///< more beacons, or rays, than this build holds
+    BSLAM_MAP_MACHINES,    ///< machines, samples or rivals beyond what this build holds; other signatures
+    BSLAM_MAP_NOT_FINITE,  ///< a NaN, an infinity, or beyond 1e12
+    BSLAM_MAP_CONTENT,     ///< a field that contradicts others, or outside its range
+    BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1
+    BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, the sink cannot be written
+    BSLAM_MAP_FAULT_COUNT
+} bslam_map_fault_t;
+
+/// The name of a fault, "bad crc" say. Never NULL.
+const char *bslam_map_fault_name(bslam_map_fault_t fault);
+
+/// Where bytes come from: a function that copies `count` bytes from place `at` on. False: it cannot.
+typedef struct bslam_map_source {
+    bool (*read)(const void *context, uint32_t at, void *bytes, uint32_t count);
+    const void *context;
+    uint32_t size;  ///< bytes there are
+} bslam_map_source_t;
+
+/// Where bytes go, one piece after the other. False: it cannot.
+typedef struct bslam_map_sink {
+    bool (*write)(void *context, const void *bytes, uint32_t count);
+    void *context;
+} bslam_map_sink_t;
+
+/// Bytes in memory to be written to, of which `count` are.
+typedef struct bslam_map_memory {
+    uint8_t *bytes;
+    uint32_t capacity;
+    uint32_t count;
+} bslam_map_memory_t;
+
+/// Memory as a sink, which cannot beyond its capacity; and as a source, mapped flash say.
+bslam_map_sink_t bslam_map_to_memory(bslam_map_memory_t *memory);
+bslam_map_source_t bslam_map_from_memory(const uint8_t *bytes, uint32_t size);
+
+/// Frozen: nothing changes a beacon, and none is added. Living: the map goes on growing and improving.
+typedef enum bslam_map_mode { BSLAM_MAP_LIVING = 0, BSLAM_MAP_FROZEN } bslam_map_mode_t;
+
+/// Bytes that bslam_map_write would write. O(n² + machines).
+uint32_t bslam_map_size(const bslam_slam_t *slam);
+
+/// Writes the confirmed beacons, their covariance, and the machines that tell them apart. BSLAM_E_MAP with
+/// *fault BSLAM_MAP_UNREADABLE: the sink failed. O(n² + machines), twice.
+BSLAM_MUST_CHECK bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t *sink,
+                                                bslam_map_fault_t *fault);
+
+/// What bslam_map_load would say to this blob, whatever the state of the pipeline. O(n² + machines).
+bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source);
+
+/// Takes the map in place of the pipeline's own. The robot is at the map's origin, knows nothing of where it
+/// really is (30 m, 3.2 rad), and its velocity states are as at the start: give it a pose
+/// (bslam_slam_set_pose) or let it find one (recovery/recovery.h). Parameters, clock and counters stay.
+/// BSLAM_E_MAP with *fault: refused, nothing has changed. Machines are taken where looks are attached.
+/// O(n² + machines), twice.
+BSLAM_MUST_CHECK bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source,
+                                               bslam_map_mode_t mode, bslam_map_fault_t *fault);
+
+#endif

@@ -1,0 +1,173 @@
+#include "bslam/store/slots.h"
+
+#include <string.h>
+
+#include "bslam/store/crc32.h"
+
+#define MAGIC 0x534c5342u  // "BSLS"
+
+enum { HEAD_WORDS = 4, HEAD_BYTES = 16 };
+
+/// One slot as it is found.
+typedef struct slot {
+    const bslam_flash_t *flash;
+    int number;
+    bool has_head;  ///< a save was finished
+    uint32_t sequence;
+    uint32_t length;
+    bslam_map_fault_t fault;
+} slot_t;
+
+static uint32_t word_at(const uint8_t *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
+static void fill_head(uint8_t head[HEAD_BYTES], uint32_t sequence, uint32_t length)
+{
+    uint32_t words[HEAD_WORDS] = {MAGIC, sequence, length, 0};
+    for (int w = 0; w < HEAD_WORDS; w++) {
+        if (w == HEAD_WORDS - 1) {
+            words[w] = ~bslam_crc32_add(BSLAM_CRC32_START, head, HEAD_BYTES - 4);
+        }
+        for (int i = 0; i < 4; i++) {
+            head[4 * w + i] = (uint8_t)(words[w] >> 8 * i);
+        }
+    }
+}
+
+static bool read_map(const void *context, uint32_t at, void *bytes, uint32_t count)
+{
+    const slot_t *slot = context;
+    return slot->flash->read(slot->flash->context, slot->number, HEAD_BYTES + at, bytes, count);
+}
+
+static bslam_map_source_t source_of(const slot_t *slot)
+{
+    return (bslam_map_source_t){read_map, slot, slot->length};
+}
+
+static slot_t look_at(const bslam_flash_t *flash, int number)
+{
+    slot_t slot = {.flash = flash, .number = number, .fault = BSLAM_MAP_NO_MAP};
+    uint8_t head[HEAD_BYTES] = {0};
+    if (!flash->read(flash->context, number, 0, head, sizeof head)) {
+        slot.fault = BSLAM_MAP_UNREADABLE;
+        return slot;
+    }
+    slot.sequence = word_at(&head[4]);
+    slot.length = word_at(&head[8]);
+    uint8_t expected[HEAD_BYTES];
+    fill_head(expected, slot.sequence, slot.length);
+    slot.has_head = memcmp(head, expected, sizeof head) == 0 && slot.length <= flash->slot_bytes - HEAD_BYTES;
+    if (slot.has_head) {
+        const bslam_map_source_t source = source_of(&slot);
+        slot.fault = bslam_map_check(&source);
+    }
+    return slot;
+}
+
+/// Whether a was saved after b. Sequence numbers roll over.
+static bool is_newer(const slot_t *a, const slot_t *b)
+{
+    return a->has_head && (!b->has_head || a->sequence - b->sequence < UINT32_MAX / 2);
+}
+
+/// Both slots, the newer one first.
+static void look(const bslam_flash_t *flash, slot_t slots[BSLAM_SLOTS])
+{
+    slots[0] = look_at(flash, 0);
+    slots[1] = look_at(flash, 1);
+    if (is_newer(&slots[1], &slots[0])) {
+        const slot_t swap = slots[0];
+        slots[0] = slots[1];
+        slots[1] = swap;
+    }
+}
+
+// ---- saving -----------------------------------------------------------------------------------------------
+
+/// Pieces on their way into a slot.
+typedef struct writer {
+    const bslam_flash_t *flash;
+    int slot;
+    uint32_t at;
+    uint32_t waiting;
+    uint8_t piece[BSLAM_FLASH_PIECE];
+} writer_t;
+
+static bool flush(writer_t *writer)
+{
+    memset(&writer->piece[writer->waiting], 0xff, BSLAM_FLASH_PIECE - writer->waiting);
+    const bool fits = writer->at + BSLAM_FLASH_PIECE <= writer->flash->slot_bytes;
+    const bool done = fits && writer->flash->write(writer->flash->context, writer->slot, writer->at,
+                                                   writer->piece, BSLAM_FLASH_PIECE);
+    writer->at += BSLAM_FLASH_PIECE;
+    writer->waiting = 0;
+    return done;
+}
+
+static bool write_piece(void *context, const void *bytes, uint32_t count)
+{
+    writer_t *writer = context;
+    const uint8_t *from = bytes;
+    for (uint32_t i = 0; i < count; i++) {
+        writer->piece[writer->waiting] = from[i];
+        writer->waiting++;
+        if (writer->waiting == BSLAM_FLASH_PIECE && !flush(writer)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Writes the map behind the head, and looks whether it is there.
+static bslam_map_fault_t write_map(const slot_t *slot, const bslam_slam_t *slam)
+{
+    writer_t writer = {.flash = slot->flash, .slot = slot->number, .at = HEAD_BYTES};
+    const bslam_map_sink_t sink = {write_piece, &writer};
+    bslam_map_fault_t fault;
+    if (bslam_map_write(slam, &sink, &fault) != BSLAM_OK || (writer.waiting > 0 && !flush(&writer))) {
+        return BSLAM_MAP_UNREADABLE;
+    }
+    const bslam_map_source_t source = source_of(slot);
+    return bslam_map_check(&source);
+}
+
+bslam_status_t bslam_slots_save(const bslam_flash_t *flash, const bslam_slam_t *slam,
+                                bslam_map_fault_t *fault)
+{
+    slot_t slots[BSLAM_SLOTS];
+    look(flash, slots);
+    const bool newer_is_whole = slots[0].fault == BSLAM_MAP_FINE;
+    slot_t *slot = newer_is_whole || slots[1].fault != BSLAM_MAP_FINE ? &slots[1] : &slots[0];
+    const uint32_t sequence = slots[0].has_head ? slots[0].sequence + 1 : 1;
+    uint8_t head[HEAD_BYTES];
+    *fault = BSLAM_MAP_UNREADABLE;
+    slot->length = bslam_map_size(slam);
+    fill_head(head, sequence, slot->length);
+    if (slot->length > flash->slot_bytes - HEAD_BYTES || !flash->erase(flash->context, slot->number)) {
+        return BSLAM_E_MAP;
+    }
+    *fault = write_map(slot, slam);
+    if (*fault == BSLAM_MAP_FINE && !flash->write(flash->context, slot->number, 0, head, sizeof head)) {
+        *fault = BSLAM_MAP_UNREADABLE;
+    }
+    return *fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
+}
+
+// ---- loading ----------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam, bslam_map_mode_t mode,
+                                bslam_map_fault_t *fault)
+{
+    slot_t slots[BSLAM_SLOTS];
+    look(flash, slots);
+    slot_t *slot = slots[0].fault == BSLAM_MAP_FINE ? &slots[0] : &slots[1];
+    if (slot->fault != BSLAM_MAP_FINE) {
+        *fault = slots[0].fault;
+        return BSLAM_E_MAP;
+    }
+    const bslam_map_source_t source = source_of(slot);
+    return bslam_map_load(slam, &source, mode, fault);
+}

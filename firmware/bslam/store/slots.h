@@ -1,0 +1,35 @@
+/// A map in flash that survives a power cut at any moment: two slots, of which one always holds a whole map.
+///
+/// A save erases the slot that is older or damaged, writes the map, reads it back, and only then the 16 bytes
+/// that make it the newer one. Until the last of these the other slot is the map; from then on this one.
+/// docs/MAP.md has the bytes.
+#ifndef BSLAM_STORE_SLOTS_H
+#define BSLAM_STORE_SLOTS_H
+
+#include "bslam/store/map.h"
+
+#define BSLAM_SLOTS 2
+/// Bytes are written in pieces of so many, at places that are multiples of it: what the flash programs at
+/// once must divide it.
+#define BSLAM_FLASH_PIECE 16
+
+/// What a board gives: two areas that are erased each as a whole (bytes become 0xff). False: it failed.
+typedef struct bslam_flash {
+    bool (*erase)(void *context, int slot);
+    bool (*write)(void *context, int slot, uint32_t at, const void *bytes, uint32_t count);
+    bool (*read)(void *context, int slot, uint32_t at, void *bytes, uint32_t count);
+    void *context;
+    uint32_t slot_bytes;  ///< of each area; a map takes BSLAM_FLASH_PIECE more than bslam_map_size
+} bslam_flash_t;
+
+/// Saves the map. BSLAM_E_MAP: *fault is BSLAM_MAP_UNREADABLE if the flash failed or the map is larger than a
+/// slot, else what is wrong with what was read back; the map saved before is still there.
+BSLAM_MUST_CHECK bslam_status_t bslam_slots_save(const bslam_flash_t *flash, const bslam_slam_t *slam,
+                                                 bslam_map_fault_t *fault);
+
+/// Loads the newest whole map, as bslam_map_load does. BSLAM_E_MAP: there is none; *fault is what is wrong
+/// with the newer slot, BSLAM_MAP_NO_MAP if nothing was ever saved.
+BSLAM_MUST_CHECK bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam,
+                                                 bslam_map_mode_t mode, bslam_map_fault_t *fault);
+
+#endif

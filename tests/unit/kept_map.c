@@ -1,0 +1,121 @@
+#include "kept_map.h"
+
+enum { STEP_US = 40000 };
+
+bslam_params_t kept_params(void)
+{
+    bslam_params_t params = unit_params();
+    params.association = 3;
+    params.left_speed_sd_mps = BSLAM_R(1e-3);
+    params.right_speed_sd_mps = BSLAM_R(1e-3);
+    params.learn_way_m = 0;
+    params.learn_budget = 2000;
+    return params;
+}
+
+const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_FEATURES])
+{
+    unit_random_t random = {(uint64_t)(1 + 997 * object + 31 * view)};
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        signature[k] = (float)unit_random(&random, 0, 0.1);
+    }
+    signature[3 * object] += 0.7f;
+    signature[3 * object + 1] += 0.6f;
+    return signature;
+}
+
+void kept_empty(bslam_slam_t *slam, bslam_looks_t *looks)
+{
+    const bslam_params_t params = kept_params();
+    int bad_id;
+    memset(slam, 0, sizeof *slam);
+    assert_int_equal(bslam_slam_init(slam, &params, &bad_id), BSLAM_OK);
+    if (looks != NULL) {
+        memset(looks, 0, sizeof *looks);
+        assert_int_equal(bslam_looks_init(looks, NULL, 0), BSLAM_OK);
+        bslam_slam_attach_looks(slam, looks);
+    }
+}
+
+void kept_make(bslam_slam_t *slam, bslam_looks_t *looks, int objects)
+{
+    kept_empty(slam, looks);
+    for (int view = 1; view <= 12; view++) {
+        const int64_t now_us = (int64_t)view * STEP_US;
+        const bslam_odometry_reading_t reading = {
+            .source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us, .left_m = real(1e-4), .right_m = real(1e-4)};
+        float signatures[6][BSLAM_SAMPLE_FEATURES];
+        bslam_sighting_t seen[7];
+        for (int i = 0; i < objects; i++) {
+            seen[i] = unit_polar(-1.5 + 0.6 * i, 2.0 + 0.4 * i, -1);
+            seen[i].signature = kept_signature(i, view, signatures[i]);
+        }
+        seen[objects] = unit_direction(2.5, -1);
+        assert_int_equal(bslam_slam_odometry(slam, &reading), BSLAM_OK);
+        assert_int_equal(bslam_slam_sightings(slam, now_us, seen, objects + 1), BSLAM_OK);
+    }
+    assert_int_equal(bslam_slam_beacon_count(slam), objects + 1);
+}
+
+uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX])
+{
+    bslam_map_memory_t memory = {bytes, KEPT_BYTES_MAX, 0};
+    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_write(slam, &sink, &fault), BSLAM_OK);
+    assert_int_equal(fault, BSLAM_MAP_FINE);
+    assert_int_equal(memory.count, bslam_map_size(slam));
+    return memory.count;
+}
+
+/// True if there is power for one byte more.
+static bool spend(kept_flash_t *flash)
+{
+    if (flash->left == 0) {
+        return false;
+    }
+    flash->left--;
+    flash->used++;
+    return true;
+}
+
+static bool erase_slot(void *context, int slot)
+{
+    kept_flash_t *flash = context;
+    for (size_t i = 0; i < sizeof flash->slots[slot]; i++) {
+        if (!spend(flash)) {
+            flash->slots[slot][i] ^= (uint8_t)(0x5a + i);
+            return false;
+        }
+        flash->slots[slot][i] = 0xff;
+    }
+    return true;
+}
+
+static bool write_slot(void *context, int slot, uint32_t at, const void *bytes, uint32_t count)
+{
+    kept_flash_t *flash = context;
+    const uint8_t *from = bytes;
+    assert_true(at % BSLAM_FLASH_PIECE == 0 && count % BSLAM_FLASH_PIECE == 0);
+    for (uint32_t i = 0; i < count; i++) {
+        if (!spend(flash)) {
+            return false;
+        }
+        assert_int_equal(flash->slots[slot][at + i], 0xff);
+        flash->slots[slot][at + i] = from[i];
+    }
+    return true;
+}
+
+static bool read_slot(void *context, int slot, uint32_t at, void *bytes, uint32_t count)
+{
+    const kept_flash_t *flash = context;
+    assert_true(at + count <= sizeof flash->slots[slot]);
+    memcpy(bytes, &flash->slots[slot][at], count);
+    return true;
+}
+
+bslam_flash_t kept_flash(kept_flash_t *flash)
+{
+    return (bslam_flash_t){erase_slot, write_slot, read_slot, flash, sizeof flash->slots[0]};
+}

@@ -1,0 +1,299 @@
+#include "kept_map.h"
+
+#include <math.h>
+
+#include "bslam/store/crc32.h"
+
+static bslam_slam_t slam;
+static bslam_looks_t looks;
+static bslam_slam_t other;
+static bslam_looks_t other_looks;
+static uint8_t bytes[KEPT_BYTES_MAX];
+static uint32_t size;
+
+enum { BEACONS_AT = 28, BEACON_BYTES = 28 };
+
+static int setup(void **state)
+{
+    kept_make(&slam, &looks, 4);
+    size = kept_write(&slam, bytes);
+    kept_empty(&other, &other_looks);
+    return 0;
+}
+
+/// Where the state values begin, and their covariance.
+static uint32_t values_at(void)
+{
+    return BEACONS_AT + BEACON_BYTES * (uint32_t)bslam_slam_beacon_count(&slam);
+}
+
+static uint32_t covariance_at(void)
+{
+    return values_at() + 4u * (uint32_t)(slam.ekf.dim - slam.ekf.base_dim);
+}
+
+static void put_u32(uint32_t at, uint32_t value)
+{
+    for (int i = 0; i < 4; i++) {
+        bytes[at + (uint32_t)i] = (uint8_t)(value >> 8 * i);
+    }
+}
+
+static void put_float(uint32_t at, float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put_u32(at, bits);
+}
+
+/// Makes the CRC right, whatever else is wrong.
+static void seal(void)
+{
+    put_u32(size - 4, ~bslam_crc32_add(BSLAM_CRC32_START, bytes, size - 4));
+}
+
+/// Refused for this, by check and by load, in both modes; nothing of the running state has changed.
+static void assert_refused(bslam_map_fault_t expected)
+{
+    static bslam_slam_t before;
+    static bslam_looks_t looks_before;
+    memcpy(&before, &slam, sizeof slam);
+    memcpy(&looks_before, &looks, sizeof looks);
+    const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
+    assert_int_equal(bslam_map_check(&source), expected);
+    for (int mode = BSLAM_MAP_LIVING; mode <= BSLAM_MAP_FROZEN; mode++) {
+        bslam_map_fault_t fault = BSLAM_MAP_FINE;
+        assert_int_equal(bslam_map_load(&slam, &source, (bslam_map_mode_t)mode, &fault), BSLAM_E_MAP);
+        assert_int_equal(fault, expected);
+        assert_memory_equal(&slam, &before, sizeof slam);
+        assert_memory_equal(&looks, &looks_before, sizeof looks);
+    }
+}
+
+static void load(bslam_map_mode_t mode)
+{
+    const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_load(&other, &source, mode, &fault), BSLAM_OK);
+    assert_int_equal(fault, BSLAM_MAP_FINE);
+}
+
+// ---- what is kept -----------------------------------------------------------------------------------------
+
+static void test_map_load_living_gives_beacons_covariance_and_looks_back(void **state)
+{
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(bslam_slam_beacon_count(&other), bslam_slam_beacon_count(&slam));
+    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
+        bslam_beacon_view_t was;
+        bslam_beacon_view_t is;
+        assert_int_equal(bslam_slam_beacon(&slam, b, &was), BSLAM_OK);
+        assert_int_equal(bslam_slam_beacon(&other, b, &is), BSLAM_OK);
+        assert_int_equal(is.uid, was.uid);
+        assert_int_equal(is.kind, was.kind);
+        assert_int_equal(is.sightings, was.sightings);
+        assert_near(is.x_m, was.x_m, 1e-6);
+        assert_near(is.y_m, was.y_m, 1e-6);
+        assert_near(is.covariance_m2.xx, was.covariance_m2.xx, 1e-7 + 1e-6 * (double)was.covariance_m2.xx);
+    }
+    const int base = slam.ekf.base_dim;
+    for (int i = base; i < slam.ekf.dim; i++) {
+        for (int j = base; j <= i; j++) {
+            const double was = (double)bslam_symmat_get(slam.ekf.covariance, i, j);
+            assert_near(bslam_symmat_get(other.ekf.covariance, i, j), was, 1e-9 + 1e-6 * fabs(was));
+        }
+        for (int j = 0; j < base; j++) {
+            assert_true(bslam_symmat_get(other.ekf.covariance, i, j) == 0);
+        }
+    }
+    assert_int_equal(other.ekf.next_uid, slam.ekf.next_uid);
+    for (int object = 0; object < 4; object++) {
+        float signature[BSLAM_SAMPLE_FEATURES];
+        bslam_sample_t sample;
+        assert_int_equal(bslam_sample_encode(kept_signature(object, 50, signature), &sample), BSLAM_OK);
+        for (int b = 0; b < 4; b++) {
+            const bslam_opinion_t was = bslam_looks_ask(&looks, &slam.params, b, &sample);
+            const bslam_opinion_t is = bslam_looks_ask(&other_looks, &other.params, b, &sample);
+            assert_near(is.value, was.value, BSLAM_SAMPLE_FLOAT ? 0.02 : 0);
+            assert_near(is.weight, was.weight, 0);
+        }
+    }
+}
+
+static void test_map_write_of_a_loaded_map_gives_the_same_bytes(void **state)
+{
+    static uint8_t again[KEPT_BYTES_MAX];
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(kept_write(&other, again), size);
+#if !BSLAM_SAMPLE_FLOAT
+    assert_memory_equal(again, bytes, size);
+#endif
+}
+
+static void test_map_load_leaves_the_robot_without_a_place(void **state)
+{
+    load(BSLAM_MAP_LIVING);
+    bslam_real_t lower[6];
+    bslam_slam_pose_covariance(&other, lower);
+    assert_near(lower[0], 900, 1e-3);
+    assert_near(lower[5], 10.24, 1e-5);
+}
+
+static void test_map_load_frozen_changes_no_beacon_and_adds_none(void **state)
+{
+    load(BSLAM_MAP_FROZEN);
+    assert_int_equal(bslam_slam_beacon_count(&other), 4);  // the ray has no distance
+    const bslam_pose_t origin = {0, 0, 0};
+    assert_int_equal(bslam_slam_set_pose(&other, &origin, BSLAM_R(0.05), BSLAM_R(0.05)), BSLAM_OK);
+    bslam_beacon_view_t before[4];
+    for (int b = 0; b < 4; b++) {
+        assert_int_equal(bslam_slam_beacon(&other, b, &before[b]), BSLAM_OK);
+    }
+    for (int view = 0; view < 30; view++) {
+        float known[BSLAM_SAMPLE_FEATURES];
+        float strange[BSLAM_SAMPLE_FEATURES];
+        bslam_sighting_t seen[] = {unit_polar(-1.5, 2.05, -1), unit_polar(2.0, 5.0, -1)};
+        seen[0].signature = kept_signature(0, 100 + view, known);
+        seen[1].signature = kept_signature(5, 100 + view, strange);
+        const int64_t now_us = 40000 * (view + 1);
+        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+        assert_int_equal(bslam_slam_odometry(&other, &still), BSLAM_OK);
+        assert_int_equal(bslam_slam_sightings(&other, now_us, seen, 2), BSLAM_OK);
+    }
+    assert_true(bslam_slam_counters(&other)->matched > 20);
+    assert_true(bslam_slam_counters(&other)->frozen > 20);
+    assert_int_equal(bslam_slam_beacon_count(&other), 4);
+    for (int b = 0; b < 4; b++) {
+        bslam_beacon_view_t after;
+        assert_int_equal(bslam_slam_beacon(&other, b, &after), BSLAM_OK);
+        assert_true(after.x_m == before[b].x_m && after.y_m == before[b].y_m);
+    }
+    assert_int_equal(other_looks.counters.taught, 0);
+}
+
+static void test_map_write_leaves_out_provisional_beacons(void **state)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen = unit_polar(2.9, 6.0, -1);
+    seen.signature = kept_signature(5, 1, signature);
+    assert_int_equal(bslam_slam_sightings(&slam, 12 * 40000 + 1, &seen, 1), BSLAM_OK);
+    assert_int_equal(bslam_slam_counters(&slam)->added, 6);
+    size = kept_write(&slam, bytes);
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(bslam_slam_beacon_count(&other), 5);
+}
+
+// ---- what is refused --------------------------------------------------------------------------------------
+
+static void test_map_load_truncated_anywhere_is_refused(void **state)
+{
+    const uint32_t whole = size;
+    for (size = 0; size < whole; size += size < 200 ? 1 : 37) {
+        assert_refused(BSLAM_MAP_TRUNCATED);
+    }
+}
+
+static void test_map_load_with_a_byte_too_many_is_refused(void **state)
+{
+    size++;
+    assert_refused(BSLAM_MAP_TOO_LONG);
+}
+
+static void test_map_check_finds_every_flipped_bit(void **state)
+{
+    for (uint32_t bit = 0; bit < 8 * size; bit++) {
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+        const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
+        assert_int_not_equal(bslam_map_check(&source), BSLAM_MAP_FINE);
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+    }
+}
+
+/// A field that is wrong while the CRC is right.
+typedef struct wrong {
+    const char *what;
+    uint32_t at;
+    uint32_t value;
+    bslam_map_fault_t fault;
+} wrong_t;
+
+static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(void **state)
+{
+    const uint32_t v = values_at();
+    const uint32_t p = covariance_at();
+    const uint32_t first = BEACONS_AT;
+    const uint32_t machine = p + 4u * (uint32_t)((slam.ekf.dim - 3) * (slam.ekf.dim - 2) / 2);
+    const wrong_t cases[] = {
+        {"magic", 0, 0x4d4c5343, BSLAM_MAP_NO_MAP},
+        {"byte order", 4, 0x00010201, BSLAM_MAP_BYTE_ORDER},
+        {"version 2", 4, 0x00020102, BSLAM_MAP_OTHER_VERSION},
+        {"version 0", 4, 0x00000102, BSLAM_MAP_OTHER_VERSION},
+        {"beacons", 12, BSLAM_BEACONS_MAX + 1, BSLAM_MAP_BEACONS},
+        {"no beacons, but values", 12, 12u << 16, BSLAM_MAP_CONTENT},
+        {"values", 12, 5 | 60000u << 16, BSLAM_MAP_BEACONS},
+        {"machines", 16, (BSLAM_LEARNER_SLOTS + 1) | 71u << 16, BSLAM_MAP_MACHINES},
+        {"features", 16, 4 | 70u << 16, BSLAM_MAP_MACHINES},
+        {"next uid", 20, 2, BSLAM_MAP_CONTENT},
+        {"reserved", 24, 1, BSLAM_MAP_CONTENT},
+        {"uid twice", first + BEACON_BYTES, 0, BSLAM_MAP_CONTENT},
+        {"label", first + 4, 0x80000000, BSLAM_MAP_CONTENT},
+        {"kind", first + 8, 3, BSLAM_MAP_CONTENT},
+        {"machine", first + 8, 4u << 16, BSLAM_MAP_CONTENT},
+        {"position NaN", first + 20, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
+        {"state infinite", v + 4, 0x7f800000, BSLAM_MAP_NOT_FINITE},
+        {"state huge", v + 4, 0x7f000000, BSLAM_MAP_NOT_FINITE},
+        {"covariance NaN", p + 4, 0xffc00001, BSLAM_MAP_NOT_FINITE},
+        {"variance too small for its correlations", p, 0, BSLAM_MAP_COVARIANCE},
+        {"variance negative", p + 8, 0xbf800000, BSLAM_MAP_COVARIANCE},
+        {"correlation", p + 4, 0x41200000, BSLAM_MAP_COVARIANCE},
+        {"samples", machine, 65, BSLAM_MAP_MACHINES},
+        {"trained", machine, 2u << 8, BSLAM_MAP_CONTENT},
+        {"rivals", machine, 0xffff0100, BSLAM_MAP_MACHINES},
+        {"unit NaN", machine + 4, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
+        {"unit negative", machine + 4, 0xbf800000, BSLAM_MAP_CONTENT},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        setup(NULL);
+        put_u32(cases[i].at, cases[i].value);
+        seal();
+        print_message("%s\n", cases[i].what);
+        assert_refused(cases[i].fault);
+    }
+}
+
+static void test_map_load_where_the_source_fails_is_refused(void **state)
+{
+    put_float(values_at(), 1.0f);
+    assert_refused(BSLAM_MAP_BAD_CRC);
+    for (int fault = 0; fault < BSLAM_MAP_FAULT_COUNT; fault++) {
+        assert_true(strlen(bslam_map_fault_name((bslam_map_fault_t)fault)) > 3);
+    }
+    assert_string_equal(bslam_map_fault_name(BSLAM_MAP_FAULT_COUNT), "unknown fault");
+}
+
+static void test_map_write_into_too_little_room_says_so(void **state)
+{
+    bslam_map_memory_t memory = {bytes, size - 1, 0};
+    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_write(&slam, &sink, &fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_map_load_living_gives_beacons_covariance_and_looks_back, setup),
+        cmocka_unit_test_setup(test_map_write_of_a_loaded_map_gives_the_same_bytes, setup),
+        cmocka_unit_test_setup(test_map_load_leaves_the_robot_without_a_place, setup),
+        cmocka_unit_test_setup(test_map_load_frozen_changes_no_beacon_and_adds_none, setup),
+        cmocka_unit_test_setup(test_map_write_leaves_out_provisional_beacons, setup),
+        cmocka_unit_test_setup(test_map_load_truncated_anywhere_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_with_a_byte_too_many_is_refused, setup),
+        cmocka_unit_test_setup(test_map_check_finds_every_flipped_bit, setup),
+        cmocka_unit_test_setup(test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name, setup),
+        cmocka_unit_test_setup(test_map_load_where_the_source_fails_is_refused, setup),
+        cmocka_unit_test_setup(test_map_write_into_too_little_room_says_so, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,150 @@
+#include "kept_map.h"
+
+static bslam_slam_t old_slam;
+static bslam_slam_t new_slam;
+static bslam_slam_t loaded;
+static kept_flash_t flash;
+static uint8_t old_bytes[KEPT_BYTES_MAX];
+static uint8_t new_bytes[KEPT_BYTES_MAX];
+static uint32_t old_size;
+static uint32_t new_size;
+
+static void save(const bslam_slam_t *slam, bslam_status_t expected)
+{
+    const bslam_flash_t interface = kept_flash(&flash);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_slots_save(&interface, slam, &fault), expected);
+}
+
+static bslam_status_t load(bslam_map_fault_t *fault)
+{
+    const bslam_flash_t interface = kept_flash(&flash);
+    kept_empty(&loaded, NULL);
+    return bslam_slots_load(&interface, &loaded, BSLAM_MAP_LIVING, fault);
+}
+
+/// What is loaded, as bytes again: the old map, the new one, or the test fails.
+static bool loads_new(void)
+{
+    static uint8_t bytes[KEPT_BYTES_MAX];
+    bslam_map_fault_t fault;
+    flash.left = UINT32_MAX;
+    assert_int_equal(load(&fault), BSLAM_OK);
+    const uint32_t size = kept_write(&loaded, bytes);
+    const bool is_old = size == old_size && memcmp(bytes, old_bytes, size) == 0;
+    const bool is_new = size == new_size && memcmp(bytes, new_bytes, size) == 0;
+    assert_true(is_old || is_new);
+    return is_new;
+}
+
+/// A pipeline whose map was once a blob, so that its numbers are float32 whatever the build: its bytes stay.
+static uint32_t make_kept(bslam_slam_t *slam, int objects, uint8_t bytes[KEPT_BYTES_MAX])
+{
+    kept_make(slam, NULL, objects);
+    const bslam_map_source_t source = bslam_map_from_memory(bytes, kept_write(slam, bytes));
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_load(slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_OK);
+    return kept_write(slam, bytes);
+}
+
+static int setup(void **state)
+{
+    old_size = make_kept(&old_slam, 2, old_bytes);
+    new_size = make_kept(&new_slam, 3, new_bytes);
+    memset(&flash, 0xff, sizeof flash);
+    flash.left = UINT32_MAX;
+    return 0;
+}
+
+static void test_slots_load_nothing_saved_says_no_map(void **state)
+{
+    bslam_map_fault_t fault;
+    assert_int_equal(load(&fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_NO_MAP);
+}
+
+static void test_slots_load_gives_the_map_saved_last(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    assert_false(loads_new());
+    for (int turn = 0; turn < 5; turn++) {
+        save(&new_slam, BSLAM_OK);
+        assert_true(loads_new());
+        save(&old_slam, BSLAM_OK);
+        assert_false(loads_new());
+    }
+}
+
+/// Bytes that a save of the new map erases and writes.
+static uint32_t save_takes(void)
+{
+    static kept_flash_t before;
+    before = flash;
+    const uint32_t used = flash.used;
+    save(&new_slam, BSLAM_OK);
+    const uint32_t taken = flash.used - used;
+    flash = before;
+    return taken;
+}
+
+static void test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new(void **state)
+{
+    static kept_flash_t before;
+    save(&new_slam, BSLAM_OK);
+    save(&old_slam, BSLAM_OK);  // both slots are used: the save must erase one
+    before = flash;
+    const uint32_t takes = save_takes();
+    uint32_t old_maps = 0;
+    for (uint32_t cut = 0; cut < takes; cut++) {
+        flash = before;
+        flash.left = cut;
+        save(&new_slam, BSLAM_E_MAP);
+        old_maps += loads_new() ? 0u : 1u;
+        if (cut % 97 == 0) {  // and the next save succeeds
+            save(&new_slam, BSLAM_OK);
+            assert_true(loads_new());
+        }
+    }
+    assert_int_equal(old_maps, takes);  // the last byte makes it the new one
+    flash = before;
+    flash.left = takes;
+    save(&new_slam, BSLAM_OK);
+    assert_true(loads_new());
+}
+
+static void test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    save(&new_slam, BSLAM_OK);
+    for (int slot = 0; slot < BSLAM_SLOTS; slot++) {
+        if (memcmp(&flash.slots[slot][16], new_bytes, new_size) == 0) {
+            flash.slots[slot][16 + 40] ^= 4;
+        }
+    }
+    assert_false(loads_new());
+    save(&new_slam, BSLAM_OK);
+    assert_true(loads_new());
+}
+
+static void test_slots_a_map_larger_than_a_slot_is_refused_and_the_old_stays(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    bslam_flash_t small = kept_flash(&flash);
+    small.slot_bytes = new_size + 8;
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_slots_save(&small, &new_slam, &fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+    assert_false(loads_new());
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_slots_load_nothing_saved_says_no_map, setup),
+        cmocka_unit_test_setup(test_slots_load_gives_the_map_saved_last, setup),
+        cmocka_unit_test_setup(test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new, setup),
+        cmocka_unit_test_setup(test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next, setup),
+        cmocka_unit_test_setup(test_slots_a_map_larger_than_a_slot_is_refused_and_the_old_stays, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
