@@ -50,6 +50,7 @@ class Box:
 
     outline: tuple[float, float, float, float]  # left, top, right, bottom
     lines: tuple[str, ...]
+    result: str  # what became of its sighting, as in Told; "": nothing yet
 
 
 @dataclass(frozen=True)

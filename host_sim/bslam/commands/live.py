@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +22,23 @@ from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
 from bslam.errors import BslamError
 from bslam.experiment.batch import BatchResult, Job, Outcome, make_jobs, write_files
+from bslam.experiment.camera import unseen_log
+from bslam.experiment.eye import Eye
 from bslam.experiment.output import write_summary
 from bslam.experiment.player import Player
+from bslam.experiment.sources import CameraSource
 from bslam.experiment.trace import Trace
 from bslam.experiment.truth import step_times_us
 from bslam.log import Log
 from bslam.moment import FAILED, Stage
+from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "watch the filter at work in the browser: pause it, step it, see why each sighting was taken"
 EXAMPLES = """examples:
   bslam live paper_room
   bslam live paper_room --seed 3 --observation direction --speed 4
+  bslam live paper_room --sensor camera
   bslam live pairs --association mahalanobis --paused
   bslam live csv out/run/paper_room_seed0
   bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
@@ -87,8 +93,7 @@ def execute(arguments: argparse.Namespace) -> int:
     except ImportError as error:
         raise BslamError(f"{error}; allowed: pip install 'bslam[live]'") from error
     job = _job(arguments)
-    log = job.source.load()
-    show = _Show(job, log, arguments.out.absolute(), arguments.speed)
+    show = _Show(job, arguments.out.absolute(), arguments.speed)
 
     def open_page(document) -> None:  # type: ignore[no-untyped-def]
         Page(document, show.stage, lambda: show.player.moment, show.player.pace)
@@ -115,15 +120,20 @@ def execute(arguments: argparse.Namespace) -> int:
 class _Show:
     """The run behind the page, and what it leaves."""
 
-    def __init__(self, job: Job, log: Log, out: Path, speed: float) -> None:
+    def __init__(self, job: Job, out: Path, speed: float) -> None:
+        log, eye = _open(job)
         self.stage = _stage(job, log)
         self.opened = False
         self._job, self._log, self._out = job, log, out
         self._outcome: Outcome | None = None
-        self.player = Player(log, job.options, align=job.source.align, speed=speed, finished=self._finished)
+        self._eye = eye
+        self.player = Player(
+            log, job.options, align=job.source.align, speed=speed, eye=eye, finished=self._finished
+        )
 
     def _finished(self, trace: Trace) -> None:
-        self._outcome = write_files(self._job, self._out, self._log, trace)
+        log = self._log if self._eye is None else replace(self._log, sightings=self._eye.sightings())
+        self._outcome = write_files(self._job, self._out, log, trace)
         write_summary(self._out, [self._outcome.entry])
 
     def end(self) -> int:
@@ -155,6 +165,16 @@ def _job(arguments: argparse.Namespace) -> Job:
         source = scenario_source(arguments, arguments.seed, sigma_mps, noise)
         options = run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=arguments.seed)
     return make_jobs([source], [options], draw, pictures=1)[0]
+
+
+def _open(job: Job) -> tuple[Log, Eye | None]:
+    """The log; of a drive that cameras watch without its sightings, and the eye that makes them."""
+    source = job.source
+    if not isinstance(source, CameraSource):
+        return source.load(), None
+    scenario, rig = load_scenario(source.scenario), load_rig(source.rig)
+    log, glances = unseen_log(scenario, source.seed, source.sigma_mps, source.noise, rig)
+    return log, Eye(log, job.options, glances)
 
 
 def _stage(job: Job, log: Log) -> Stage:

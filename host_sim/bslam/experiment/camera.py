@@ -80,6 +80,17 @@ class CameraDrive:
 
 
 @dataclass(frozen=True)
+class Glance:
+    """A frame, and what the front end saw in it."""
+
+    step: int
+    camera: int
+    rgb: NDArray[np.uint8]  # (h, w, 3)
+    candidates: tuple[Candidate, ...]  # those that have a direction
+    rows: list[tuple[Any, ...]]  # of SEEN, one a candidate
+
+
+@dataclass(frozen=True)
 class CameraStore:
     """Where rendered drives are kept. A file's name holds all that it depends on: nothing stale is read."""
 
@@ -106,16 +117,34 @@ def camera_log(
 
     Its machines start from the same generic looks: they do as well as signatures of rendered things.
     """
+    scenario = _checked(scenario, sigma_mps, noise, rig)
+    return _log_of(scenario, seed, rig, store.drive(scenario, seed, rig))
+
+
+def unseen_log(
+    scenario: Scenario, seed: int, sigma_mps: float | None, noise: str | None, rig: Rig
+) -> tuple[Log, Iterator[Glance]]:
+    """The same before anything is seen, so without sightings, and what its cameras will see, step by step."""
+    scenario = _checked(scenario, sigma_mps, noise, rig)
+    scene = dress(scenario, seed)
+    log = _log_of(scenario, seed, rig, CameraDrive(_places(scene), np.empty(0, SEEN)))
+    return log, _watch(scene, scenario, seed, rig)
+
+
+def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig: Rig) -> Scenario:
+    """The scenario with the noise that is asked for. Raises BslamError for cameras that stand apart."""
     first = rig.cameras[0]
     if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
         raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
-    scenario = with_noise(scenario, sigma_mps, noise)
-    drive = store.drive(scenario, seed, rig)
+    return with_noise(scenario, sigma_mps, noise)
+
+
+def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
     log = simulate(replace(scenario, arena=drive.arena(scenario.arena)), seed)
     robot = replace(
         log.robot,
-        sensor_x_m=first.x_m,
-        sensor_y_m=first.y_m,
+        sensor_x_m=rig.cameras[0].x_m,
+        sensor_y_m=rig.cameras[0].y_m,
         sensor_yaw_rad=0.0,  # bearings are in the robot's frame already
         sighting_delay_us=0,
         sighting_correlation_m=CORRELATION_M,
@@ -126,13 +155,16 @@ def camera_log(
 def watch(scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
     """Drive, render one frame a step, the cameras in turn, and keep what the front end sees in each."""
     scene = dress(scenario, seed)
-    seen = np.array(list(_watch(scene, scenario, seed, rig)), dtype=SEEN)
-    places = np.array([(one.beacon_id, *one.at) for one in scene.arena.beacons]).reshape(-1, 3)
-    return CameraDrive(places, seen)
+    rows = [row for glance in _watch(scene, scenario, seed, rig) for row in glance.rows]
+    return CameraDrive(_places(scene), np.array(rows, dtype=SEEN))
 
 
-def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig) -> Iterator[tuple[Any, ...]]:
-    """A row of SEEN for each thing in a frame that has a direction."""
+def _places(scene: Scene) -> NDArray[np.float64]:
+    return np.array([(one.beacon_id, *one.at) for one in scene.arena.beacons]).reshape(-1, 3)
+
+
+def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig) -> Iterator[Glance]:
+    """One frame a step."""
     path = true_drive(scenario, seed)
     renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
     front_end, aim = FrontEnd(rig.cameras, threshold=_THRESHOLD), Aim(rig)
@@ -145,8 +177,9 @@ def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig) -> Iterator[tu
         picture = renderers[camera].render((x_m, y_m, theta_rad), step * step_s, aim.angle_rad)
         before = poses[max(step - len(rig.cameras), 0)]  # when this camera took its last picture
         seeing = front_end.see(picture.rgb, camera, step == 0 or aim.moved or before != poses[step])
-        rows = [_row(step, one, picture.identity) for one in seeing.candidates if one.bearing_rad is not None]
-        yield from rows
+        measured = [one for one in seeing.candidates if one.bearing_rad is not None]
+        rows = [_row(step, one, picture.identity) for one in measured]
+        yield Glance(step, camera, picture.rgb, tuple(measured), rows)
         aim.turn([row[2] for row in rows], step * step_s, step_s)
 
 

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.experiment.align import Rigid, fit_rigid, wrap_angle
+from bslam.experiment.eye import Eye
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.experiment.trace import Trace
 from bslam.experiment.truth import step_times_us, truth_at
 from bslam.log import Log
-from bslam.moment import FAILED, FINISHED, PAUSED, RUNNING, Course, Moment, Shown, Spot, Told
+from bslam.moment import FAILED, FINISHED, PAUSED, RUNNING, Course, Moment, Spot, Told
 
 _PUBLISH_S: Final = 0.03  # moments that follow each other sooner nobody sees
 _ALIGN_S: Final = 1.0
@@ -110,8 +111,9 @@ class Pace:
 class Player:
     """One run over a log. It stands at the start until `pace` is told to play or to step.
 
-    align: the truth has a frame of its own. finished: called in the run's thread with the trace of a run that
-    came to its end; raises BslamError where that goes wrong.
+    align: the truth has a frame of its own. eye: what it sees is taken in place of the log's sightings.
+    finished: called in the run's thread with the trace of a run that came to its end; raises BslamError where
+    that goes wrong.
     """
 
     def __init__(
@@ -121,11 +123,12 @@ class Player:
         *,
         align: bool = False,
         speed: float = 1.0,
+        eye: Eye | None = None,
         finished: Callable[[Trace], None] | None = None,
     ) -> None:
         self.pace = Pace(speed)
-        self._log, self._options, self._finished = log, options, finished
-        self._books = _Books(log, align)
+        self._log, self._options, self._eye, self._finished = log, options, eye, finished
+        self._books = _Books(log, align, eye)
         self._published_s, self._stale = 0.0, False
         self.moment = self._books.moment(PAUSED)
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
@@ -143,7 +146,7 @@ class Player:
     def _run(self) -> None:
         state, message = FINISHED, ""
         try:
-            trace = run_log(self._log, self._options, watcher=self)
+            trace = run_log(self._log, self._options, watcher=self, frames=self._eye)
             if self._finished is not None:
                 self._finished(trace)
         except StopRun:
@@ -180,7 +183,7 @@ class Player:
 class _Books:
     """What there is to say of a run so far."""
 
-    def __init__(self, log: Log, align: bool) -> None:
+    def __init__(self, log: Log, align: bool, eye: Eye | None) -> None:
         times_us = step_times_us(log)
         rows = len(times_us)
         self.start_us = int(times_us[0])
@@ -201,7 +204,7 @@ class _Books:
         self._frame: tuple[Told, ...] = ()
         self._told: deque[Told] = deque(maxlen=_TOLD_KEPT)
         self._entered: list[Told] = []
-        self._shown: Shown | None = None
+        self._eye = eye
 
     def enter_frame(
         self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
@@ -256,7 +259,7 @@ class _Books:
             true_beacons_m=self._beacons_m,
             frame=self._frame,
             told=tuple(self._told),
-            shown=self._shown,
+            shown=None if self._eye is None else self._eye.shown(self._frame),
             message=message,
         )
 

@@ -43,10 +43,20 @@ class Watcher(Protocol):
     def frame(
         self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
     ) -> None:
-        """The filter has worked off a frame (columns: `_columns_for_filter`); accounts None: refused it."""
+        """The filter has worked off a frame (columns: `columns_for_filter`); accounts None: refused it."""
 
     def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
         """A row of the trace is done; `slam` may be asked anything."""
+
+
+class FrameFeed(Protocol):
+    """Frames of sightings in order of time, as the filter is to see them."""
+
+    def waiting_before(self, until_us: int | None) -> bool:
+        """There is one stamped before `until_us`; None: there is one."""
+
+    def take(self) -> tuple[int, Sequence[int], list[Any]]:
+        """Time, true identities, and the columns of the next frame, see `columns_for_filter`."""
 
 
 def run_log(
@@ -55,13 +65,16 @@ def run_log(
     slam_factory: SlamFactory | None = None,
     watcher: Watcher | None = None,
     record: Path | None = None,
+    frames: FrameFeed | None = None,
 ) -> Trace:
     """Run the filter over the log. Raises BslamError if the core does not accept the parameters.
 
     What the core refuses on the way (an impossible time stamp, say) is counted in `Trace.refusals` and the
     run goes on, as a robot would. `slam_factory` makes the filter from its parameters and the number of
-    beacons to hold. `record` is the file of the recording to make.
+    beacons to hold. `record` is the file of the recording to make. `frames` are taken in place of the log's
+    sightings.
     """
+    frames = frames or Frames(log.sightings, options)
     params, beacons = core_params(options, log), _beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
         if options.real != "float":
@@ -70,26 +83,27 @@ def run_log(
         with connect(
             options.target, params, beacons, fingerprints=record is not None, looks=looks, seeds=log.seeds
         ) as slam:
-            return _run(slam, log, options, watcher, record, slam.target_description)
+            return _run(slam, log, options, frames, watcher, record, slam.target_description)
     factory = slam_factory or partial(_make_slam, options, log)
-    return _run(factory(params, beacons), log, options, watcher, record)
+    return _run(factory(params, beacons), log, options, frames, watcher, record)
 
 
 def _run(
     slam: Any,
     log: Log,
     options: RunOptions,
+    frames: FrameFeed,
     watcher: Watcher | None,
     record: Path | None,
     target: Callable[[], Mapping[str, Any]] | None = None,
 ) -> Trace:
     """`target` tells of what it runs on, if not here."""
     if record is None:
-        return _Run(slam, log, options, watcher).finish(target and target())
+        return _Run(slam, log, options, frames, watcher).finish(target and target())
     start = start_of(log, slam.params, _beacons_to_hold(log, options), _uses_looks(options), options.real)
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
-        trace = _Run(recorder, log, options, watcher).finish(target and target())
+        trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
         recorder.finish()
     return trace
 
@@ -114,10 +128,12 @@ def _beacons_to_hold(log: Log, options: RunOptions) -> int:
 class _Run:
     """One pass over a log; lists rather than small arrays inside, since the loop runs some thousand times."""
 
-    def __init__(self, slam: Any, log: Log, options: RunOptions, watcher: Watcher | None) -> None:
+    def __init__(
+        self, slam: Any, log: Log, options: RunOptions, frames: FrameFeed, watcher: Watcher | None
+    ) -> None:
         self.slam, self.watcher = slam, watcher
         self.recorded = isinstance(slam, Recorder)
-        self.frames = _Frames(log.sightings, options)
+        self.frames = frames
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
             self._give_map(log)
@@ -301,7 +317,7 @@ def _as_written(value: Number) -> Number:
     return value if isinstance(value, int) else float(f"{value:.7g}")
 
 
-class _Frames:
+class Frames:
     """Sightings in frames of equal time, as the filter is to see them: without what it must not know."""
 
     def __init__(self, sightings: Sightings, options: RunOptions) -> None:
@@ -310,17 +326,18 @@ class _Frames:
         self._bounds = [*first.tolist(), len(times)]
         self._time_us: list[int] = times[first].tolist()
         self._true_id: list[int] = sightings.beacon_id.tolist()
-        self._columns = _columns_for_filter(sightings, options)
+        self._columns = columns_for_filter(sightings, options)
         self._signature = sightings.signature if _uses_looks(options) else None
         self._next = 0
 
     def waiting_before(self, until_us: int | None) -> bool:
+        """As `FrameFeed.waiting_before`."""
         if self._next == len(self._time_us):
             return False
         return until_us is None or self._time_us[self._next] < until_us
 
     def take(self) -> tuple[int, Sequence[int], list[Any]]:
-        """Time, true identities, and the columns of the next frame, see `_columns_for_filter`."""
+        """As `FrameFeed.take`."""
         frame = self._next
         rows = slice(self._bounds[frame], self._bounds[frame + 1])
         self._next = frame + 1
@@ -330,7 +347,7 @@ class _Frames:
         return self._time_us[frame], self._true_id[rows], columns
 
 
-def _columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:
+def columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:
     """bearing_rad, range_m, label, mappable of all sightings, with what the options hide hidden.
 
     And the noise, bearing_sd_rad, range_sd_m, of a detector that gives it.

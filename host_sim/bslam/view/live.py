@@ -21,7 +21,7 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from bslam.moment import FAILED, FINISHED, Moment, Shown, Spot, Stage, Told
-from bslam.view.frames import Mark, annotate
+from bslam.view.frames import RIGHT, UNKNOWN, WRONG, Mark, annotate
 from bslam.view.style import BAND, BEACON, ESTIMATE, SECOND, TRUTH, WALL
 
 SPEEDS: Final[dict[str, float]] = {
@@ -38,12 +38,14 @@ RESULT_COLOURS: Final = {
     "rejected": SECOND,
     "refused": SECOND,
 }
+_ON_FRAME: Final = {"matched": RIGHT, "new": "#5ab4ff", "rejected": WRONG, "refused": WRONG}
 RESULT_WORDS: Final = {"matched": "fused", "new": "new beacon"}
 _REFRESH_MS: Final = 20
 _ROWS_MOST: Final = 4000  # of a path: more than a screen has pixels only costs time
 _SIGMAS: Final = 2.0  # size of the ellipses
 _RAY_M: Final = 3.0  # of a sighting without a distance and without a beacon
-_TOLD_SHOWN: Final = 14
+_NOSE_M: Final = 0.35  # how far the robot's heading is drawn
+_TOLD_SHOWN: Final = 16
 _ROOM_PX: Final = 640
 _SIDE_PX: Final = 560
 
@@ -85,7 +87,7 @@ class Page:
         self._sources = {name: ColumnDataSource(columns) for name, columns in _EMPTY.items()}
         self._sources["walls"].data = dict(zip(("x0", "y0", "x1", "y1"), stage.walls_m.T, strict=True))
         self._status, self._told = Div(), Div(width=_SIDE_PX)
-        self._camera = Div(width=_SIDE_PX, height=440, visible=stage.has_camera)
+        self._camera = Div(width=_SIDE_PX, height=450, visible=stage.has_camera)
         self._pause = Button(label="Play", button_type="primary", width=90)
         step = Button(label="Step", width=90)
         speed = RadioButtonGroup(labels=list(SPEEDS))
@@ -95,8 +97,8 @@ class Page:
         step.on_click(controls.step)
         speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
         bar = row(self._pause, step, Div(text="times real speed:"), speed)
-        side = column(self._camera, self._error_plot(), self._told)
-        document.add_root(column(bar, self._status, row(self._room_plot(), side)))
+        left, right = column(self._room_plot(), self._error_plot()), column(self._camera, self._told)
+        document.add_root(column(bar, self._status, row(left, right)))
         document.title = f"bslam: {stage.title}"
         document.add_periodic_callback(self.refresh, _REFRESH_MS)
         self.refresh()
@@ -110,7 +112,7 @@ class Page:
     def _room_plot(self) -> Any:
         """Everything in the plane; as much of it as the walls and the truth take."""
         x_low, y_low, x_high, y_high = self._stage.extent_m
-        tall_px = min(max(int(_ROOM_PX * (y_high - y_low) / (x_high - x_low)), 300), 760)
+        tall_px = min(max(int(_ROOM_PX * (y_high - y_low) / (x_high - x_low)), 300), 560)
         plot = figure(
             width=_ROOM_PX,
             height=tall_px + 90,
@@ -138,8 +140,8 @@ class Page:
         plot.ellipse(
             "x", "y", "width", "height", "angle", source=source["doubt"], fill_alpha=0.2, color=ESTIMATE
         )
-        robot = {"marker": "triangle", "size": 15, "angle": "angle", "color": "colour", "line_color": "white"}
-        plot.scatter("x", "y", source=source["robots"], **robot)
+        plot.segment("x", "y", "x1", "y1", source=source["robots"], color="colour", line_width=3)
+        plot.scatter("x", "y", source=source["robots"], size=11, color="colour", line_color="white")
         tips = [("beacon", "@name"), ("sightings", "@sightings"), ("sd, m", "@sd_m{0.000}")]
         plot.add_tools(HoverTool(renderers=[crosses], tooltips=tips))
         plot.legend.location = "bottom_center"
@@ -149,8 +151,8 @@ class Page:
 
     def _error_plot(self) -> Any:
         plot = figure(
-            width=_SIDE_PX,
-            height=230,
+            width=_ROOM_PX,
+            height=210,
             tools="pan,wheel_zoom,box_zoom,reset,save",
             x_axis_label="time, s",
             y_axis_label="m",
@@ -218,14 +220,12 @@ class Page:
         poses = [(*estimate, ESTIMATE)]
         if np.isfinite(truth).all():
             poses.insert(0, (*truth, TRUTH))
-        columns = list(zip(*poses, strict=True))
-        angle = [theta_rad - 0.5 * math.pi for theta_rad in columns[2]]  # the marker points up
-        self._sources["robots"].data = {
-            "x": columns[0],
-            "y": columns[1],
-            "angle": angle,
-            "colour": columns[3],
-        }
+        robots: dict[str, list[Any]] = {name: [] for name in _EMPTY["robots"]}
+        for x_m, y_m, theta_rad, colour in poses:
+            nose_m = (x_m + _NOSE_M * math.cos(theta_rad), y_m + _NOSE_M * math.sin(theta_rad))
+            for name, value in zip(robots, (x_m, y_m, *nose_m, colour), strict=True):
+                robots[name].append(value)
+        self._sources["robots"].data = robots
         self._sources["doubt"].data = _ellipses([(estimate[0], estimate[1], moment.covariance_m2)])
         self._sources["rays"].data = self._rays(estimate, moment)
 
@@ -257,7 +257,7 @@ _EMPTY: Final[dict[str, dict[str, list[Any]]]] = {
         name: [] for name in ("x", "y", "width", "height", "angle", "alpha", "name", "sightings", "sd_m")
     },
     "rays": {"x0": [], "y0": [], "x1": [], "y1": [], "colour": []},
-    "robots": {"x": [], "y": [], "angle": [], "colour": []},
+    "robots": {"x": [], "y": [], "x1": [], "y1": [], "colour": []},
     "doubt": {"x": [], "y": [], "width": [], "height": [], "angle": []},
 }
 
@@ -292,7 +292,7 @@ def _told_table(told: Sequence[Told]) -> str:
     """What became of the newest sightings, and why."""
     heads = ("time, s", "bearing, rad", "range, m", "true beacon", "became", "why", "beacon", "test ratio")
     rows = "".join(_told_row(one) for one in told)
-    cells = "".join(f"<th style='padding: 0 0.6em'>{head}</th>" for head in heads)
+    cells = "".join(f"<th style='padding: 0 0.7em'>{head}</th>" for head in heads)
     return f"<table style='text-align: right; font-size: 12px'><tr>{cells}</tr>{rows}</table>"
 
 
@@ -312,7 +312,7 @@ def _told_row(one: Told) -> str:
 
 
 def _camera_html(shown: Shown) -> str:
-    marks = [Mark(one.outline, tuple(one.lines), SECOND) for one in shown.boxes]
+    marks = [Mark(one.outline, one.lines, _ON_FRAME.get(one.result, UNKNOWN)) for one in shown.boxes]
     buffer = io.BytesIO()
     annotate(shown.rgb, marks, shown.caption).save(buffer, format="JPEG", quality=80)
     data = base64.b64encode(buffer.getvalue()).decode()

@@ -14,7 +14,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+import bslam
 from bslam.cli import main
+from bslam.experiment.options import RunOptions
+from bslam.experiment.output import tum
+from bslam.experiment.runner import run_log
+from bslam.experiment.sources import CameraSource
 
 STATUS = re.compile(r"(running|paused|finished|failed) · step (\d+) of (\d+)")
 
@@ -91,6 +96,32 @@ def test_live_pause_step_and_speed_act_on_the_running_filter(page: Page, tmp_pat
     )
     assert watched == alone
     assert json.loads((tmp_path / "summary.json").read_text())["runs"][0]["steps"] == 5000
+
+
+def test_live_camera_shows_its_frames_and_what_became_of_what_it_saw(page: Page, tmp_path: Path) -> None:
+    world = (Path(bslam.__file__).parent / "scenarios/paper_room.toml").read_text(encoding="utf-8")
+    assert "steps = 5000\n" in world
+    short = tmp_path / "short.toml"
+    short.write_text(world.replace("steps = 5000\n", "steps = 60\n"), encoding="utf-8")
+    with live(short, "--sensor", "camera", "--speed", "inf", out=tmp_path) as command:
+        page.goto(command.url)
+        expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
+        picture = page.get_by_role("img", name="camera")
+        assert picture.evaluate("image => image.naturalWidth") == 960
+        expect(page.get_by_text("fused").first).to_be_visible()
+        assert command.end()[0] == 0
+    # What the eye sees step by step is what a drive that was rendered first has.
+    source = CameraSource(str(short), 0, None, None, "three60", tmp_path / "store")
+    options = RunOptions(
+        association="svm", sensor="camera", rig="three60", noise="speedometer", sigma_mps=0.3
+    )
+    log = source.load()
+    assert len(log.sightings.time_us) > 5
+    trace = run_log(log, options)
+    watched = (tmp_path / "short_seed0.estimate.tum").read_text()
+    assert watched == tum(trace.time_us, trace.pose)
+    entry = json.loads((tmp_path / "summary.json").read_text())["runs"][0]
+    assert entry["sightings"] == len(log.sightings.time_us)
 
 
 def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
