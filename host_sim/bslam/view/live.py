@@ -15,8 +15,8 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.layouts import column, row
-from bokeh.models import Button, ColumnDataSource, Div, HoverTool, RadioButtonGroup, Range1d
+from bokeh.layouts import row
+from bokeh.models import Button, ColumnDataSource, CustomJS, Div, HoverTool, RadioButtonGroup, Range1d
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
@@ -48,6 +48,25 @@ _NOSE_M: Final = 0.35  # how far the robot's heading is drawn
 _TOLD_SHOWN: Final = 16
 _ROOM_PX: Final = 640
 _SIDE_PX: Final = 560
+
+
+# Each part is a document of its own in it: where a text changes, only that text is laid out anew.
+_TEMPLATE: Final = """
+{% block contents %}
+<div style="display: flex; gap: 1em; flex-wrap: wrap; align-items: center">
+  {{ embed(roots.bar) }}{{ embed(roots.status) }}
+</div>
+<div style="display: flex; gap: 1em; flex-wrap: wrap">
+  <div>{{ embed(roots.room) }}{{ embed(roots.error) }}</div>
+  <div>{{ embed(roots.camera) }}{{ embed(roots.told) }}</div>
+</div>
+{% endblock %}
+"""
+
+
+# After a frame of the browser's: a browser that is slow, or whose page nobody looks at, gets less and later,
+# instead of a queue that grows.
+_SAY_DRAWN: Final = "requestAnimationFrame(() => { drawn.data = {times: [drawn.data.times[0] + 1]} })"
 
 
 class Controls(Protocol):
@@ -82,12 +101,16 @@ class Page:
     ) -> None:
         self._stage, self._moment, self._controls = stage, moment, controls
         self._drawn: Moment | None = None
+        self._under_way = False  # something was sent that the browser has not drawn yet
         self._rows = 0  # of the course that are in the document
         self._truth: NDArray[np.float64] | None = None
         self._sources = {name: ColumnDataSource(columns) for name, columns in _EMPTY.items()}
         self._sources["walls"].data = dict(zip(("x0", "y0", "x1", "y1"), stage.walls_m.T, strict=True))
         self._status, self._told = Div(), Div(width=_SIDE_PX)
         self._camera = Div(width=_SIDE_PX, height=450, visible=stage.has_camera)
+        drawn = ColumnDataSource({"times": [0]})
+        drawn.on_change("data", lambda _attribute, _old, _new: self._note_drawn())
+        self._status.js_on_change("text", CustomJS(args={"drawn": drawn}, code=_SAY_DRAWN))
         self._pause = Button(label="Play", button_type="primary", width=90)
         step = Button(label="Step", width=90)
         speed = RadioButtonGroup(labels=list(SPEEDS))
@@ -97,11 +120,20 @@ class Page:
         step.on_click(controls.step)
         speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
         bar = row(self._pause, step, Div(text="times real speed:"), speed)
-        left, right = column(self._room_plot(), self._error_plot()), column(self._camera, self._told)
-        document.add_root(column(bar, self._status, row(left, right)))
+        parts = {"bar": bar, "status": self._status, "room": self._room_plot(), "error": self._error_plot()}
+        parts |= {"camera": self._camera, "told": self._told}
+        for name, part in parts.items():
+            part.name = name
+            document.add_root(part)
+        document.template = _TEMPLATE
         document.title = f"bslam: {stage.title}"
         document.add_periodic_callback(self.refresh, _REFRESH_MS)
         self.refresh()
+        self._under_way = True  # until the browser has all of that
+        document.on_event("document_ready", lambda _event: self._note_drawn())
+
+    def _note_drawn(self) -> None:
+        self._under_way = False
 
     def _toggle(self) -> None:
         if self._controls.playing:
@@ -165,14 +197,16 @@ class Page:
         return plot
 
     def refresh(self) -> None:
-        """Send what is new since the last time."""
+        """Send what is new since the last time, unless the browser is still busy with that."""
         moment = self._moment()
-        if moment is self._drawn:
+        if moment is self._drawn or self._under_way:
             return
         self._drawn = moment
         self._pause.label = "Pause" if self._controls.playing else "Play"
         self._pause.disabled = moment.state in (FINISHED, FAILED)
-        self._status.text = self._words(moment)
+        words = self._words(moment)
+        self._under_way = words != self._status.text
+        self._status.text = words
         self._send_course(moment)
         self._send_robot(moment)
         self._sources["beacons"].data = _columns(("x", "y"), moment.true_beacons_m)
