@@ -56,7 +56,7 @@ _TEMPLATE: Final = """
 <div style="display: flex; gap: 1em; flex-wrap: wrap; align-items: center">
   {{ embed(roots.bar) }}{{ embed(roots.status) }}
 </div>
-<div style="display: flex; gap: 1em; flex-wrap: wrap">
+<div style="display: flex; gap: 0.5em">
   <div>{{ embed(roots.room) }}{{ embed(roots.error) }}</div>
   <div>{{ embed(roots.camera) }}{{ embed(roots.told) }}</div>
 </div>
