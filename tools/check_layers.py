@@ -44,12 +44,14 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "moment": frozenset(),
     "rig": frozenset({"errors", "parsing"}),
     "modelfile": frozenset({"errors"}),
+    "motion": frozenset(),
     "core": frozenset({"errors", "modelfile", "rig"}),
-    "world": LOG | {"rig"},
+    "world": LOG | {"rig", "motion"},
+    "algorithms": LOG | {"core", "motion"},
     "link": frozenset({"errors"}),
     "target": frozenset({"errors", "core", "link"}),
     "recording": LOG | {"core"},
-    "experiment": LOG | {"moment", "rig", "core", "world", "target", "recording"},
+    "experiment": LOG | {"moment", "rig", "core", "world", "target", "recording", "algorithms"},
     "view": LOG | {"moment"},
 }
 # The command line ties the parts together and may import them all.

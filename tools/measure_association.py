@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats  # type: ignore[import-untyped]
+from scipy import stats
 from sklearn.svm import LinearSVC
 
 from bslam.experiment.batch import make_jobs, run_batch

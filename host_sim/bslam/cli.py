@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from types import ModuleType
 
-from bslam.commands import calibrate, export, live, look, params, replay, run, sweep, tables
+from bslam.commands import calibrate, compare, export, live, look, params, replay, run, sweep, tables
 from bslam.errors import BslamError
 
 COMMANDS: dict[str, ModuleType] = {
@@ -21,6 +21,7 @@ COMMANDS: dict[str, ModuleType] = {
     "replay": replay,
     "tables": tables,
     "sweep": sweep,
+    "compare": compare,
     "live": live,
     "look": look,
     "calibrate": calibrate,

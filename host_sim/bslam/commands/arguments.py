@@ -291,5 +291,16 @@ def positive_count(text: str) -> int:
     return int(text)
 
 
+def positive_number(text: str) -> float:
+    """A number above 0, as an option's value."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a number above 0")
+    return value
+
+
 def _names(words: Iterable[str]) -> str:
     return "{" + ",".join(words) + "}"

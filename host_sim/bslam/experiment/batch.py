@@ -105,7 +105,7 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     except BrokenExecutor:
         for index, job in enumerate(jobs):
             if index not in finished:
-                finished[index] = Outcome(job.name, _failed_entry(job, _LOST), crash=_LOST)
+                finished[index] = Outcome(job.name, failed_entry(job, _LOST), crash=_LOST)
     outcomes = tuple(finished[index] for index in sorted(finished))
     more = {"interrupted": True} if interrupted else {}
     write_summary(out, [outcome.entry for outcome in outcomes], **more)
@@ -133,9 +133,9 @@ def execute(job: Job, out: Path) -> Outcome:
     try:
         return _execute(job, out)
     except BslamError as error:
-        return Outcome(job.name, _failed_entry(job, str(error)), bad_input=str(error))
+        return Outcome(job.name, failed_entry(job, str(error)), bad_input=str(error))
     except Exception as error:  # a run that crashes is an outcome; the others go on
-        entry = _failed_entry(job, f"{type(error).__name__}: {error}")
+        entry = failed_entry(job, f"{type(error).__name__}: {error}")
         return Outcome(job.name, entry, crash=traceback.format_exc())
 
 
@@ -184,7 +184,7 @@ def write_files(
     )
 
 
-def _failed_entry(job: Job, error: str) -> dict[str, Any]:
+def failed_entry(job: Job, error: str) -> dict[str, Any]:
     words = describe(job.options) | {"name": job.name, "scenario": job.source.name}
     return words | {"diverged": True, "error": error}
 

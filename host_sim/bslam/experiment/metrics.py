@@ -148,6 +148,7 @@ def _nees(
     """NEES of the rows that have one; `truth` in the map frame, where the filter keeps its error."""
     rows = scored.copy()
     rows[:NEES_FIRST_STEP] = False
+    rows &= np.isfinite(trace.covariance).all(axis=(1, 2))  # not every algorithm says how sure it is
     result = np.full(len(rows), np.nan)
     result[rows] = nees(trace.pose[rows], truth[rows], trace.covariance[rows], options.filter)
     return result

@@ -75,11 +75,11 @@ def run_log(
     sightings.
     """
     frames = frames or Frames(log.sightings, options)
-    params, beacons = core_params(options, log), _beacons_to_hold(log, options)
+    params, beacons = core_params(options, log), beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
         if options.real != "float":
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
-        looks = _uses_looks(options)
+        looks = uses_looks(options)
         with connect(
             options.target, params, beacons, fingerprints=record is not None, looks=looks, seeds=log.seeds
         ) as slam:
@@ -100,7 +100,7 @@ def _run(
     """`target` tells of what it runs on, if not here."""
     if record is None:
         return _Run(slam, log, options, frames, watcher).finish(target and target())
-    start = start_of(log, slam.params, _beacons_to_hold(log, options), _uses_looks(options), options.real)
+    start = start_of(log, slam.params, beacons_to_hold(log, options), uses_looks(options), options.real)
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
@@ -109,15 +109,15 @@ def _run(
 
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Slam:
-    looks = _uses_looks(options)
+    looks = uses_looks(options)
     return Slam(params, beacons_max=beacons_max, real=options.real, looks=looks, seeds=log.seeds)
 
 
-def _uses_looks(options: RunOptions) -> bool:
+def uses_looks(options: RunOptions) -> bool:
     return options.association == "svm"
 
 
-def _beacons_to_hold(log: Log, options: RunOptions) -> int:
+def beacons_to_hold(log: Log, options: RunOptions) -> int:
     """Beacons that there are, as far as the log tells, and room for false ones where identity is unknown."""
     sighted = log.sightings.beacon_id[log.sightings.mappable]
     given = 0 if log.beacons is None else len(log.beacons.beacon_id)
@@ -327,7 +327,7 @@ class Frames:
         self._time_us: list[int] = times[first].tolist()
         self._true_id: list[int] = sightings.beacon_id.tolist()
         self._columns = columns_for_filter(sightings, options)
-        self._signature = sightings.signature if _uses_looks(options) else None
+        self._signature = sightings.signature if uses_looks(options) else None
         self._next = 0
 
     def waiting_before(self, until_us: int | None) -> bool:

@@ -83,14 +83,24 @@ def _wheels_start_us(log: Log) -> int:
 
 def odometry_increments(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Way along the path, m, and turn, rad, of each step, (n,) each, as odometry gives them."""
-    odometry, robot = log.odometry, log.robot
+    odometry = log.odometry
     if odometry.kind == "velocity":
         dt_s = np.diff(odometry.time_us) * 1e-6
         return odometry.a[1:] * dt_s, odometry.b[1:] * dt_s
-    left_m, right_m = odometry.a, odometry.b
+    left_m, right_m = wheel_travel(log)
+    return 0.5 * (left_m + right_m), (right_m - left_m) / log.robot.wheelbase_m
+
+
+def wheel_travel(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Travel of the left and the right wheel in each step, m, (n,) each, whatever odometry the log has."""
+    odometry = log.odometry
     if odometry.kind == "ticks":
-        left_m, right_m = _travel_of_ticks(log)
-    return 0.5 * (left_m + right_m), (right_m - left_m) / robot.wheelbase_m
+        return _travel_of_ticks(log)
+    if odometry.kind == "wheels":
+        return odometry.a, odometry.b
+    way_m, turn_rad = odometry_increments(log)
+    half_m = 0.5 * log.robot.wheelbase_m * turn_rad
+    return way_m - half_m, way_m + half_m
 
 
 def _travel_of_ticks(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,0 +1,47 @@
+"""The noise of wheels and sensor by the core's parameters, as MATH (5) and (13) have it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Of a way, m², or a turn, rad²: readings without noise would weigh infinitely.
+_VARIANCE_MIN: Final = 1e-12
+
+
+def motion_covariance(
+    p: Mapping[str, int | float], dt_s: Any, left_m: Any, right_m: Any
+) -> NDArray[np.float64]:
+    """Covariance (..., 2, 2) of (way m, turn rad) of steps (...), from the wheels' travel, MATH (5)."""
+    dt_s, left_m, right_m = (np.asarray(one, dtype=np.float64) for one in (dt_s, left_m, right_m))
+    base_m = p["wheelbase_m"]
+    way, turn = np.abs(0.5 * (left_m + right_m)), np.abs(right_m - left_m) / base_m
+    grown = p["travel_sd_per_sqrt_m"] ** 2
+    left = (p["left_speed_sd_mps"] * dt_s) ** 2 + grown * np.abs(left_m)
+    right = (p["right_speed_sd_mps"] * dt_s) ** 2 + grown * np.abs(right_m)
+    moving_s = np.where((left_m != 0.0) | (right_m != 0.0), dt_s, 0.0)
+    covariance = np.empty((*np.shape(dt_s), 2, 2))
+    covariance[..., 0, 0] = (
+        0.25 * (left + right)
+        + p["forward_sd_per_sqrt_s"] ** 2 * moving_s
+        + p["forward_sd_per_sqrt_m"] ** 2 * way
+        + _VARIANCE_MIN
+    )
+    covariance[..., 1, 1] = (
+        (left + right) / base_m**2
+        + p["turn_sd_per_sqrt_s"] ** 2 * moving_s
+        + p["turn_sd_per_sqrt_m"] ** 2 * way
+        + p["turn_sd_per_sqrt_rad"] ** 2 * turn
+        + _VARIANCE_MIN
+    )
+    covariance[..., 0, 1] = covariance[..., 1, 0] = 0.5 * (right - left) / base_m
+    return covariance
+
+
+def range_sd_m(p: Mapping[str, int | float], range_m: Any) -> Any:
+    """Standard deviation of a distance, MATH (13)."""
+    fraction, per_m = p["range_sd_fraction"], p["range_sd_per_m"]
+    return np.sqrt(p["range_sd_floor_m"] ** 2 + (fraction * range_m) ** 2 + (per_m * range_m**2) ** 2)

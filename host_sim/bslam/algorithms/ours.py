@@ -1,0 +1,89 @@
+"""bslam's own core as one algorithm among others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.algorithms.protocol import Landmark, Setup, Sighting
+from bslam.core.errors import CoreError
+from bslam.core.slam import Slam
+from bslam.motion import Pose
+
+_BY_LOOKS = 3  # the parameter `association` of the method that learns what beacons look like
+
+
+class Bslam:
+    """The C library. What it refuses is counted there, and the drive goes on, as on a robot."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._slam = self._new()
+
+    def _new(self) -> Slam:
+        setup = self._setup
+        looks = setup.parameters["association"] == _BY_LOOKS
+        return Slam(
+            setup.parameters, beacons_max=setup.beacons_max, real=setup.real, looks=looks, seeds=setup.seeds
+        )
+
+    def reset(self, seed: int) -> None:
+        """See `Algorithm`. Nothing inside is random."""
+        self._slam = self._new()
+
+    def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
+        """See `Algorithm`."""
+        try:
+            self._slam.odometry("wheels", time_us, left_m, right_m)
+        except CoreError:
+            return  # the core has counted it
+
+    def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
+        """See `Algorithm`."""
+        try:
+            self._slam.sightings(time_us, *_columns(sightings), signature=_signatures(sightings))
+        except CoreError:
+            return  # the core has counted it
+
+    def pose(self) -> Pose:
+        """See `Algorithm`."""
+        return self._slam.pose()
+
+    def pose_covariance(self) -> NDArray[np.float64]:
+        """See `Algorithm`."""
+        return self._slam.pose_covariance()
+
+    def map(self) -> Sequence[Landmark]:
+        """The confirmed beacons."""
+        return [
+            Landmark(one.x_m, one.y_m, one.label if one.label >= 0 else None, one.covariance)
+            for one in self._slam.beacons()
+            if one.confirmed
+        ]
+
+
+def _columns(sightings: Sequence[Sighting]) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m as the core has them: no None."""
+    rows = [
+        (
+            one.bearing_rad,
+            math.nan if one.range_m is None else one.range_m,
+            -1 if one.label is None else one.label,
+            one.mappable,
+            one.bearing_sd_rad or 0.0,
+            one.range_sd_m or 0.0,
+        )
+        for one in sightings
+    ]
+    bearing, range_m, label, mappable, bearing_sd, range_sd = zip(*rows, strict=True) if rows else ((),) * 6
+    return bearing, range_m, label, mappable, bearing_sd, range_sd
+
+
+def _signatures(sightings: Sequence[Sighting]) -> NDArray[np.float32] | None:
+    """(m, 71); None unless every sighting has one."""
+    looks = [one.signature for one in sightings if one.signature is not None]
+    return np.stack(looks) if looks and len(looks) == len(sightings) else None

@@ -1,0 +1,237 @@
+"""`bslam compare`: several algorithms on the same drives, side by side."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bslam.commands.arguments import (
+    add_batch_options,
+    add_filter_options,
+    add_sensor_options,
+    positive_count,
+    positive_number,
+    run_options,
+    scenario_source,
+)
+from bslam.commands.report import table_of
+from bslam.errors import BslamError
+from bslam.experiment.contest import ContestResult, hold_contest, make_bouts, means
+from bslam.experiment.methods import BOUND, Method, own_method, shipped_methods
+from bslam.experiment.options import RunOptions
+from bslam.experiment.output import write_atomically, write_json, write_summary
+from bslam.experiment.sources import FolderSource, Source
+from bslam.view.comparison import Contender, draw_comparison
+from bslam.view.style import png
+from bslam.world.simulate import load_scenario
+
+SUMMARY = "several SLAM algorithms on the same drives, yours among them"
+EXAMPLES = """examples:
+  bslam compare paper_room --seeds 0:2
+  bslam compare paper_room --with my_slam:MySlam
+  bslam compare paper_room --with my_slam.py:MySlam --only bslam,map --sigma 0.6 --seeds 0:8
+  bslam compare out/run/paper_room_seed0 --association known
+
+SCENARIO is a name, the path of a TOML file, or a log folder. --with names a class by module (found from
+the working directory, or installed) or by file; docs/PLUGIN.md says what it must offer. Without --only all
+that are installed run: bslam, dead_reckoning, map (the exact causal MAP, the bound), isam2 (GTSAM).
+The table's ratio is to the map at the steps at which that is solved. compare.json has the table, summary.json
+the runs, compare.png the errors over time."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("scenario", metavar="SCENARIO", help="name, path of a TOML file, or a log folder")
+    group = parser.add_argument_group("algorithms")
+    group.add_argument(
+        "--with",
+        dest="own",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="an algorithm of your own; may be repeated",
+    )
+    group.add_argument("--only", metavar="NAME,...", help="of those that come with bslam, only these")
+    group.add_argument(
+        "--map-every",
+        type=positive_count,
+        default=25,
+        metavar="N",
+        help="solve the exact MAP every N steps (25)",
+    )
+    group.add_argument(
+        "--call-limit",
+        type=positive_number,
+        default=60.0,
+        metavar="S",
+        help="an algorithm hangs if one step takes longer, in seconds (default: 60)",
+    )
+    add_sensor_options(parser)
+    add_filter_options(parser)
+    add_batch_options(parser, "compare", pictures=1)
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    for word, unset in (("target", "host"), ("known_map", False)):
+        if getattr(arguments, word) != unset:
+            option = f"--{word.replace('_', '-')}"
+            raise BslamError(f"{option}: not where algorithms are compared; allowed: with run and replay")
+    methods = _methods(arguments)
+    sources, options = _drives(arguments)
+    for source in {source.shared: source for source in sources if source.shared is not None}.values():
+        source.prepare()
+    bouts = make_bouts(methods, sources, options)
+    result = hold_contest(bouts, arguments.out, arguments.jobs, arguments.call_limit)
+    lines = means(result, methods, BOUND, arguments.map_every)
+    _write(arguments, result, methods, lines)
+    return _say(arguments, result, lines, options[0])
+
+
+def _methods(arguments: argparse.Namespace) -> list[Method]:
+    """Those that come with bslam, all or as --only says, and then the user's. Raises BslamError."""
+    shipped = shipped_methods(arguments.map_every)
+    chosen = _installed(shipped) if arguments.only is None else _named(shipped, arguments.only)
+    for text in arguments.own:
+        own = own_method(text)
+        if any(other.name == own.name for other in chosen):
+            raise BslamError(f"--with {text}: {own.name} is there already; allowed: a name of its own")
+        chosen.append(own)
+    return chosen
+
+
+def _installed(shipped: Sequence[Method]) -> list[Method]:
+    for one in shipped:
+        if not one.is_here:
+            print(f"left out: {one.name} ({_how_to_get(one)})", file=sys.stderr)
+    return [one for one in shipped if one.is_here]
+
+
+def _named(shipped: Sequence[Method], only: str) -> list[Method]:
+    by_name = {one.name: one for one in shipped}
+    chosen = []
+    for name in (word.strip() for word in only.split(",")):
+        if name not in by_name:
+            raise BslamError(f"--only {name}: there is no such algorithm; allowed: {', '.join(by_name)}")
+        if not by_name[name].is_here:
+            raise BslamError(f"--only {name}: is not installed; allowed: {_how_to_get(by_name[name])}")
+        chosen.append(by_name[name])
+    return chosen
+
+
+def _how_to_get(method: Method) -> str:
+    return f"needs {' and '.join(method.needs)}: pip install 'bslam[{method.name}]'"
+
+
+def _drives(arguments: argparse.Namespace) -> tuple[list[Source], list[RunOptions]]:
+    if Path(arguments.scenario).is_dir():
+        source = FolderSource(Path(arguments.scenario).absolute())
+        options = [
+            run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed)
+            for seed in arguments.seeds
+        ]
+        return [source] * len(options), options
+    wheels = load_scenario(arguments.scenario).wheels
+    sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
+    noise = arguments.noise or wheels.noise
+    options = [
+        run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=seed) for seed in arguments.seeds
+    ]
+    return [scenario_source(arguments, seed, sigma_mps, noise) for seed in arguments.seeds], options
+
+
+def _write(
+    arguments: argparse.Namespace,
+    result: ContestResult,
+    methods: Sequence[Method],
+    lines: Sequence[dict[str, Any]],
+) -> None:
+    out = arguments.out
+    more = {"interrupted": True} if result.interrupted else {}
+    write_summary(out, [outcome.entry for _, outcome in result.outcomes], **more)
+    about = {
+        "scenario": arguments.scenario,
+        "seeds": [arguments.seeds.start, arguments.seeds.stop],
+        "bound": BOUND,
+        "bound_every_steps": arguments.map_every,
+        "versions": _versions(methods),
+    }
+    write_json(out / "compare.json", {"schema": 1, **about, "methods": list(lines), **more})
+    if arguments.pictures > 0 and (shown := _contenders(result, methods, arguments.map_every)):
+        drives = len(arguments.seeds)
+        title = f"{Path(arguments.scenario).stem}, {f'mean of {drives} drives' if drives > 1 else '1 drive'}"
+        write_atomically(out / "compare.png", png(draw_comparison(title, shown)))
+
+
+def _versions(methods: Sequence[Method]) -> dict[str, str]:
+    packages = {"bslam", "numpy", "scipy", *(package for one in methods for package in one.needs)}
+    return {package: importlib.metadata.version(package) for package in sorted(packages)}
+
+
+def _contenders(result: ContestResult, methods: Sequence[Method], every: int) -> list[Contender]:
+    """What the picture shows; the bound at the steps at which it is solved."""
+    shown = []
+    for method in methods:
+        runs = [one for bout, one in result.outcomes if bout.method.name == method.name and len(one.error_m)]
+        if len({len(one.error_m) for one in runs}) == 1:
+            rows = slice(None, None, every if method.name == BOUND else 1)
+            errors = np.array([one.error_m[rows] for one in runs])
+            shown.append(Contender(method.name, runs[0].time_s[rows], errors, dashed=method.name == BOUND))
+    return shown
+
+
+def _say(
+    arguments: argparse.Namespace,
+    result: ContestResult,
+    lines: Sequence[dict[str, Any]],
+    options: RunOptions,
+) -> int:
+    """Print the table and what failed; the exit status."""
+    every = arguments.map_every
+    rows = [["algorithm", "mean cm", "max cm", "last 50 s", f"every {every}th", "/ map", "NEES", "map cm"]]
+    rows[0] += ["mapped", "of", "us/step", ""]
+    rows += [_row(line) for line in lines]
+    print(table_of(rows))
+    if options.association != "known":
+        print(f"association {options.association}: map and isam2 are given the identities")
+    print(
+        f"files in {arguments.out}: compare.json, compare.png, summary.json, NAME.estimate.tum, NAME.map.csv"
+    )
+    for bout, outcome in result.outcomes:
+        if outcome.failed:
+            print(f"{bout.job.name} failed: {outcome.entry['error']}", file=sys.stderr)
+            if outcome.crash is not None and "\n" in outcome.crash:
+                print(outcome.crash, file=sys.stderr)
+    if result.interrupted:
+        print("stopped: what was finished is kept", file=sys.stderr)
+    return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
+
+
+def _row(line: dict[str, Any]) -> list[str]:
+    def cm(key: str) -> str:
+        return f"{100.0 * line[key]:.2f}" if key in line else "-"
+
+    def number(key: str, form: str) -> str:
+        return format(line[key], form) if key in line else "-"
+
+    troubles = [f"{line[word]} {word.upper()}" for word in ("failed", "lost") if line[word]]
+    return [
+        line["method"],
+        cm("position_error_mean_m"),
+        cm("position_error_max_m"),
+        cm("position_error_last_50s_m"),
+        cm("on_bound_steps_m"),
+        number("ratio_to_bound", ".3f"),
+        number("nees_mean", ".2f"),
+        cm("map_rmse_m"),
+        number("beacons_mapped", ".4g"),
+        number("beacons_true", ".4g"),
+        number("step_us_median", ".0f"),
+        ", ".join(troubles),
+    ]

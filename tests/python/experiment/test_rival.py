@@ -1,0 +1,208 @@
+"""Any algorithm on a log: what it is told, in which order, and what it must not say."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from bslam.algorithms import Landmark
+from bslam.algorithms.dead_reckoning import DeadReckoning
+from bslam.algorithms.ours import Bslam
+from bslam.errors import BslamError
+from bslam.experiment.methods import load_method, own_method, shipped_methods
+from bslam.experiment.options import RunOptions
+from bslam.experiment.rival import run_algorithm, setup_for
+from bslam.experiment.runner import run_log
+from bslam.experiment.truth import dead_reckoning
+
+
+class Scribe:
+    """Writes down what it is told."""
+
+    def __init__(self, setup):
+        self.setup = setup
+        self.calls = []
+
+    def reset(self, seed):
+        self.calls.append(("reset", seed))
+
+    def odometry(self, time_us, left_m, right_m):
+        self.calls.append(("odometry", time_us, left_m, right_m))
+
+    def observe(self, time_us, sightings):
+        self.calls.append(("observe", time_us, list(sightings)))
+
+    def pose(self):
+        return 0.0, 0.0, 0.0
+
+    def map(self):
+        return []
+
+
+def ignore(_step):
+    pass
+
+
+def told(log, options, kind=Scribe):
+    made = []
+
+    def make(setup):
+        made.append(kind(setup))
+        return made[-1]
+
+    trace = run_algorithm(log, options, make, ignore)
+    return made[-1], trace
+
+
+@pytest.mark.parametrize("observation", ["distance", "direction"])
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_our_core_as_an_algorithm_is_our_core_to_the_bit(made, observation, real):
+    log = made.circle_log(150, seed=3)
+    options = RunOptions(observation=observation, real=real)
+    rival, own = run_algorithm(log, options, Bslam, ignore), run_log(log, options)
+    assert rival.pose.tolist() == own.pose.tolist()
+    assert rival.covariance.tolist() == own.covariance.tolist()
+    places = [(one.label, one.x_m, one.y_m) for one in own.beacons if one.confirmed]
+    assert [(one.label, one.x_m, one.y_m) for one in rival.beacons] == places
+    assert len(places) == 3
+
+
+def test_calls_come_in_order_of_time_from_the_start_on(made):
+    log = made.circle_log(5, seed=1)
+    scribe, trace = told(log, RunOptions(seed=7))
+    assert scribe.calls[0] == ("reset", 7)
+    assert [call[0] for call in scribe.calls[1:]] == ["observe", *["odometry", "observe"] * 5]
+    assert [call[1] for call in scribe.calls[1::2]] == [made.step_us * k for k in range(6)]
+    assert [call[2:] for call in scribe.calls[2::2]] == list(
+        zip(log.odometry.a.tolist(), log.odometry.b.tolist(), strict=True)
+    )
+    first = scribe.calls[1][2][0]
+    assert (first.label, first.bearing_rad, first.range_m) == (
+        3,
+        log.sightings.bearing_rad[0],
+        log.sightings.range_m[0],
+    )
+    assert trace.steps == 5
+
+
+def test_what_is_not_to_be_known_is_none(made):
+    log = made.circle_log(3, seed=1)
+    scribe, _ = told(log, RunOptions(observation="direction", association="nearest"))
+    sighting = scribe.calls[1][2][0]
+    assert sighting.range_m is None
+    assert sighting.label is None
+    assert not scribe.setup.identities
+    assert scribe.setup.observation == "direction"
+
+
+def test_who_needs_identities_gets_them(made):
+    class Needy(Scribe):
+        needs_identity = True
+
+    scribe, _ = told(made.circle_log(3, seed=1), RunOptions(association="nearest"), Needy)
+    assert scribe.setup.identities
+    assert [one.label for one in scribe.calls[1][2]] == [3, 5, 8]
+
+
+def test_start_without_an_image_is_an_empty_one(made):
+    log = made.circle_log(3, seed=1)
+    late = made.sightings([(made.step_us * 2, 3, 0.1, 2.0, True)])
+    scribe, trace = told(type(log)(**vars(log) | {"sightings": late}), RunOptions())
+    assert scribe.calls[1] == ("observe", 0, [])
+    assert [call[1] for call in scribe.calls if call[0] == "observe"] == [0, made.step_us * 2]
+    assert trace.seen.tolist() == [False, False, True, False]
+
+
+def test_dead_reckoning_is_the_sum_of_arcs(made):
+    log = made.circle_log(100, seed=2)
+    trace = run_algorithm(log, RunOptions(), DeadReckoning, ignore)
+    np.testing.assert_allclose(trace.pose, dead_reckoning(log), atol=1e-12)
+
+
+def test_landmark_without_a_label_stands_for_the_beacon_it_is_near(made):
+    class Mapper(Scribe):
+        def map(self):
+            return [Landmark(2.1, 0.4), Landmark(9.0, 9.0), Landmark(0.0, 0.0, label=8)]
+
+    _, trace = told(made.circle_log(2), RunOptions(), Mapper)
+    assert [one.true_id for one in trace.beacons] == [3, -1, 8]
+
+
+@pytest.mark.parametrize(
+    ("pose", "says"),
+    [
+        ((0.0, math.nan, 0.0), "nan"),
+        ((math.inf, 0.0, 0.0), "inf"),
+        ((0.0, 0.0), "three numbers"),
+        (None, "three numbers"),
+        ("abc", "three numbers"),
+    ],
+)
+def test_pose_that_cannot_be_is_named_with_its_step(made, pose, says):
+    class Wrong(Scribe):
+        def pose(self):
+            return pose if len(self.calls) > 4 else (0.0, 0.0, 0.0)
+
+    with pytest.raises(BslamError, match=r"pose\(\) returned .* at step 2; allowed") as caught:
+        told(made.circle_log(5), RunOptions(), Wrong)
+    assert says in str(caught.value)
+
+
+def test_map_that_cannot_be_is_named(made):
+    class Wrong(Scribe):
+        def map(self):
+            return [Landmark(math.nan, 0.0)]
+
+    with pytest.raises(BslamError, match=r"map\(\) returned Landmark"):
+        told(made.circle_log(2), RunOptions(), Wrong)
+
+
+def test_setup_has_every_parameter_of_the_core(made):
+    setup = setup_for(made.circle_log(3), RunOptions(parameters=(("huber_d", 2.0),)))
+    assert setup.parameters["huber_d"] == 2.0
+    assert setup.parameters["wheelbase_m"] == 0.4
+    assert set(setup.parameters) == set(Bslam(setup)._slam.params)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("my_slam", ["--with my_slam", "module:Class"]),
+        ("no_such_module:A", ["no_such_module", "module:Class"]),
+        ("/no/such/file.py:A", ["/no/such/file.py"]),
+        ("a b:A", ["'a b'"]),
+    ],
+)
+def test_own_method_that_is_not_there_is_named(text, parts):
+    with pytest.raises(BslamError) as caught:
+        own_method(text)
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def test_class_that_is_not_there_or_lacks_methods_is_named(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text("class Half:\n    def reset(self, seed): pass\n")
+    with pytest.raises(BslamError, match=r"no class Whole; allowed: .*Half"):
+        load_method(own_method(f"{file}:Whole"))
+    with pytest.raises(BslamError, match="has no odometry, observe, pose, map"):
+        load_method(own_method(f"{file}:Half"))
+
+
+def test_class_without_a_constructor_is_made_without_a_setup(tmp_path, made):
+    file = tmp_path / "plain.py"
+    body = "".join(f"    def {call}: return {value}\n" for call, value in {
+        "reset(self, seed)": None, "odometry(self, time_us, left_m, right_m)": None,
+        "observe(self, time_us, sightings)": None, "pose(self)": (0, 0, 0), "map(self)": [],
+    }.items())  # fmt: skip
+    file.write_text(f"class Plain:\n{body}")
+    trace = run_algorithm(made.circle_log(3), RunOptions(), load_method(own_method(f"{file}:Plain")), ignore)
+    assert trace.steps == 3
+
+
+def test_shipped_methods_can_be_loaded_where_what_they_need_is_installed(made):
+    setup = setup_for(made.circle_log(3), RunOptions())
+    for method in shipped_methods(25):
+        if method.is_here:
+            assert re.match(r"\w+", type(load_method(method)(setup)).__name__)
