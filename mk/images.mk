@@ -6,12 +6,14 @@ BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board
 
 # What boards may use.
 CORTEX_M_SOURCES := $(wildcard firmware/port/cortex_m/*.c)
-# The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does.
-HOST_SIZES := -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
+# The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
+# and the front end for pictures.
+HOST_SIZES := -DSESSION_VISION=1 \
+    -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := firmware/app/session.c firmware/app/text.c
+APP_SOURCES := firmware/app/session.c firmware/app/seeing.c firmware/app/text.c
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -54,7 +56,7 @@ HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk
 	@mkdir -p $(@D)
-	@$(UNIT_COMPILE_float) $(C_WARNINGS) $(C_WARNINGS_FLOAT) -c $< -o $@
+	@$(UNIT_COMPILE_float) $(C_WARNINGS) $(C_WARNINGS_FLOAT) -DSESSION_VISION=1 -c $< -o $@
 
 $(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
 	@$(CC) $(SANITIZE) $^ -lm -o $@

@@ -9,11 +9,13 @@
 #define BEACONS_A_FRAME ((BSLAM_LINK_PAYLOAD_MAX - 16) / BEACON_BYTES)
 #define FLAG_FINGERPRINT 1u
 #define FLAG_LOOKS 2u
+#define FLAG_AS_IT_IS 4u
 #define FLAG_GYRO 1u
 #define FLAG_RANGE 1u
 #define FLAG_SIGNATURE 2u
 #define FLAG_BEACON 1u
 #define FLAG_CONFIRMED 1u
+#define FLAG_MOVED 1u
 
 static const char *param_name(int id)
 {
@@ -59,9 +61,13 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         session->id = id;
         session->open = true;
         session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
-        session->uses_looks = (flags & FLAG_LOOKS) != 0;
-        session->seed_count = 0;
-        bslam_params_default(&session->params);
+        if ((flags & FLAG_AS_IT_IS) != 0) {
+            session->params = session->slam.params;
+        } else {
+            session->uses_looks = (flags & FLAG_LOOKS) != 0;
+            session->seed_count = 0;
+            bslam_params_default(&session->params);
+        }
         keep(session, BSLAM_OK);
     }
 }
@@ -220,12 +226,138 @@ static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+/// What is stored: every parameter in the order of the table, as float32, which holds all that the link can
+/// set, then names_crc and a CRC over all before.
+#define STORED_BYTES_MAX (4 * 128 + 4)
+
+static uint16_t crc_of(const uint8_t *bytes, size_t count)
+{
+    uint16_t crc = BSLAM_CRC16_START;
+    for (size_t i = 0; i < count; i++) {
+        crc = bslam_crc16_add(crc, bytes[i]);
+    }
+    return bslam_crc16_end(crc);
+}
+
+static size_t stored_size(void)
+{
+    return 4 * (size_t)bslam_params_count() + 4;
+}
+
+static bool save_params(const bslam_params_t *params)
+{
+    uint8_t bytes[STORED_BYTES_MAX];
+    const size_t size = stored_size();
+    if (size > sizeof bytes) {
+        return false;
+    }
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const float value = (float)bslam_params_get(params, id);
+        memcpy(&bytes[4 * id], &value, sizeof value);
+    }
+    const uint16_t names = names_crc();
+    memcpy(&bytes[size - 4], &names, sizeof names);
+    const uint16_t crc = crc_of(bytes, size - 2);
+    memcpy(&bytes[size - 2], &crc, sizeof crc);
+    return port_save(bytes, size);
+}
+
+/// False, and the defaults: nothing is stored, or not by an image with these parameters, or damaged.
+static bool load_params(bslam_params_t *params)
+{
+    uint8_t bytes[STORED_BYTES_MAX];
+    const size_t size = stored_size();
+    uint16_t names = 0;
+    uint16_t crc = 0;
+    bslam_params_default(params);
+    if (size > sizeof bytes || !port_load(bytes, size)) {
+        return false;
+    }
+    memcpy(&names, &bytes[size - 4], sizeof names);
+    memcpy(&crc, &bytes[size - 2], sizeof crc);
+    bool good = names == names_crc() && crc == crc_of(bytes, size - 2);
+    for (int id = 0; id < bslam_params_count() && good; id++) {
+        float value;
+        memcpy(&value, &bytes[4 * id], sizeof value);
+        good = bslam_params_set(params, id, value) == BSLAM_OK;
+    }
+    if (!good) {
+        bslam_params_default(params);
+    }
+    return good;
+}
+
+static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
+{
+    if (is_whole(session, reader)) {
+        session->last_status = save_params(&session->params) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+    }
+}
+
 /// A question changes nothing: it is read when it is answered.
 static void apply_nothing(session_t *session, bslam_link_reader_t *reader)
 {
     (void)reader;
     keep(session, BSLAM_OK);
 }
+
+#if SESSION_VISION
+
+static void apply_camera(session_t *session, bslam_link_reader_t *reader)
+{
+    const int index = bslam_link_get_u8(reader);
+    bslam_camera_t camera = {.lens = (bslam_lens_kind_t)bslam_link_get_u8(reader)};
+    camera.width_px = bslam_link_get_u16(reader);
+    camera.height_px = bslam_link_get_u16(reader);
+    bslam_real_t *const values[] = {&camera.fx_px,   &camera.fy_px,     &camera.cx_px,
+                                    &camera.cy_px,   &camera.k1,        &camera.k2,
+                                    &camera.yaw_rad, &camera.pitch_rad, &camera.z_m};
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+        *values[i] = bslam_link_get_real(reader);
+    }
+    if (is_whole(session, reader)) {
+        keep(session, seeing_set_camera(&session->seeing, index, &camera));
+    }
+}
+
+static void apply_image(session_t *session, bslam_link_reader_t *reader)
+{
+    const int camera = bslam_link_get_u8(reader);
+    const bslam_pixel_format_t format = (bslam_pixel_format_t)bslam_link_get_u8(reader);
+    if (is_whole(session, reader)) {
+        session->ticks = 0;
+        keep(session, seeing_begin(&session->seeing, camera, format));
+    }
+}
+
+static void apply_pixels(session_t *session, bslam_link_reader_t *reader)
+{
+    const uint32_t began = port_ticks();
+    bslam_status_t status = BSLAM_OK;
+    while (reader->left > 0 && status == BSLAM_OK) {
+        status = seeing_take(&session->seeing, bslam_link_get_u8(reader));
+    }
+    keep(session, status);
+    session->ticks += port_ticks() - began;
+}
+
+static void apply_look(session_t *session, bslam_link_reader_t *reader)
+{
+    const bool moved = (bslam_link_get_u8(reader) & FLAG_MOVED) != 0;
+    if (is_whole(session, reader)) {
+        const uint32_t began = port_ticks();
+        seeing_t *seeing = &session->seeing;
+        bslam_status_t status = seeing_look(seeing, moved);
+        if (status == BSLAM_OK) {
+            status = bslam_slam_sightings(&session->slam, session->parser.header.time_us, seeing->sightings,
+                                          seeing->count);
+        }
+        keep(session, status);
+        session->ticks += port_ticks() - began;
+    }
+}
+
+#endif
 
 // ---- answers: from the state as it stands, so that one that was lost can be given again
 // -----------------------
@@ -380,6 +512,42 @@ static void answer_counters(session_t *session, bslam_link_reader_t *reader, bsl
 // ---- from a frame to its message
 // ------------------------------------------------------------------------------
 
+#if SESSION_VISION
+
+static void answer_look(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    answer_sightings(session, reader, out);
+    bslam_link_put_u8(out, (uint8_t)bslam_vision_reason(&session->seeing.vision));
+    bslam_link_put_u8(out, (uint8_t)session->seeing.count);
+}
+
+static void put_seen(bslam_link_writer_t *out, const bslam_sighting_t *sighting)
+{
+    bslam_link_put_real(out, sighting->bearing_rad);
+    bslam_link_put_real(out, sighting->range_m);
+    bslam_link_put_real(out, sighting->bearing_sd_rad);
+    bslam_link_put_real(out, sighting->range_sd_m);
+    bslam_link_put_i32(out, sighting->label);
+    bslam_link_put_u8(out, sighting->beacon_class);
+    bslam_link_put_u8(out, (sighting->has_range ? FLAG_RANGE : 0) | FLAG_SIGNATURE);
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        bslam_link_put_real(out, sighting->signature[k]);
+    }
+}
+
+/// One a message: a frame of default size has no room for two.
+static void answer_seen(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    const int index = bslam_link_get_u8(reader);
+    const bool there = index < session->seeing.count;
+    bslam_link_put_u8(out, there ? 1 : 0);
+    if (there) {
+        put_seen(out, &session->seeing.sightings[index]);
+    }
+}
+
+#endif
+
 typedef struct exchange {
     uint8_t type;
     void (*apply)(session_t *session, bslam_link_reader_t *reader);
@@ -401,6 +569,15 @@ static const exchange_t exchanges[] = {
     {SESSION_COUNTERS, apply_nothing, answer_counters},
     {SESSION_SIGNATURES, apply_signatures, answer_nothing},
     {SESSION_SEEDS, apply_seeds, answer_nothing},
+    {SESSION_STATE, apply_nothing, answer_step},
+    {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
+#if SESSION_VISION
+    {SESSION_CAMERA, apply_camera, answer_nothing},
+    {SESSION_IMAGE, apply_image, answer_nothing},
+    {SESSION_PIXELS, apply_pixels, answer_nothing},
+    {SESSION_LOOK, apply_look, answer_look},
+    {SESSION_SEEN, apply_nothing, answer_seen},
+#endif
 };
 
 static const exchange_t *find_exchange(uint8_t type)
@@ -441,11 +618,20 @@ static void answer(session_t *session, const exchange_t *exchange)
     send(session, &out);
 }
 
+static void end_step(session_t *session)
+{
+    if (session->takes_fingerprints) {
+        session->fingerprint = bslam_slam_fingerprint(&session->slam, session->fingerprint);
+    }
+}
+
 static void apply(session_t *session, const exchange_t *exchange)
 {
     session->last_sequence = session->parser.header.sequence;
     session->detail = NO_DETAIL;
-    session->ticks = 0;
+    if (session->parser.header.type != SESSION_PIXELS && session->parser.header.type != SESSION_LOOK) {
+        session->ticks = 0;
+    }
     if (!session->open && session->parser.header.type != SESSION_HELLO) {
         session->last_status = SESSION_E_NO_SESSION;
         return;
@@ -456,9 +642,9 @@ static void apply(session_t *session, const exchange_t *exchange)
     }
     bslam_link_reader_t reader = bslam_link_payload(&session->parser);
     exchange->apply(session, &reader);
-    const bool is_step = exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS;
-    if (is_step && session->takes_fingerprints) {
-        session->fingerprint = bslam_slam_fingerprint(&session->slam, session->fingerprint);
+    if (exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS ||
+        exchange->type == SESSION_LOOK) {
+        end_step(session);
     }
 }
 
@@ -495,8 +681,12 @@ void session_init(session_t *session)
 {
     int bad_id = 0;
     *session = (session_t){0};
-    bslam_params_default(&session->params);
-    const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
+    const bool stored = load_params(&session->params);
+    bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
+    if (stored && status != BSLAM_OK) {  // they contradict each other
+        bslam_params_default(&session->params);
+        status = bslam_slam_init(&session->slam, &session->params, &bad_id);
+    }
     session->fingerprint = BSLAM_FINGERPRINT_START;
     bslam_link_writer_t out;
     // A delimiter first: whatever the line had before the start is no part of this frame.
@@ -516,10 +706,13 @@ void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ti
     const uint32_t began = port_ticks();
     const bslam_status_t status = bslam_slam_odometry(&session->slam, &reading);
     session->ticks = port_ticks() - began;
+    end_step(session);
     bslam_link_writer_t out;
     session->report_sequence++;
     begin(session, &out, SESSION_POSE, session->report_sequence, time_us);
     bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u32(&out, left_ticks);
+    bslam_link_put_u32(&out, right_ticks);
     put_step(session, &out);
     send(session, &out);
 }

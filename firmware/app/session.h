@@ -7,6 +7,7 @@
 #ifndef APP_SESSION_H
 #define APP_SESSION_H
 
+#include "app/seeing.h"
 #include "bslam/bslam.h"
 #include "bslam/link/crc16.h"
 
@@ -26,6 +27,13 @@ typedef enum session_message {
     SESSION_COUNTERS = 0x0c,
     SESSION_SIGNATURES = 0x0d,  ///< how some of the next frame's sightings look
     SESSION_SEEDS = 0x0e,       ///< signatures of things that are no beacon, for the next SESSION_RESET
+    SESSION_STATE = 0x0f,       ///< asks where the robot stands
+    SESSION_PARAM_SAVE = 0x10,  ///< keeps the parameters as set over a restart
+    SESSION_CAMERA = 0x11,      ///< what a camera is; this and the next four: only with SESSION_VISION
+    SESSION_IMAGE = 0x12,       ///< starts a picture
+    SESSION_PIXELS = 0x13,      ///< the next bytes of it
+    SESSION_LOOK = 0x14,        ///< ends it: what it shows goes into the filter
+    SESSION_SEEN = 0x15,        ///< asks what it showed
     SESSION_ANSWER = 0x80
 } session_message_t;
 
@@ -39,13 +47,17 @@ typedef enum session_report {
 typedef enum session_status {
     SESSION_E_NO_SESSION = 0x40,  ///< no SESSION_HELLO came since the robot started
     SESSION_E_TYPE = 0x41,        ///< no such message
-    SESSION_E_LENGTH = 0x42       ///< the payload is not as long as its message is
+    SESSION_E_LENGTH = 0x42,      ///< the payload is not as long as its message is
+    SESSION_E_STORE = 0x43        ///< the board keeps nothing, or failed to
 } session_status_t;
 
 /// All members are the session's own.
 typedef struct session {
     bslam_slam_t slam;
     bslam_looks_t looks;
+#if SESSION_VISION
+    seeing_t seeing;
+#endif
     bslam_params_t params;  ///< as set, for the next reset
     bslam_link_parser_t parser;
     uint32_t id;  ///< the host's number of this session
@@ -58,7 +70,7 @@ typedef struct session {
     uint8_t detail;     ///< of the last status: the parameter or sighting at fault, 255: none
     uint32_t repeated;  ///< messages that came again
     uint32_t replayed;  ///< older messages, which were dropped
-    uint32_t ticks;     ///< that the last message took to apply
+    uint32_t ticks;     ///< that the last message took to apply; a look with all of its pixels
     uint64_t fingerprint;
     bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
     float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
@@ -67,13 +79,14 @@ typedef struct session {
     uint8_t out[BSLAM_LINK_FRAME_MAX];
 } session_t;
 
-/// Starts with default parameters and an empty map, and reports that the robot is ready.
+/// Starts with an empty map, with the parameters that were saved or else the defaults, and reports that the
+/// robot is ready.
 void session_init(session_t *session);
 
 /// Takes a byte that came over the link; applies and answers the message that it completes.
 void session_take(session_t *session, uint8_t byte);
 
-/// A reading of the robot's own encoders; reports the pose.
+/// A reading of the robot's own encoders; reports it, and the pose.
 void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks);
 
 #endif

@@ -33,6 +33,11 @@ void port_watchdog(void);
 /// The counters of both wheel encoders, if the robot has them and a reading is due. They may roll over.
 bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks);
 
+/// Keeps bytes over a restart, the same number at each call, a few hundred; and gives them back. False: the
+/// board has no memory for that, it failed, or nothing was ever kept.
+bool port_save(const uint8_t *bytes, size_t count);
+bool port_load(uint8_t *bytes, size_t count);
+
 /// The end: resets a robot; under an emulator ends it with this exit status.
 _Noreturn void port_exit(int status);
 

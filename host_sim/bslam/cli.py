@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from types import ModuleType
 
-from bslam.commands import calibrate, compare, export, live, look, params, replay, run, sweep, tables
+from bslam.commands import calibrate, compare, console, export, live, look, params, replay, run, sweep, tables
 from bslam.errors import BslamError
 
 COMMANDS: dict[str, ModuleType] = {
@@ -25,6 +25,7 @@ COMMANDS: dict[str, ModuleType] = {
     "live": live,
     "look": look,
     "calibrate": calibrate,
+    "console": console,
     "export": export,
     "params": params,
 }

@@ -64,6 +64,8 @@
     INTEGER(sighting_delay_us, 0, -1000000, 10000000, \
             "a sighting stamped t shows what odometry has at t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
+    INTEGER(history_steps, 1024, 1, 1024, \
+            "odometry readings that may wait for a late sighting, at most BSLAM_HISTORY_MAX of them") \
     REAL(bearing_sd_rad, 0.0136, 1e-4, 3.2, "noise of the direction") \
     REAL(range_sd_floor_m, 0.0, 0.0, 100.0, \
          "noise of the distance: sd^2 = floor^2 + (fraction r)^2 + (per_m r^2)^2") \

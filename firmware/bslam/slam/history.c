@@ -5,12 +5,13 @@
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 
-bool bslam_history_is_full(const bslam_history_t *history)
+bool bslam_history_is_full(const bslam_history_t *history, int32_t room)
 {
-    return history->filter.waiting == BSLAM_HISTORY_MAX;
+    return history->filter.waiting >= room;
 }
 
-void bslam_history_add(bslam_history_t *history, int32_t duration_us, const bslam_motion_t *motion)
+void bslam_history_add(bslam_history_t *history, int32_t room, int32_t duration_us,
+                       const bslam_motion_t *motion)
 {
     history->steps[history->next] =
         (bslam_history_step_t){.duration_us = duration_us,
@@ -20,7 +21,7 @@ void bslam_history_add(bslam_history_t *history, int32_t duration_us, const bsla
                                .turn_var_rad2 = motion->turn_var_rad2,
                                .forward_turn_cov_mrad = motion->forward_turn_cov_mrad};
     history->next = (history->next + 1) % BSLAM_HISTORY_MAX;
-    if (history->count < BSLAM_HISTORY_MAX) {
+    if (history->count < room) {
         history->count++;
     }
     history->filter.waiting++;

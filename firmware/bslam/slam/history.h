@@ -23,7 +23,7 @@ typedef struct bslam_history_place {
     int32_t gone_us;    ///< since the oldest of these began
 } bslam_history_place_t;
 
-/// The last BSLAM_HISTORY_MAX motions. All zero is the empty history.
+/// The last motions, as many as there is room for: 1 to BSLAM_HISTORY_MAX. All zero is the empty history.
 typedef struct bslam_history {
     bslam_history_step_t steps[BSLAM_HISTORY_MAX];
     int32_t count;
@@ -34,10 +34,11 @@ typedef struct bslam_history {
 } bslam_history_t;
 
 /// True if as many motions wait as there is room for: one must be taken before the next is added.
-bool bslam_history_is_full(const bslam_history_t *history);
+bool bslam_history_is_full(const bslam_history_t *history, int32_t room);
 
 /// Remembers a motion of this duration, which now waits; forgets the oldest if there is no room.
-void bslam_history_add(bslam_history_t *history, int32_t duration_us, const bslam_motion_t *motion);
+void bslam_history_add(bslam_history_t *history, int32_t room, int32_t duration_us,
+                       const bslam_motion_t *motion);
 
 /// Forgets all.
 void bslam_history_clear(bslam_history_t *history);

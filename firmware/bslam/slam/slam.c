@@ -71,10 +71,12 @@ static void predict_until(bslam_slam_t *slam, int64_t until_us)
 /// A motion waits until a frame shows what comes after it, or until the room is needed.
 static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_motion_t *motion)
 {
-    if (bslam_history_is_full(&slam->history)) {
+    const int32_t steps = slam->params.history_steps;
+    const int32_t room = steps < BSLAM_HISTORY_MAX ? steps : BSLAM_HISTORY_MAX;
+    if (bslam_history_is_full(&slam->history, room)) {
         predict_step(slam, 0);
     }
-    bslam_history_add(&slam->history, duration_us, motion);
+    bslam_history_add(&slam->history, room, duration_us, motion);
 }
 
 static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)

@@ -175,6 +175,20 @@ bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
     return true;
 }
 
+bool port_save(const uint8_t *bytes, size_t count)
+{
+    (void)bytes;
+    (void)count;
+    return false;
+}
+
+bool port_load(uint8_t *bytes, size_t count)
+{
+    (void)bytes;
+    (void)count;
+    return false;
+}
+
 void port_exit(int status)
 {
     if (is_emulated) {

@@ -100,7 +100,8 @@ def _run(
     """`target` tells of what it runs on, if not here."""
     if record is None:
         return _Run(slam, log, options, frames, watcher).finish(target and target())
-    start = start_of(log, slam.params, beacons_to_hold(log, options), uses_looks(options), options.real)
+    params = slam.params if target is None else slam.host_params
+    start = start_of(log, params, beacons_to_hold(log, options), uses_looks(options), options.real)
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())

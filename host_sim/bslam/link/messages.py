@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -31,6 +32,13 @@ class Message(IntEnum):
     COUNTERS = 0x0C
     SIGNATURES = 0x0D
     SEEDS = 0x0E
+    STATE = 0x0F
+    PARAM_SAVE = 0x10
+    CAMERA = 0x11
+    IMAGE = 0x12
+    PIXELS = 0x13
+    LOOK = 0x14
+    SEEN = 0x15
 
 
 class Report(IntEnum):
@@ -40,7 +48,7 @@ class Report(IntEnum):
     POSE = 0x41
 
 
-LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH"}
+LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE"}
 """Statuses that are the link's own; below are the library's."""
 NO_DETAIL = 255
 
@@ -51,6 +59,9 @@ _KNOWN_BEACON = struct.Struct("<iff")
 _UID = struct.Struct("<I")
 _PARAM_ID = struct.Struct("<H")
 _PARAM = struct.Struct("<Hf")
+_REPORT = struct.Struct("<BII")
+_CAMERA = struct.Struct("<BBHH9f")
+_SEEN = struct.Struct("<4fiBB71f")
 _VALUE = struct.Struct("<f")
 _POSE_AT = struct.Struct("<B3f")
 _STEP = struct.Struct("<9fQI")
@@ -78,8 +89,8 @@ def float32(value: float) -> bytes:
         return np.float32(value).astype("<f4").tobytes()
 
 
-def hello(session: int, fingerprints: bool, looks: bool) -> bytes:
-    return _HELLO.pack(session, int(fingerprints) | int(looks) << 1)
+def hello(session: int, fingerprints: bool, looks: bool, as_it_is: bool) -> bytes:
+    return _HELLO.pack(session, int(fingerprints) | int(looks) << 1 | int(as_it_is) << 2)
 
 
 def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
@@ -118,6 +129,37 @@ def sightings(rows: Sequence[tuple[float, float, int, bool, float, float]], sign
         table["beacon_class"] = np.where(mappable, 0, _NOT_MAPPABLE)
         table["flags"] = has_range | signed << 1
     return bytes((min(count, 255),)) + table.tobytes()
+
+
+@dataclass(frozen=True)
+class CameraRecord:
+    """A camera as the robot wants it, bslam_camera_t; lens 0 pinhole, 1 equidistant."""
+
+    lens: int
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    yaw_rad: float
+    pitch_rad: float
+    z_m: float
+
+
+def camera(index: int, record: CameraRecord) -> bytes:
+    return _CAMERA.pack(index, *astuple(record))
+
+
+def image(index: int, rgb565: bool) -> bytes:
+    return bytes((index, 0 if rgb565 else 1))
+
+
+def pixels_a_frame(sightings_max: int) -> int:
+    """How many bytes of a picture a payload of that image has room for."""
+    return 16 + 24 * sightings_max
 
 
 def resume(position_sd_m: float, heading_sd_rad: float) -> bytes:
@@ -187,6 +229,44 @@ class RawAccount:
     beacon_uid: int
     test_ratio: float
     weight: float
+
+
+@dataclass(frozen=True)
+class PoseReport:
+    """A reading of the robot's own encoders: what became of it, the counters, and where it led."""
+
+    status: int
+    left_ticks: int
+    right_ticks: int
+    step: Step
+
+
+def read_pose_report(payload: bytes) -> PoseReport:
+    status, left_ticks, right_ticks = _REPORT.unpack_from(payload)
+    return PoseReport(status, left_ticks, right_ticks, read_step(payload[_REPORT.size :]))
+
+
+def read_look(body: bytes) -> tuple[list[RawAccount], int, int]:
+    """An answer to LOOK without its step: accounts, bslam_vision_reason_t, how many were seen."""
+    return read_accounts(body[:-2]), body[-2], body[-1]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A sighting that the robot itself took from a picture."""
+
+    bearing_rad: float
+    range_m: float  # NaN: none
+    bearing_sd_rad: float
+    range_sd_m: float
+    signature: NDArray[np.float32]  # (71,)
+
+
+def read_seen(body: bytes) -> Seen:
+    bearing_rad, range_m, bearing_sd_rad, range_sd_m, _, _, flags, *signature = _SEEN.unpack(body[1:])
+    has_range = bool(flags & 1)
+    looks = np.array(signature, dtype=np.float32)
+    return Seen(bearing_rad, range_m if has_range else math.nan, bearing_sd_rad, range_sd_m, looks)
 
 
 def read_accounts(body: bytes) -> list[RawAccount]:

@@ -13,6 +13,7 @@ from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
 ATTEMPTS = 5
+_MEANING = {"STORE": ": the board keeps nothing over a restart", "TYPE": ": the image has no such message"}
 
 
 @dataclass(frozen=True)
@@ -27,15 +28,20 @@ class Answer:
 class Client:
     """The host's side of the link. A message is applied once, however often its frame or answer is lost."""
 
-    def __init__(self, line: Line, *, fingerprints: bool = False, looks: bool = False) -> None:
+    def __init__(
+        self, line: Line, *, fingerprints: bool = False, looks: bool = False, as_it_is: bool = False
+    ) -> None:
         self._line = line
         self._decoder = Decoder()
         self._frames: deque[Frame] = deque()
         self._sequence = secrets.randbelow(1 << 16)
         self.repeats = 0
+        self._reports: deque[Frame] = deque()
+        self._last_report: int | None = None
+        self.reports_lost = 0
         session = secrets.randbits(32)
         line.write(b"\0")
-        answer = self.ask(Message.HELLO, messages.hello(session, fingerprints, looks))
+        answer = self.ask(Message.HELLO, messages.hello(session, fingerprints, looks, as_it_is))
         self.info: Info = messages.read_info(answer.body)
         self._open = True
 
@@ -60,6 +66,7 @@ class Client:
                 frame = self._frames.popleft()
                 if frame.type == Report.READY and self._open:
                     raise TargetError("the target started anew: what it knew is lost")
+                self._keep_report(frame)
                 if frame.type == message | ANSWER and frame.sequence == self._sequence:
                     return frame
             data = self._line.read(ANSWER_TIMEOUT_S)
@@ -67,12 +74,37 @@ class Client:
                 return None
             self._frames.extend(self._decoder.push(data))
 
+    def listen(self, timeout_s: float) -> list[Frame]:
+        """What the robot has reported of itself, at once or within the time-out. Raises TargetError."""
+        if not self._reports:
+            self._frames.extend(self._decoder.push(self._line.read(timeout_s)))
+        while self._frames:
+            frame = self._frames.popleft()
+            if frame.type == Report.READY:
+                raise TargetError("the target started anew: what it knew is lost")
+            self._keep_report(frame)
+        reports = list(self._reports)
+        self._reports.clear()
+        return reports
+
+    def drop_reports(self) -> None:
+        """Forget those that came before the last answer."""
+        self._reports.clear()
+
+    def _keep_report(self, frame: Frame) -> None:
+        if frame.type == Report.POSE:
+            if self._last_report is not None:
+                self.reports_lost += (frame.sequence - self._last_report - 1) % (1 << 16)
+            self._last_report = frame.sequence
+            self._reports.append(frame)
+
     def _checked(self, message: Message, frame: Frame) -> Answer:
         if len(frame.payload) < 2:
             raise TargetError(f"an empty answer to {message.name}")
         answer = Answer(frame.payload[0], frame.payload[1], frame.payload[2:])
         if answer.status in LINK_STATUSES:
-            raise TargetError(f"{message.name} was refused: {LINK_STATUSES[answer.status]}")
+            name = LINK_STATUSES[answer.status]
+            raise TargetError(f"{message.name} was refused: {name}{_MEANING.get(name, '')}")
         return answer
 
     def close(self) -> None:

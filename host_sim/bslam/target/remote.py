@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.errors import CoreError
 from bslam.core.raw import library
 from bslam.core.slam import Account, Beacon, Slam
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
-from bslam.link.messages import NO_DETAIL, Message, Step
+from bslam.link.messages import NO_DETAIL, Message, PoseReport, Step
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
 
@@ -22,15 +23,15 @@ from bslam.target.lines import Line, TargetError, open_line
 class RemoteSlam:
     """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
 
-    params, beacons_max, looks, seeds as for `Slam`; `line` is taken over. Raises BslamError for parameters
-    that the library refuses and for an image that is too small or has others, TargetError if the robot does
-    not answer.
+    params, beacons_max, looks, seeds as for `Slam`; params None: the robot goes on as it is, with what it
+    knows. `line` is taken over. Raises BslamError for parameters that the library refuses and for an image
+    that is too small or has others, TargetError if the robot does not answer.
     """
 
     def __init__(
         self,
         line: Line,
-        params: Mapping[str, float],
+        params: Mapping[str, float] | None,
         beacons_max: int,
         *,
         fingerprints: bool = False,
@@ -39,9 +40,10 @@ class RemoteSlam:
     ) -> None:
         self._line = line
         self._raw = library("float", 1)
+        as_it_is = params is None
         # What the image would refuse is refused here first, in the words of the library.
         self._values = Slam(params, beacons_max=beacons_max).params
-        self._client = Client(line, fingerprints=fingerprints, looks=looks)
+        self._client = Client(line, fingerprints=fingerprints, looks=looks, as_it_is=as_it_is)
         self._looks = looks
         self._check_image(beacons_max)
         self._step: Step | None = None
@@ -51,7 +53,10 @@ class RemoteSlam:
         self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
         if looks and seeds is not None:
             self._send_signatures(Message.SEEDS, seeds)
-        self._set_params()
+        if as_it_is:
+            self._values = {name: self._param(number) for number, name in enumerate(self._values)}
+        else:
+            self._set_params()
 
     def _check_image(self, beacons_max: int) -> None:
         info = self._client.info
@@ -68,18 +73,22 @@ class RemoteSlam:
             )
 
     def _set_params(self) -> None:
-        names = [p.name for p in Slam.parameters()]
         for number, (name, default) in enumerate(Slam.defaults().items()):
             value = self._values[name]
             if value == _as_float32(default):
                 continue
-            self._ensure(self._client.ask(Message.PARAM_SET, messages.param_set(number, value)), name)
-            kept = messages.read_value(self._client.ask(Message.PARAM_GET, messages.param_get(number)).body)
-            if kept != value:
-                raise BslamError(f"parameter {name} = {value}: the link carries float32, which has {kept}")
-        answer = self._client.ask(Message.RESET)
-        if answer.status:
-            self._ensure(answer, f"parameter {names[answer.detail]}")
+            self._set_param(number, name, value)
+        self.reset()
+
+    def _set_param(self, number: int, name: str, value: float) -> None:
+        self._ensure(self._client.ask(Message.PARAM_SET, messages.param_set(number, value)), name)
+        kept = self._param(number)
+        if kept != value:
+            raise BslamError(f"parameter {name} = {value}: the link carries float32, which has {kept}")
+
+    def _param(self, number: int) -> float:
+        value = messages.read_value(self._client.ask(Message.PARAM_GET, messages.param_get(number)).body)
+        return int(value) if isinstance(list(self._values.values())[number], int) else value
 
     # ---- the interface of Slam -----------------------------------------------------------------------------
 
@@ -92,6 +101,12 @@ class RemoteSlam:
     def params(self) -> dict[str, float]:
         """The values in force."""
         return dict(self._values)
+
+    @property
+    def host_params(self) -> dict[str, float]:
+        """Those with which a host's build, which remembers more, does what the target does."""
+        steps = min(self._values["history_steps"], self._client.info.history_max)
+        return self.params | {"history_steps": steps}
 
     def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
         """As `Slam.odometry`."""
@@ -232,6 +247,78 @@ class RemoteSlam:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def update(self) -> Step:
+        """Ask where the robot stands now: it may move by itself."""
+        self._step = messages.read_step(self._client.ask(Message.STATE).body)
+        return self._step
+
+    def reset(self) -> None:
+        """Start over, with the parameters as set."""
+        self._step = None
+        answer = self._client.ask(Message.RESET)
+        if answer.status:
+            self._ensure(answer, f"parameter {list(self._values)[answer.detail]}")
+        self._client.drop_reports()
+
+    def set_param(self, name: str, value: float) -> None:
+        """Set a parameter for the next `reset`. Raises BslamError."""
+        checked = Slam(self._values | {name: value}).params[name]
+        self._set_param(list(self._values).index(name), name, checked)
+        self._values[name] = checked
+
+    def save_params(self) -> None:
+        """Have the robot keep the parameters as set over a restart. Raises TargetError if it cannot."""
+        self._client.ask(Message.PARAM_SAVE)
+
+    def reports(self, timeout_s: float) -> list[tuple[int, PoseReport, str | None]]:
+        """Readings of the robot's own encoders since the last call, awaited so long: time in us, report, and
+        the name of the status by which it was refused.
+        """
+        found = []
+        for frame in self._client.listen(timeout_s):
+            report = messages.read_pose_report(frame.payload)
+            found.append((frame.time_us, report, self._refusal(report.status)))
+            self._step = report.step
+        return found
+
+    @property
+    def reports_lost(self) -> int:
+        """Reports that the line lost, by their sequence numbers."""
+        return self._client.reports_lost
+
+    def _refusal(self, status: int) -> str | None:
+        try:
+            self._raw.ensure(status, "")
+        except CoreError as error:
+            return error.status
+        return None
+
+    @property
+    def info(self) -> messages.Info:
+        """What the image says of itself."""
+        return self._client.info
+
+    def set_camera(self, index: int, record: messages.CameraRecord) -> None:
+        """Set camera `index`, the last of index + 1; the front end starts over. Raises CoreError."""
+        self._ensure(self._client.ask(Message.CAMERA, messages.camera(index, record)), f"camera {index}")
+
+    def look(
+        self, time_us: int, camera: int, picture: NDArray[np.uint16], moved: bool
+    ) -> tuple[list[messages.Seen], list[Account]]:
+        """Send a picture, (height, width) RGB565, for the robot's own front end; what it saw goes into the
+        filter. Raises CoreError.
+        """
+        self._ensure(self._client.ask(Message.IMAGE, messages.image(camera, True)), f"image of {camera}")
+        data = picture.astype("<u2").tobytes()
+        piece = messages.pixels_a_frame(self._client.info.sightings_max)
+        for at in range(0, len(data), piece):
+            self._ensure(self._client.ask(Message.PIXELS, data[at : at + piece]), f"pixels {at}")
+        answer = self._client.ask(Message.LOOK, bytes((int(moved),)), time_us)
+        self._take_step(answer, f"image at {time_us} us")
+        accounts, _, count = messages.read_look(answer.body)
+        seen = [messages.read_seen(self._client.ask(Message.SEEN, bytes((i,))).body) for i in range(count)]
+        return seen, [self._account(one) for one in accounts]
+
     # ---- inside --------------------------------------------------------------------------------------------
 
     def _take_step(self, answer: Answer, what: str) -> None:
@@ -242,10 +329,7 @@ class RemoteSlam:
         self._ensure(answer, what)
 
     def _last_step(self) -> Step:
-        if self._step is None:
-            self.resume_odometry(0.0, 0.0)  # at the start this changes nothing, and is answered with the pose
-        assert self._step is not None
-        return self._step
+        return self.update() if self._step is None else self._step
 
     def _ensure(self, answer: Answer, what: str) -> None:
         self._raw.ensure(answer.status, what)
@@ -253,7 +337,7 @@ class RemoteSlam:
 
 def connect(
     target: str,
-    params: Mapping[str, float],
+    params: Mapping[str, float] | None,
     beacons_max: int,
     *,
     fingerprints: bool = False,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from bslam.cli import main
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
@@ -14,6 +15,7 @@ from bslam.link import messages
 from bslam.link.frames import Frame, encode
 from bslam.link.messages import Message
 from bslam.log import first_steps
+from bslam.recording import load
 from bslam.target import client
 from bslam.target.client import Client
 from bslam.target.lines import ProcessLine, TargetError, open_line
@@ -54,6 +56,12 @@ def same(one, other):
     assert [b.covariance_m2.tolist() for b in one.beacons] == [
         b.covariance_m2.tolist() for b in other.beacons
     ]
+
+
+@pytest.fixture
+def moving(monkeypatch):
+    """Robots drive by themselves."""
+    monkeypatch.setenv("BSLAM_ENCODERS", "1")
 
 
 class BadLine:
@@ -264,3 +272,109 @@ def test_any_message_is_answered_or_dropped_and_never_a_crash(robot_line):
     robot = RemoteSlam(line, {}, 6)
     robot.odometry("wheels", 40_000, 0.01, 0.01)
     assert robot.counters()["odometry"] == 1
+
+
+def test_parameters_that_are_saved_are_there_after_a_restart(robot_line, tmp_path, monkeypatch):
+    monkeypatch.setenv("BSLAM_STORE", str(tmp_path / "stored"))
+    robot = RemoteSlam(robot_line(), None, 6)
+    assert robot.params == Slam.defaults() | {
+        name: value for name, value in robot.params.items() if isinstance(value, float)
+    }
+    robot.set_param("wheelbase_m", 0.31)
+    robot.set_param("ticks_per_revolution", 4096)
+    robot.save_params()
+    again = RemoteSlam(robot_line(), None, 6)
+    assert again.params == robot.params
+    assert again.params["wheelbase_m"] == pytest.approx(0.31)
+    stored = bytearray((tmp_path / "stored").read_bytes())
+    stored[40] ^= 1
+    (tmp_path / "stored").write_bytes(stored)
+    assert RemoteSlam(robot_line(), None, 6).params["ticks_per_revolution"] == 1024
+
+
+def test_a_board_that_keeps_nothing_says_so(robot_line, monkeypatch):
+    monkeypatch.delenv("BSLAM_STORE", raising=False)
+    with pytest.raises(TargetError, match="STORE: the board keeps nothing"):
+        RemoteSlam(robot_line(), None, 6).save_params()
+
+
+def test_a_console_changes_nothing_of_what_a_robot_knows(robot_line):
+    line = robot_line()
+    first = RemoteSlam(line, {"gate_d2": 9.0}, 6)
+    first.odometry("wheels", 40_000, 0.02, 0.02)
+    first.sightings(40_000, [0.3], [3.0], [5], [True])
+    counters = first.counters()
+    second = RemoteSlam(line, None, 6)
+    assert second.pose() == first.pose()
+    assert second.params == first.params
+    assert [one.label for one in second.beacons()] == [5]
+    assert second.counters() == counters
+    second.reset()
+    assert second.beacons() == []
+    assert second.update().pose == (0.0, 0.0, 0.0)
+
+
+def test_a_robot_s_own_readings_are_reported_and_lost_ones_are_counted(robot_line, moving):
+    robot = RemoteSlam(robot_line(), None, 6)
+    found = []
+    while len(found) < 8:
+        found += robot.reports(1.0)
+    assert [r.left_ticks for _, r, _ in found[-3:]] == [3 * n for n in range(len(found) - 2, len(found) + 1)]
+    assert all(refused is None for _, _, refused in found)
+    assert robot.reports_lost == 0
+    robot._client._last_report -= 2  # as if two had not come
+    robot.reports(1.0)
+    assert robot.reports_lost == 2
+
+
+def test_a_console_s_recording_replays_to_the_same_bits(tmp_path, moving, capsys):
+    path = tmp_path / "drive.mcap"
+    words = ["console", f"process:{ROBOT}", "--seconds", "1.2", "--record", str(path), "--reset"]
+    assert main([*words, "--set", "ticks_per_revolution=4096"]) == 0
+    said = capsys.readouterr().out
+    assert "counters  odometry" in said and "map       empty" in said and "heading" in said
+    assert main(["replay", str(path), "--pictures", "0", "--out", str(tmp_path / "out")]) == 0
+    assert "states are the recorded ones to the bit" in capsys.readouterr().out
+
+
+def test_a_recording_of_a_robot_that_has_moved_says_what_it_lacks(robot_line, tmp_path, moving, monkeypatch):
+    from bslam.commands import console
+
+    line = robot_line()
+    robot = RemoteSlam(line, None, 6)
+    while robot.counters()["odometry"] < 20:
+        robot.reports(0.2)
+    monkeypatch.setattr(console, "open_line", lambda target: line)
+    path = tmp_path / "late.mcap"
+    assert main(["console", "process:it", "--seconds", "0.3", "--record", str(path)]) == 0
+    assert load(path).entries[0].lost >= 20
+    assert main(["replay", str(path), "--pictures", "0", "--out", str(tmp_path / "out")]) == 1
+
+
+def test_a_console_drives_a_robot_by_a_scenario(tmp_path, capsys):
+    path = tmp_path / "fed.mcap"
+    words = ["console", f"process:{ROBOT}", "--drive", "paper_room", "--association", "known"]
+    assert main([*words, "--seconds", "1.5", "--record", str(path)]) == 0
+    assert "driven by paper_room" in capsys.readouterr().out
+    assert main(["replay", str(path), "--pictures", "0", "--out", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["fax:1"], "allowed: host, qemu:"),
+        (["serial:/dev/nowhere"], "allowed: a device"),
+        (["ROBOT", "--set", "nothing=1"], "KEY of `bslam params`"),
+        (["ROBOT", "--set", "gate_d2=high"], "allowed: a number"),
+        (["ROBOT", "--drive", "nowhere"], "nowhere"),
+        (["ROBOT", "--target", "qemu:mps2_an386"], "first argument"),
+    ],
+)
+def test_what_a_console_cannot_do_is_bad_input(words, says, capsys):
+    words = [f"process:{ROBOT}" if word == "ROBOT" else word for word in words]
+    try:
+        status = main(["console", *words])
+    except SystemExit as end:
+        status = end.code
+    assert status == 2
+    assert says in capsys.readouterr().err.splitlines()[-1]

@@ -26,7 +26,7 @@ static bslam_history_t waiting_arc(int steps)
 {
     bslam_history_t history = {0};
     for (int i = 0; i < steps; i++) {
-        bslam_history_add(&history, STEP_US, &step);
+        bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     }
     return history;
 }
@@ -107,14 +107,14 @@ static void test_walk_to_a_moment_within_a_step_splits_it(void **state)
 static void test_is_full_when_no_more_may_wait(void **state)
 {
     bslam_history_t history = waiting_arc(BSLAM_HISTORY_MAX - 1);
-    assert_false(bslam_history_is_full(&history));
-    bslam_history_add(&history, STEP_US, &step);
-    assert_true(bslam_history_is_full(&history));
+    assert_false(bslam_history_is_full(&history, BSLAM_HISTORY_MAX));
+    bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
+    assert_true(bslam_history_is_full(&history, BSLAM_HISTORY_MAX));
     // Half of the oldest gone makes no room; all of it does.
     take_until(&history, (int64_t)BSLAM_HISTORY_MAX * STEP_US - STEP_US / 2);
-    assert_true(bslam_history_is_full(&history));
+    assert_true(bslam_history_is_full(&history, BSLAM_HISTORY_MAX));
     take_until(&history, (int64_t)(BSLAM_HISTORY_MAX - 1) * STEP_US);
-    assert_false(bslam_history_is_full(&history));
+    assert_false(bslam_history_is_full(&history, BSLAM_HISTORY_MAX));
 }
 
 static void test_look_back_from_the_filter_is_on_the_arc(void **state)
@@ -163,7 +163,7 @@ static void test_look_back_before_the_history_is_refused(void **state)
     // One more than fits: the first is forgotten.
     bslam_history_t history = waiting_arc(BSLAM_HISTORY_MAX);
     take_until(&history, 0);
-    bslam_history_add(&history, STEP_US, &step);
+    bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     const bslam_params_t params = arc_params();
     const int64_t reach_us = (int64_t)(BSLAM_HISTORY_MAX - 1) * STEP_US;
     bslam_pose_t pose;
@@ -198,7 +198,7 @@ static void test_clear_forgets_all(void **state)
     assert_int_equal(history.filter.behind_us, 0);
     assert_int_equal(bslam_history_look_back(&history, &params, 1, &pose), BSLAM_E_TIME);
     // Nothing of the step that was cut short is left in the next one.
-    bslam_history_add(&history, STEP_US, &step);
+    bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     take_until(&history, 0);
     assert_int_equal(bslam_history_look_back(&history, &params, STEP_US, &pose), BSLAM_OK);
     assert_on_circle(&pose, -1);

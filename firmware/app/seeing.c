@@ -1,0 +1,78 @@
+#include "app/seeing.h"
+
+#if SESSION_VISION
+
+#include "models/beacons.h"
+
+bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera_t *camera)
+{
+    seeing->row_bytes = 0;
+    seeing->count = 0;
+    seeing->vision.camera_count = 0;
+    if (index < 0 || index >= BSLAM_CAMERAS_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    seeing->cameras[index] = *camera;
+    return bslam_vision_init(&seeing->vision, &bslam_beacons_model, seeing->cameras, index + 1);
+}
+
+bslam_status_t seeing_begin(seeing_t *seeing, int camera, bslam_pixel_format_t format)
+{
+    seeing->row_bytes = 0;
+    seeing->count = 0;
+    if (camera < 0 || camera >= seeing->vision.camera_count) {
+        return BSLAM_E_COUNT;
+    }
+    const bslam_camera_t *lens = &seeing->cameras[camera];
+    const bslam_status_t status =
+        bslam_vision_begin(&seeing->vision, camera, format, lens->width_px, lens->height_px);
+    if (status == BSLAM_OK) {
+        seeing->row_bytes = (size_t)lens->width_px * (format == BSLAM_PIXELS_RGB888 ? 3 : 2);
+        seeing->filled = 0;
+    }
+    return status;
+}
+
+bslam_status_t seeing_take(seeing_t *seeing, uint8_t byte)
+{
+    if (seeing->row_bytes == 0) {
+        return BSLAM_E_COUNT;
+    }
+    seeing->row[seeing->filled++] = byte;
+    if (seeing->filled < seeing->row_bytes) {
+        return BSLAM_OK;
+    }
+    seeing->filled = 0;
+    return bslam_vision_row(&seeing->vision, seeing->row);
+}
+
+static bslam_sighting_t as_sighting(const bslam_candidate_t *candidate)
+{
+    const bool has_range = candidate->has_range;
+    const bslam_sighting_t sighting = {.bearing_rad = candidate->bearing_rad,
+                                       .range_m = has_range ? candidate->range_m : 0,
+                                       .bearing_sd_rad = candidate->bearing_sd_rad,
+                                       .range_sd_m = has_range ? candidate->range_sd_m : 0,
+                                       .has_range = has_range,
+                                       .beacon_class = BSLAM_CLASS_NONE,
+                                       .label = BSLAM_LABEL_NONE,
+                                       .signature = candidate->signature};
+    return sighting;
+}
+
+bslam_status_t seeing_look(seeing_t *seeing, bool robot_moved)
+{
+    seeing->row_bytes = 0;
+    seeing->count = 0;
+    const bslam_status_t status = bslam_vision_end(&seeing->vision, robot_moved);
+    int32_t count = 0;
+    const bslam_candidate_t *found = bslam_vision_candidates(&seeing->vision, &count);
+    for (int i = 0; status == BSLAM_OK && i < count; i++) {
+        if (found[i].has_bearing) {
+            seeing->sightings[seeing->count++] = as_sighting(&found[i]);
+        }
+    }
+    return status;
+}
+
+#endif

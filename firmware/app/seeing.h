@@ -1,0 +1,41 @@
+/// Pictures that come as pieces of rows, and what is seen in them as sightings: the vision front end behind
+/// the link or a board's camera. Only in an application that is built with SESSION_VISION.
+#ifndef APP_SEEING_H
+#define APP_SEEING_H
+
+#include "bslam/bslam.h"
+#include "bslam/vision/vision.h"
+
+#ifndef SESSION_VISION
+#define SESSION_VISION 0
+#endif
+
+#if SESSION_VISION
+
+/// All members are this module's own. All zero: no camera yet.
+typedef struct seeing {
+    bslam_vision_t vision;
+    bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
+    uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];
+    size_t row_bytes;  ///< of the frame that streams in; 0: there is none
+    size_t filled;     ///< bytes of the row that have come
+    bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];
+    int count;  ///< of sightings in the last finished frame
+} seeing_t;
+
+/// Sets camera `index`, and that there are index + 1; starts over, with empty memories of the room. What
+/// bslam_vision_init refuses, BSLAM_E_COUNT for an index: then there is no camera.
+bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera_t *camera);
+
+/// Starts a frame of a camera: its statuses are bslam_vision_begin's, BSLAM_E_COUNT: there is no camera.
+bslam_status_t seeing_begin(seeing_t *seeing, int camera, bslam_pixel_format_t format);
+
+/// The next byte of the frame, row after row. bslam_vision_row's statuses.
+bslam_status_t seeing_take(seeing_t *seeing, uint8_t byte);
+
+/// Looks at the frame: its sightings, in the robot's axes, stand in seeing->sightings until the next frame
+/// begins. bslam_vision_end's statuses.
+bslam_status_t seeing_look(seeing_t *seeing, bool robot_moved);
+
+#endif
+#endif

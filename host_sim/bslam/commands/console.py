@@ -1,0 +1,274 @@
+"""`bslam console`: what a connected robot knows, and a recording of what it does."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bslam.commands.arguments import add_filter_options, run_options
+from bslam.commands.report import table_of
+from bslam.errors import BslamError
+from bslam.experiment.runner import run_log
+from bslam.log import Log, read_folder
+from bslam.recording import RecordingWriter
+from bslam.recording.entries import Counters, Gap, Map, Reading, Start, State
+from bslam.recording.recorder import MAP_PERIOD_US
+from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
+from bslam.target.remote import RemoteSlam
+from bslam.world.simulate import load_scenario, simulate
+
+SUMMARY = "show a connected robot's pose, map and counters; set its parameters; record it"
+EXAMPLES = """examples:
+  bslam console serial:/dev/ttyUSB0
+  bslam console serial:/dev/ttyUSB0 --record drive.mcap --reset
+  bslam console serial:/dev/ttyUSB0 --set wheelbase_m=0.31 --save --reset
+  bslam console qemu:mps2_an386 --drive paper_room --record drive.mcap
+  bslam console qemu:mps2_an386 --drive out/run/paper_room_seed0
+
+A robot with encoders of its own drives by itself, and is watched; nothing that it knows is changed but by
+--set, --save and --reset. --drive feeds it with a scenario's odometry and sightings, or a log folder's, from
+the start. A recording that begins with --reset or --drive runs again with `bslam replay` to the same bits.
+Ctrl-C ends it."""
+_DRAW_S = 1.0
+_LISTEN_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("robot", metavar="TARGET", type=_target, help="qemu:BOARD or serial:DEVICE")
+    group = parser.add_argument_group("robot")
+    group.add_argument("--save", action="store_true", help="the robot keeps its parameters over a restart")
+    group.add_argument(
+        "--reset", action="store_true", help="start over at the origin with an empty map and what --set says"
+    )
+    group.add_argument("--drive", metavar="LOG", help="feed it: a scenario, or a log folder")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the scenario (default: 0)")
+    group = parser.add_argument_group("console")
+    group.add_argument("--record", type=Path, metavar="FILE", help="write a recording, FILE.mcap")
+    group.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="end after so long")
+    add_filter_options(parser)
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    if arguments.target != "host":
+        raise BslamError("--target: the console's robot is its first argument")
+    try:
+        return _drive(arguments) if arguments.drive else _watch(arguments)
+    except TargetError as error:
+        print(f"bslam console: {error}", file=sys.stderr)
+        return 1
+
+
+# ---- a robot that is fed -----------------------------------------------------------------------------------
+
+
+def _drive(arguments: argparse.Namespace) -> int:
+    folder = Path(arguments.drive)
+    log = read_folder(folder) if folder.is_dir() else simulate(load_scenario(arguments.drive), arguments.seed)
+    by_sight = log.sightings.signature is not None
+    arguments.target = arguments.robot
+    options = run_options(arguments, has_looks=by_sight, sensor="recorded", seed=arguments.seed)
+    screen = _Screen(f"{arguments.robot}, driven by {log.name}")
+    _Driven(screen, log, options).run(arguments.record, arguments.seconds)
+    return 0
+
+
+class _Driven:
+    """A run that is shown on the way."""
+
+    def __init__(self, screen: _Screen, log: Log, options: Any) -> None:
+        self._screen, self._log, self._options = screen, log, options
+        self._end_s = math.inf
+
+    def run(self, record: Path | None, seconds: float) -> None:
+        self._end_s = time.monotonic() + seconds
+        try:
+            trace = run_log(self._log, self._options, watcher=self, record=record)
+        except _Enough:
+            return
+        self._screen.last(f"image {trace.target.get('image', '-')}, {trace.steps} steps")
+
+    def frame(self, *_: Any) -> None:
+        """Nothing: a step tells all."""
+
+    def step(self, time_us: int, _pose: Any, slam: Any) -> None:
+        """A row of the run is done."""
+        self._screen.draw(slam, time_us)
+        if time.monotonic() > self._end_s:
+            raise _Enough
+
+
+class _Enough(Exception):  # noqa: N818
+    """The time that the user gave is over."""
+
+
+# ---- a robot that drives by itself -------------------------------------------------------------------------
+
+
+def _watch(arguments: argparse.Namespace) -> int:
+    line = open_line(arguments.robot)
+    try:
+        slam = RemoteSlam(line, None, 1, fingerprints=arguments.record is not None)
+        _change(slam, arguments)
+        screen = _Screen(f"{arguments.robot}, bslam {slam.info.version}, build {slam.info.build_id[:12]}")
+        if arguments.record is None:
+            _follow(slam, screen, None, arguments.seconds)
+        else:
+            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max)
+            start.about.update(slam.target_description())
+            with RecordingWriter(arguments.record, start) as writer:
+                if not arguments.reset:
+                    _note_what_went_before(slam, writer)
+                _follow(slam, screen, writer, arguments.seconds)
+            print(f"recorded in {arguments.record}")
+    finally:
+        line.close()
+    return 0
+
+
+def _change(slam: RemoteSlam, arguments: argparse.Namespace) -> None:
+    """What the command line asks to be changed before the robot is watched."""
+    for text in arguments.set:
+        key, equals, value = text.partition("=")
+        if not equals or key not in slam.params:
+            raise BslamError(f"--set {text}: allowed: KEY=VALUE with a KEY of `bslam params`")
+        try:
+            slam.set_param(key, float(value))
+        except ValueError:
+            raise BslamError(f"--set {text}: '{value}' is not allowed; allowed: a number") from None
+        print(f"{key} = {slam.params[key]:g}, in force after a reset")
+    if arguments.save:
+        slam.save_params()
+        print("the robot keeps its parameters")
+    if arguments.reset:
+        slam.reset()
+
+
+def _note_what_went_before(slam: RemoteSlam, writer: RecordingWriter) -> None:
+    readings = slam.counters()["odometry"]
+    if readings:
+        writer.put(Gap(readings))
+        print(
+            f"the robot has {readings} readings behind it: its replay will not be exact; --reset starts over"
+        )
+
+
+def _follow(slam: RemoteSlam, screen: _Screen, writer: RecordingWriter | None, seconds: float) -> None:
+    """Show, and write down, what the robot reports, until Ctrl-C or the end of the time."""
+    watch = _Watch(slam, writer)
+    end_s = time.monotonic() + seconds
+    try:
+        while time.monotonic() < end_s:
+            watch.listen()
+            if screen.is_due():
+                slam.update()
+                screen.draw(slam, watch.time_us)
+    except KeyboardInterrupt:
+        pass
+    watch.end()
+    screen.draw(slam, watch.time_us, now=True)
+
+
+class _Watch:
+    """A robot's reports into a recording."""
+
+    def __init__(self, slam: RemoteSlam, writer: RecordingWriter | None) -> None:
+        self._slam, self._writer = slam, writer
+        self._lost = slam.reports_lost
+        self._map_us = -MAP_PERIOD_US
+        self.time_us = 0
+
+    def listen(self) -> None:
+        """Take what has come."""
+        reports = self._slam.reports(_LISTEN_S)
+        if self._writer is None:
+            self.time_us = reports[-1][0] if reports else self.time_us
+            return
+        if self._slam.reports_lost > self._lost:
+            self._writer.put(Gap(self._slam.reports_lost - self._lost))
+            self._lost = self._slam.reports_lost
+        for time_us, report, refused in reports:
+            self._writer.put(Reading("ticks", time_us, report.left_ticks, report.right_ticks, None, refused))
+            step = report.step
+            self._writer.put(State(time_us, step.pose, step.covariance, step.fingerprint))
+            self.time_us = time_us
+        if self.time_us - self._map_us >= MAP_PERIOD_US:
+            self._map_us = self.time_us
+            self._note_map()
+
+    def end(self) -> None:
+        """Note the last map."""
+        if self._writer is not None:
+            self._note_map()
+
+    def _note_map(self) -> None:
+        assert self._writer is not None
+        self._writer.put(Map(self._slam.beacons()))
+        self._writer.put(Counters(self._slam.counters()))
+
+
+# ---- what is shown -----------------------------------------------------------------------------------------
+
+
+class _Screen:
+    """A terminal is drawn anew each second; elsewhere each drawing is a paragraph."""
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._next_s = time.monotonic()
+
+    def is_due(self) -> bool:
+        """The next drawing's time has come."""
+        return time.monotonic() >= self._next_s
+
+    def draw(self, slam: Any, time_us: int, now: bool = False) -> None:
+        """Show the robot, if it is time."""
+        if not now and not self.is_due():
+            return
+        self._next_s = time.monotonic() + _DRAW_S
+        if sys.stdout.isatty():
+            print("\x1b[H\x1b[J", end="")
+        print(f"{self._title}\n{describe(slam, time_us)}\n", flush=True)
+
+    def last(self, text: str) -> None:
+        """A line at the end."""
+        print(text)
+
+
+def describe(slam: Any, time_us: int) -> str:
+    """A robot's pose, map and counters in some lines."""
+    x_m, y_m, theta_rad = slam.pose()
+    xx, _, yy, _, _, tt = slam.pose_covariance_lower()
+    sd_cm, sd_deg = 100.0 * math.sqrt(max(xx + yy, 0.0)), math.degrees(math.sqrt(max(tt, 0.0)))
+    lines = [
+        f"time      {time_us * 1e-6:.3f} s",
+        f"pose      x {x_m:.3f} m, y {y_m:.3f} m, heading {math.degrees(theta_rad):.1f} deg "
+        f"(sd {sd_cm:.1f} cm, {sd_deg:.1f} deg)",
+    ]
+    counts = ", ".join(f"{name} {count}" for name, count in slam.counters().items() if count)
+    return "\n".join([*lines, f"counters  {counts or 'all 0'}", _map_text(slam.beacons())])
+
+
+def _map_text(beacons: Sequence[Any]) -> str:
+    if not beacons:
+        return "map       empty"
+    rows = [["beacon", "x m", "y m", "sd cm", "sightings", ""]]
+    for one in beacons:
+        sd_cm = 100.0 * math.sqrt(max(one.covariance[0][0] + one.covariance[1][1], 0.0))
+        name = str(one.label if one.label >= 0 else one.uid)
+        sure = "" if one.confirmed else "provisional"
+        rows.append([name, f"{one.x_m:.3f}", f"{one.y_m:.3f}", f"{sd_cm:.1f}", str(one.sightings), sure])
+    return table_of(rows)
+
+
+def _target(text: str) -> str:
+    kind, _, name = text.partition(":")
+    if kind not in TARGET_KINDS or not name:
+        raise argparse.ArgumentTypeError(f"'{text}' does not exist; allowed: {allowed_targets()}")
+    return text
