@@ -199,6 +199,19 @@ static void apply_resume(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+static void apply_set_pose(session_t *session, bslam_link_reader_t *reader)
+{
+    bslam_pose_t pose;
+    pose.x_m = bslam_link_get_real(reader);
+    pose.y_m = bslam_link_get_real(reader);
+    pose.theta_rad = bslam_link_get_real(reader);
+    const bslam_real_t position_sd_m = bslam_link_get_real(reader);
+    const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
+    if (is_whole(session, reader)) {
+        keep(session, bslam_slam_set_pose(&session->slam, &pose, position_sd_m, heading_sd_rad));
+    }
+}
+
 static void apply_known_beacon(session_t *session, bslam_link_reader_t *reader)
 {
     const int32_t label = bslam_link_get_i32(reader);
@@ -571,6 +584,7 @@ static const exchange_t exchanges[] = {
     {SESSION_SEEDS, apply_seeds, answer_nothing},
     {SESSION_STATE, apply_nothing, answer_step},
     {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
+    {SESSION_SET_POSE, apply_set_pose, answer_step},
 #if SESSION_VISION
     {SESSION_CAMERA, apply_camera, answer_nothing},
     {SESSION_IMAGE, apply_image, answer_nothing},

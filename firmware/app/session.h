@@ -29,6 +29,7 @@ typedef enum session_message {
     SESSION_SEEDS = 0x0e,       ///< signatures of things that are no beacon, for the next SESSION_RESET
     SESSION_STATE = 0x0f,       ///< asks where the robot stands
     SESSION_PARAM_SAVE = 0x10,  ///< keeps the parameters as set over a restart
+    SESSION_SET_POSE = 0x16,    ///< the robot is told where it is
     SESSION_CAMERA = 0x11,      ///< what a camera is; this and the next four: only with SESSION_VISION
     SESSION_IMAGE = 0x12,       ///< starts a picture
     SESSION_PIXELS = 0x13,      ///< the next bytes of it

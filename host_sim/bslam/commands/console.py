@@ -16,7 +16,7 @@ from bslam.errors import BslamError
 from bslam.experiment.runner import run_log
 from bslam.log import Log, read_folder
 from bslam.recording import RecordingWriter
-from bslam.recording.entries import Counters, Gap, Map, Reading, Start, State
+from bslam.recording.entries import Call, Counters, Gap, Map, Reading, Start, State
 from bslam.recording.recorder import MAP_PERIOD_US
 from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
 from bslam.target.remote import RemoteSlam
@@ -27,6 +27,7 @@ EXAMPLES = """examples:
   bslam console serial:/dev/ttyUSB0
   bslam console serial:/dev/ttyUSB0 --record drive.mcap --reset
   bslam console serial:/dev/ttyUSB0 --set wheelbase_m=0.31 --save --reset
+  bslam console serial:/dev/ttyUSB0 --set-pose 1.5,0,1.57,0.1,0.05
   bslam console qemu:mps2_an386 --drive paper_room --record drive.mcap
   bslam console qemu:mps2_an386 --drive out/run/paper_room_seed0
 
@@ -45,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--save", action="store_true", help="the robot keeps its parameters over a restart")
     group.add_argument(
         "--reset", action="store_true", help="start over at the origin with an empty map and what --set says"
+    )
+    group.add_argument(
+        "--set-pose",
+        type=_pose,
+        metavar="X,Y,HEADING,SD,SD",
+        help="tell it where it is in its map: m, m, rad, and how sure that is: m, rad",
     )
     group.add_argument("--drive", metavar="LOG", help="feed it: a scenario, or a log folder")
     group.add_argument("--seed", type=int, default=0, metavar="N", help="of the scenario (default: 0)")
@@ -118,14 +125,14 @@ def _watch(arguments: argparse.Namespace) -> int:
         _change(slam, arguments)
         screen = _Screen(f"{arguments.robot}, bslam {slam.info.version}, build {slam.info.build_id[:12]}")
         if arguments.record is None:
-            _follow(slam, screen, None, arguments.seconds)
+            _follow(slam, screen, None, arguments)
         else:
             start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max)
             start.about.update(slam.target_description())
             with RecordingWriter(arguments.record, start) as writer:
                 if not arguments.reset:
                     _note_what_went_before(slam, writer)
-                _follow(slam, screen, writer, arguments.seconds)
+                _follow(slam, screen, writer, arguments)
             print(f"recorded in {arguments.record}")
     finally:
         line.close()
@@ -159,10 +166,14 @@ def _note_what_went_before(slam: RemoteSlam, writer: RecordingWriter) -> None:
         )
 
 
-def _follow(slam: RemoteSlam, screen: _Screen, writer: RecordingWriter | None, seconds: float) -> None:
+def _follow(
+    slam: RemoteSlam, screen: _Screen, writer: RecordingWriter | None, arguments: argparse.Namespace
+) -> None:
     """Show, and write down, what the robot reports, until Ctrl-C or the end of the time."""
     watch = _Watch(slam, writer)
-    end_s = time.monotonic() + seconds
+    if arguments.set_pose is not None:
+        watch.set_pose(arguments.set_pose)
+    end_s = time.monotonic() + arguments.seconds
     try:
         while time.monotonic() < end_s:
             watch.listen()
@@ -184,9 +195,16 @@ class _Watch:
         self._map_us = -MAP_PERIOD_US
         self.time_us = 0
 
-    def listen(self) -> None:
+    def set_pose(self, pose: tuple[float, ...]) -> None:
+        """Tell the robot where it is."""
+        self._slam.set_pose(*pose)
+        self.listen(None)  # what it reported before it heard that
+        if self._writer is not None:
+            self._writer.put(Call("set_pose", pose))
+
+    def listen(self, timeout_s: float | None = _LISTEN_S) -> None:
         """Take what has come."""
-        reports = self._slam.reports(_LISTEN_S)
+        reports = self._slam.reports(timeout_s)
         if self._writer is None:
             self.time_us = reports[-1][0] if reports else self.time_us
             return
@@ -265,6 +283,16 @@ def _map_text(beacons: Sequence[Any]) -> str:
         sure = "" if one.confirmed else "provisional"
         rows.append([name, f"{one.x_m:.3f}", f"{one.y_m:.3f}", f"{sd_cm:.1f}", str(one.sightings), sure])
     return table_of(rows)
+
+
+def _pose(text: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 5:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: five numbers, commas between")
+    return numbers
 
 
 def _target(text: str) -> str:

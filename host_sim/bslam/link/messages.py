@@ -39,6 +39,7 @@ class Message(IntEnum):
     PIXELS = 0x13
     LOOK = 0x14
     SEEN = 0x15
+    SET_POSE = 0x16
 
 
 class Report(IntEnum):
@@ -164,6 +165,10 @@ def pixels_a_frame(sightings_max: int) -> int:
 
 def resume(position_sd_m: float, heading_sd_rad: float) -> bytes:
     return float32(position_sd_m) + float32(heading_sd_rad)
+
+
+def set_pose(x_m: float, y_m: float, theta_rad: float, position_sd_m: float, heading_sd_rad: float) -> bytes:
+    return b"".join(map(float32, (x_m, y_m, theta_rad, position_sd_m, heading_sd_rad)))
 
 
 def known_beacon(label: int, x_m: float, y_m: float) -> bytes:

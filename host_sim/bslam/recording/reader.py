@@ -13,6 +13,7 @@ from typing import Any
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Footer, Message
 from mcap.stream_reader import CRCValidationError, StreamReader
+from zstandard import ZstdError
 
 from bslam.errors import BslamError
 from bslam.recording.entries import FORMATS, Entry, Start
@@ -56,7 +57,7 @@ def _read(path: Path, file: Any) -> tuple[list[Entry], bool]:
             elif isinstance(record, Message) and topics.get(record.channel_id) in _BY_TOPIC:
                 entries.append(_entry(path, topics[record.channel_id], record))
             complete = complete or isinstance(record, Footer)
-    except (McapError, CRCValidationError, ValueError) as error:
+    except (McapError, CRCValidationError, ZstdError, ValueError) as error:
         raise BslamError(f"{path}: {type(error).__name__}: {error}; {_ALLOWED}") from error
     return entries, complete
 

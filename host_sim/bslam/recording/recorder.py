@@ -64,6 +64,10 @@ class Recorder:
         """As `Slam.resume_odometry`."""
         self._call("resume_odometry", *arguments)
 
+    def set_pose(self, *arguments: float) -> None:
+        """As `Slam.set_pose`."""
+        self._call("set_pose", *arguments)
+
     def add_known_beacon(self, *arguments: float) -> None:
         """As `Slam.add_known_beacon`."""
         self._call("add_known_beacon", *arguments)

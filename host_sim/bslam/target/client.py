@@ -74,11 +74,13 @@ class Client:
                 return None
             self._frames.extend(self._decoder.push(data))
 
-    def listen(self, timeout_s: float) -> list[Frame]:
-        """What the robot has reported of itself, at once or within the time-out. Raises TargetError."""
-        if not self._reports:
+    def listen(self, timeout_s: float | None) -> list[Frame]:
+        """What the robot has reported of itself, at once or within the time-out; None: what it had reported
+        before its last answer. Raises TargetError.
+        """
+        if not self._reports and timeout_s is not None:
             self._frames.extend(self._decoder.push(self._line.read(timeout_s)))
-        while self._frames:
+        while self._frames and timeout_s is not None:
             frame = self._frames.popleft()
             if frame.type == Report.READY:
                 raise TargetError("the target started anew: what it knew is lost")

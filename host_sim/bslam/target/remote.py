@@ -201,6 +201,13 @@ class RemoteSlam:
             phi_rad=raw.phi_rad,
         )
 
+    def set_pose(
+        self, x_m: float, y_m: float, theta_rad: float, position_sd_m: float, heading_sd_rad: float
+    ) -> None:
+        """As `Slam.set_pose`."""
+        payload = messages.set_pose(x_m, y_m, theta_rad, position_sd_m, heading_sd_rad)
+        self._take_step(self._client.ask(Message.SET_POSE, payload), f"pose ({x_m}, {y_m}, {theta_rad})")
+
     def add_known_beacon(self, label: int, x_m: float, y_m: float) -> None:
         """As `Slam.add_known_beacon`."""
         payload = messages.known_beacon(label, x_m, y_m)
@@ -270,9 +277,9 @@ class RemoteSlam:
         """Have the robot keep the parameters as set over a restart. Raises TargetError if it cannot."""
         self._client.ask(Message.PARAM_SAVE)
 
-    def reports(self, timeout_s: float) -> list[tuple[int, PoseReport, str | None]]:
-        """Readings of the robot's own encoders since the last call, awaited so long: time in us, report, and
-        the name of the status by which it was refused.
+    def reports(self, timeout_s: float | None) -> list[tuple[int, PoseReport, str | None]]:
+        """Readings of the robot's own encoders since the last call, awaited so long (None: only those from
+        before its last answer): time in us, report, and the name of the status by which it was refused.
         """
         found = []
         for frame in self._client.listen(timeout_s):

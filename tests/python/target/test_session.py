@@ -210,6 +210,8 @@ def test_refusals_are_those_of_the_host(robot_line):
         ("pose_at", (10**9,)),
         ("resume_odometry", (99.0, 0.0)),
         ("resume_odometry", (0.1, 0.1)),
+        ("set_pose", (1.0, 2.0, 0.5, 0.1, 0.05)),
+        ("set_pose", (1.0, 2.0, 0.5, 99.0, 0.05)),
     ]
     for name, arguments in calls:
         answers = []
@@ -330,6 +332,7 @@ def test_a_robot_s_own_readings_are_reported_and_lost_ones_are_counted(robot_lin
 def test_a_console_s_recording_replays_to_the_same_bits(tmp_path, moving, capsys):
     path = tmp_path / "drive.mcap"
     words = ["console", f"process:{ROBOT}", "--seconds", "1.2", "--record", str(path), "--reset"]
+    words += ["--set-pose", "1,2,0.5,0.1,0.05"]
     assert main([*words, "--set", "ticks_per_revolution=4096"]) == 0
     said = capsys.readouterr().out
     assert "counters  odometry" in said and "map       empty" in said and "heading" in said
