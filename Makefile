@@ -87,9 +87,10 @@ pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
 .PHONY: proof
-proof: setup ## what takes longer: `make test`, the library for every core, the same bits over 5000 steps
+proof: setup ## what takes longer: `make test`, the library for every core, the same bits over 5000 steps, a sweep that is killed
 	@$(MAKE) --no-print-directory test firmware-all
 	@$(PYTHON) tools/same_bits.py --steps 5000
+	@$(PYTHON) tools/kill_sweep.py --runs 1000
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

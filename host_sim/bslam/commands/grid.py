@@ -10,13 +10,22 @@ from typing import Any
 from bslam.commands.arguments import run_options, scenario_source
 from bslam.commands.drawing import draw
 from bslam.experiment.batch import Job, make_jobs
+from bslam.experiment.options import RunOptions
+from bslam.experiment.sources import Source
 from bslam.world.simulate import load_scenario
 
 
 def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None) -> list[Job]:
+    """The grid as jobs; the first arguments.pictures of them are drawn."""
+    return make_jobs(*grid(arguments, sigmas_mps), draw, arguments.pictures)
+
+
+def grid(
+    arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None
+) -> tuple[list[Source], list[RunOptions]]:
     """Simulated runs of arguments.scenario: sigma x observation x filter x association x seed.
 
-    `sigmas_mps` None: what the scenario says. The first arguments.pictures runs are drawn.
+    `sigmas_mps` None: what the scenario says.
     """
     wheels = load_scenario(arguments.scenario).wheels
     noise = arguments.noise or wheels.noise
@@ -38,8 +47,8 @@ def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None)
             arguments.seeds,
         )
     ]
-    sources = [scenario_source(arguments, one.seed, one.sigma_mps, noise) for one in options]
-    return make_jobs(sources, options, draw, arguments.pictures)
+    sources: list[Source] = [scenario_source(arguments, one.seed, one.sigma_mps, noise) for one in options]
+    return sources, options
 
 
 def _values(one_or_several: Any) -> list[Any]:

@@ -1,54 +1,233 @@
-"""`bslam sweep`: a grid of runs, and a table with one line a combination."""
+"""`bslam sweep`: a grid of runs, thousands perhaps, and a table with one line a combination."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
-from collections.abc import Sequence
+import json
+import statistics
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, Final, NoReturn
 
 from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
-from bslam.commands.grid import grid_jobs
-from bslam.commands.report import HEADINGS, finish, mean_row, table_of
-from bslam.experiment.batch import Outcome, run_batch
-from bslam.experiment.output import write_atomically
+from bslam.commands.drawing import draw
+from bslam.commands.grid import grid
+from bslam.commands.report import HEADINGS, mean_row, table_of
+from bslam.errors import BslamError
+from bslam.experiment.batch import Job, make_jobs
+from bslam.experiment.cluster import cluster
+from bslam.experiment.options import RunOptions
+from bslam.experiment.output import write_atomically, write_summary
+from bslam.experiment.sources import Source
+from bslam.experiment.sweep import (
+    PARQUET,
+    STORE,
+    Store,
+    SweepResult,
+    code_digest,
+    forget,
+    run_sweep,
+    write_parquet,
+)
+from bslam.parsing.settings import check_keys, load_toml
+from bslam.world.simulate import load_scenario
 
-SUMMARY = "run every combination of sigmas, observations, filters and associations"
+SUMMARY = "run every combination of scenarios, sigmas, observations, filters, associations, parameters"
 EXAMPLES = """examples:
   bslam sweep paper_room --sigma 0.3,0.6,1.0 --filter standard,invariant --seeds 0:10
   bslam sweep pairs --association known,known:0.05,nearest,mahalanobis --seeds 0:5
-  bslam sweep paper_room --observation distance,direction --set bearing_sd_rad=0.02
+  bslam sweep gates.toml --jobs 8 --out out/gates
+  bslam sweep gates.toml --cluster tcp://10.0.0.1:8786 --no-files
 
-Options with lists take values with commas between. sweep.txt has the means of each combination over its
-seeds."""
+A sweep file (TOML) holds the options by their names, with underscores, and lists where there are several:
+  scenarios = ["paper_room", "pairs"]
+  seeds = "0:100"
+  sigma = [0.3, 1.0]
+  association = ["known", "mahalanobis"]
+  set.gate_d2 = [9.0, 16.0]
+which is 2 x 100 x 2 x 2 x 2 runs. Finished runs are kept in DIR/sweep.sqlite: after Ctrl-C, a crash or a
+power cut the same command makes those that are missing. results.parquet has a row a run, sweep.txt the means
+of each combination over its seeds. On a cluster every worker needs this version of bslam and, without
+--no-files, the same DIR."""
+_LISTS: Final = ("observation", "association", "filter", "sigma")
+_FLAGS: Final = ("velocity_states", "known_map", "files")
+_WORDS: Final = ("seeds", "motion", "noise", "sensor", "rig", "real")
+_KEYS: Final = dict.fromkeys(("scenarios", *_LISTS, *_WORDS, *_FLAGS, "set"))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name, or path of a TOML file")
+    parser.add_argument(
+        "scenario", metavar="FILE", help="a sweep file; or a scenario, by name or path of a TOML file"
+    )
+    parser.add_argument(
+        "--restart", action="store_true", help="throw away the runs that DIR keeps, and begin anew"
+    )
+    parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="a Dask scheduler whose workers make the runs, tcp://HOST:PORT"
+    )
+    _add_run_options(parser)
+
+
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--files",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="trajectories and map of each run, about 0.7 MB (default: yes)",
+    )
     add_sensor_options(parser)
-    add_filter_options(parser, lists=("observation", "association", "filter", "sigma"))
+    add_filter_options(parser, lists=_LISTS)
     add_batch_options(parser, "sweep", pictures=0)
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    result = run_batch(grid_jobs(arguments, arguments.sigma), arguments.out, arguments.jobs)
-    text = combinations(result.outcomes)
-    write_atomically(Path(arguments.out) / "sweep.txt", text + "\n")
-    return finish(result, arguments.out, text)
+    jobs, plan = _jobs_and_plan(arguments)
+    out: Path = arguments.out
+    if arguments.restart:
+        forget(out)
+    with contextlib.ExitStack() as stack:
+        backend = stack.enter_context(cluster(arguments.cluster)) if arguments.cluster else None
+        store = stack.enter_context(Store(out, plan))
+        result = run_sweep(jobs, store, out, arguments.jobs, backend)
+    status = _finish(result, out)
+    if _jobs_and_plan(arguments)[1] != plan:
+        raise BslamError(f"{arguments.scenario}: was changed while its runs were made, which are of before")
+    return status
 
 
-def combinations(outcomes: Sequence[Outcome]) -> str:
-    """Means over the seeds, one line a combination."""
+def _finish(result: SweepResult, out: Path) -> int:
+    """Write and say what came of it; the exit status. Raises BslamError if an input was bad."""
+    failures = [one.entry for one in result.failed]
+    more = {"interrupted": True} if result.missing else {}
+    write_summary(out, [*result.entries, *failures], **more)
+    files = ["summary.json", "sweep.txt", STORE]
+    if result.entries:
+        text = combinations(result.entries)
+        write_atomically(out / "sweep.txt", text + "\n")
+        print(text)
+        try:
+            write_parquet(out / PARQUET, result.entries)
+            files.insert(0, PARQUET)
+        except ImportError as error:
+            print(f"no {PARQUET}: {error}; pip install 'bslam[sweep]', and the same command writes it")
+    if result.kept:
+        print(f"{result.kept} of {len(result.entries)} runs were there already")
+    print(f"files in {out}: {', '.join(files)}")
+    for outcome in result.failed:
+        print(f"{outcome.name} failed:\n{outcome.crash or outcome.bad_input}", file=sys.stderr)
+    if result.missing:
+        print(
+            f"{result.stopped}: {result.missing} runs are missing; the same command makes them",
+            file=sys.stderr,
+        )
+    bad_input = next((one.bad_input for one in result.failed if one.bad_input is not None), None)
+    if bad_input is not None:
+        raise BslamError(bad_input)
+    return 1 if result.failed or result.missing else 0
 
-    def combination(outcome: Outcome) -> tuple[str, ...]:
-        entry = outcome.entry
-        return tuple(str(entry[word]) for word in ("sigma_mps", "observation", "filter", "association"))
 
-    rows = [["means over seeds", *HEADINGS]]
-    for words, group in itertools.groupby(outcomes, combination):
-        sigma, observation, filter_name, association = words
-        name = f"sigma {sigma}  {observation}  {filter_name}  {association}"
-        rows.append(mean_row(name, [outcome.entry for outcome in group]))
+def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Means over the seeds, one line a combination, and how sure the mean error is."""
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for entry in entries:
+        words = [f"sigma {entry['sigma_mps']}", *(str(entry[key]) for key in ("observation", "filter"))]
+        words += [str(entry["association"]), *_parameters(entry, entries)]
+        groups.setdefault((str(entry["scenario"]), *words), []).append(entry)
+    rows = [["means over seeds", "runs", "mean +- cm", *HEADINGS]]
+    for name, group in groups.items():
+        first, *rest = mean_row("  ".join(name), [dict(entry) for entry in group])
+        rows.append([first, str(len(group)), _interval(group), *rest])
     return table_of(rows)
+
+
+def _parameters(entry: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Those that differ from run to run, but for what the other words say already."""
+    own = entry["parameters"]
+    told = ("association", "filter", "left_speed_sd_mps", "right_speed_sd_mps")
+    return [
+        f"{key} {own[key]}"
+        for key in sorted(own)
+        if key not in told and len({one["parameters"].get(key) for one in entries}) > 1
+    ]
+
+
+def _interval(group: Sequence[Mapping[str, Any]]) -> str:
+    """Half of the 95 % interval of the mean error, by the runs' scatter, taken as normal."""
+    errors = [one["position_error_m"]["mean"] for one in group if "position_error_m" in one]
+    if len(errors) < 2:
+        return "-"
+    return f"{100.0 * 1.96 * statistics.stdev(errors) / len(errors) ** 0.5:.2f}"
+
+
+# --- What is to be run ------------------------------------------------------------------------------------
+
+
+def _jobs_and_plan(arguments: argparse.Namespace) -> tuple[list[Job], dict[str, str]]:
+    """The runs, and what decides them. Raises BslamError."""
+    path = Path(arguments.scenario)
+    if path.suffix == ".toml" and path.is_file() and "scenarios" in (content := load_toml(path)):
+        grids = list(_of_file(path, content))
+        words = {key: json.dumps(value, sort_keys=True) for key, value in content.items()}
+    else:
+        grids = [arguments]
+        words = {key: str(getattr(arguments, key)) for key in (*_LISTS, *_WORDS, *_FLAGS, "set")}
+    sources: list[Source] = []
+    options: list[RunOptions] = []
+    for one in grids:
+        if Path(one.scenario).is_file():
+            one.scenario = str(Path(one.scenario).absolute())  # workers may have another working directory
+        more_sources, more_options = grid(one, one.sigma)
+        sources += more_sources
+        options += more_options
+    jobs = make_jobs(sources, options, draw, arguments.pictures)
+    if not grids[0].files:
+        jobs = [Job(one.name, one.source, one.options, one.draw, files=False) for one in jobs]
+    worlds = {f"scenario {one.scenario}": repr(load_scenario(one.scenario)) for one in grids}
+    return jobs, words | worlds | {"bslam": code_digest()}
+
+
+class _FileParser(argparse.ArgumentParser):
+    """Says what is wrong with a file's content instead of ending the program."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(allow_abbrev=False, add_help=False)
+        self._path = path
+
+    def error(self, message: str) -> NoReturn:
+        raise BslamError(f"{self._path}: {message.removeprefix('argument --')}")
+
+
+def _of_file(path: Path, content: Mapping[str, Any]) -> list[argparse.Namespace]:
+    """A grid for each scenario and combination of parameters. Raises BslamError."""
+    check_keys(content, _KEYS, str(path))
+    parser = _FileParser(path)
+    _add_run_options(parser)
+    words = [word for key, value in content.items() for word in _words(key, value)]
+    axes = {key: _listed(value) for key, value in content.get("set", {}).items()}
+    grids = []
+    for scenario in _listed(content["scenarios"]):
+        for values in itertools.product(*axes.values()):
+            settings = [f"--set={key}={value}" for key, value in zip(axes, values, strict=True)]
+            one = parser.parse_args([*words, *settings])
+            one.scenario = str(scenario)
+            grids.append(one)
+    return grids
+
+
+def _words(key: str, value: Any) -> list[str]:
+    """A key of the file as on the command line."""
+    option = key.replace("_", "-")
+    if key in ("scenarios", "set"):
+        return []
+    if key in _FLAGS and isinstance(value, bool):
+        return [f"--{option}" if value else f"--no-{option}"] if key != "known_map" or value else []
+    return [f"--{option}={','.join(str(one) for one in _listed(value))}"]
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]

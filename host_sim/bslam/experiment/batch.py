@@ -7,7 +7,7 @@ import itertools
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -49,6 +49,7 @@ class Job:
     options: RunOptions
     draw: Draw | None = None
     record: bool = False  # write the log as a folder NAME and the run as NAME.mcap, too
+    files: bool = True  # write trajectories and map
 
 
 @dataclass(frozen=True)
@@ -95,9 +96,13 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     finished: dict[int, Outcome] = {}
     interrupted = False
     try:
-        _prepare(jobs, processes)
+        prepare(jobs, processes)
         for index, outcome in tqdm(
-            _outcomes(jobs, out, processes), total=len(jobs), desc="runs", unit="run", disable=_bar_off(jobs)
+            outcomes_of(jobs, out, processes),
+            total=len(jobs),
+            desc="runs",
+            unit="run",
+            disable=_bar_off(jobs),
         ):
             finished[index] = outcome
     except KeyboardInterrupt:
@@ -112,7 +117,7 @@ def run_batch(jobs: Sequence[Job], out: Path, processes: int) -> BatchResult:
     return BatchResult(outcomes, interrupted)
 
 
-def _prepare(jobs: Sequence[Job], processes: int) -> None:
+def prepare(jobs: Sequence[Job], processes: int) -> None:
     """Do the preparations that several runs share, each once; what fails here fails again in its run."""
     needed = {job.source.shared: job.source for job in jobs if job.source.shared is not None}
     if not needed:
@@ -163,7 +168,8 @@ def write_files(
 ) -> Outcome:
     """Judge a run that is over, and write its files; `more` goes into its entry. Raises BslamError."""
     evaluation = evaluate(log, trace, job.options, job.source.align)
-    write_run(out, job.name, trace, evaluation)
+    if job.files:
+        write_run(out, job.name, trace, evaluation)
     if job.draw is not None:
         job.draw(out, job.name, job.source, log, trace, evaluation)
     entry = summarise(log, trace, job.options, evaluation) | {
@@ -189,14 +195,21 @@ def failed_entry(job: Job, error: str) -> dict[str, Any]:
     return words | {"diverged": True, "error": error}
 
 
-def _outcomes(jobs: Sequence[Job], out: Path, processes: int) -> Iterator[tuple[int, Outcome]]:
-    """Pairs of job index and outcome as they finish; in this process where a second one would not help."""
+def outcomes_of(
+    jobs: Sequence[Job], out: Path, processes: int, backend: str | None = None
+) -> Iterator[tuple[int, Outcome]]:
+    """Pairs of job index and outcome as they finish; in this process where a second one would not help.
+
+    backend: joblib's; None: its own processes on this machine.
+    """
     processes = min(processes, len(jobs))
-    if processes <= 1:
+    if processes <= 1 and backend is None:
         yield from ((index, execute(job, out)) for index, job in enumerate(jobs))
         return
-    parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
-    yield from parallel(joblib.delayed(_execute_in_worker)(index, job, out) for index, job in enumerate(jobs))
+    with joblib.parallel_config(backend=backend or "loky"):
+        parallel = joblib.Parallel(n_jobs=-1 if backend else processes, return_as="generator_unordered")
+    work = (joblib.delayed(_execute_in_worker)(index, job, out) for index, job in enumerate(jobs))
+    yield from parallel(work)
 
 
 def _execute_in_worker(index: int, job: Job, out: Path) -> tuple[int, Outcome]:
@@ -241,14 +254,17 @@ def run_names(sources: Sequence[Source], options: Sequence[RunOptions]) -> list[
         )
     }
     seeds_vary = len({one.seed for one in options}) > 1
-    names: list[str] = []
-    for source, one in zip(sources, options, strict=True):
+    parameters = [dict(one.parameters) for one in options]
+    keys = [key for key in parameters[0] if len({one.get(key) for one in parameters}) > 1] if options else []
+    names: dict[str, None] = {}
+    for source, one, values in zip(sources, options, parameters, strict=True):
         name = source.name
         if seeds_vary or isinstance(source, ScenarioSource):
             name += f"_seed{one.seed}"
         name += "".join(_name_part(word, getattr(one, word)) for word, varies in varying.items() if varies)
-        names.append(_unique(name, names))
-    return names
+        name += "".join(f"_{key}{values.get(key):g}" for key in keys)
+        names[_unique(name, names)] = None
+    return list(names)
 
 
 def _name_part(word: str, value: Any) -> str:
@@ -259,7 +275,7 @@ def _name_part(word: str, value: Any) -> str:
     return f"_{str(value).replace(':', '')}"
 
 
-def _unique(name: str, taken: Sequence[str]) -> str:
+def _unique(name: str, taken: Collection[str]) -> str:
     """`name`, or where two logs share it, with a number behind."""
     numbered = (f"{name}-{number}" for number in itertools.count(2))
     return next(one for one in itertools.chain([name], numbered) if one not in taken)

@@ -143,7 +143,7 @@ def test_a_process_that_dies_fails_what_is_not_finished_and_keeps_the_rest(made,
         yield 1, batch.execute(jobs[1], out)
         raise BrokenExecutor
 
-    monkeypatch.setattr(batch, "_outcomes", one_and_then_none)
+    monkeypatch.setattr(batch, "outcomes_of", one_and_then_none)
     result = run_batch(jobs, tmp_path, processes=2)
     assert not result.ok
     assert result.bad_input is None
