@@ -29,8 +29,9 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "association": MATH | {"model", "svm", "ekf"},
     "slam": BELOW_SLAM,
     "store": BELOW_SLAM | {"link", "slam"},
+    "recovery": BELOW_SLAM | {"slam"},
     # bslam.h itself, the umbrella: for users of the library, so nothing inside may include it.
-    "umbrella": BELOW_SLAM | {"link", "slam", "store"},
+    "umbrella": BELOW_SLAM | {"link", "slam", "store", "recovery"},
 }
 LIBC_HEADERS = frozenset(
     {"assert.h", "float.h", "limits.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}

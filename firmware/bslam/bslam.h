@@ -10,6 +10,7 @@
 #define BSLAM_VERSION_PATCH 0
 
 #include "bslam/link/parser.h"
+#include "bslam/recovery/recovery.h"
 #include "bslam/slam/fingerprint.h"
 #include "bslam/store/slots.h"
 #include "bslam/svm/learner.h"

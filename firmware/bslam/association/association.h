@@ -27,6 +27,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
     BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
+    BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
     BSLAM_REASON_COUNT
 } bslam_reason_t;
 

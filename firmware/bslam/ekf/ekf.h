@@ -116,10 +116,9 @@ void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real
                       bslam_real_t heading_var_rad2);
 
 /// Puts the robot somewhere, whatever was thought before: its pose has these variances (each axis) and is
-/// independent of the map, of which nothing changes. Velocity states become as at the start, scales stay.
-/// O(n).
-void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *pose,
-                        bslam_real_t position_var_m2, bslam_real_t heading_var_rad2);
+/// independent of all else, of which nothing changes. O(n).
+void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_pose_t *pose, bslam_real_t position_var_m2,
+                        bslam_real_t heading_var_rad2);
 
 // ---- sightings --------------------------------------------------------------------------------------------
 

@@ -349,25 +349,20 @@ static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t sd)
     bslam_symmat_set(ekf->covariance, at, at, sd * sd);
 }
 
-static void forget_speeds(bslam_ekf_t *ekf, const bslam_params_t *params)
-{
-    if (params->velocity_states != 0) {
-        forget_state(ekf, BSLAM_STATE_FORWARD, params->velocity_sd_mps);
-        forget_state(ekf, BSLAM_STATE_TURN, params->turn_rate_sd_radps);
-    }
-}
-
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
                       bslam_real_t heading_var_rad2)
 {
     add_variance(ekf, BSLAM_STATE_X, position_var_m2, BSLAM_R(900.0));
     add_variance(ekf, BSLAM_STATE_Y, position_var_m2, BSLAM_R(900.0));
     add_variance(ekf, BSLAM_STATE_THETA, heading_var_rad2, BSLAM_R(10.24));
-    forget_speeds(ekf, params);
+    if (params->velocity_states != 0) {
+        forget_state(ekf, BSLAM_STATE_FORWARD, params->velocity_sd_mps);
+        forget_state(ekf, BSLAM_STATE_TURN, params->turn_rate_sd_radps);
+    }
 }
 
-void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *pose,
-                        bslam_real_t position_var_m2, bslam_real_t heading_var_rad2)
+void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_pose_t *pose, bslam_real_t position_var_m2,
+                        bslam_real_t heading_var_rad2)
 {
     forget_state(ekf, BSLAM_STATE_X, bslam_sqrt(position_var_m2));
     forget_state(ekf, BSLAM_STATE_Y, bslam_sqrt(position_var_m2));
@@ -375,5 +370,4 @@ void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_params_t *params, const bs
     ekf->mean[BSLAM_STATE_X] = pose->x_m;
     ekf->mean[BSLAM_STATE_Y] = pose->y_m;
     ekf->mean[BSLAM_STATE_THETA] = bslam_angle_wrap(pose->theta_rad);
-    forget_speeds(ekf, params);
 }

@@ -3,6 +3,7 @@
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
+#include "bslam/slam/internal.h"
 
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
@@ -143,9 +144,16 @@ bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
     if (!are_doubts(position_sd_m, heading_sd_rad)) {
         return BSLAM_E_RANGE;
     }
-    bslam_ekf_set_pose(&slam->ekf, &slam->params, pose, position_sd_m * position_sd_m,
-                       heading_sd_rad * heading_sd_rad);
+    bslam_ekf_set_pose(&slam->ekf, pose, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
+    slam->is_lost = false;
     return BSLAM_OK;
+}
+
+void bslam_slam_lose_pose(bslam_slam_t *slam)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(&slam->ekf);
+    bslam_ekf_set_pose(&slam->ekf, &pose, 0, 0);
+    slam->is_lost = true;
 }
 
 /// How long before the newest odometry a moment is; 0 while no clock has started.
@@ -518,8 +526,8 @@ static void count_accounts(bslam_slam_t *slam, int count)
     counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
 }
 
-bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                    int count)
+bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                     int count, bslam_pose_t *mount)
 {
     int64_t behind_us;
     const bslam_status_t status = check_frame(slam, time_us, sightings, count, &behind_us);
@@ -528,19 +536,42 @@ bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const b
         return status;
     }
     predict_until(slam, behind_us > 0 ? behind_us : 0);
-    const bslam_pose_t mount = mount_of_frame(slam, behind_us);
-    const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks, &mount, sightings, count};
-    const bslam_associate_fn associate = bslam_associate_method(&slam->params);
-    associate(&frame, slam->matches);
-    use_matches(slam, time_us, &mount, sightings, count);
-    learn_looks(slam, sightings, count);
-    tidy_map(slam, time_us, &mount);
+    *mount = mount_of_frame(slam, behind_us);
+    return BSLAM_OK;
+}
+
+void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
+                            const bslam_pose_t *mount, bool use)
+{
+    if (use && !slam->is_lost) {
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks,
+                                              mount,      sightings,     count};
+        const bslam_associate_fn associate = bslam_associate_method(&slam->params);
+        associate(&frame, slam->matches);
+        use_matches(slam, time_us, mount, sightings, count);
+        learn_looks(slam, sightings, count);
+        tidy_map(slam, time_us, mount);
+    } else {
+        for (int i = 0; i < count; i++) {
+            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
+        }
+    }
     slam->last_frame_us = time_us;
     slam->has_frame = true;
     bslam_odometry_start(&slam->odometry, time_us);
     slam->account_count = count;
     count_accounts(slam, count);
-    return BSLAM_OK;
+}
+
+bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                    int count)
+{
+    bslam_pose_t mount;
+    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &mount);
+    if (status == BSLAM_OK) {
+        bslam_slam_close_frame(slam, time_us, sightings, count, &mount, true);
+    }
+    return status;
 }
 
 // ---- the map ----------------------------------------------------------------------------------------------
@@ -628,6 +659,11 @@ void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6])
             lower[k] = bslam_symmat_get(robot.covariance, i, j);
             k++;
         }
+    }
+    if (slam->is_lost) {
+        lower[0] += POSITION_SD_MAX_M * POSITION_SD_MAX_M;
+        lower[2] += POSITION_SD_MAX_M * POSITION_SD_MAX_M;
+        lower[5] += HEADING_SD_MAX_RAD * HEADING_SD_MAX_RAD;
     }
 }
 

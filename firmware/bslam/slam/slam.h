@@ -71,6 +71,7 @@ typedef struct bslam_slam {
     uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
+    bool is_lost;          ///< the pose is what odometry makes of one that is unknown
     bool is_frozen;        ///< the map: no beacon is added, learned or taken out by itself
     bslam_looks_t *looks;  ///< the caller's; NULL: none attached
     bslam_counters_t counters;
@@ -111,6 +112,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, b
 /// to 3.2.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
                                                     bslam_real_t position_sd_m, bslam_real_t heading_sd_rad);
+
+/// Nobody knows where the robot is. Its pose goes on from the present one by odometry alone, its covariance
+/// says 30 m and 3.2 rad, sightings are accounted for as "lost" and used for nothing, and the map stays as it
+/// is, until bslam_slam_set_pose.
+void bslam_slam_lose_pose(bslam_slam_t *slam);
 
 /// What one image shows, stamped time_us. Associates, fuses, adds, removes; the account of sighting i is
 /// bslam_slam_accounts()[i]. An empty frame is fine. O(count n²), after a prediction for each reading that

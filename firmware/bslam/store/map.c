@@ -16,8 +16,6 @@ enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
 // A covariance that was rounded to float32 may show a correlation a little beyond 1.
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.001);
-static const bslam_real_t POSITION_SD_UNKNOWN_M = BSLAM_R(30.0);
-static const bslam_real_t HEADING_SD_UNKNOWN_RAD = BSLAM_R(3.2);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_WAY_UM = 1000000000u;
 
@@ -695,9 +693,10 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     const target_t target = {slam, mode};
     passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
     read_all(&passage, &target);
-    const bslam_pose_t origin = {0, 0, 0};
-    const bslam_status_t placed =
-        bslam_slam_set_pose(slam, &origin, POSITION_SD_UNKNOWN_M, HEADING_SD_UNKNOWN_RAD);
     *fault = passage.fault;
-    return passage.fault == BSLAM_MAP_FINE && placed == BSLAM_OK ? BSLAM_OK : BSLAM_E_MAP;
+    if (*fault != BSLAM_MAP_FINE) {
+        bslam_slam_forget_map(slam);
+    }
+    bslam_slam_lose_pose(slam);
+    return *fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
 }

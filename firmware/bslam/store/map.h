@@ -71,10 +71,10 @@ BSLAM_MUST_CHECK bslam_status_t bslam_map_write(const bslam_slam_t *slam, const 
 /// What bslam_map_load would say to this blob, whatever the state of the pipeline. O(n² + machines).
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source);
 
-/// Takes the map in place of the pipeline's own. The robot is at the map's origin, knows nothing of where it
-/// really is (30 m, 3.2 rad), and its velocity states are as at the start: give it a pose
-/// (bslam_slam_set_pose) or let it find one (recovery/recovery.h). Parameters, clock and counters stay.
-/// BSLAM_E_MAP with *fault: refused, nothing has changed. Machines are taken where looks are attached.
+/// Takes the map in place of the pipeline's own. The robot is lost in it (bslam_slam_lose_pose): give it a
+/// pose (bslam_slam_set_pose) or let it find one (recovery/recovery.h). Parameters, clock and counters stay.
+/// BSLAM_E_MAP with *fault: refused, nothing has changed (but if a source that was whole when it was checked
+/// can no longer be read, there is no map). Machines are taken where looks are attached.
 /// O(n² + machines), twice.
 BSLAM_MUST_CHECK bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source,
                                                bslam_map_mode_t mode, bslam_map_fault_t *fault);

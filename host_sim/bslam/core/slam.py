@@ -66,8 +66,8 @@ class Slam:
 
     params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must
     hold. real: "float", as on the target, or "double", the twin. looks: it learns what the beacons look like
-    (association 3); seeds (n, 71): signatures of things that are no beacon here. Raises BslamError for what
-    is no parameter or is out of range.
+    (association 3); seeds (n, 71): signatures of things that are no beacon here. recovery: it notices when it
+    is lost, and finds itself again. Raises BslamError for what is no parameter or is out of range.
     """
 
     def __init__(
@@ -78,6 +78,7 @@ class Slam:
         real: str = "float",
         looks: bool = False,
         seeds: NDArray[np.float32] | None = None,
+        recovery: bool = False,
     ) -> None:
         self._raw = library(real, beacons_max)
         self._lib, self._ffi = self._raw.lib, self._raw.ffi
@@ -94,6 +95,10 @@ class Slam:
             "velocity": (self._lib.BSLAM_ODOMETRY_VELOCITY, "v_mps", "omega_radps"),
         }
         self._init(params or {})
+        self._recovery = None
+        if recovery:
+            self._recovery = self._ffi.new("bslam_recovery_t *")
+            self._lib.bslam_recovery_init(self._recovery)
         self._looks = None
         if looks:
             self._attach_looks(np.empty((0, SIGNATURE_SIZE), np.float32) if seeds is None else seeds)
@@ -214,7 +219,12 @@ class Slam:
             signature = _checked_signatures(signature, len(rows))
         try:
             array = self._raw.sightings(rows, signature)
-            status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
+            if self._recovery is None:
+                status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
+            else:
+                status = self._lib.bslam_recovery_sightings(
+                    self._recovery, self._slam, time_us, array, len(rows)
+                )
         except OverflowError as error:
             raise BslamError(f"frame at {time_us} us: {error}") from error
         if status:
@@ -339,7 +349,18 @@ class Slam:
         if self._looks is not None:
             counts |= self._raw.fields(self._looks.counters, "bslam_looks_counters_t")
             counts |= self._raw.fields(self._looks.learner.counters, "bslam_learner_counters_t")
+        if self._recovery is not None:
+            counts |= self._raw.fields(self._recovery.counters, "bslam_recovery_counters_t")
         return counts
+
+    @property
+    def is_lost(self) -> bool:
+        """Nobody knows where the robot is: its pose is what odometry makes of an unknown one."""
+        return bool(self._slam.is_lost)
+
+    def lose_pose(self) -> None:
+        """Says that nobody knows where the robot is; sightings are used for nothing until it is found."""
+        self._lib.bslam_slam_lose_pose(self._slam)
 
 
 def _checked_signatures(signature: NDArray[np.float32], count: int) -> NDArray[np.float32]:

@@ -1,0 +1,72 @@
+/// Notices that the robot is not where the filter has it, and finds it again in the same map: after it was
+/// carried away or slipped, and after switching on in a kept map. MATH "Lost and found".
+///
+///     bslam_recovery_init(&recovery);
+///     bslam_recovery_sightings(&recovery, &slam, time_us, seen, count);    in place of bslam_slam_sightings
+///
+/// It lives on identities that do not come from position: labels, or looks. A sighting contradicts if it
+/// shows a beacon that is clearly elsewhere by the present pose. A frame in which more contradict than agree
+/// is not used; after some of them the robot is lost. Then no sighting is fused and the map stays as it is,
+/// until two beacons or more agree on a pose, and a third, or time, confirms it. Nothing jumps silently:
+/// state and counters say what happened, and the pose's covariance is 30 m and 3.2 rad meanwhile.
+///
+/// Without labels and without looks nothing can contradict: association alone decides.
+#ifndef BSLAM_RECOVERY_RECOVERY_H
+#define BSLAM_RECOVERY_RECOVERY_H
+
+#include "bslam/recovery/relocate.h"
+#include "bslam/slam/slam.h"
+
+typedef enum bslam_recovery_state {
+    BSLAM_RECOVERY_FOLLOWING = 0,  ///< all is well
+    BSLAM_RECOVERY_DOUBTING,       ///< sightings contradict the pose
+    BSLAM_RECOVERY_LOST            ///< the pose is unknown
+} bslam_recovery_state_t;
+
+/// Never-decreasing counts of what happened.
+typedef struct bslam_recovery_counters {
+    uint32_t contradicting;  ///< sightings
+    uint32_t withheld;       ///< frames that were not used
+    uint32_t lost;           ///< times
+    uint32_t found;          ///< times
+} bslam_recovery_counters_t;
+
+/// A recognised beacon, when and from where it was seen last. Private.
+typedef struct bslam_memory {
+    uint32_t uid;
+    int64_t time_us;
+    bslam_sighting_t sighting;
+    bslam_pose_t mount;
+    bslam_pose_t robot;  ///< as the filter had it, in the frame of odometry since it got lost
+    bslam_real_t heading_var_rad2;
+} bslam_memory_t;
+
+/// All memory of the recovery, 1 KB. Private but for the counters.
+typedef struct bslam_recovery {
+    bslam_recovery_counters_t counters;
+    int32_t evidence;
+    int64_t doubted_us;    ///< the first frame that contradicted, of this doubt,
+    uint32_t doubted_uid;  ///< and the beacon that it showed
+    bool several;          ///< others have contradicted, too
+    bslam_memory_t memories[BSLAM_CLUES_MAX];
+    int32_t memory_count;
+    bslam_pose_t last_fix;
+    int32_t confirmed;  ///< frames whose fix was the one before, carried on
+    bool has_fix;
+    int64_t fix_us;
+} bslam_recovery_t;
+
+/// Nothing is known against the pose.
+void bslam_recovery_init(bslam_recovery_t *recovery);
+
+/// bslam_slam_sightings with a look at whether the robot is where the filter has it. Sightings of a frame
+/// that is not used have the account "deferred", reason "lost". The same statuses; of what is refused nothing
+/// changes. O(count machines) more, and while lost O(clues³).
+BSLAM_MUST_CHECK bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam,
+                                                         int64_t time_us, const bslam_sighting_t *sightings,
+                                                         int count);
+
+/// How the robot is doing. O(1).
+bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, const bslam_slam_t *slam);
+
+#endif

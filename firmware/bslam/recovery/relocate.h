@@ -1,0 +1,40 @@
+/// Where a robot is that knows nothing but which beacons it sees: a pose from clues. MATH "Relocalisation".
+///
+/// Two beacons with distance give a pose, three in direction only. Every such choice of the clues is tried;
+/// the pose that most clues agree with is refined by all that do. Pure: nothing is kept.
+#ifndef BSLAM_RECOVERY_RELOCATE_H
+#define BSLAM_RECOVERY_RELOCATE_H
+
+#include "bslam/base/types.h"
+
+/// Clues that are looked at; a pose is tried for each two, or three, of them.
+#define BSLAM_CLUES_MAX 10
+
+/// A beacon that was recognised, as seen from where the robot is now.
+typedef struct bslam_clue {
+    bslam_real_t x_m;  ///< the beacon in the map
+    bslam_real_t y_m;
+    bslam_pose_t sensor;  ///< where the sensor was, in the robot's present frame
+    bslam_real_t bearing_rad;
+    bslam_real_t range_m;
+    bool has_range;
+    bslam_real_t bearing_var_rad2;  ///< of the sighting, of the beacon's place, and of the way since
+    bslam_real_t range_var_m2;
+} bslam_clue_t;
+
+/// A pose, and what speaks for it.
+typedef struct bslam_fix {
+    bslam_pose_t pose;
+    bslam_real_t position_sd_m;  ///< along the longer axis
+    bslam_real_t heading_sd_rad;
+    int32_t agreeing;    ///< clues that fit it
+    int32_t with_range;  ///< of them with a distance
+    int32_t dissenting;  ///< clues that do not
+} bslam_fix_t;
+
+/// The pose that most of `count` <= BSLAM_CLUES_MAX clues, of different beacons, agree with. False, and *fix
+/// unchanged: fewer than two with distance agree on any, nor three without. O(count³), or O(count⁴) without
+/// distances.
+bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix);
+
+#endif

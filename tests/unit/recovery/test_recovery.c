@@ -1,0 +1,160 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/recovery/recovery.h"
+
+#define PI 3.14159265358979323846
+
+enum { STEP_US = 40000, BEACONS = 4 };
+
+static const double beacons[BEACONS][2] = {{3, 1}, {4, -2}, {6, 2}, {5, 4}};
+static bslam_slam_t slam;
+static bslam_recovery_t recovery;
+static int64_t now_us;
+
+static int setup(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.left_speed_sd_mps = BSLAM_R(0.01);
+    params.right_speed_sd_mps = BSLAM_R(0.01);
+    int bad_id;
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    bslam_recovery_init(&recovery);
+    now_us = 0;
+    return 0;
+}
+
+/// A frame of a robot that stands at (x, y, theta) and says so by its wheels, with the first `count` beacons.
+static void look_from(double x, double y, double theta, int count)
+{
+    bslam_sighting_t seen[BEACONS];
+    for (int i = 0; i < count; i++) {
+        const double dx = beacons[i][0] - x;
+        const double dy = beacons[i][1] - y;
+        seen[i] = unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), hypot(dx, dy), i);
+    }
+    now_us += STEP_US;
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, count), BSLAM_OK);
+}
+
+static void look_on(int frames, double x, double y, double theta, int count)
+{
+    for (int k = 0; k < frames; k++) {
+        look_from(x, y, theta, count);
+    }
+}
+
+static void assert_at(double x, double y, double theta)
+{
+    const bslam_pose_t pose = bslam_slam_pose(&slam);
+    assert_near(pose.x_m, x, 0.05);
+    assert_near(pose.y_m, y, 0.05);
+    assert_near(unit_angle_between((double)pose.theta_rad, theta), 0, 0.02);
+}
+
+static void test_recovery_of_a_robot_that_stays_changes_nothing(void **state)
+{
+    static bslam_slam_t alone;
+    look_on(50, 0, 0, 0, BEACONS);
+    alone = slam;
+    setup(NULL);
+    for (int k = 0; k < 50; k++) {
+        bslam_sighting_t seen[BEACONS];
+        for (int i = 0; i < BEACONS; i++) {
+            seen[i] = unit_polar(atan2(beacons[i][1], beacons[i][0]), hypot(beacons[i][0], beacons[i][1]), i);
+        }
+        now_us += STEP_US;
+        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+        assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+        assert_int_equal(bslam_slam_sightings(&slam, now_us, seen, BEACONS), BSLAM_OK);
+    }
+    assert_memory_equal(alone.ekf.mean, slam.ekf.mean, sizeof slam.ekf.mean);
+    assert_memory_equal(alone.ekf.covariance, slam.ekf.covariance, sizeof slam.ekf.covariance);
+    assert_int_equal(recovery.counters.withheld, 0);
+}
+
+static void test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_kept(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    const bslam_ekf_t before = slam.ekf;
+    look_from(1, 2, 2.5, BEACONS);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
+    int count;
+    assert_int_equal(bslam_slam_accounts(&slam, &count)[0].reason, BSLAM_REASON_LOST);
+    look_on(7, 1, 2, 2.5, BEACONS);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
+    bslam_real_t lower[6];
+    bslam_slam_pose_covariance(&slam, lower);
+    assert_true(lower[0] >= 900 && lower[5] >= BSLAM_R(10.2));
+    look_on(2, 1, 2, 2.5, BEACONS);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    assert_int_equal(recovery.counters.lost, 1);
+    assert_int_equal(recovery.counters.found, 1);
+    for (int i = 3; i < slam.ekf.dim; i++) {
+        assert_true(slam.ekf.mean[i] == before.mean[i]);
+    }
+    look_on(20, 1, 2, 2.5, BEACONS);
+    assert_at(1, 2, 2.5);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+}
+
+static void test_recovery_by_two_beacons_takes_time(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(10, 1, 2, -1, 2);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
+    look_on(10, 1, 2, -1, 2);
+    assert_int_equal(recovery.counters.found, 1);
+    assert_at(1, 2, -1);
+}
+
+static void test_recovery_by_one_beacon_is_never_a_guess(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(200, 1, 2, -1, 1);
+    assert_int_equal(recovery.counters.lost, 1);
+    assert_int_equal(recovery.counters.found, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+}
+
+static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(4, 1, 2, 2.5, BEACONS);
+    look_on(10, 0, 0, 0, BEACONS);
+    assert_int_equal(recovery.counters.lost, 0);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    assert_at(0, 0, 0);
+}
+
+static void test_recovery_refuses_as_the_pipeline_does(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    static bslam_slam_t before;
+    static bslam_recovery_t recovery_before;
+    memcpy(&before, &slam, sizeof slam);
+    memcpy(&recovery_before, &recovery, sizeof recovery);
+    bslam_sighting_t seen = unit_polar(0, NAN, 0);
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us + 1, &seen, 1), BSLAM_E_NOT_FINITE);
+    before.counters.frames_refused++;
+    before.bad_sighting = 0;
+    assert_memory_equal(&before, &slam, sizeof slam);
+    assert_memory_equal(&recovery_before, &recovery, sizeof recovery);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_recovery_of_a_robot_that_stays_changes_nothing, setup),
+        cmocka_unit_test_setup(test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_kept,
+                               setup),
+        cmocka_unit_test_setup(test_recovery_by_two_beacons_takes_time, setup),
+        cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
+        cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),
+        cmocka_unit_test_setup(test_recovery_refuses_as_the_pipeline_does, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

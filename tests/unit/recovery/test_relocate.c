@@ -1,0 +1,100 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/recovery/relocate.h"
+
+static const double beacons[][2] = {{0, 0}, {4, 1}, {3, 6}, {-2, 5}, {6, 4}};
+
+/// Beacon i from (x, y, theta), with or without its distance, by a sensor in the robot's middle.
+static bslam_clue_t clue_of(int i, double x, double y, double theta, bool has_range)
+{
+    const double dx = beacons[i][0] - x;
+    const double dy = beacons[i][1] - y;
+    return (bslam_clue_t){.x_m = real(beacons[i][0]),
+                          .y_m = real(beacons[i][1]),
+                          .bearing_rad = real(atan2(dy, dx) - theta),
+                          .range_m = real(hypot(dx, dy)),
+                          .has_range = has_range,
+                          .bearing_var_rad2 = real(1e-4),
+                          .range_var_m2 = real(0.01)};
+}
+
+static void assert_found(const bslam_clue_t *clues, int count, double x, double y, double theta, int agreeing)
+{
+    bslam_fix_t fix;
+    assert_true(bslam_relocate(clues, count, &fix));
+    assert_near(fix.pose.x_m, x, 2e-3);
+    assert_near(fix.pose.y_m, y, 2e-3);
+    assert_near(unit_angle_between((double)fix.pose.theta_rad, theta), 0, 1e-3);
+    assert_int_equal(fix.agreeing, agreeing);
+    assert_int_equal(fix.dissenting, count - agreeing);
+    assert_true(fix.position_sd_m > 0 && fix.position_sd_m < 0.5);
+}
+
+static void test_relocate_by_two_beacons_with_distance(void **state)
+{
+    for (double theta = -3; theta <= 3; theta += 0.5) {
+        const bslam_clue_t clues[] = {clue_of(0, 1, 3, theta, true), clue_of(1, 1, 3, theta, true)};
+        assert_found(clues, 2, 1, 3, theta, 2);
+    }
+}
+
+static void test_relocate_by_three_directions(void **state)
+{
+    for (double theta = -3; theta <= 3; theta += 0.5) {
+        const bslam_clue_t clues[] = {clue_of(0, 1.5, 3, theta, false), clue_of(1, 1.5, 3, theta, false),
+                                      clue_of(3, 1.5, 3, theta, false)};
+        assert_found(clues, 3, 1.5, 3, theta, 3);
+    }
+}
+
+static void test_relocate_leaves_out_a_clue_that_does_not_fit(void **state)
+{
+    bslam_clue_t clues[5];
+    for (int i = 0; i < 5; i++) {
+        clues[i] = clue_of(i, 2, 3, 1, true);
+    }
+    clues[2].bearing_rad += real(1.0);
+    assert_found(clues, 5, 2, 3, 1, 4);
+    for (int i = 0; i < 5; i++) {
+        clues[i].has_range = false;
+    }
+    assert_found(clues, 5, 2, 3, 1, 4);
+}
+
+static void test_relocate_by_clues_from_along_the_way(void **state)
+{
+    // Seen 1 m behind the robot, which then turned by 0.5.
+    bslam_clue_t clues[] = {clue_of(0, 1, 3, 0.2, true), clue_of(1, 1, 3, 0.2, true),
+                            clue_of(3, 1, 3, 0.2, true)};
+    for (int i = 0; i < 3; i++) {
+        clues[i].sensor = (bslam_pose_t){real(-cos(0.5)), real(sin(0.5)), real(-0.5)};
+    }
+    assert_found(clues, 3, 1 + cos(0.2), 3 + sin(0.2), 0.7, 3);
+}
+
+static void test_relocate_with_too_little_finds_nothing(void **state)
+{
+    const bslam_clue_t one[] = {clue_of(0, 1, 3, 0, true)};
+    const bslam_clue_t two[] = {clue_of(0, 1, 3, 0, false), clue_of(1, 1, 3, 0, false)};
+    const bslam_clue_t same[] = {clue_of(0, 1, 3, 0, true), clue_of(0, 1, 3, 0, true)};
+    bslam_fix_t fix = {.agreeing = 77};
+    assert_false(bslam_relocate(one, 0, &fix));
+    assert_false(bslam_relocate(one, 1, &fix));
+    assert_false(bslam_relocate(two, 2, &fix));
+    assert_false(bslam_relocate(same, 2, &fix));
+    assert_int_equal(fix.agreeing, 77);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_relocate_by_two_beacons_with_distance),
+        cmocka_unit_test(test_relocate_by_three_directions),
+        cmocka_unit_test(test_relocate_leaves_out_a_clue_that_does_not_fit),
+        cmocka_unit_test(test_relocate_by_clues_from_along_the_way),
+        cmocka_unit_test(test_relocate_with_too_little_finds_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
