@@ -12,15 +12,18 @@ from sklearn.preprocessing import StandardScaler
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import Svm
 from training.additive import decide_additive, fit_additive, most_telling, place_knots
-from training.detector_samples import CLUTTER, BoxSamples, CellSamples
-from training.fit import choose_cost, fit
+from training.detector_samples import CLASSES, CLUTTER, RECOLOURED, BoxSamples, CellSamples
+from training.fit import choose_cost, fit, mean_average_precision
 from training.render_set import KINDS
 from training.together import fit_together
 from training.truth import IGNORED, NOTHING
 
 CELLS_MAX = 200_000
 CELL_COSTS = (0.01, 0.1)
-KIND_COST = 0.002
+KIND_COSTS = (0.0005, 0.002, 0.008)
+KIND_FOLDS = 2
+KIND_TRIALS = 20_000  # beacons, and as many others, that the cost is chosen on
+KIND_EQUAL = 0.001  # average precisions that differ by less are equal
 FUSION_COST = 0.001
 SCREEN_COST = 0.01
 SCREEN_RECALL = 0.99
@@ -35,6 +38,8 @@ CROSSED = 16  # features that are told in pairs, too
 FIRST_ITERATIONS = 50
 ITERATIONS = 80
 FUSION_LIMIT = 4.0  # as BSLAM_FUSION_LIMIT
+SIZE_FREE, SIZE_LOSS, SIZE_LOSS_MAX = 0.2, 1.5, 1.0  # as in detector.c
+LOG_HEIGHT, PER_METRE = 1, 7  # as BSLAM_BLOB_LOG_HEIGHT, BSLAM_BLOB_PER_METRE
 FUSION_SHARE = 5  # every so many worlds are kept for the fusion
 
 
@@ -117,7 +122,14 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     chosen = np.concatenate([positives, negatives[:NEGATIVES_FIRST]])
     x = normalised(samples.features[chosen], detector)
     knots = place_knots(x[: len(positives)])
-    first = fit_additive(x, targets[chosen], knots, NOT_CROSSED, KIND_COST, FIRST_ITERATIONS)
+    tried = np.concatenate([positives[:KIND_TRIALS], negatives[:KIND_TRIALS]])
+    cost = choose_kind_cost(
+        normalised(samples.features[tried], detector),
+        targets[tried],
+        knots,
+        samples.world[tried] % RECOLOURED,
+    )
+    first = fit_additive(x, targets[chosen], knots, NOT_CROSSED, cost, FIRST_ITERATIONS)
     crossed = most_telling(first, x, CROSSED)
     rest = negatives[NEGATIVES_FIRST:]
     if len(rest):
@@ -125,8 +137,40 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
         hard = rest[np.argsort(-worst)[:NEGATIVES_HARD]]
         chosen = np.concatenate([chosen, hard])
     x = normalised(samples.features[chosen], detector)
-    kinds = fit_additive(x, targets[chosen], knots, crossed, KIND_COST, ITERATIONS)
+    kinds = fit_additive(x, targets[chosen], knots, crossed, cost, ITERATIONS)
     return replace(detector, kinds=kinds)
+
+
+def choose_kind_cost(
+    x: NDArray[np.float32],
+    targets: NDArray[np.bool_],
+    knots: NDArray[np.float32],
+    worlds: NDArray[np.integer],
+) -> float:
+    """The cost by cross-validation over worlds, of machines without grids. A world and its other colours are
+    left out together. Of equals the middle one: an extreme one wants a reason."""
+
+    def score(cost: float) -> float:
+        values = np.empty(targets.shape)
+        for fold in range(KIND_FOLDS):
+            out = worlds % KIND_FOLDS == fold
+            machine = fit_additive(x[~out], targets[~out], knots, NOT_CROSSED, cost, FIRST_ITERATIONS)
+            values[out] = decide_additive(machine, x[out])
+        return mean_average_precision(targets, values)
+
+    scores = {cost: score(cost) for cost in KIND_COSTS}
+    print("kinds: " + ", ".join(f"C {cost:g}: AP {value:.4f}" for cost, value in scores.items()), flush=True)
+    good = [cost for cost in KIND_COSTS if scores[cost] > max(scores.values()) - KIND_EQUAL]
+    return min(good, key=lambda cost: abs(np.log(cost / KIND_COSTS[len(KIND_COSTS) // 2])))
+
+
+def misfits(features: NDArray[np.float32], is_cut: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """What each kind's value (n, kinds) loses because the box is not as high as the kind: as detector.c."""
+    heights_m = np.array([one.height_m for one in CLASSES])
+    excess = np.abs(features[:, LOG_HEIGHT, None] - np.log(heights_m))
+    loss = np.clip(SIZE_LOSS * (excess - SIZE_FREE), 0.0, SIZE_LOSS_MAX)
+    has_height = (features[:, PER_METRE] > 0) & ~is_cut
+    return np.where(has_height[:, None], loss, 0.0).astype(np.float32)
 
 
 def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
@@ -135,7 +179,8 @@ def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     x = normalised(samples.features[chosen], detector)
     screened = decide(detector.screen, x)
     passed = screened[:, 0] >= detector.screen_threshold
-    values = np.hstack([decide_additive(detector.kinds, x), screened])[passed]
+    values = np.hstack([decide_additive(detector.kinds, x[passed]), screened[passed]])
+    values[:, 1 : 1 + len(KINDS)] -= misfits(samples.features[chosen][passed], samples.is_cut[chosen][passed])
     is_beacon = kind_targets(samples)[chosen][passed][:, :1]
     svm = fit_together(np.clip(values, -FUSION_LIMIT, FUSION_LIMIT), is_beacon, FUSION_COST, 150)
     any_threshold = float(np.quantile(values[is_beacon[:, 0], 0], 1 - SCREEN_RECALL))

@@ -55,6 +55,7 @@ class BoxSamples:
     """Proposals, or candidates, of all frames."""
 
     features: NDArray[np.float32]
+    is_cut: NDArray[np.bool_]  # above or below, by the frame
     label: NDArray[np.int64]
     overlap: NDArray[np.float32]  # with the best object that counts
     object_row: NDArray[np.int64]  # of the world's `seen`, or -1
@@ -181,8 +182,10 @@ def _label_boxes(
     label[is_clutter] = CLUTTER
     object_row = np.full(len(boxes), -1)
     object_row[owner >= 0] = rows[owner[owner >= 0]]
+    top, bottom = boxes[:, 1], boxes[:, 3]
     return BoxSamples(
         features,
+        (top < CELL_PX) | (bottom > world.pictures.shape[1] - CELL_PX),
         label,
         overlap.astype(np.float32),
         object_row,

@@ -9,8 +9,12 @@
 /// one stays.
 #define OVERLAP_MAX BSLAM_R(0.3)
 #define WITHIN_MAX BSLAM_R(0.7)
-/// Natural logarithm of how many times too high or too low a candidate may be; the floor line errs too.
-#define LOG_SIZE_MAX 1.0f
+/// What a kind's value loses where the box is not as high as the kind: so much for each unit of the natural
+/// logarithm beyond SIZE_FREE, SIZE_LOSS_MAX at most, since the floor line errs too. tools/training takes off
+/// the same before it fits the fusion.
+#define SIZE_FREE 0.2f
+#define SIZE_LOSS 1.5f
+#define SIZE_LOSS_MAX 1.0f
 
 static float clamped(float value, float limit)
 {
@@ -52,37 +56,42 @@ static void choose_class(const float *kinds, int32_t class_count, bslam_candidat
     candidate->class_margin = kinds[best] - (next < 0 ? -BSLAM_FUSION_LIMIT : kinds[next]);
 }
 
-/// True if the box is far from as high as its kind is, where the floor line tells; a box at the upper or
-/// lower edge of the frame may be the part of something.
-static bool is_of_another_size(const bslam_view_t *view, const bslam_proposal_t *proposal, float log_height,
-                               float per_metre, float height_m)
+/// Whether the floor line tells how high the box is: a box at the upper or lower edge of the frame may be the
+/// part of something.
+static bool has_height(const bslam_view_t *view, const bslam_box_t *box, float per_metre)
 {
-    if (view->camera->lens != BSLAM_LENS_PINHOLE || !(per_metre > 0) || !(height_m > 0) ||
-        proposal->top <= 0 || proposal->bottom >= view->frame->rows) {
-        return false;
-    }
-    const float excess = log_height - bslam_log(height_m);
-    return excess > LOG_SIZE_MAX || excess < -LOG_SIZE_MAX;
+    const bslam_real_t cell_px = BSLAM_CELL_PX, frame_px = (bslam_real_t)view->frame->height_px;
+    return per_metre > 0 && box->top_px >= cell_px && box->bottom_px <= frame_px - cell_px;
 }
 
-/// What the machines say of a proposal: the score, and of the size what is_of_another_size needs.
+/// What is red and square looks like a sign in all but its size; no sum of curves says "but": this does.
+static void take_off_misfits(const bslam_beacon_class_t *classes, int32_t class_count, float log_height,
+                             float *kinds)
+{
+    for (int32_t c = 0; c < class_count; c++) {
+        const float height_m = classes[c].height_m;
+        const float excess = height_m > 0 ? log_height - bslam_log(height_m) : 0.0f;
+        const float loss = SIZE_LOSS * ((excess < 0 ? -excess : excess) - SIZE_FREE);
+        kinds[c] -= loss < 0 ? 0.0f : loss < SIZE_LOSS_MAX ? loss : SIZE_LOSS_MAX;
+    }
+}
+
+/// What the machines say of a proposal.
 typedef struct opinion {
     float values[BSLAM_CLASSES_MAX + 3];
     float score;
-    float log_height;
-    float per_metre;
 } opinion_t;
 
 /// False if a machine refuses it. Not to be inlined: its kilobyte of stack is then free for what follows.
-__attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t *model, int32_t class_count,
+__attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t *model,
+                                                   const bslam_beacon_class_t *classes, int32_t class_count,
                                                    const bslam_view_t *view, const bslam_proposal_t *proposal,
                                                    opinion_t *opinion)
 {
     float features[BSLAM_BLOB_FEATURES];
     float *values = opinion->values;
     bslam_blob_features(view, proposal, features);
-    opinion->log_height = features[BSLAM_BLOB_LOG_HEIGHT];
-    opinion->per_metre = features[BSLAM_BLOB_PER_METRE];
+    const float log_height = features[BSLAM_BLOB_LOG_HEIGHT], per_metre = features[BSLAM_BLOB_PER_METRE];
     bslam_detector_normalise(model, features);
     float *screen = &values[class_count + 2];
     bslam_svm_decide(&model->screen, features, screen);
@@ -96,6 +105,9 @@ __attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t 
         return false;
     }
     bslam_additive_decide(&model->kinds, &place, 1, model->kinds.rows, values + 1);
+    if (has_height(view, &proposal->box, per_metre)) {
+        take_off_misfits(classes, class_count, log_height, values + 1);
+    }
     clamp_all(values, class_count + 3, BSLAM_FUSION_LIMIT);
     bslam_svm_decide(&model->fusion, values, &opinion->score);
     return opinion->score >= model->threshold;
@@ -107,15 +119,14 @@ static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_cl
                       bslam_candidate_t *candidate)
 {
     opinion_t opinion;
-    if (!ask_machines(model, class_count, view, proposal, &opinion)) {
+    if (!ask_machines(model, classes, class_count, view, proposal, &opinion)) {
         return false;
     }
     memset(candidate, 0, sizeof *candidate);
     candidate->outline = proposal->box;
     candidate->score = opinion.score;
     choose_class(opinion.values + 1, class_count, candidate);
-    const float height_m = classes[candidate->beacon_class - 1].height_m;
-    return !is_of_another_size(view, proposal, opinion.log_height, opinion.per_metre, height_m);
+    return true;
 }
 
 static bslam_real_t area_px2(const bslam_box_t *box)

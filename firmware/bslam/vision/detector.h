@@ -6,8 +6,8 @@
 #include "bslam/vision/features.h"
 
 /// Judges proposals and writes the best, surest first, to candidates[BSLAM_CANDIDATES_MAX]: outline, class,
-/// margin and score; all else zero. One that is not about as high as its kind is dropped. Returns how many.
-/// *dropped grows by those that found no room.
+/// margin and score; all else zero. Kinds that are not about as high as the box, by the floor line, lose of
+/// their values. Returns how many. *dropped grows by those that found no room.
 int32_t bslam_detector_judge(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
                              int32_t class_count, const bslam_view_t *view,
                              const bslam_proposals_t *proposals, bslam_candidate_t *candidates,

@@ -17,7 +17,7 @@
 /// A frame whose cells' green differs by at most this is of one colour.
 #define FLAT_RANGE 12
 /// An outline that overlaps the detector's box less than this is of something else.
-#define AGREE_MIN BSLAM_R(0.5)
+#define AGREE_MIN BSLAM_R(0.75)
 
 static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
     [BSLAM_VISION_SEEN] = "seen",

@@ -138,6 +138,41 @@ static void test_detector_class_is_the_surest_kind_and_by_how_much(void **state)
     assert_near(candidates[0].class_margin, 1.25, 1e-6);
 }
 
+/// How high the floor line makes the box, by the features; it must know.
+static float height_of(const bslam_proposal_t *proposal)
+{
+    float features[BSLAM_BLOB_FEATURES];
+    bslam_blob_features(&made.view, proposal, features);
+    assert_true(features[BSLAM_BLOB_PER_METRE] > 0);
+    return features[BSLAM_BLOB_LOG_HEIGHT];
+}
+
+/// Margin of kind 2 (0.3 m) over kind 1 (2 m), their machines being equally sure of the only box.
+static float margin_of_small(void)
+{
+    detector.kind_bias[1] = detector.kind_bias[2] = 2;
+    assert_int_equal(judge(), 1);
+    return candidates[0].beacon_class == 2 ? candidates[0].class_margin : -candidates[0].class_margin;
+}
+
+static void test_detector_a_kind_of_another_height_loses_at_most_one(void **state)
+{
+    unit_made_view(&made, 3);
+    add(10, 12, 20, 24);
+    const float log_height = height_of(&proposals.items[0]);
+    const float loss_small = 1.5f * (fabsf(log_height - logf(0.3f)) - 0.2f);
+    const float loss_tall = 1.5f * (fabsf(log_height - logf(2.0f)) - 0.2f);
+    assert_true(loss_small > 0 && loss_small < 1 && loss_tall > 1);  // the box is chosen so
+    assert_near(margin_of_small(), 1 - loss_small, 0.02);
+}
+
+static void test_detector_a_box_at_the_frames_edge_may_be_of_any_height(void **state)
+{
+    unit_made_view(&made, 3);
+    add(10, 0, 20, 8);
+    assert_near(margin_of_small(), 0, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -149,6 +184,8 @@ int main(void)
         cmocka_unit_test_setup(test_detector_keeps_the_surest_where_there_is_no_room, setup),
         cmocka_unit_test_setup(test_detector_asks_screen_first_machine_and_threshold, setup),
         cmocka_unit_test_setup(test_detector_class_is_the_surest_kind_and_by_how_much, setup),
+        cmocka_unit_test_setup(test_detector_a_kind_of_another_height_loses_at_most_one, setup),
+        cmocka_unit_test_setup(test_detector_a_box_at_the_frames_edge_may_be_of_any_height, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
