@@ -91,6 +91,7 @@ proof: setup ## what takes longer: `make test`, the library for every core, the 
 	@$(MAKE) --no-print-directory test firmware-all
 	@$(PYTHON) tools/same_bits.py --steps 5000
 	@$(PYTHON) tools/kill_sweep.py --runs 1000
+	@$(PYTHON) tools/same_bits.py --steps 5000 --rig wide180
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

@@ -12,11 +12,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from bslam.commands.arguments import CAMERA_STORE
 from bslam.core.slam import Slam
+from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import Log, first_steps, read_folder
 from bslam.recording.recorder import FINGERPRINT_START
+from bslam.rig import load_rig
 from bslam.target.lines import qemu_machines
 from bslam.target.remote import connect
 from bslam.world.simulate import load_scenario, simulate
@@ -84,19 +87,34 @@ def first_difference(one: list[int], other: list[int]) -> int | None:
     return None
 
 
+def read_log(options: argparse.Namespace) -> Log:
+    """The log that the command line names. A drive seen by cameras is rendered once, which takes minutes."""
+    folder = Path(options.log)
+    if folder.is_dir():
+        return read_folder(folder)
+    scenario = load_scenario(options.log)
+    if options.rig is None:
+        return simulate(scenario, options.seed)
+    noise = scenario.wheels.noise
+    return camera_log(scenario, options.seed, None, noise, load_rig(options.rig), CameraStore(CAMERA_STORE))
+
+
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("log", nargs="?", default="paper_room", help="a scenario, or the folder of a log")
     parser.add_argument("--steps", type=int, default=5000, help="of the log (default: 5000)")
+    parser.add_argument(
+        "--rig", help="see the scenario through these cameras; signatures go to the boards, too"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of a scenario (default: 0)")
     parser.add_argument("--boards", nargs="+", default=sorted(qemu_machines()), help="default: all of QEMU")
     parser.add_argument("--association", default="svm", help="default: svm")
     parser.add_argument("--observation", default="distance", help="default: distance")
     options = parser.parse_args(argv)
-    folder = Path(options.log)
-    whole = read_folder(folder) if folder.is_dir() else simulate(load_scenario(options.log), options.seed)
-    log = first_steps(whole, options.steps)
+    log = first_steps(read_log(options), options.steps)
     words = {"association": options.association, "observation": options.observation}
+    if options.rig is not None:
+        words["sensor"] = "camera"
     here = fingerprints(log, RunOptions(**words))
     print(f"{log.name}, {len(log.odometry.time_us)} steps, {len(here)} states, {words}")
     print(f"{'host':<12} {here[-1]:016x}")
