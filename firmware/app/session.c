@@ -53,6 +53,15 @@ static void keep(session_t *session, bslam_status_t status)
     session->last_status = (uint8_t)status;
 }
 
+static void forget_seeds(session_t *session)
+{
+#if SESSION_LOOKS
+    session->seed_count = 0;
+#else
+    (void)session;
+#endif
+}
+
 static void apply_hello(session_t *session, bslam_link_reader_t *reader)
 {
     const uint32_t id = bslam_link_get_u32(reader);
@@ -65,23 +74,27 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
             session->params = session->slam.params;
         } else {
             session->uses_looks = (flags & FLAG_LOOKS) != 0;
-            session->seed_count = 0;
+            forget_seeds(session);
             bslam_params_default(&session->params);
         }
         keep(session, BSLAM_OK);
     }
 }
 
-static bslam_status_t attach_looks(session_t *session)
+static uint8_t attach_looks(session_t *session)
 {
     if (!session->uses_looks) {
         return BSLAM_OK;
     }
+#if SESSION_LOOKS
     const bslam_status_t status = bslam_looks_init(&session->looks, session->seeds, session->seed_count);
     if (status == BSLAM_OK) {
         bslam_slam_attach_looks(&session->slam, &session->looks);
     }
-    return status;
+    return (uint8_t)status;
+#else
+    return SESSION_E_LOOKS;
+#endif
 }
 
 static void apply_reset(session_t *session, bslam_link_reader_t *reader)
@@ -89,7 +102,7 @@ static void apply_reset(session_t *session, bslam_link_reader_t *reader)
     if (is_whole(session, reader)) {
         int bad_id = NO_DETAIL;
         const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
-        keep(session, status == BSLAM_OK ? attach_looks(session) : status);
+        session->last_status = status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
         session->detail = (uint8_t)bad_id;
         session->fingerprint = BSLAM_FINGERPRINT_START;
     }
@@ -119,6 +132,8 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
         session->ticks = port_ticks() - began;
     }
 }
+
+#if SESSION_LOOKS
 
 static void read_signature(bslam_link_reader_t *reader, float signature[BSLAM_SAMPLE_FEATURES])
 {
@@ -161,6 +176,22 @@ static void apply_seeds(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+static const float *signature_of(const session_t *session, int sighting)
+{
+    return session->signatures[sighting];
+}
+
+#else
+
+static const float *signature_of(const session_t *session, int sighting)
+{
+    (void)session;
+    (void)sighting;
+    return NULL;
+}
+
+#endif
+
 static void read_sighting(bslam_link_reader_t *reader, const float *signature, bslam_sighting_t *sighting)
 {
     sighting->bearing_rad = bslam_link_get_real(reader);
@@ -178,7 +209,7 @@ static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
 {
     const int count = bslam_link_get_u8(reader);
     for (int i = 0; i < count && i < BSLAM_SIGHTINGS_MAX; i++) {
-        read_sighting(reader, session->signatures[i], &session->sightings[i]);
+        read_sighting(reader, signature_of(session, i), &session->sightings[i]);
     }
     // Of too many, which the library refuses, there is no room to read all.
     if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
@@ -500,6 +531,11 @@ static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_li
     }
 }
 
+_Static_assert(2 + sizeof(bslam_counters_t) + sizeof(bslam_looks_counters_t) +
+                       sizeof(bslam_learner_counters_t) + sizeof(bslam_link_counters_t) + 8 <=
+                   BSLAM_LINK_PAYLOAD_MAX,
+               "the counters are one answer");
+
 /// Counters are structs of nothing but uint32_t.
 static void put_counters(bslam_link_writer_t *out, const void *counters, size_t size)
 {
@@ -515,8 +551,17 @@ static void answer_counters(session_t *session, bslam_link_reader_t *reader, bsl
 {
     (void)reader;
     put_counters(out, &session->slam.counters, sizeof session->slam.counters);
-    put_counters(out, &session->looks.counters, sizeof session->looks.counters);
-    put_counters(out, &session->looks.learner.counters, sizeof session->looks.learner.counters);
+#if SESSION_LOOKS
+    const bslam_looks_counters_t *looks = &session->looks.counters;
+    const bslam_learner_counters_t *learner = &session->looks.learner.counters;
+#else
+    static const bslam_looks_counters_t no_looks;
+    static const bslam_learner_counters_t no_learner;
+    const bslam_looks_counters_t *looks = &no_looks;
+    const bslam_learner_counters_t *learner = &no_learner;
+#endif
+    put_counters(out, looks, sizeof *looks);
+    put_counters(out, learner, sizeof *learner);
     put_counters(out, &session->parser.counters, sizeof session->parser.counters);
     bslam_link_put_u32(out, session->repeated);
     bslam_link_put_u32(out, session->replayed);
@@ -580,8 +625,10 @@ static const exchange_t exchanges[] = {
     {SESSION_POSE_AT, apply_nothing, answer_pose_at},
     {SESSION_MAP, apply_nothing, answer_map},
     {SESSION_COUNTERS, apply_nothing, answer_counters},
+#if SESSION_LOOKS
     {SESSION_SIGNATURES, apply_signatures, answer_nothing},
     {SESSION_SEEDS, apply_seeds, answer_nothing},
+#endif
     {SESSION_STATE, apply_nothing, answer_step},
     {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
     {SESSION_SET_POSE, apply_set_pose, answer_step},

@@ -11,6 +11,11 @@
 #include "bslam/bslam.h"
 #include "bslam/link/crc16.h"
 
+/// 0: the robot learns no looks, which saves bslam_looks_t, the largest part of its memory.
+#ifndef SESSION_LOOKS
+#define SESSION_LOOKS 1
+#endif
+
 /// What the host may send. The answer to message m has type m | SESSION_ANSWER and the same sequence number.
 typedef enum session_message {
     SESSION_HELLO = 0x01,         ///< opens a session; the answer says what the image is
@@ -49,13 +54,19 @@ typedef enum session_status {
     SESSION_E_NO_SESSION = 0x40,  ///< no SESSION_HELLO came since the robot started
     SESSION_E_TYPE = 0x41,        ///< no such message
     SESSION_E_LENGTH = 0x42,      ///< the payload is not as long as its message is
-    SESSION_E_STORE = 0x43        ///< the board keeps nothing, or failed to
+    SESSION_E_STORE = 0x43,       ///< the board keeps nothing, or failed to
+    SESSION_E_LOOKS = 0x44        ///< the image learns no looks
 } session_status_t;
 
 /// All members are the session's own.
 typedef struct session {
     bslam_slam_t slam;
+#if SESSION_LOOKS
     bslam_looks_t looks;
+    float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
+    bslam_sample_t seeds[BSLAM_SEEDS_MAX];
+    int32_t seed_count;
+#endif
 #if SESSION_VISION
     seeing_t seeing;
 #endif
@@ -64,7 +75,7 @@ typedef struct session {
     uint32_t id;  ///< the host's number of this session
     bool open;
     bool takes_fingerprints;
-    bool uses_looks;
+    bool uses_looks;  ///< as the host wishes
     uint16_t last_sequence;
     uint16_t report_sequence;
     uint8_t last_status;
@@ -74,9 +85,6 @@ typedef struct session {
     uint32_t ticks;     ///< that the last message took to apply; a look with all of its pixels
     uint64_t fingerprint;
     bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
-    float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
-    bslam_sample_t seeds[BSLAM_SEEDS_MAX];
-    int32_t seed_count;
     uint8_t out[BSLAM_LINK_FRAME_MAX];
 } session_t;
 

@@ -19,8 +19,8 @@
 /// Version, type, sequence, time.
 #define BSLAM_LINK_HEADER_BYTES 12
 #define BSLAM_LINK_CRC_BYTES 2
-/// A frame of sightings of the largest size, or a part of the map.
-#define BSLAM_LINK_PAYLOAD_MAX (16 + 24 * BSLAM_SIGHTINGS_MAX)
+/// A frame of sightings of the largest size, but no less than the counters take.
+#define BSLAM_LINK_PAYLOAD_MAX (16 + 24 * (BSLAM_SIGHTINGS_MAX < 16 ? 16 : BSLAM_SIGHTINGS_MAX))
 /// Header, payload and CRC.
 #define BSLAM_LINK_CONTENT_MAX (BSLAM_LINK_HEADER_BYTES + BSLAM_LINK_PAYLOAD_MAX + BSLAM_LINK_CRC_BYTES)
 /// Bytes on the wire of the longest frame: COBS adds one byte in 254, and the delimiter ends it.

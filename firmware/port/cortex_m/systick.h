@@ -1,4 +1,4 @@
-/// Time from SysTick, the timer that every Cortex-M has.
+/// Time from SysTick, the timer that a Cortex-M has; an M0 or M0+ may be without.
 #ifndef PORT_CORTEX_M_SYSTICK_H
 #define PORT_CORTEX_M_SYSTICK_H
 

@@ -49,7 +49,7 @@ class Report(IntEnum):
     POSE = 0x41
 
 
-LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE"}
+LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE", 0x44: "LOOKS"}
 """Statuses that are the link's own; below are the library's."""
 NO_DETAIL = 255
 
@@ -101,9 +101,14 @@ def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
     return bytes((_SOURCES[kind], int(has_gyro))) + values + float32(gyro_radps or 0.0)
 
 
+def payload_max(sightings_max: int) -> int:
+    """Bytes of the longest payload of an image that takes so many sightings (BSLAM_LINK_PAYLOAD_MAX)."""
+    return 16 + 24 * max(sightings_max, 16)
+
+
 def signatures_a_frame(sightings_max: int) -> int:
-    """How many signatures a payload of that image has room for (BSLAM_LINK_PAYLOAD_MAX)."""
-    return max(1, (16 + 24 * sightings_max - 2) // _SIGNATURE_BYTES)
+    """How many signatures a payload of that image has room for."""
+    return (payload_max(sightings_max) - 2) // _SIGNATURE_BYTES
 
 
 def signatures(first: int, part: NDArray[np.float32]) -> bytes:
@@ -156,11 +161,6 @@ def camera(index: int, record: CameraRecord) -> bytes:
 
 def image(index: int, rgb565: bool) -> bytes:
     return bytes((index, 0 if rgb565 else 1))
-
-
-def pixels_a_frame(sightings_max: int) -> int:
-    """How many bytes of a picture a payload of that image has room for."""
-    return 16 + 24 * sightings_max
 
 
 def resume(position_sd_m: float, heading_sd_rad: float) -> bytes:

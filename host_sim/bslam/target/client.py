@@ -13,7 +13,11 @@ from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
 ATTEMPTS = 5
-_MEANING = {"STORE": ": the board keeps nothing over a restart", "TYPE": ": the image has no such message"}
+_MEANING = {
+    "STORE": ": the board keeps nothing over a restart",
+    "TYPE": ": the image has no such message",
+    "LOOKS": ": the image learns no looks (SESSION_LOOKS=0)",
+}
 
 
 @dataclass(frozen=True)

@@ -317,7 +317,7 @@ class RemoteSlam:
         """
         self._ensure(self._client.ask(Message.IMAGE, messages.image(camera, True)), f"image of {camera}")
         data = picture.astype("<u2").tobytes()
-        piece = messages.pixels_a_frame(self._client.info.sightings_max)
+        piece = messages.payload_max(self._client.info.sightings_max)
         for at in range(0, len(data), piece):
             self._ensure(self._client.ask(Message.PIXELS, data[at : at + piece]), f"pixels {at}")
         answer = self._client.ask(Message.LOOK, bytes((int(moved),)), time_us)
