@@ -20,7 +20,11 @@
 #define BSLAM_LINK_HEADER_BYTES 12
 #define BSLAM_LINK_CRC_BYTES 2
 /// A frame of sightings of the largest size, but no less than the counters take.
-#define BSLAM_LINK_PAYLOAD_MAX (16 + 24 * (BSLAM_SIGHTINGS_MAX < 16 ? 16 : BSLAM_SIGHTINGS_MAX))
+#if BSLAM_SIGHTINGS_MAX < 16
+#define BSLAM_LINK_PAYLOAD_MAX 400
+#else
+#define BSLAM_LINK_PAYLOAD_MAX (16 + 24 * BSLAM_SIGHTINGS_MAX)
+#endif
 /// Header, payload and CRC.
 #define BSLAM_LINK_CONTENT_MAX (BSLAM_LINK_HEADER_BYTES + BSLAM_LINK_PAYLOAD_MAX + BSLAM_LINK_CRC_BYTES)
 /// Bytes on the wire of the longest frame: COBS adds one byte in 254, and the delimiter ends it.
