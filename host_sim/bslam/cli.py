@@ -13,7 +13,20 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from types import ModuleType
 
-from bslam.commands import calibrate, compare, console, export, live, look, params, replay, run, sweep, tables
+from bslam.commands import (
+    calibrate,
+    compare,
+    console,
+    export,
+    live,
+    look,
+    params,
+    replay,
+    report_page,
+    run,
+    sweep,
+    tables,
+)
 from bslam.errors import BslamError
 
 COMMANDS: dict[str, ModuleType] = {
@@ -23,6 +36,7 @@ COMMANDS: dict[str, ModuleType] = {
     "sweep": sweep,
     "compare": compare,
     "live": live,
+    "report": report_page,
     "look": look,
     "calibrate": calibrate,
     "console": console,

@@ -131,8 +131,8 @@ def add_batch_options(
     group = parser.add_argument_group("runs")
     group.add_argument(
         "--seeds",
-        type=_seeds,
-        default=_seeds(seeds),
+        type=seeds_range,
+        default=seeds_range(seeds),
         metavar="A:B",
         help=f"seeds from A up to and without B (default: {seeds})",
     )
@@ -268,7 +268,8 @@ def _sigma_mps(text: str) -> float:
         raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: {allowed}") from None
 
 
-def _seeds(text: str) -> range:
+def seeds_range(text: str) -> range:
+    """A:B as an option's value."""
     first, colon, end = text.partition(":")
     if not (colon and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
         raise argparse.ArgumentTypeError(

@@ -83,15 +83,22 @@ def execute(arguments: argparse.Namespace) -> int:
         if getattr(arguments, word) != unset:
             option = f"--{word.replace('_', '-')}"
             raise BslamError(f"{option}: not where algorithms are compared; allowed: with run and replay")
+    methods, options, result, lines = compare(arguments)
+    _write(arguments, result, methods, lines)
+    return _say(arguments, result, lines, options[0])
+
+
+def compare(
+    arguments: argparse.Namespace,
+) -> tuple[list[Method], list[RunOptions], ContestResult, list[dict[str, Any]]]:
+    """The algorithms, the drives' options, what came of it, and a line for each algorithm."""
     methods = _methods(arguments)
     sources, options = _drives(arguments)
     for source in {source.shared: source for source in sources if source.shared is not None}.values():
         source.prepare()
     bouts = make_bouts(methods, sources, options)
     result = hold_contest(bouts, arguments.out, arguments.jobs, arguments.call_limit)
-    lines = means(result, methods, BOUND, arguments.map_every)
-    _write(arguments, result, methods, lines)
-    return _say(arguments, result, lines, options[0])
+    return methods, options, result, means(result, methods, BOUND, arguments.map_every)
 
 
 def _methods(arguments: argparse.Namespace) -> list[Method]:

@@ -10,7 +10,7 @@ from bslam.commands.arguments import add_batch_options, add_filter_options, core
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
 from bslam.errors import BslamError
-from bslam.experiment.batch import make_jobs, run_batch
+from bslam.experiment.batch import Job, make_jobs, run_batch
 from bslam.experiment.datasets import find_directory
 from bslam.experiment.mrclam import ROBOTS, robots_in
 from bslam.experiment.rerun import options_of
@@ -62,14 +62,20 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _replay_logs(arguments: argparse.Namespace, kind: str, directories: list[str]) -> int:
+    return finish(
+        run_batch(jobs_of(arguments, kind, directories), arguments.out, arguments.jobs), arguments.out
+    )
+
+
+def jobs_of(arguments: argparse.Namespace, kind: str, directories: list[str]) -> list[Job]:
+    """A run for each log and seed. Raises BslamError."""
     logs = log_sources(kind, directories, arguments.robot)
     pairs = [
         (source, run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed))
         for source in logs
         for seed in arguments.seeds
     ]
-    jobs = make_jobs([source for source, _ in pairs], [one for _, one in pairs], draw, arguments.pictures)
-    return finish(run_batch(jobs, arguments.out, arguments.jobs), arguments.out)
+    return make_jobs([source for source, _ in pairs], [one for _, one in pairs], draw, arguments.pictures)
 
 
 def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:

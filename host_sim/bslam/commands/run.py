@@ -13,7 +13,7 @@ from bslam.commands.arguments import (
 )
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
-from bslam.experiment.batch import make_jobs, run_batch
+from bslam.experiment.batch import Job, make_jobs, run_batch
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "simulate a scenario and run the filter on it"
@@ -42,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
+    return finish(run_batch(jobs_of(arguments), arguments.out, arguments.jobs), arguments.out)
+
+
+def jobs_of(arguments: argparse.Namespace) -> list[Job]:
+    """A run for each seed. Raises BslamError."""
     wheels = load_scenario(arguments.scenario).wheels
     sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
     noise = arguments.noise or wheels.noise
@@ -49,5 +54,4 @@ def execute(arguments: argparse.Namespace) -> int:
         run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=seed) for seed in arguments.seeds
     ]
     sources = [scenario_source(arguments, seed, sigma_mps, noise) for seed in arguments.seeds]
-    jobs = make_jobs(sources, options, draw, arguments.pictures, arguments.record)
-    return finish(run_batch(jobs, arguments.out, arguments.jobs), arguments.out)
+    return make_jobs(sources, options, draw, arguments.pictures, arguments.record)

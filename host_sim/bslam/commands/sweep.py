@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import itertools
 import json
-import statistics
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from bslam.commands.report import HEADINGS, mean_row, table_of
 from bslam.errors import BslamError
 from bslam.experiment.batch import Job, make_jobs
 from bslam.experiment.cluster import cluster
+from bslam.experiment.consistency import half_interval_95
 from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_atomically, write_summary
 from bslam.experiment.sources import Source
@@ -86,7 +86,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    jobs, plan = _jobs_and_plan(arguments)
+    jobs, plan = jobs_and_plan(arguments)
     out: Path = arguments.out
     if arguments.restart:
         forget(out)
@@ -95,7 +95,7 @@ def execute(arguments: argparse.Namespace) -> int:
         store = stack.enter_context(Store(out, plan))
         result = run_sweep(jobs, store, out, arguments.jobs, backend)
     status = _finish(result, out)
-    if _jobs_and_plan(arguments)[1] != plan:
+    if jobs_and_plan(arguments)[1] != plan:
         raise BslamError(f"{arguments.scenario}: was changed while its runs were made, which are of before")
     return status
 
@@ -157,17 +157,15 @@ def _parameters(entry: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) 
 
 
 def _interval(group: Sequence[Mapping[str, Any]]) -> str:
-    """Half of the 95 % interval of the mean error, by the runs' scatter, taken as normal."""
-    errors = [one["position_error_m"]["mean"] for one in group if "position_error_m" in one]
-    if len(errors) < 2:
-        return "-"
-    return f"{100.0 * 1.96 * statistics.stdev(errors) / len(errors) ** 0.5:.2f}"
+    """Half of the 95 % interval of the mean error."""
+    half_m = half_interval_95([one["position_error_m"]["mean"] for one in group if "position_error_m" in one])
+    return "-" if half_m is None else f"{100.0 * half_m:.2f}"
 
 
 # --- What is to be run ------------------------------------------------------------------------------------
 
 
-def _jobs_and_plan(arguments: argparse.Namespace) -> tuple[list[Job], dict[str, str]]:
+def jobs_and_plan(arguments: argparse.Namespace) -> tuple[list[Job], dict[str, str]]:
     """The runs, and what decides them. Raises BslamError."""
     path = Path(arguments.scenario)
     if path.suffix == ".toml" and path.is_file() and "scenarios" in (content := load_toml(path)):

@@ -76,7 +76,14 @@ def group(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> dict[tuple[float,
 
 
 def _draw_sigma(out: Path, sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -> str:
-    """Draw both observations of one sigma; the name of the file."""
+    """Write the picture of a sigma; the name of the file."""
+    name = f"sigma{sigma_mps:g}.png"
+    write_atomically(out / name, picture(sigma_mps, by_cell))
+    return name
+
+
+def picture(sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -> bytes:
+    """Both observations of one sigma over time, as PNG."""
     pair = []
     for observation in OBSERVATIONS:
         runs = [one for one in by_cell.get((sigma_mps, observation), []) if len(one.time_s)]
@@ -84,9 +91,7 @@ def _draw_sigma(out: Path, sigma_mps: float, by_cell: dict[tuple[float, str], li
             error_m, nees = np.array([one.error_m for one in runs]), np.array([one.nees for one in runs])
             title = OBSERVATION_TITLES[observation]
             pair.append(Series(title, runs[0].time_s, error_m, nees, nees_band_95(len(runs)), WINDOW_S))
-    name = f"sigma{sigma_mps:g}.png"
-    write_atomically(out / name, png(draw_pair(f"Position error and NEES, sigma = {sigma_mps:g} m/s", pair)))
-    return name
+    return png(draw_pair(f"Position error and NEES, sigma = {sigma_mps:g} m/s", pair))
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[str]]:

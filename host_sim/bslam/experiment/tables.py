@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from bslam.experiment.batch import Outcome
-from bslam.experiment.consistency import nees_band_95
+from bslam.experiment.consistency import half_interval_95, nees_band_95
 
 STATISTICS: Final = ("max", "min", "mean", "std")  # in the paper's order
 TITLES: Final = {
@@ -44,6 +44,7 @@ class Cell:
     error_cm: dict[str, float]  # by STATISTICS
     mean_low_cm: float  # least and greatest mean error of a run
     mean_high_cm: float
+    mean_half_95_cm: float | None  # half of the 95 % interval of the mean error over runs; None of one run
     first_50s_cm: float
     last_50s_cm: float
     dead_reckoning_cm: float
@@ -74,6 +75,7 @@ def make_cell(sigma_mps: float, observation: str, outcomes: Sequence[Outcome]) -
 
     errors = [entry["position_error_m"] for entry in entries]
     band = nees_band_95(len(entries))
+    half_m = half_interval_95([error["mean"] for error in errors])
     return Cell(
         sigma_mps=sigma_mps,
         observation=observation,
@@ -82,6 +84,7 @@ def make_cell(sigma_mps: float, observation: str, outcomes: Sequence[Outcome]) -
         error_cm={name: 100.0 * statistics.fmean(error[name] for error in errors) for name in STATISTICS},
         mean_low_cm=100.0 * min(error["mean"] for error in errors),
         mean_high_cm=100.0 * max(error["mean"] for error in errors),
+        mean_half_95_cm=None if half_m is None else 100.0 * half_m,
         first_50s_cm=mean_of("position_error_first_50s_m", 100.0),
         last_50s_cm=mean_of("position_error_last_50s_m", 100.0),
         dead_reckoning_cm=mean_of("dead_reckoning_error_m", 100.0),

@@ -1,0 +1,64 @@
+"""`bslam report`, opened in a real browser: it holds all it shows, and what it shows is what was run."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+import kill_sweep
+from bslam.cli import main
+from bslam.commands import compare
+from bslam.experiment.contest import ContestResult
+
+BOUND = [
+    {"method": "bslam", "on_bound_steps_m": 0.051, "ratio_to_bound": 1.02},
+    {"method": "map", "on_bound_steps_m": 0.05, "ratio_to_bound": 1.0},
+]
+
+
+@pytest.fixture
+def short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A scenario of a few steps, and no real data."""
+    monkeypatch.setenv("BSLAM_DATA", str(tmp_path))
+    kill_sweep.write_sweep(tmp_path, 2)
+    path = tmp_path / "short.toml"
+    path.write_text(path.read_text().replace(f"steps = {kill_sweep.STEPS}", "steps = 100"))
+    return path
+
+
+def test_report_holds_its_pictures_and_the_figures_of_its_runs(
+    page: Page, short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ([], [], ContestResult((), interrupted=False), BOUND)
+    monkeypatch.setattr(compare, "compare", lambda _: lines)
+    words = ["report", "--scenario", str(short), "--seeds", "3:5", "--parts", "tables,bound,real"]
+    out = tmp_path / "out"
+    assert main([*words, "--jobs", "1", "--out", str(out)]) == 0
+    page.goto((out / "report.html").as_uri())
+    expect(
+        page.get_by_text(f"bslam tables --scenario {short} --association known --seeds 3:5")
+    ).to_be_visible()
+    widths = page.evaluate("[...document.images].map(one => one.complete && one.naturalWidth)")
+    assert len(widths) == 4 and all(width > 500 for width in widths)  # Figures 6 to 9
+    runs = json.loads((out / "tables/summary.json").read_text())["runs"]
+    cell = [one for one in runs if one["sigma_mps"] == 1.0 and one["observation"] == "distance"]
+    mean_cm = 100.0 * np.mean([one["position_error_m"]["mean"] for one in cell])
+    table = page.get_by_role("table").filter(has_text="Table III")
+    row = table.get_by_role("row", name="Mean error", exact=False).first
+    assert row.get_by_role("cell").all_inner_texts()[1] == "15.1"  # the paper's
+    assert row.get_by_role("cell").all_inner_texts()[2].startswith(f"{mean_cm:.2f} ± ")
+    bound = page.get_by_role("row", name="sigma 0.6 m/s")
+    assert bound.get_by_role("cell").all_inner_texts()[1:] == ["5.10", "5.00", "1.020"]
+    expect(
+        page.get_by_text("of the UTIAS MRCLAM data are not at hand; BSLAM_DATA names their place")
+    ).to_be_visible()
+
+
+def test_report_unknown_part_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["report", "--parts", "tables,weather"])
+    assert (
+        "'weather' is no part; allowed: tables, bound, figure3, association, real" in capsys.readouterr().err
+    )
