@@ -24,6 +24,7 @@ from bslam.commands import (
     replay,
     report_page,
     run,
+    scenario,
     sweep,
     tables,
 )
@@ -41,6 +42,7 @@ COMMANDS: dict[str, ModuleType] = {
     "calibrate": calibrate,
     "console": console,
     "export": export,
+    "scenario": scenario,
     "params": params,
 }
 

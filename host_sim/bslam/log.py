@@ -417,8 +417,11 @@ def _read_looks(path: Path, allowed: str) -> NDArray[np.float32] | None:
 
 def _read_truth(folder: Path) -> Truth | None:
     path = _find_csv(folder, "truth")
-    if path is None:
-        return None
+    return None if path is None else read_truth(path)
+
+
+def read_truth(path: Path) -> Truth:
+    """True poses from a truth.csv or .csv.gz. Raises BslamError that names the line and what is allowed."""
     table = read_table(path, [_columns("time_us", "x_m", "y_m", "theta_rad")])
     table.require_rows("allowed: at least one, or no such file")
     table.require_order("time_us", strict=True)

@@ -26,8 +26,9 @@ _ARC_SD_M: Final = 1e-5
 _SPEED_VARIANCE_MIN: Final = 1e-12  # (m/s)², (rad/s)²: speeds without a walk would weigh infinitely
 _FIRST_RANGE_M: Final = 4.0
 _FIRST_RANGE_SD_M: Final = 2.5
-_ITERATIONS_MAX: Final = 30
+_ITERATIONS_MAX: Final = 100
 _SETTLED: Final = 1e-7  # m, rad: the largest change of an iteration that changes nothing
+_SETTLED_COST: Final = 1e-10  # nor does one that lessens the cost by so small a share
 _SHORTEST: Final = 1e-6  # share of a step that is still tried
 _POSE: Final = 3  # unknowns of a pose
 _BEACON: Final = 2
@@ -110,7 +111,7 @@ class Smoother:
             trial = problem.lower(poses, beacons, *normal.solve(), weights, cost)
             largest = max(np.abs(trial[0] - poses).max(), np.abs(trial[1] - beacons).max(initial=0.0))
             poses, beacons = trial
-            if largest < _SETTLED:
+            if largest < _SETTLED or cost - problem.cost(*trial, weights) < _SETTLED_COST * cost:
                 self._poses, self._beacons = poses, beacons
                 return iteration
         raise ArithmeticError(f"{self.steps} poses have not settled in {_ITERATIONS_MAX} iterations")

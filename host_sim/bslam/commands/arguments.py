@@ -27,11 +27,13 @@ from bslam.experiment.options import (
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
+from bslam.world.scenario import load_scenario
 
 T = TypeVar("T")
 
 # Rendering takes about a minute a drive: what a later command needs again is kept here.
 CAMERA_STORE = Path("out") / "camera"
+DEFAULT_RIG = "three60"
 
 
 def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = ()) -> None:
@@ -109,9 +111,9 @@ def add_sensor_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--rig",
-        default="three60",
         metavar="RIG",
-        help="the cameras: three60, wide180, pan60, or the path of a TOML file (default: three60)",
+        help="the cameras: three60, wide180, pan60, or the path of a TOML file "
+        f"(default: the scenario's, or {DEFAULT_RIG})",
     )
 
 
@@ -120,8 +122,13 @@ def scenario_source(
 ) -> ScenarioSource:
     """The simulated drive that the options ask for."""
     if arguments.sensor == "camera":
-        return CameraSource(arguments.scenario, seed, sigma_mps, noise, arguments.rig, CAMERA_STORE)
+        return CameraSource(arguments.scenario, seed, sigma_mps, noise, _rig(arguments), CAMERA_STORE)
     return ScenarioSource(arguments.scenario, seed, sigma_mps, noise)
+
+
+def _rig(arguments: argparse.Namespace) -> str:
+    """The cameras: asked for, else the scenario's."""
+    return arguments.rig or load_scenario(arguments.scenario).rig or DEFAULT_RIG
 
 
 def add_batch_options(
@@ -175,7 +182,7 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "velocity_states": arguments.velocity_states,
         "noise": arguments.noise,
         "sensor": getattr(arguments, "sensor", "simulated"),
-        "rig": arguments.rig if getattr(arguments, "sensor", "") == "camera" else None,
+        "rig": _rig(arguments) if getattr(arguments, "sensor", "") == "camera" else None,
         "target": arguments.target,
         "real": arguments.real,
         "known_map": arguments.known_map,

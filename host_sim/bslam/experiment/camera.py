@@ -63,7 +63,7 @@ class CameraDrive:
     def arena(self, arena: Arena) -> Arena:
         """With the beacons where they are seen, which for a thick one is not on the wall."""
         beacons = tuple(Beacon(int(number), (x_m, y_m)) for number, x_m, y_m in self.places.tolist())
-        return Arena(arena.walls, beacons)
+        return replace(arena, beacons=beacons)
 
     def sightings(self, step_us: int) -> Sightings:
         """As a log has them, stamped with the time of their frames."""
@@ -136,6 +136,9 @@ def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig
     first = rig.cameras[0]
     if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
         raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
+    if scenario.movers:
+        reason = "what moves about is not drawn"
+        raise BslamError(f"scenario {scenario.name}, movers: {reason}; allowed: none, or --sensor simulated")
     return with_noise(scenario, sigma_mps, noise)
 
 

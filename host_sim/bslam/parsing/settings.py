@@ -22,13 +22,20 @@ T = TypeVar("T")
 class Rule:
     """What a key may hold: its TOML type (`float` takes integers too), a test, and the words for both.
 
-    `make` turns a good value into what the program works with.
+    `make` turns a good value into what the program works with. `more` is what a JSON schema can say of the
+    test, for editors.
     """
 
     allowed: str
     kind: type
     holds: Callable[[Any], bool] = lambda value: True
     make: Callable[[Any], Any] = lambda value: value
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The rule as JSON schema, as far as that goes; what is allowed stands in the description."""
+        return {"type": _SCHEMA_TYPES[self.kind], "description": f"allowed: {self.allowed}", **self.more}
 
     def convert(self, value: object, where: str) -> Any:
         """The value to work with, or a BslamError that starts with `where` (file and key)."""
@@ -43,26 +50,40 @@ class Rule:
         raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}")
 
 
+_SCHEMA_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", list: "array"}
+
+
 def one_of(*words: str) -> Rule:
-    return Rule(" or ".join(repr(word) for word in words), str, lambda value: value in words)
+    allowed = " or ".join(repr(word) for word in words)
+    return Rule(allowed, str, lambda value: value in words, more={"enum": list(words)})
 
 
 def integer(lowest: int, highest: int | None = None) -> Rule:
     if highest is None:
-        return Rule(f"an integer from {lowest}", int, lambda value: value >= lowest)
-    return Rule(f"an integer from {lowest} to {highest}", int, lambda value: lowest <= value <= highest)
+        return Rule(f"an integer from {lowest}", int, lambda value: value >= lowest, more={"minimum": lowest})
+    allowed, more = f"an integer from {lowest} to {highest}", {"minimum": lowest, "maximum": highest}
+    return Rule(allowed, int, lambda value: lowest <= value <= highest, more=more)
 
 
 def number(lowest: float, highest: float) -> Rule:
-    return Rule(f"a number from {lowest:g} to {highest:g}", float, lambda value: lowest <= value <= highest)
+    allowed, more = f"a number from {lowest:g} to {highest:g}", {"minimum": lowest, "maximum": highest}
+    return Rule(allowed, float, lambda value: lowest <= value <= highest, more=more)
 
 
+_ABOVE_0 = {"exclusiveMinimum": 0}
 ANY = Rule("a finite number", float, math.isfinite)
-POSITIVE = Rule("a finite number above 0", float, lambda value: 0.0 < value < math.inf)
-NOT_NEGATIVE = Rule("a finite number from 0", float, lambda value: 0.0 <= value < math.inf)
-POSITIVE_OR_INF = Rule("a number above 0, or inf", float, lambda value: value > 0.0)
-SHARE = Rule("a number from 0 to 1", float, lambda value: 0.0 <= value <= 1.0)
-FIELD_OF_VIEW = Rule("above 0, at most 6.2832 (a full turn)", float, lambda value: 0.0 < value <= 6.2832)
+POSITIVE = Rule("a finite number above 0", float, lambda value: 0.0 < value < math.inf, more=_ABOVE_0)
+NOT_NEGATIVE = Rule(
+    "a finite number from 0", float, lambda value: 0.0 <= value < math.inf, more={"minimum": 0}
+)
+POSITIVE_OR_INF = Rule("a number above 0, or inf", float, lambda value: value > 0.0, more=_ABOVE_0)
+SHARE = number(0.0, 1.0)
+FIELD_OF_VIEW = Rule(
+    "above 0, at most 6.2832 (a full turn)",
+    float,
+    lambda value: 0.0 < value <= 6.2832,
+    more=_ABOVE_0 | {"maximum": 6.2832},
+)
 
 
 def setting(rule: Rule, default: Any = MISSING) -> Any:

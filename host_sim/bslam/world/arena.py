@@ -30,12 +30,47 @@ class Beacon:
     beacon_id: int
     at: Point
     looks_like: int | None = None  # the beacon whose looks it has; None: its own
+    kind: str | None = None  # before a camera, these three; None: whatever fits
+    width_m: float | None = None
+    texture: int | None = None  # beacons of one kind and texture look alike
+
+
+@dataclass(frozen=True)
+class Box:
+    """A thing that stands about: a rectangle on the floor, turned about its middle."""
+
+    at: Point
+    size_m: Point
+    turn_rad: float = 0.0
+    hides: bool = True  # higher than the sensor: what is behind cannot be seen
+
+    @property
+    def sides(self) -> tuple[Wall, ...]:
+        """Its four sides."""
+        c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
+        half_x, half_y = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
+        corners = [
+            (self.at[0] + c * x - s * y, self.at[1] + s * x + c * y)
+            for x, y in ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
+        ]
+        return tuple(Wall(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
 
 
 @dataclass(frozen=True)
 class Arena:
     walls: tuple[Wall, ...]
     beacons: tuple[Beacon, ...]
+    boxes: tuple[Box, ...] = ()
+
+    @cached_property
+    def obstacles(self) -> tuple[Wall, ...]:
+        """All that stops a robot: walls and the sides of boxes."""
+        return (*self.walls, *(side for box in self.boxes for side in box.sides))
+
+    @cached_property
+    def screens(self) -> tuple[Wall, ...]:
+        """All that hides what is behind: walls and the sides of high boxes."""
+        return (*self.walls, *(side for box in self.boxes if box.hides for side in box.sides))
 
     @property
     def low(self) -> Point:
@@ -56,9 +91,9 @@ class Arena:
 
     @cached_property
     def _spans(self) -> list[tuple[float, float, float, float, float]]:
-        """Start, vector to the end, and 1 / length^2 of each wall: what the distance to it needs."""
+        """Start, vector to the end, and 1 / length^2 of each obstacle: what the distance to it needs."""
         spans = []
-        for (x0, y0), (x1, y1) in ((wall.start, wall.end) for wall in self.walls):
+        for (x0, y0), (x1, y1) in ((wall.start, wall.end) for wall in self.obstacles):
             dx, dy = x1 - x0, y1 - y0
             spans.append((x0, y0, dx, dy, 1.0 / (dx * dx + dy * dy)))
         return spans
@@ -87,7 +122,7 @@ class Arena:
     def path_clearance(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Least distance of straight paths a -> b, (k, 2) each, to any wall: (k,), 0 where one is crossed."""
         clearance = np.full(len(a), math.inf)
-        for wall in self.walls:
+        for wall in self.obstacles:
             p, q = np.array(wall.start), np.array(wall.end)
             for distance in (
                 _distance_to_segment(a, p, q),
@@ -104,7 +139,7 @@ class Arena:
         ray = target - eye
         length = np.hypot(ray[:, 0], ray[:, 1])
         free = length > _BEACON_DEPTH_M
-        for wall in self.walls:
+        for wall in self.screens:
             look = np.flatnonzero(free)
             depth_share = 1.0 - _BEACON_DEPTH_M / length[look]
             free[look] = ~_hides(wall, eye[look], ray[look], depth_share)

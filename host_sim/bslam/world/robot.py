@@ -39,11 +39,12 @@ class Body:
     def __init__(self, arena: Arena, pose: Pose, radius_m: float, wheelbase_m: float) -> None:
         self.pose = pose
         self.feeler = Feeler(arena)
+        self.others: list[tuple[float, float, float]] = []  # x, y, radius of what moves about
         self._radius_m = radius_m
         self._wheelbase_m = wheelbase_m
 
     def roll(self, left_m: float, right_m: float) -> bool:
-        """Roll the wheels. False: a wall is in the way, both wheels stall and nothing has moved."""
+        """Roll the wheels. False: something is in the way, both wheels stall and nothing has moved."""
         pieces = max(1, math.ceil(abs(left_m + right_m) / 2.0 / _PIECE_M))
         pose = self.pose
         for piece in range(1, pieces + 1):
@@ -51,5 +52,14 @@ class Body:
             pose = move_on_arc(self.pose, left_m * share, right_m * share, self._wheelbase_m)
             if self.feeler.nearest_within(pose[0], pose[1], self._radius_m) is not None:
                 return False
+            if any(self._touches(pose, other) for other in self.others):
+                return False
         self.pose = pose
         return True
+
+    def _touches(self, pose: Pose, other: tuple[float, float, float]) -> bool:
+        """A robot that stands too near already may still go away."""
+        x_m, y_m, radius_m = other
+        distance_m = math.hypot(pose[0] - x_m, pose[1] - y_m)
+        before_m = math.hypot(self.pose[0] - x_m, self.pose[1] - y_m)
+        return distance_m < self._radius_m + radius_m and distance_m < before_m

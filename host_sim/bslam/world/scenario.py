@@ -7,8 +7,9 @@ key, the value and what is allowed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +26,7 @@ from bslam.log import (
     WHEEL_RADIUS_M,
     WHEEL_SPEED_SIGMA_MPS,
     WHEELBASE_M,
+    read_truth,
 )
 from bslam.parsing.settings import (
     ANY,
@@ -44,12 +46,16 @@ from bslam.parsing.settings import (
     setting,
     toml_names,
 )
-from bslam.world.arena import Arena, Beacon, Point, Wall
+from bslam.rig import load_rig
+from bslam.world.arena import Arena, Beacon, Box, Point, Wall
+from bslam.world.crowd import Mover
+from bslam.world.kinds import KINDS
 from bslam.world.planner import grid_size
 
 _SHORTEST_WALL_M = 0.001
+_OUTSIDE_M = 0.05  # a beacon may stand out from the outer side of an outer wall
 _CELLS_MAX = 1_000_000  # of the grid that routes are planned on
-_FOLDER = Path(__file__).resolve().parent.parent / "scenarios"
+SCENARIOS = Path(__file__).resolve().parent.parent / "scenarios"
 
 T = TypeVar("T")
 
@@ -65,15 +71,43 @@ def _to_point(value: list[Any]) -> Point:
     return float(value[0]), float(value[1])
 
 
-_POINT = Rule("[x, y], two finite numbers", list, _is_point, _to_point)
+_TWO_NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_POINT = Rule("[x, y], two finite numbers", list, _is_point, _to_point, _TWO_NUMBERS)
 _INTERVAL = Rule(
-    "[low, high], two numbers, low < high", list, lambda v: _is_point(v) and v[0] < v[1], _to_point
+    "[low, high], two numbers, low < high",
+    list,
+    lambda v: _is_point(v) and v[0] < v[1],
+    _to_point,
+    _TWO_NUMBERS,
 )
+_POINTS = Rule(
+    "[[x, y], ...], points, at least one",
+    list,
+    lambda v: len(v) > 0 and all(map(_is_point, v)),
+    lambda v: tuple(map(_to_point, v)),
+    {"type": "array", "items": _POINT.schema, "minItems": 1},
+)
+_PATH = Rule(
+    "[[x, y], ...], two points or more, each apart from the one before",
+    list,
+    lambda v: len(v) > 1 and all(map(_is_point, v)) and all(a != b for a, b in pairwise(v)),
+    lambda v: tuple(map(_to_point, v)),
+    {"type": "array", "items": _POINT.schema, "minItems": 2},
+)
+_SIZE = Rule(
+    "[width, depth], two numbers from 0.01 to 100",
+    list,
+    lambda v: _is_point(v) and all(0.01 <= one <= 100.0 for one in v),
+    _to_point,
+    _POINT.schema,
+)
+_TRUE_OR_FALSE = Rule("true or false", bool)
 _GAPS = Rule(
     "[[from, to], ...], stretches along the wall in m, in order, from < to",
     list,
     lambda v: all(_is_point(gap) and gap[0] < gap[1] for gap in v),
     lambda v: tuple(_to_point(gap) for gap in v),
+    {"type": "array", "items": _POINT.schema},
 )
 
 
@@ -122,6 +156,9 @@ class Driving:
     path_clearance_m: float = setting(POSITIVE)  # from the middle of a cell on the route to any wall
     cells_ahead: int = setting(integer(1, 1000))
     reach_m: float = setting(POSITIVE)  # so near to the goal, the next one is headed for
+    waypoints: tuple[Point, ...] = setting(_POINTS, ())  # goals, in turn and over again; none: random ones
+    keep_off_m: float = setting(NOT_NEGATIVE, 0.0)  # so near to somebody ahead it waits; 0: it runs into them
+    recorded: str | None = setting(Rule("the path of a truth.csv", str), None)  # drive as recorded there
 
 
 @dataclass(frozen=True)
@@ -164,7 +201,8 @@ class Scenario:
     """Everything but the seed.
 
     `areas` are visited in turn; without any, goals are drawn from the whole arena. Without `encoders` the
-    odometry is the wheels' travel itself.
+    odometry is the wheels' travel itself. `recorded` has rows of time_us, x_m, y_m, theta_rad from the start
+    pose: the robot goes that way, whatever `driving` says. `rig` names the cameras, if it has any of its own.
     """
 
     name: str
@@ -179,6 +217,30 @@ class Scenario:
     wheels: Wheels
     encoders: Encoders | None
     sensor: Sensor
+    movers: tuple[Mover, ...] = ()
+    recorded: tuple[tuple[float, float, float, float], ...] = ()
+    rig: str | None = None
+
+
+@dataclass(frozen=True)
+class _BoxTable:
+    """Clutter that stands."""
+
+    at: tuple[float, float] = setting(_POINT)  # its middle
+    size_m: tuple[float, float] = setting(_SIZE)
+    turn_rad: float = setting(ANY, 0.0)
+    hides: bool = setting(_TRUE_OR_FALSE, True)  # higher than the sensor
+
+
+@dataclass(frozen=True)
+class _MoverTable:
+    """Clutter that moves: people, carts. They go to and fro on a path and wait for the robot."""
+
+    path: tuple[Point, ...] = setting(_PATH)
+    speed_mps: float = setting(POSITIVE, 0.8)
+    radius_m: float = setting(number(0.01, 10.0), 0.25)
+    pause_s: float = setting(NOT_NEGATIVE, 0.0)  # at both ends of the path
+    hides: bool = setting(_TRUE_OR_FALSE, True)
 
 
 @dataclass(frozen=True)
@@ -193,14 +255,18 @@ class _BeaconTable:
     id: int = setting(integer(0, BEACON_ID_MAX))
     at: tuple[float, float] = setting(_POINT)
     looks_like: int | None = setting(integer(0, BEACON_ID_MAX), None)
+    kind: str | None = setting(one_of(*KINDS), None)  # before a camera; left out: whatever fits the place
+    width_m: float | None = setting(number(0.05, 10.0), None)
+    texture: int | None = setting(integer(0, 1_000_000), None)  # one kind and texture: one look
 
 
-_TOP_RULES = {
+TOP_RULES = {
     "description": Rule("text", str),
     "steps": integer(1, 10_000_000),
     "step_us": integer(1, 10_000_000),
+    "rig": Rule("the name of a rig, or a path that ends in .toml", str),
 }
-_TABLES: dict[str, type] = {
+TABLES: dict[str, type] = {
     "start": Start,
     "body": BodySettings,
     "driving": Driving,
@@ -208,43 +274,59 @@ _TABLES: dict[str, type] = {
     "encoders": Encoders,
     "sensor": Sensor,
 }
-_OPTIONAL = ("encoders", "areas", "beacons")
-_LISTS: dict[str, type] = {"walls": _WallTable, "beacons": _BeaconTable, "areas": Area}
+OPTIONAL = ("encoders", "areas", "beacons", "boxes", "movers", "rig")
+LISTS: dict[str, type] = {
+    "walls": _WallTable,
+    "beacons": _BeaconTable,
+    "areas": Area,
+    "boxes": _BoxTable,
+    "movers": _MoverTable,
+}
 
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that come with the package."""
-    return toml_names(_FOLDER)
+    return toml_names(SCENARIOS)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
     """A scenario by its name or from a path that ends in .toml; BslamError if it is missing or wrong."""
-    path = find_toml("scenario", name_or_path, _FOLDER)
+    path = find_toml("scenario", name_or_path, SCENARIOS)
     return _parse_scenario(load_toml(path), path)
 
 
 def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
-    known = {**_TOP_RULES, **_TABLES, **_LISTS}
+    known = {**TOP_RULES, **TABLES, **LISTS}
     check_keys(document, known, str(path))
     for key in known:
-        if key not in document and key not in _OPTIONAL:
+        if key not in document and key not in OPTIONAL:
             raise BslamError(f"{path}, key {key}: is missing; allowed: {_allowed(key)}")
     top: dict[str, Any] = {
-        key: rule.convert(document[key], f"{path}, key {key}") for key, rule in _TOP_RULES.items()
+        key: rule.convert(document[key], f"{path}, key {key}")
+        for key, rule in TOP_RULES.items()
+        if key in document
     }
     tables: dict[str, Any] = {
         key: _parse_one(cls, document[key], f"{path}, [{key}]") if key in document else None
-        for key, cls in _TABLES.items()
+        for key, cls in TABLES.items()
     }
     lists: dict[str, Any] = {
-        key: _parse_list(cls, document.get(key, []), path, key) for key, cls in _LISTS.items()
+        key: _parse_list(cls, document.get(key, []), path, key) for key, cls in LISTS.items()
     }
+    if "rig" in top:
+        top["rig"] = _find_rig(top["rig"], path)
     scenario = Scenario(
         name=path.stem,
         arena=Arena(
             walls=_cut_doors(lists["walls"], path),
-            beacons=tuple(Beacon(one.id, one.at, one.looks_like) for one in lists["beacons"]),
+            beacons=tuple(
+                Beacon(one.id, one.at, one.looks_like, one.kind, one.width_m, one.texture)
+                for one in lists["beacons"]
+            ),
+            boxes=tuple(Box(one.at, one.size_m, one.turn_rad, one.hides) for one in lists["boxes"]),
         ),
+        movers=tuple(Mover(**vars(one)) for one in lists["movers"]),
+        recorded=_read_recorded(tables["driving"].recorded, path, top["steps"] * top["step_us"]),
         areas=tuple(lists["areas"]),
         **top,
         **tables,
@@ -253,10 +335,46 @@ def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
     return scenario
 
 
+def _find_rig(name: str, path: Path) -> str:
+    """The rig's name, or its path from the scenario's folder. Raises BslamError if there is none."""
+    found = str(path.parent / name) if name.endswith(".toml") else name
+    try:
+        load_rig(found)
+    except BslamError as error:
+        raise BslamError(f"{path}, key rig: {error}") from error
+    return found
+
+
+def _read_recorded(
+    name: str | None, path: Path, duration_us: int
+) -> tuple[tuple[float, float, float, float], ...]:
+    """The rows of the true path to follow, beside the scenario's file."""
+    if name is None:
+        return ()
+    where = f"{path}, [driving], key recorded"
+    file = path.parent / name
+    if not file.is_file():
+        raise BslamError(
+            f"{where}: there is no file {file}; allowed: a truth.csv, from the scenario's folder"
+        )
+    truth = read_truth(file)
+    rows = zip(
+        truth.time_us.tolist(), truth.x_m.tolist(), truth.y_m.tolist(), truth.theta_rad.tolist(), strict=True
+    )
+    recorded = tuple(rows)
+    span_us = recorded[-1][0] - recorded[0][0]
+    if span_us < duration_us:
+        allowed = f"steps times step_us up to its {span_us} us"
+        raise BslamError(
+            f"{where}: {name!r} is shorter than the {duration_us} us of the steps; allowed: {allowed}"
+        )
+    return recorded
+
+
 def _allowed(key: str) -> str:
-    if key in _TOP_RULES:
-        return _TOP_RULES[key].allowed
-    if key in _TABLES:
+    if key in TOP_RULES:
+        return TOP_RULES[key].allowed
+    if key in TABLES:
         return f"a table [{key}]"
     return "a list of tables, at least one"
 
@@ -297,6 +415,36 @@ def _cut_doors(tables: list[_WallTable], path: Path) -> tuple[Wall, ...]:
     return tuple(walls)
 
 
+def _check_inside(scenario: Scenario, require: Callable[[bool, str, object, str], None]) -> None:
+    """Whatever has a place has it within the walls' bounding box."""
+    arena, start = scenario.arena, scenario.start
+    (low_x, low_y), (high_x, high_y) = arena.low, arena.high
+    allowed = f"within the walls, x {low_x:g} to {high_x:g}, y {low_y:g} to {high_y:g}"
+
+    def check(key: str, *points: Point) -> None:
+        for x_m, y_m in points:
+            inside = (
+                low_x - _OUTSIDE_M <= x_m <= high_x + _OUTSIDE_M
+                and low_y - _OUTSIDE_M <= y_m <= high_y + _OUTSIDE_M
+            )
+            require(inside, key, [x_m, y_m], allowed)
+
+    check("[start], keys x_m, y_m", (start.x_m, start.y_m))
+    for index, beacon in enumerate(arena.beacons):
+        check(f"beacons[{index}], key at", beacon.at)
+    for index, box in enumerate(arena.boxes):
+        check(f"boxes[{index}], key at", box.at)
+        c, s = math.cos(box.turn_rad), math.sin(box.turn_rad)
+        dx, dy = start.x_m - box.at[0], start.y_m - box.at[1]
+        in_box = abs(c * dx + s * dy) <= box.size_m[0] / 2 and abs(c * dy - s * dx) <= box.size_m[1] / 2
+        place = [start.x_m, start.y_m]
+        allowed_start = f"a place outside boxes[{index}]"
+        require(not in_box, "[start], keys x_m, y_m", place, allowed_start)
+    for index, mover in enumerate(scenario.movers):
+        check(f"movers[{index}], key path", *mover.path)
+    check("[driving], key waypoints", *scenario.driving.waypoints)
+
+
 def _check_together(scenario: Scenario, path: Path) -> None:
     """What no value shows by itself."""
     radius_m = scenario.body.diameter_m / 2.0
@@ -320,7 +468,9 @@ def _check_together(scenario: Scenario, path: Path) -> None:
         require(like is None or like in own_looks, f"beacons[{index}], key looks_like", like, allowed)
     to_wall_m = scenario.arena.nearest_wall(start.x_m, start.y_m)[0]
     place = (start.x_m, start.y_m)
-    require(to_wall_m >= radius_m, "[start], keys x_m, y_m", place, f"a place {radius_m:g} m from every wall")
+    free = f"a place {radius_m:g} m from every wall and box"
+    require(to_wall_m >= radius_m, "[start], keys x_m, y_m", place, free)
+    _check_inside(scenario, require)
     mount = (sensor.x_m, sensor.y_m)
     require(math.hypot(*mount) <= radius_m, "[sensor], keys x_m, y_m", mount, "a place on the robot's body")
     path_m, cell_m = driving.path_clearance_m, driving.cell_m

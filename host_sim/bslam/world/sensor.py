@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bslam.log import Sightings, wrap_rad
 from bslam.world.arena import Arena
+from bslam.world.crowd import Screens
 from bslam.world.scenario import Sensor
 from bslam.world.signatures import Looks
 
@@ -19,9 +20,16 @@ Matrix = NDArray[np.float64]
 
 
 def see(
-    arena: Arena, sensor: Sensor, time_us: NDArray[np.int64], poses: Matrix, random: np.random.Generator
+    arena: Arena,
+    sensor: Sensor,
+    time_us: NDArray[np.int64],
+    poses: Matrix,
+    random: np.random.Generator,
+    screens: Screens | None = None,
 ) -> Sightings:
     """Sightings of every visible beacon; poses (n, 3) are x m, y m, theta rad in the arena's frame.
+
+    `screens` moved about in the meantime and may have stood in front.
 
     Noise is drawn for every beacon at every pose, seen or not, so that what one sighting gets does not hang
     on the others. An outlier keeps its beacon's identity, but its direction and range mean nothing.
@@ -29,6 +37,10 @@ def see(
     bearing_rad, range_m = look(arena, sensor, poses)
     side_rad, true_range_m = bearing_rad + poses[:, 2:] + sensor.yaw_rad, range_m
     seen = is_visible(arena, sensor, poses, bearing_rad, range_m)
+    if screens is not None:
+        step, beacon = np.nonzero(seen)
+        eye, _ = _mount(sensor, poses)
+        seen[step, beacon] = ~screens.hide(step, eye[step], arena.beacon_xy_m[beacon])
     bearing_noise, range_noise = random.standard_normal((2, *seen.shape))
     bearing_rad = wrap_rad(bearing_rad + sensor.bearing_sigma_rad * bearing_noise)
     range_m = range_m + range_sigma_m(sensor, range_m) * range_noise

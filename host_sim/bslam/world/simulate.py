@@ -20,6 +20,7 @@ from bslam.log import (
     Truth,
     wrap_rad,
 )
+from bslam.world.crowd import Screens
 from bslam.world.driving import Drive, drive
 from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
@@ -40,7 +41,9 @@ def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, nois
     time_us = np.arange(scenario.steps + 1, dtype=np.int64) * scenario.step_us
     path = true_drive(scenario, seed)
     poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1)
-    sightings = see(scenario.arena, scenario.sensor, time_us, poses, _random_streams(seed)[2])
+    sightings = see(
+        scenario.arena, scenario.sensor, time_us, poses, _random_streams(seed)[2], _screens(scenario, path)
+    )
     x_m, y_m = _to_map_frame(scenario.start, path.x_m, path.y_m)
     return Log(
         name=f"{scenario.name}_seed{seed}",
@@ -51,6 +54,15 @@ def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, nois
         robot=_describe_robot(scenario),
         seeds=generic_looks(),
     )
+
+
+def _screens(scenario: Scenario, path: Drive) -> Screens | None:
+    """Whoever may have stood in the way of a sight."""
+    hiding = [index for index, mover in enumerate(scenario.movers) if mover.hides]
+    if not hiding:
+        return None
+    radius_m = np.array([scenario.movers[index].radius_m for index in hiding])
+    return Screens(path.others_m[:, hiding], radius_m)
 
 
 def true_drive(scenario: Scenario, seed: int) -> Drive:

@@ -9,12 +9,12 @@
 """
 
 from bslam.world.camera.drive import free_pose, walk
-from bslam.world.camera.kinds import KINDS
 from bslam.world.camera.looks import STYLES
 from bslam.world.camera.renderer import Frame, Renderer, Seen
 from bslam.world.camera.rgb565 import from_rgb565, to_rgb565
 from bslam.world.camera.scene import CLUTTER, NO_BEACON, BeaconLook, Scene
 from bslam.world.camera.worlds import dress, make_world
+from bslam.world.kinds import KINDS
 
 __all__ = [
     "CLUTTER",

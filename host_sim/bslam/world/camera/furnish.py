@@ -9,7 +9,6 @@ import numpy as np
 
 from bslam.world.arena import Arena, Beacon, Point, Wall
 from bslam.world.camera import looks, raw
-from bslam.world.camera.kinds import ROUND, Kind
 from bslam.world.camera.looks import Artist, Look, Piece
 from bslam.world.camera.scene import (
     CLUTTER,
@@ -21,6 +20,7 @@ from bslam.world.camera.scene import (
     Scene,
     SceneBuilder,
 )
+from bslam.world.kinds import ROUND, Kind
 
 _FLOOR_PIECE_M = 6.0  # a light map is coarse: floors and ceilings are laid in pieces
 _LAMP_SPACING_M = 3.5

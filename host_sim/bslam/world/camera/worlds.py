@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.world.arena import Beacon, Point, Wall
+from bslam.world.arena import Beacon, Box, Point, Wall
 from bslam.world.camera.furnish import Area, Furnisher, WallFace
-from bslam.world.camera.kinds import KINDS, Kind, KindDeck
-from bslam.world.camera.looks import Artist, Look, clutter, style_of
+from bslam.world.camera.looks import BEACONS, Artist, Look, clutter, style_of
 from bslam.world.camera.scene import IDENTITY_MAX, Scene
+from bslam.world.kinds import KINDS, Kind, KindDeck
 from bslam.world.scenario import Scenario
 
 _SIDE_M = (5.0, 12.0)
@@ -23,6 +25,8 @@ _BEFORE_WALL_M, _BEFORE_WALL_SHARE = 0.9, 0.9
 _ON_WALL_M = 0.05  # a scenario's beacon this near to a wall hangs on it
 _GAP_SHARE = 0.9  # of the way to the neighbour that two beacons may take together
 _AT_WALL_M = 0.15  # clutter of a dressed scenario stands so near to a wall, out of the robot's way
+_HIGH_BOX_M, _LOW_BOX_M = 1.3, 0.3  # a box that hides what is behind, and one that does not
+_TEXTURES = 2  # the stream that a scenario's own textures come from
 _DRESSED_DEPTH_M = 0.25  # a scenario's robot comes as near to the walls as 0.3 m
 
 
@@ -52,9 +56,9 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
     of the beacon that it looks like.
 
     A beacon's foot is where the scenario has it; what stands out from the wall is seen its depth farther in
-    (`Scene.beacons`, `Scene.arena`). Clutter stands at the walls, where no robot drives. BslamError: a beacon
-    that hangs on no wall, or too close to another for the narrowest kind; an id beyond 32767; a bad seed or
-    style.
+    (`Scene.beacons`, `Scene.arena`). Clutter stands at the walls, where no robot drives; a scenario's box is
+    a piece of clutter as wide as its longer side. BslamError: a beacon that hangs on no wall, or has too
+    little of it for its kind; an id beyond 32767; a bad seed or style.
     """
     artist = _artist(seed, style, 1)
     arena = scenario.arena
@@ -72,13 +76,11 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
             continue
         alike = zip(arena.beacons, hung, strict=True)
         free_m = min(place[2] for other, place in alike if _own_looks(other) == whose)
-        drawn = deck.draw(free_m)
-        if drawn is None:
-            where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
-            raise BslamError(f"{where}: {free_m:.2f} m of free wall; allowed: enough for a beacon, 0.18 m")
+        drawn = _kind_for(scenario, beacon, free_m, deck)
         kind = KINDS[drawn].shallow(_DRESSED_DEPTH_M)
-        width_m = artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
-        look = furnisher.add_beacon(beacon.beacon_id, drawn, kind, face, along_m, width_m)
+        width_m = beacon.width_m or artist.between(kind.width_m[0], min(kind.width_m[1], free_m))
+        painted = None if beacon.texture is None else _textured(drawn, beacon.texture, artist)
+        look = furnisher.add_beacon(beacon.beacon_id, drawn, kind, face, along_m, width_m, painted)
         made[whose] = drawn, kind, width_m, look
     furnisher.add_wall_things(artist.count(*artist.style.thing_count) * len(areas))
     for _ in range(artist.count(*artist.style.clutter_count) * len(areas)):
@@ -86,7 +88,34 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         foot = furnisher.draw_foot(piece.width_m, _AT_WALL_M)
         if foot is not None:
             furnisher.add_clutter(piece, *foot)
+    _stand_boxes(furnisher, artist, arena.boxes)
     return furnisher.finish(seed)
+
+
+def _kind_for(scenario: Scenario, beacon: Beacon, free_m: float, deck: KindDeck) -> str:
+    """The kind that the scenario has for a beacon, or one that fits. Raises BslamError if it does not fit."""
+    drawn = beacon.kind or deck.draw(free_m)
+    narrowest_m = min(kind.width_m[0] for kind in KINDS.values())
+    needed_m = beacon.width_m or (narrowest_m if drawn is None else KINDS[drawn].width_m[0])
+    if drawn is None or needed_m > free_m:
+        where = f"scenario {scenario.name}, beacon {beacon.beacon_id} at {beacon.at}"
+        raise BslamError(
+            f"{where}: {free_m:.2f} m of free wall; allowed: enough for a beacon, {needed_m:g} m"
+        )
+    return drawn
+
+
+def _textured(name: str, texture: int, artist: Artist) -> Look:
+    """The look of that number: the same in every scene of a style."""
+    painter = np.random.default_rng([artist.style.stream, _TEXTURES, texture])
+    return BEACONS[name](Artist(artist.style, painter))
+
+
+def _stand_boxes(furnisher: Furnisher, artist: Artist, boxes: Sequence[Box]) -> None:
+    for box in boxes:
+        height_m = _HIGH_BOX_M if box.hides else _LOW_BOX_M
+        piece = replace(clutter(artist), width_m=max(box.size_m), height_m=height_m)
+        furnisher.add_clutter(piece, *box.at)
 
 
 def _own_looks(beacon: Beacon) -> int:

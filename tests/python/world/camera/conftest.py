@@ -11,9 +11,9 @@ import pytest
 from bslam.rig import Camera, Lens
 from bslam.world.arena import Wall
 from bslam.world.camera.furnish import Area, Furnisher
-from bslam.world.camera.kinds import Kind
 from bslam.world.camera.looks import Artist, style_of
 from bslam.world.camera.scene import Scene
+from bslam.world.kinds import Kind
 
 ROOM_M = (6.0, 4.0)
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-from bslam.world.camera.kinds import KINDS
 from bslam.world.camera.looks.canvas import Canvas, Colour, mix, tint
 from bslam.world.camera.looks.look import Look
 from bslam.world.camera.looks.piece import Piece
 from bslam.world.camera.looks.prints import scribble, text
 from bslam.world.camera.looks.style import Artist
+from bslam.world.kinds import KINDS
 
 _WHITE: Colour = (0.96, 0.96, 0.95)
 _SIZE_TOLERANCE = 1.35
