@@ -87,7 +87,7 @@ pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
 .PHONY: proof
-proof: setup ## what takes longer: `make test`, the library for every core, the same bits over 5000 steps, a sweep that is killed
+proof: setup ## what takes longer: `make test`, every core, the same bits over 5000 steps, a killed sweep
 	@$(MAKE) --no-print-directory test firmware-all
 	@$(PYTHON) tools/same_bits.py --steps 5000
 	@$(PYTHON) tools/kill_sweep.py --runs 1000
