@@ -115,6 +115,7 @@ SENSOR_OFFSET_M = number(-100.0, 100.0)
 SENSOR_YAW_RAD = number(-3.2, 3.2)
 SIGHTING_DELAY_US = integer(0, 10_000_000)
 CORRELATION_M = number(0.0, 100.0)
+SCALE_SD = number(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ class Robot:
     sensor_yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
     sighting_delay_us: int = setting(SIGHTING_DELAY_US, 0)
     sighting_correlation_m: float = setting(CORRELATION_M, 0.0)  # way over which a beacon's errors stay alike
+    sighting_scale_sd: float = setting(SCALE_SD, 0.0)  # by which all distances of a beacon are too long or short
     left_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
     right_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
     ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)

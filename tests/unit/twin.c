@@ -34,9 +34,12 @@ static void randomise_beacon(bslam_ekf_t *ekf, unit_random_t *random, const bsla
     const double px = x + distance * cos(direction);
     const double py = y + distance * sin(direction);
     bslam_real_t *state = &ekf->mean[beacon->at];
-    if (beacon->kind == BSLAM_BEACON_POINT) {
+    if (beacon->kind != BSLAM_BEACON_RAY) {
         state[0] = real(px);
         state[1] = real(py);
+        if (beacon->kind == BSLAM_BEACON_SIZED) {
+            state[2] = real(unit_random(random, 0.8, 1.2));
+        }
         return;
     }
     const double anchor_x = x + unit_random(random, -1, 1);
@@ -147,7 +150,7 @@ void twin_observe(const bslam_ekf_t *ekf, const bslam_pose_t *mount, int beacon,
     const double c = cos(state[BSLAM_STATE_THETA]);
     const double dx = px - (state[BSLAM_STATE_X] + c * (double)mount->x_m - s * (double)mount->y_m);
     const double dy = py - (state[BSLAM_STATE_Y] + s * (double)mount->x_m + c * (double)mount->y_m);
-    *range_m = hypot(dx, dy);
+    *range_m = hypot(dx, dy) * (b->kind == BSLAM_BEACON_SIZED ? own[2] : 1);
     *bearing_rad = unit_angle_between(atan2(dy, dx), state[BSLAM_STATE_THETA] + (double)mount->theta_rad);
 }
 

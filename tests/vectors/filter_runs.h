@@ -34,6 +34,7 @@ static void standard_params(bslam_params_t *p)
     p->range_sd_floor_m = BSLAM_R(0.01);
     p->range_sd_fraction = BSLAM_R(0.02);
     p->range_sd_per_m = BSLAM_R(0.009);
+    p->range_scale_sd = BSLAM_R(0.0);
     p->bearing_only_variance_factor = BSLAM_R(2.0);
     p->bearing_only_curvature_factor = BSLAM_R(1.0);
     p->gate_d2 = BSLAM_R(0.0);
@@ -460,6 +461,7 @@ static void invariant_params(bslam_params_t *p)
     p->range_sd_floor_m = BSLAM_R(0.01);
     p->range_sd_fraction = BSLAM_R(0.02);
     p->range_sd_per_m = BSLAM_R(0.009);
+    p->range_scale_sd = BSLAM_R(0.0);
     p->bearing_only_variance_factor = BSLAM_R(2.0);
     p->bearing_only_curvature_factor = BSLAM_R(1.0);
     p->gate_d2 = BSLAM_R(0.0);

@@ -1,7 +1,7 @@
 /// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its
 /// right-invariant form. MATH "The filter".
 ///
-/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 or 4 values each. The
+/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 to 4 values each. The
 /// covariance is held in these ordinary coordinates in both forms; the invariant form transports it after
 /// each correction.
 ///
@@ -19,7 +19,8 @@
 
 /// The robot's own values: pose, and v, omega or their scale factors.
 #define BSLAM_ROBOT_DIM_MAX 5
-/// The largest state: 5 for the robot, 2 a beacon, 2 more a ray.
+/// The largest state: 5 for the robot, 2 a beacon, and room for 2 more a ray, or 1 more for each of twice as
+/// many sized beacons.
 #define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
 #define BSLAM_STATE_PADDED BSLAM_SYMMAT_PADDED(BSLAM_STATE_MAX)
 /// Scalars whose down-date waits for a common pass.
@@ -37,8 +38,18 @@ enum {
 typedef enum bslam_beacon_kind {
     BSLAM_BEACON_POINT = 0,  ///< 2 state values: x, y in the map
     BSLAM_BEACON_RAY = 1,    ///< 4 state values: anchor x, y, direction, inverse distance
-    BSLAM_BEACON_KNOWN = 2   ///< no state value: its position is given and never changes, paper equation (12)
+    BSLAM_BEACON_KNOWN = 2,  ///< no state value: its position is given and never changes, paper equation (12)
+    BSLAM_BEACON_SIZED = 3   ///< 3 state values: x, y, and its scale, by which its distances are too long
 } bslam_beacon_kind_t;
+
+/// How many state values a beacon of this kind has.
+static inline int32_t bslam_beacon_dim(bslam_beacon_kind_t kind)
+{
+    return kind == BSLAM_BEACON_POINT   ? BSLAM_POINT_DIM
+           : kind == BSLAM_BEACON_SIZED ? BSLAM_SIZED_DIM
+           : kind == BSLAM_BEACON_RAY   ? BSLAM_RAY_DIM
+                                        : 0;
+}
 
 /// A beacon of the map.
 typedef struct bslam_beacon {
@@ -65,6 +76,7 @@ typedef struct bslam_ekf {
     int32_t base_dim;  ///< 3, or 5 with velocity or scale states
     int32_t beacon_count;
     int32_t ray_count;
+    int32_t sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
     // Scratch: holds nothing between calls.
@@ -176,8 +188,9 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
 
 // ---- map --------------------------------------------------------------------------------------------------
 
-/// Adds the beacon that a sighting shows: as a point if it has a distance, else as a ray. *index is its
-/// place. BSLAM_E_MAP_FULL: no room for it. O(n).
+/// Adds the beacon that a sighting shows: as a ray if it has no distance, else as a point, or a sized one
+/// where params->range_scale_sd is set and there is room for its third value. *index is its place.
+/// BSLAM_E_MAP_FULL: no room for it. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params,
                                               const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                               int *index);

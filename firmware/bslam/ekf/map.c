@@ -55,13 +55,21 @@ static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
     ekf->dim = at + 1;
 }
 
+/// A distance's standard deviation that all sightings of a beacon have in common.
+static bslam_real_t common_range_sd_m(const bslam_params_t *params, const bslam_sighting_t *sighting)
+{
+    return params->range_scale_sd * sighting->range_m;
+}
+
 static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                          const bslam_sighting_t *sighting)
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t range_var = bslam_range_variance_m2(params, sighting, sighting->range_m);
+    const bslam_real_t common_sd_m = common_range_sd_m(params, sighting);
+    const bslam_real_t range_var =
+        bslam_range_variance_m2(params, sighting, sighting->range_m) + common_sd_m * common_sd_m;
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
@@ -77,6 +85,24 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
     append_value(ekf, &x);
     append_value(ekf, &y);
     ekf->covariance[bslam_symmat_at(at + 1, at)] += yx;
+}
+
+/// As a point, and the scale: where it is larger, the point is nearer.
+static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                         const bslam_sighting_t *sighting)
+{
+    static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
+    append_point(ekf, params, mount, sighting);
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_sighted_point_t point =
+        bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
+    const bslam_real_t sd = params->range_scale_sd;
+    const bslam_real_t by_range = -sd * common_range_sd_m(params, sighting);
+    const new_value_t scale = {BY_NOTHING, 1, sd * sd};
+    const int at = ekf->dim;
+    append_value(ekf, &scale);
+    ekf->covariance[bslam_symmat_at(at, at - 2)] = by_range * point.x_by_range;
+    ekf->covariance[bslam_symmat_at(at, at - 1)] = by_range * point.y_by_range;
 }
 
 static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
@@ -119,14 +145,20 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
                              const bslam_sighting_t *sighting, int *index)
 {
     const bool ray = !sighting->has_range;
-    if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && ekf->ray_count == BSLAM_RAYS_MAX)) {
+    const int room = 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;  // values beyond two a beacon
+    if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && room < 2)) {
         return BSLAM_E_MAP_FULL;
     }
-    *index = append_beacon(ekf, ray ? BSLAM_BEACON_RAY : BSLAM_BEACON_POINT);
     if (ray) {
+        *index = append_beacon(ekf, BSLAM_BEACON_RAY);
         append_ray(ekf, params, mount, sighting);
         ekf->ray_count++;
+    } else if (params->range_scale_sd > 0 && room > 0) {
+        *index = append_beacon(ekf, BSLAM_BEACON_SIZED);
+        append_sized(ekf, params, mount, sighting);
+        ekf->sized_count++;
     } else {
+        *index = append_beacon(ekf, BSLAM_BEACON_POINT);
         append_point(ekf, params, mount, sighting);
     }
     return BSLAM_OK;
@@ -164,11 +196,10 @@ static void remove_values(bslam_ekf_t *ekf, int first, int count)
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
-    if (beacon->kind == BSLAM_BEACON_RAY) {
-        ekf->ray_count--;
-        remove_values(ekf, beacon->at, BSLAM_RAY_DIM);
-    } else if (beacon->kind == BSLAM_BEACON_POINT) {
-        remove_values(ekf, beacon->at, BSLAM_POINT_DIM);
+    ekf->ray_count -= beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
+    ekf->sized_count -= beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
+    if (beacon->kind != BSLAM_BEACON_KNOWN) {
+        remove_values(ekf, beacon->at, bslam_beacon_dim(beacon->kind));
     }
     ekf->beacon_count--;
     memmove(&ekf->beacons[index], &ekf->beacons[index + 1],
@@ -182,6 +213,7 @@ void bslam_ekf_forget_map(bslam_ekf_t *ekf)
     ekf->dim = ekf->base_dim;
     ekf->beacon_count = 0;
     ekf->ray_count = 0;
+    ekf->sized_count = 0;
 }
 
 // ---- rays -------------------------------------------------------------------------------------------------
@@ -283,7 +315,7 @@ bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
     const bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
     bslam_sym2_t result = {0, 0, 0};
-    if (beacon->kind == BSLAM_BEACON_POINT) {
+    if (beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_SIZED) {
         result.xx = bslam_symmat_get(ekf->covariance, at, at);
         result.xy = bslam_symmat_get(ekf->covariance, at + 1, at);
         result.yy = bslam_symmat_get(ekf->covariance, at + 1, at + 1);

@@ -43,10 +43,7 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
-    static const uint16_t dims[] = {
-        [BSLAM_BEACON_POINT] = BSLAM_POINT_DIM, [BSLAM_BEACON_RAY] = BSLAM_RAY_DIM};
-    *row = (bslam_row_t){.at = (uint16_t)beacon->at,
-                         .dim = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : dims[beacon->kind]};
+    *row = (bslam_row_t){.at = (uint16_t)beacon->at, .dim = (uint16_t)bslam_beacon_dim(beacon->kind)};
     memcpy(row->base, by_pose, 3 * sizeof row->base[0]);
     memcpy(row->other, by_beacon, sizeof row->other);
 }
@@ -94,15 +91,30 @@ static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beac
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_real_t *state = &ekf->mean[beacon->at];
+    bslam_status_t status;
     switch (beacon->kind) {
     case BSLAM_BEACON_RAY:
         return bslam_observe_ray(&pose, mount, state, seen);
     case BSLAM_BEACON_KNOWN:
         return bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+    case BSLAM_BEACON_SIZED:
+        status = bslam_observe_point(&pose, mount, state[0], state[1], seen);
+        if (status == BSLAM_OK) {
+            bslam_observation_scale(seen, state[2]);
+        }
+        return status;
     case BSLAM_BEACON_POINT:
     default:
         return bslam_observe_point(&pose, mount, state[0], state[1], seen);
     }
+}
+
+/// Of a beacon without a scale of its own, what it would have counts as noise.
+static bslam_real_t range_variance_m2(const bslam_params_t *params, const bslam_sighting_t *sighting,
+                                      const bslam_beacon_t *beacon, bslam_real_t range_m)
+{
+    const bslam_real_t sd_m = beacon->kind == BSLAM_BEACON_SIZED ? 0 : params->range_scale_sd * range_m;
+    return bslam_range_variance_m2(params, sighting, range_m) + sd_m * sd_m;
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
@@ -128,7 +140,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     }
     if (sighting->has_range) {
         innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = bslam_range_variance_m2(params, sighting, seen.range_m);
+        innovation->range_var_m2 = range_variance_m2(params, sighting, beacon, seen.range_m);
         fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
     }
     return BSLAM_OK;
@@ -290,6 +302,9 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
         const int at = beacon->at;
         if (beacon->kind != BSLAM_BEACON_KNOWN) {
             move_position(ekf, at, turn_rad);
+        }
+        if (beacon->kind == BSLAM_BEACON_SIZED) {
+            ekf->mean[at + 2] += ekf->correction[at + 2];
         }
         if (beacon->kind == BSLAM_BEACON_RAY) {
             ekf->mean[at + 2] = bslam_angle_wrap(ekf->mean[at + 2] + ekf->correction[at + 2]);

@@ -60,6 +60,18 @@ bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t 
     return BSLAM_OK;
 }
 
+void bslam_observation_scale(bslam_observation_t *seen, bslam_real_t scale)
+{
+    seen->range_by_beacon[BSLAM_POINT_DIM] = seen->range_m;
+    seen->range_m *= scale;
+    for (int k = 0; k < 3; k++) {
+        seen->range_by_pose[k] *= scale;
+    }
+    for (int k = 0; k < BSLAM_POINT_DIM; k++) {
+        seen->range_by_beacon[k] *= scale;
+    }
+}
+
 bslam_status_t bslam_observe_ray(const bslam_pose_t *pose, const bslam_pose_t *mount,
                                  const bslam_real_t ray[BSLAM_RAY_DIM], bslam_observation_t *seen)
 {

@@ -6,8 +6,10 @@
 #include "bslam/base/status.h"
 #include "bslam/base/types.h"
 
-/// State values of a beacon: a point is (x, y); a ray is (anchor x, anchor y, direction, inverse distance).
+/// State values of a beacon: a point is (x, y); a sized one (x, y, scale), its distances all being measured
+/// scale times as long as they are; a ray is (anchor x, anchor y, direction, inverse distance).
 #define BSLAM_POINT_DIM 2
+#define BSLAM_SIZED_DIM 3
 #define BSLAM_RAY_DIM 4
 
 /// A predicted sighting with its derivatives, the rows of H in paper equation (8). Those by values that a
@@ -29,6 +31,9 @@ typedef struct bslam_observation {
 BSLAM_MUST_CHECK bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t *mount,
                                                     bslam_real_t x_m, bslam_real_t y_m,
                                                     bslam_observation_t *seen);
+
+/// Makes of a point's sighting that of a sized one at the same place.
+void bslam_observation_scale(bslam_observation_t *seen, bslam_real_t scale);
 
 /// Sighting of a ray: the point anchor + (cos, sin)(direction) / inverse distance. An inverse distance of 0
 /// is a beacon at infinity; range_m and its derivatives are 0 where the inverse distance is not positive.

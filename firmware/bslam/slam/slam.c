@@ -327,6 +327,18 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     account->weight = 1;
 }
 
+/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
+/// taken for something else, it has a direction only.
+static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
+{
+    bslam_sighting_t taken = *sighting;
+    const bool differs = beacon->beacon_class != sighting->beacon_class &&
+                         beacon->beacon_class != BSLAM_CLASS_NONE &&
+                         sighting->beacon_class != BSLAM_CLASS_NONE;
+    taken.has_range = taken.has_range && !(beacon->kind == BSLAM_BEACON_SIZED && differs);
+    return taken;
+}
+
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
 /// them before the first is fused, so that the order within a frame does not matter.
 static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sightings,
@@ -338,11 +350,14 @@ static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, cons
             reject(slam, match->reason, NULL, &slam->accounts[i]);
         } else if (match->verdict == BSLAM_VERDICT_DEFER) {
             fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
-        } else if (match->verdict == BSLAM_VERDICT_MATCH &&
-                   bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &sightings[i], match->beacon,
-                                        &slam->innovations[i]) != BSLAM_OK) {
-            reject(slam, BSLAM_REASON_SINGULAR, &slam->ekf.beacons[match->beacon], &slam->accounts[i]);
-            match->verdict = BSLAM_VERDICT_REJECT;
+        } else if (match->verdict == BSLAM_VERDICT_MATCH) {
+            const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
+            const bslam_sighting_t taken = sighting_of(&sightings[i], beacon);
+            if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon,
+                                     &slam->innovations[i]) != BSLAM_OK) {
+                reject(slam, BSLAM_REASON_SINGULAR, beacon, &slam->accounts[i]);
+                match->verdict = BSLAM_VERDICT_REJECT;
+            }
         }
     }
 }

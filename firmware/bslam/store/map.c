@@ -180,11 +180,6 @@ static void move_header(passage_t *passage, header_t *header)
 
 // ---- beacons ----------------------------------------------------------------------------------------------
 
-static uint32_t values_of(bslam_beacon_kind_t kind)
-{
-    return kind == BSLAM_BEACON_POINT ? BSLAM_POINT_DIM : kind == BSLAM_BEACON_RAY ? BSLAM_RAY_DIM : 0;
-}
-
 /// What the blob has of a beacon. Its position is for who reads the map; where it has state values they
 /// count.
 typedef struct record {
@@ -207,9 +202,9 @@ static void move_record(passage_t *passage, record_t *record)
     record->x_m = move_real(passage, record->x_m);
     record->y_m = move_real(passage, record->y_m);
     require(passage, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
-    require(passage, kind <= BSLAM_BEACON_KNOWN, BSLAM_MAP_CONTENT);
+    require(passage, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
-    beacon->kind = kind <= BSLAM_BEACON_KNOWN ? (bslam_beacon_kind_t)kind : BSLAM_BEACON_POINT;
+    beacon->kind = kind <= BSLAM_BEACON_SIZED ? (bslam_beacon_kind_t)kind : BSLAM_BEACON_POINT;
 }
 
 /// Where the beacons being loaded go; NULL while checking.
@@ -238,8 +233,9 @@ static void take_record(const target_t *target, const record_t *record)
         beacon->kind = BSLAM_BEACON_KNOWN;
     }
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
+    ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
-    ekf->dim += (int32_t)values_of(beacon->kind);
+    ekf->dim += bslam_beacon_dim(beacon->kind);
     if (target->slam->looks != NULL && record->machine != NO_MACHINE) {
         target->slam->looks->of[index].machine = (int16_t)record->machine;
     }
@@ -248,13 +244,13 @@ static void take_record(const target_t *target, const record_t *record)
 static void read_beacons(passage_t *passage, const header_t *header, const target_t *target)
 {
     uint32_t values = 0;
-    uint32_t rays = 0;
+    uint32_t further = 0;  // beyond two a beacon
     uint32_t least_uid = 0;
     for (uint32_t b = 0; b < header->beacons && passage->fault == BSLAM_MAP_FINE; b++) {
         record_t record = {.machine = NO_MACHINE};
         move_record(passage, &record);
-        values += values_of(record.beacon.kind);
-        rays += record.beacon.kind == BSLAM_BEACON_RAY ? 1u : 0u;
+        values += (uint32_t)bslam_beacon_dim(record.beacon.kind);
+        further += record.beacon.kind == BSLAM_BEACON_RAY ? 2u : record.beacon.kind == BSLAM_BEACON_SIZED ? 1u : 0u;
         const uint32_t uid = record.beacon.uid;
         require(passage, uid >= least_uid && uid < header->next_uid, BSLAM_MAP_CONTENT);
         require(passage, record.machine == NO_MACHINE || record.machine < header->machines,
@@ -265,7 +261,7 @@ static void read_beacons(passage_t *passage, const header_t *header, const targe
         }
     }
     require(passage, values == header->values, BSLAM_MAP_CONTENT);
-    require(passage, rays <= BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
+    require(passage, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
 }
 
 // ---- mean and covariance ----------------------------------------------------------------------------------
@@ -330,7 +326,7 @@ static bool next_value(const bslam_ekf_t *ekf, place_t *place)
     place->value++;
     while (
         place->beacon < ekf->beacon_count &&
-        (!is_saved(ekf, place->beacon) || place->value >= (int)values_of(ekf->beacons[place->beacon].kind))) {
+        (!is_saved(ekf, place->beacon) || place->value >= bslam_beacon_dim(ekf->beacons[place->beacon].kind))) {
         place->beacon++;
         place->value = 0;
     }
@@ -584,7 +580,7 @@ static void write_all(passage_t *passage, const bslam_slam_t *slam, uint32_t len
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (is_saved(ekf, b)) {
             header.beacons++;
-            header.values += values_of(ekf->beacons[b].kind);
+            header.values += (uint32_t)bslam_beacon_dim(ekf->beacons[b].kind);
         }
     }
     for (int32_t slot = 0; slam->looks != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {

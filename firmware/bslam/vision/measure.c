@@ -114,7 +114,8 @@ static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camer
 /// How far ahead an object is, from where its upper and its lower side are seen.
 typedef struct ahead {
     bslam_real_t inverse;       ///< 1/m
-    bslam_real_t relative_var;  ///< of it, but for what repeats from sighting to sighting
+    bslam_real_t relative_var;  ///< of it
+    bslam_real_t noise_var;     ///< the part of that which is another one in each frame, relative as well
     bslam_real_t residual_sds;  ///< by how much its two sides contradict its place; 0 without one
 } ahead_t;
 
@@ -130,10 +131,13 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
     const bslam_real_t height_m = size->height_m;
     const bslam_real_t by_height = (top - bottom) / height_m;
     const bslam_real_t looks = size->looks_sd * height_m * by_height;
-    const bslam_real_t top_var = point_var + RANGE_DOUBT * o->top_var + looks * looks / 2;
-    const bslam_real_t bottom_var = point_var + RANGE_DOUBT * o->bottom_var + looks * looks / 2;
+    const bslam_real_t top_noise = point_var + RANGE_DOUBT * o->top_var;
+    const bslam_real_t bottom_noise = point_var + RANGE_DOUBT * o->bottom_var;
+    const bslam_real_t top_var = top_noise + looks * looks / 2;
+    const bslam_real_t bottom_var = bottom_noise + looks * looks / 2;
     if (!(size->top_high_m > 0)) {
-        return (ahead_t){by_height, (top_var + bottom_var) / ((top - bottom) * (top - bottom)), 0};
+        const bslam_real_t square = (top - bottom) * (top - bottom);
+        return (ahead_t){by_height, (top_var + bottom_var) / square, (top_noise + bottom_noise) / square, 0};
     }
     const bslam_real_t band_m = size->top_high_m - size->top_low_m;
     const bslam_real_t place_var = (BAND_SD_M * BAND_SD_M + band_m * band_m / 12) * by_height * by_height;
@@ -144,16 +148,19 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
     const bslam_real_t information =
         top_m * top_m * bottom_var + bottom_m * bottom_m * top_var + common * height_m * height_m;
     const bslam_real_t determinant = top_var * bottom_var + common * (top_var + bottom_var);
-    const bslam_real_t inverse =
-        (top_m * top * bottom_var + bottom_m * bottom * top_var + common * height_m * (top - bottom)) /
-        information;
+    const bslam_real_t by_top = (top_m * bottom_var + common * height_m) / information;
+    const bslam_real_t by_bottom = (bottom_m * top_var - common * height_m) / information;
+    const bslam_real_t inverse = by_top * top + by_bottom * bottom;
+    const bslam_real_t square = inverse * inverse;
     const bslam_real_t top_left = top - top_m * inverse;
     const bslam_real_t bottom_left = bottom - bottom_m * inverse;
     const bslam_real_t apart = top_left - bottom_left;
     const bslam_real_t distance2 =
         (top_left * top_left * bottom_var + bottom_left * bottom_left * top_var + common * apart * apart) /
         determinant;
-    return (ahead_t){inverse, determinant / (information * inverse * inverse), bslam_sqrt(distance2)};
+    return (ahead_t){inverse, determinant / (information * square),
+                     (by_top * by_top * top_noise + by_bottom * by_bottom * bottom_noise) / square,
+                     bslam_sqrt(distance2)};
 }
 
 /// False if the width of something round contradicts that: of an extinguisher without its neck, say.
@@ -192,6 +199,7 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     }
     candidate->range_m = bslam_sqrt(1 + o->middle * o->middle) / ahead.inverse;
     candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
+    candidate->range_noise_sd_m = candidate->range_m * bslam_sqrt(ahead.noise_var);
     candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
 }
 

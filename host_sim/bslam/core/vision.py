@@ -59,6 +59,7 @@ class Candidate:
     bearing_sd_rad: float | None
     range_m: float | None
     range_sd_m: float | None
+    range_noise_sd_m: float | None  # the part of it that is another one in each frame
     beacon_class: int
     kind: str
     class_margin: float
@@ -254,6 +255,7 @@ class FrontEnd:
             bearing_sd_rad=found.bearing_sd_rad if found.has_bearing else None,
             range_m=found.range_m if found.has_range else None,
             range_sd_m=found.range_sd_m if found.has_range else None,
+            range_noise_sd_m=found.range_noise_sd_m if found.has_range else None,
             beacon_class=found.beacon_class,
             kind=name,
             class_margin=found.class_margin,

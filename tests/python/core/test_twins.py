@@ -69,6 +69,7 @@ def test_run_has_points_and_rays_of_which_some_settle() -> None:
         {"velocity_decay_s": 1e6, "turn_rate_decay_s": 1e6},
         {"mount_x_m": 0.0, "mount_y_m": 0.0, "mount_yaw_rad": -3.1},
         {"ray_linear_limit": 1e-4},
+        {"range_scale_sd": 0.1},
         {"ray_inverse_distance_per_m": 0.05, "ray_inverse_distance_sd_per_m": 0.2},
     ],
     ids=lambda values: next(iter(values)),

@@ -24,6 +24,7 @@ def candidate(outline=(0.0, 0.0, 320.0, 240.0), bearing_rad=0.1, range_m=2.0):
         bearing_sd_rad=None if bearing_rad is None else 0.01,
         range_m=range_m,
         range_sd_m=None if range_m is None else 0.05,
+        range_noise_sd_m=None if range_m is None else 0.03,
         beacon_class=1,
         kind="door",
         class_margin=1.0,
@@ -72,8 +73,9 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     assert seen.time_us.tolist() == [step * short.step_us for step in range(8) for _ in range(2)]
     assert seen.bearing_rad.tolist() == [0.1] * 16
     np.testing.assert_array_equal(seen.range_m, [2.0, math.nan] * 8)
-    np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.005))
-    np.testing.assert_allclose(seen.range_sd_m, [0.05, 0.0] * 8)
+    np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.004))
+    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.03, 0.02), 0.0] * 8)
+    assert log.robot.sighting_scale_sd > 0
     assert log.robot.wheel_speed_sigma_mps == 0.6
 
 

@@ -26,6 +26,7 @@ def candidate(box, **changes):
         "bearing_sd_rad": 0.01,
         "range_m": 2.5,
         "range_sd_m": 0.05,
+        "range_noise_sd_m": 0.03,
         "beacon_class": 1,
         "kind": "door",
         "class_margin": 1.0,
@@ -138,7 +139,7 @@ def test_look_says_name_place_and_marks(seen, pictures, tmp_path, capsys):
         (
             candidate((10, 10, 50, 90)),
             candidate(
-                (60, 10, 90, 90), object="my red box", object_margin=0.8, range_m=None, range_sd_m=None
+                (60, 10, 90, 90), object="my red box", object_margin=0.8, range_m=None, range_sd_m=None, range_noise_sd_m=None
             ),
             candidate((0, 10, 9, 90), bearing_rad=None, range_m=None, marks=frozenset({"cut_left"})),
         ),

@@ -6,7 +6,8 @@ in the error's own coordinates comes from complex steps, exact to rounding. What
 for reasons of its own.
 
 The state vector: x, y, theta | v and omega, or their scale factors, where switched on | beacons in the
-order in which they came, (x, y) for a point and (anchor x, anchor y, direction, inverse distance) for a
+order in which they came, (x, y) for a point, (x, y, scale) for a sized one, whose distances are measured
+scale times as long as they are, and (anchor x, anchor y, direction, inverse distance) for a
 ray. Units m, rad, s.
 
 Coordinates of the error e of a state X, estimated as X̂:
@@ -60,7 +61,7 @@ class Sighting:
 
 @dataclass
 class Beacon:
-    """A beacon of the map: "point" or "ray" with its state values' count, or "known" with its place."""
+    """A beacon of the map: "point", "sized" or "ray" with its state values' count, or "known" with its place."""
 
     label: int
     kind: str
@@ -68,7 +69,7 @@ class Beacon:
 
     @property
     def size(self) -> int:
-        return {"point": 2, "ray": 4, "known": 0}[self.kind]
+        return {"point": 2, "sized": 3, "ray": 4, "known": 0}[self.kind]
 
 
 def wrap(angle_rad: float) -> float:
@@ -333,7 +334,8 @@ class DenseEkf:
             known = beacon.kind == "known"
             dx = (beacon.place[0] if known else state[at]) - sensor_x
             dy = (beacon.place[1] if known else state[at + 1]) - sensor_y
-            length = range_m = np.sqrt(dx * dx + dy * dy)
+            length = np.sqrt(dx * dx + dy * dy)
+            range_m = length * state[at + 2] if beacon.kind == "sized" else length
         return range_m, _direction(dx, dy) - state[THETA] - yaw, np.log(length)
 
     def measurement(
@@ -348,7 +350,8 @@ class DenseEkf:
         bearing_var = p["bearing_sd_rad"] ** 2
         bearing = wrap(sighting.bearing_rad - bearing_rad)
         if sighting.range_m is not None:
-            variances = [bearing_var, self._range_variance(range_m)]
+            common = 0.0 if self.beacons[index].kind == "sized" else p["range_scale_sd"] * range_m
+            variances = [bearing_var, self._range_variance(range_m) + common**2]
             return [bearing_row, range_row], [bearing, sighting.range_m - range_m], variances
         # The bend of the model, to second order: half the trace of (Hessian P)² of a complex logarithm.
         joint = np.array([length_row, bearing_row])
@@ -399,6 +402,7 @@ class DenseEkf:
     def add(self, sighting: Sighting, mount: Pose) -> None:
         """The augment step: a beacon is a function of the state and of its sighting's noise."""
         p = self.params
+        is_sized = p["range_scale_sd"] > 0
 
         def placed(state, noise):  # type: ignore[no-untyped-def]
             mount_x, mount_y, yaw = mount
@@ -408,15 +412,18 @@ class DenseEkf:
             if sighting.range_m is None:
                 inverse = p["ray_inverse_distance_per_m"] + noise[1]
                 return [*state, sensor_x, sensor_y, direction, inverse]
-            range_m = sighting.range_m + noise[1]
-            return [*state, sensor_x + range_m * np.cos(direction), sensor_y + range_m * np.sin(direction)]
+            scale = 1 + noise[2]
+            range_m = (sighting.range_m + noise[1]) / scale
+            place = [sensor_x + range_m * np.cos(direction), sensor_y + range_m * np.sin(direction)]
+            return [*state, *place, scale] if is_sized else [*state, *place]
 
         bearing_var = p["bearing_sd_rad"] ** 2
         if sighting.range_m is None:
             noise = [bearing_var * p["bearing_only_variance_factor"], p["ray_inverse_distance_sd_per_m"] ** 2]
         else:
-            noise = [bearing_var, self._range_variance(sighting.range_m)]
-        beacon = Beacon(sighting.label, "ray" if sighting.range_m is None else "point")
+            noise = [bearing_var, self._range_variance(sighting.range_m), p["range_scale_sd"] ** 2]
+        kind = "ray" if sighting.range_m is None else "sized" if is_sized else "point"
+        beacon = Beacon(sighting.label, kind)
         self._change(placed, np.diag(noise), [*self.beacons, beacon])
 
     def remove(self, index: int) -> None:

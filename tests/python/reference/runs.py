@@ -44,6 +44,7 @@ PARAMS: dict[str, float] = {
     "range_sd_floor_m": 0.01,
     "range_sd_fraction": 0.02,
     "range_sd_per_m": 0.009,
+    "range_scale_sd": 0.0,
     "bearing_only_variance_factor": 2.0,
     "bearing_only_curvature_factor": 1.0,
     "gate_d2": 0.0,

@@ -83,6 +83,19 @@ static void new_point(const double *in, double *out, const void *context)
     out[1] = y + range_m * sin(direction);
 }
 
+/// Noise: of the distance, of the direction, of the scale.
+static void new_sized(const double *in, double *out, const void *context)
+{
+    const adding_t *a = context;
+    double x, y, theta;
+    sensor_of(in, &x, &y, &theta);
+    out[2] = 1 + in[a->dim + 2];
+    const double range_m = (a->range_m + in[a->dim]) / out[2];
+    const double direction = theta + a->bearing_rad + in[a->dim + 1];
+    out[0] = x + range_m * cos(direction);
+    out[1] = y + range_m * sin(direction);
+}
+
 /// Noise: of the direction, of the inverse distance.
 static void new_ray(const double *in, double *out, const void *context)
 {
@@ -112,6 +125,44 @@ static void test_add_point_is_the_augment_step(void **state)
         assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_POINT);
         twin_assert(&ekf, &expected, TOLERANCE);
     }
+}
+
+static void test_add_sized_is_the_augment_step(void **state)
+{
+    unit_random_t random = {15};
+    for (int i = 0; i < 20; i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        params.range_scale_sd = BSLAM_R(0.07);
+        const double range_m = unit_random(&random, 0.5, 8);
+        const double bearing = unit_random(&random, -3.14, 3.14);
+        const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
+        const double noise_var[] = {range_sd2, 0.02 * 0.02, 0.07 * 0.07};
+        const adding_t adding = {ekf.dim, range_m, bearing};
+        const twin_t expected = augmented(&ekf, new_sized, 3, noise_var, 3, &adding);
+        const bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_SIZED);
+        assert_int_equal(ekf.sized_count, 1);
+        twin_assert(&ekf, &expected, TOLERANCE);
+    }
+}
+
+static void test_add_sized_beyond_their_room_are_points(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.range_scale_sd = BSLAM_R(0.07);
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
+    for (int i = 0; i < BSLAM_BEACONS_MAX; i++) {
+        int index;
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+        assert_int_equal(ekf.beacons[index].kind,
+                         i < 2 * BSLAM_RAYS_MAX ? BSLAM_BEACON_SIZED : BSLAM_BEACON_POINT);
+    }
+    assert_true(ekf.dim <= BSLAM_STATE_MAX);
 }
 
 static void test_add_ray_is_the_augment_step(void **state)
@@ -196,13 +247,12 @@ static bslam_ekf_t mixed_filter(bslam_params_t *params, unit_random_t *random)
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, 3, -4, &index), BSLAM_OK);
     const bslam_sighting_t polar = unit_polar(0.5, 3, 9);
+    params->range_scale_sd = BSLAM_R(0.1);
+    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_SIZED);
+    params->range_scale_sd = 0;
     assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
     return ekf;
-}
-
-static int dim_of(const bslam_beacon_t *beacon)
-{
-    return beacon->kind == BSLAM_BEACON_RAY ? 4 : beacon->kind == BSLAM_BEACON_POINT ? 2 : 0;
 }
 
 static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
@@ -214,12 +264,13 @@ static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
         bslam_ekf_t ekf = full;
         const bslam_beacon_t *removed = &full.beacons[gone];
         twin_t expected = twin_of(&full);
-        expected.mean = dense_without(&expected.mean, removed->at, dim_of(removed));
-        expected.covariance = dense_without(&expected.covariance, removed->at, dim_of(removed));
+        expected.mean = dense_without(&expected.mean, removed->at, bslam_beacon_dim(removed->kind));
+        expected.covariance = dense_without(&expected.covariance, removed->at, bslam_beacon_dim(removed->kind));
         bslam_ekf_remove(&ekf, gone);
         twin_assert(&ekf, &expected, 0);
         assert_int_equal(ekf.beacon_count, full.beacon_count - 1);
         assert_int_equal(ekf.ray_count, full.ray_count - (removed->kind == BSLAM_BEACON_RAY ? 1 : 0));
+        assert_int_equal(ekf.sized_count, full.sized_count - (removed->kind == BSLAM_BEACON_SIZED ? 1 : 0));
         for (int b = 0; b < ekf.beacon_count; b++) {
             const int from = b < gone ? b : b + 1;
             bslam_real_t x[2];
@@ -477,6 +528,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_add_point_is_the_augment_step),
+        cmocka_unit_test(test_add_sized_is_the_augment_step),
+        cmocka_unit_test(test_add_sized_beyond_their_room_are_points),
         cmocka_unit_test(test_add_ray_is_the_augment_step),
         cmocka_unit_test(test_add_points_beyond_the_map_are_refused),
         cmocka_unit_test(test_add_rays_beyond_their_number_are_refused_but_points_are_not),

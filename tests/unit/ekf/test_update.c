@@ -77,8 +77,12 @@ static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const 
         const double floor_m = (double)params->range_sd_floor_m;
         const double fraction_m = (double)params->range_sd_fraction * range_m;
         const double quadratic_m = (double)params->range_sd_per_m * range_m * range_m;
+        const bool is_sized = ekf->beacons[plan->beacon].kind == BSLAM_BEACON_SIZED;
+        const double common_m = is_sized ? 0 : (double)params->range_scale_sd * range_m;
         append(m, &rows, 0, (double)sighting->range_m - range_m,
-               (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m) / weight);
+               (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m +
+                common_m * common_m) /
+                   weight);
     }
 }
 
@@ -182,6 +186,22 @@ static void test_fuse_distance_of_a_ray_is_the_batch_update(void **state)
         bslam_ekf_t ekf = random_filter(&params, &random);
         const plan_t plans[] = {random_plan(&random, 3, true), random_plan(&random, 4, true)};
         assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+    }
+}
+
+static void test_fuse_sized_beacons_among_rays_is_the_batch_update(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        bslam_params_t params = params_of(filter, true);
+        params.range_scale_sd = BSLAM_R(0.1);
+        unit_random_t random = {2};
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        assert_int_equal(ekf.beacons[1].kind, BSLAM_BEACON_SIZED);
+        for (int frame = 0; frame < 5; frame++) {
+            const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, false),
+                                    random_plan(&random, 2, true), random_plan(&random, 3, true)};
+            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+        }
     }
 }
 
@@ -609,6 +629,7 @@ int main(void)
         cmocka_unit_test(test_fuse_invariant_any_number_of_sightings_is_the_batch_update),
         cmocka_unit_test(test_fuse_invariant_with_velocity_states_is_the_batch_update),
         cmocka_unit_test(test_fuse_distance_of_a_ray_is_the_batch_update),
+        cmocka_unit_test(test_fuse_sized_beacons_among_rays_is_the_batch_update),
         cmocka_unit_test(test_fuse_frames_in_a_row_are_the_textbooks),
         cmocka_unit_test(test_fuse_order_within_a_frame_does_not_matter),
         cmocka_unit_test(test_fuse_known_beacon_corrects_the_robot_and_stays),
