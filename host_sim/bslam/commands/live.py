@@ -13,6 +13,7 @@ import numpy as np
 from bslam.commands.arguments import (
     add_filter_options,
     add_sensor_options,
+    core_parameters,
     run_options,
     scenario_source,
     whole_number,
@@ -21,16 +22,19 @@ from bslam.commands.drawing import draw
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
 from bslam.errors import BslamError
-from bslam.experiment.batch import BatchResult, Job, Outcome, make_jobs, write_files
+from bslam.experiment.batch import BatchResult, Job, Outcome, make_jobs, run_job, write_files
 from bslam.experiment.camera import unseen_log
 from bslam.experiment.eye import Eye
+from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_summary
 from bslam.experiment.player import Player
-from bslam.experiment.sources import CameraSource
-from bslam.experiment.trace import Trace
+from bslam.experiment.rerun import options_of
+from bslam.experiment.runner import Watcher
+from bslam.experiment.sources import CameraSource, RecordingSource, Source
 from bslam.experiment.truth import step_times_us
 from bslam.log import Log
 from bslam.moment import FAILED, Stage
+from bslam.recording.reader import SUFFIX
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 
@@ -40,6 +44,7 @@ EXAMPLES = """examples:
   bslam live paper_room --seed 3 --observation direction --speed 4
   bslam live paper_room --sensor camera
   bslam live pairs --association mahalanobis --paused
+  bslam live out/run/paper_room_seed0.mcap
   bslam live csv out/run/paper_room_seed0
   bslam live mrclam MRCLAM_Dataset6 --robot 3 --speed 16
   bslam live paper_room --target qemu:mps2_an386
@@ -56,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "words",
         nargs="+",
         metavar="SCENARIO",
-        help=f"name, or path of a TOML file; or a recorded log: {{{','.join(COLLECTIONS)}}} DIR",
+        help=f"name, or path of a TOML file; or a record: FILE.mcap, {{{','.join(COLLECTIONS)}}} DIR",
     )
     parser.add_argument("--robot", type=int, help="mrclam: whose log")
     add_sensor_options(parser)
@@ -127,13 +132,13 @@ class _Show:
         self._job, self._log, self._out = job, log, out
         self._outcome: Outcome | None = None
         self._eye = eye
-        self.player = Player(
-            log, job.options, align=job.source.align, speed=speed, eye=eye, finished=self._finished
-        )
+        self.player = Player(log, self._run, align=job.source.align, speed=speed, eye=eye)
 
-    def _finished(self, trace: Trace) -> None:
+    def _run(self, watcher: Watcher) -> None:
+        """All of it, and its files; in the player's thread."""
+        trace, more = run_job(self._job, self._log, self._out, watcher, self._eye)
         log = self._log if self._eye is None else replace(self._log, sightings=self._eye.sightings())
-        self._outcome = write_files(self._job, self._out, log, trace)
+        self._outcome = write_files(self._job, self._out, log, trace, more)
         write_summary(self._out, [self._outcome.entry])
 
     def end(self) -> int:
@@ -148,23 +153,31 @@ class _Show:
 
 
 def _job(arguments: argparse.Namespace) -> Job:
+    source, options = _what(arguments)
+    return make_jobs([source], [options], draw, pictures=1)[0]
+
+
+def _what(arguments: argparse.Namespace) -> tuple[Source, RunOptions]:
     kind, *rest = arguments.words
     if kind in COLLECTIONS:
         sources = log_sources(kind, rest, arguments.robot)
         if len(sources) != 1:
             raise BslamError(f"{kind}: {len(sources)} logs; allowed: one DIR, and --robot N with mrclam")
-        source = sources[0]
-        options = run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=arguments.seed)
-    else:
-        if rest:
-            raise BslamError(f"'{rest[0]}' after {kind}; allowed: one SCENARIO, or {{csv,mrclam}} DIR")
-        wheels = load_scenario(kind).wheels
-        noise = arguments.noise or wheels.noise
-        sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
-        arguments.scenario = kind
-        source = scenario_source(arguments, arguments.seed, sigma_mps, noise)
-        options = run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=arguments.seed)
-    return make_jobs([source], [options], draw, pictures=1)[0]
+        looks = sources[0].has_looks
+        return sources[0], run_options(arguments, has_looks=looks, sensor="recorded", seed=arguments.seed)
+    if rest:
+        raise BslamError(
+            f"'{rest[0]}' after {kind}; allowed: one SCENARIO or FILE.mcap, or {{csv,mrclam}} DIR"
+        )
+    if kind.endswith(SUFFIX):
+        recording = RecordingSource(Path(kind))
+        return recording, options_of(recording.recording(), arguments.target, core_parameters(arguments))
+    wheels = load_scenario(kind).wheels
+    noise = arguments.noise or wheels.noise
+    sigma_mps = wheels.sigma_mps if arguments.sigma is None else arguments.sigma
+    arguments.scenario = kind
+    source = scenario_source(arguments, arguments.seed, sigma_mps, noise)
+    return source, run_options(arguments, sigma_mps=sigma_mps, noise=noise, seed=arguments.seed)
 
 
 def _open(job: Job) -> tuple[Log, Eye | None]:

@@ -24,7 +24,7 @@ from bslam.experiment.metrics import Evaluation, describe, evaluate, summarise
 from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_run, write_summary
 from bslam.experiment.rerun import rerun
-from bslam.experiment.runner import run_log
+from bslam.experiment.runner import FrameFeed, Watcher, run_log
 from bslam.experiment.sources import RecordingSource, ScenarioSource, Source
 from bslam.experiment.trace import Trace
 from bslam.log import Log, write_folder
@@ -144,22 +144,24 @@ def execute(job: Job, out: Path) -> Outcome:
         return Outcome(job.name, entry, crash=traceback.format_exc())
 
 
-def _run(job: Job, log: Log, out: Path) -> tuple[Trace, dict[str, Any]]:
-    """The trace of the run, and what the entry of a recording says otherwise."""
+def run_job(
+    job: Job, log: Log, out: Path, watcher: Watcher | None = None, frames: FrameFeed | None = None
+) -> tuple[Trace, dict[str, Any]]:
+    """The trace of the run, and what the entry of a recording says otherwise. Raises BslamError."""
     if isinstance(job.source, RecordingSource):
-        trace, comparison = rerun(job.source.recording(), job.options)
+        trace, comparison = rerun(job.source.recording(), job.options, watcher)
         nameless = not (log.sightings.beacon_id >= 0).any()
         unknown = dict.fromkeys([*_BY_IDENTITY, "step_us_median"] if nameless else ["step_us_median"])
         return trace, unknown | {"recording": asdict(comparison)}
     record = out / f"{job.name}.mcap" if job.record else None
-    return run_log(log, job.options, record=record), {}
+    return run_log(log, job.options, watcher=watcher, record=record, frames=frames), {}
 
 
 def _execute(job: Job, out: Path) -> Outcome:
     log = job.source.load()
     if job.record:
         write_folder(log, out / job.name)
-    trace, more = _run(job, log, out)
+    trace, more = run_job(job, log, out)
     return write_files(job, out, log, trace, more)
 
 

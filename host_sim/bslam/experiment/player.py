@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.experiment.align import Rigid, fit_rigid, wrap_angle
 from bslam.experiment.eye import Eye
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
-from bslam.experiment.trace import Trace
+from bslam.experiment.runner import Watcher
 from bslam.experiment.truth import step_times_us, truth_at
 from bslam.log import Log
 from bslam.moment import FAILED, FINISHED, PAUSED, RUNNING, Course, Moment, Spot, Told
@@ -111,23 +109,21 @@ class Pace:
 class Player:
     """One run over a log. It stands at the start until `pace` is told to play or to step.
 
-    align: the truth has a frame of its own. eye: what it sees is taken in place of the log's sightings.
-    finished: called in the run's thread with the trace of a run that came to its end; raises BslamError where
-    that goes wrong.
+    run: runs the filter over the log and tells the watcher it is given; in a thread of its own. align: the
+    truth has a frame of its own. eye: what it sees is shown.
     """
 
     def __init__(
         self,
         log: Log,
-        options: RunOptions,
+        run: Callable[[Watcher], None],
         *,
         align: bool = False,
         speed: float = 1.0,
         eye: Eye | None = None,
-        finished: Callable[[Trace], None] | None = None,
     ) -> None:
         self.pace = Pace(speed)
-        self._log, self._options, self._eye, self._finished = log, options, eye, finished
+        self._run_it = run
         self._books = _Books(log, align, eye)
         self._published_s, self._stale = 0.0, False
         self.moment = self._books.moment(PAUSED)
@@ -146,9 +142,7 @@ class Player:
     def _run(self) -> None:
         state, message = FINISHED, ""
         try:
-            trace = run_log(self._log, self._options, watcher=self, frames=self._eye)
-            if self._finished is not None:
-                self._finished(trace)
+            self._run_it(self)
         except StopRun:
             return
         except BslamError as error:

@@ -15,7 +15,7 @@ from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.experiment.ledger import Ledger
 from bslam.experiment.options import ASSOCIATIONS, FILTERS, MOTIONS, Number, RunOptions
-from bslam.experiment.runner import Rows, make_trace
+from bslam.experiment.runner import Rows, Watcher, make_trace
 from bslam.experiment.trace import Trace
 from bslam.experiment.truth import step_times_us
 from bslam.recording import Recording
@@ -60,13 +60,15 @@ def options_of(recording: Recording, target: str, changes: Mapping[str, Number])
     )
 
 
-def rerun(recording: Recording, options: RunOptions) -> tuple[Trace, Comparison]:
+def rerun(
+    recording: Recording, options: RunOptions, watcher: Watcher | None = None
+) -> tuple[Trace, Comparison]:
     """The trace of the rerun, and how it compares. Raises BslamError."""
     start = recording.start
     params, room = dict(options.parameters), start.beacons_max
     if options.target == "host":
         slam = Slam(params, beacons_max=room, real=start.real, looks=start.looks, seeds=start.seeds)
-        return _Rerun(slam, recording).finish()
+        return _Rerun(slam, recording, watcher).finish()
     if start.real != "float":
         raise BslamError(
             f"{recording.path}: real {start.real} with --target {options.target}: allowed is float"
@@ -74,14 +76,14 @@ def rerun(recording: Recording, options: RunOptions) -> tuple[Trace, Comparison]
     with connect(
         options.target, params, room, fingerprints=True, looks=start.looks, seeds=start.seeds
     ) as remote:
-        return _Rerun(remote, recording).finish(remote.target_description)
+        return _Rerun(remote, recording, watcher).finish(remote.target_description)
 
 
 class _Rerun:
     """One pass over a recording. Rows of its trace as the runner makes them: a row for each reading."""
 
-    def __init__(self, slam: Any, recording: Recording) -> None:
-        self.slam = slam
+    def __init__(self, slam: Any, recording: Recording, watcher: Watcher | None) -> None:
+        self.slam, self.watcher = slam, watcher
         self.found = Comparison()
         self.refusals: Counter[str] = Counter()
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
@@ -126,6 +128,8 @@ class _Rerun:
             self.ledger.book_refused(true_id, frame.mappable)
         else:
             self.ledger.book(true_id, frame.mappable, accounts)
+        if self.watcher is not None:
+            self.watcher.frame(frame.time_us, true_id, columns, accounts)
         self._chain()
         self._answer(frame, refused)
 
@@ -159,6 +163,9 @@ class _Rerun:
         if len(self.rows.poses) < len(self.rows.seen):
             self.rows.poses.append(self.slam.pose())
             self.rows.covariances.append(self.slam.pose_covariance_lower())
+            if self.watcher is not None:
+                row = len(self.rows.poses) - 1
+                self.watcher.step(self.times_us[row], self.rows.poses[row], self.slam)
 
     def finish(self, target: Callable[[], Mapping[str, Any]] | None = None) -> tuple[Trace, Comparison]:
         """What it left behind; `target` tells of what it ran on, if not here."""

@@ -63,6 +63,16 @@ def click(page: Page, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
 
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    """The paper's room for 60 steps."""
+    world = (Path(bslam.__file__).parent / "scenarios/paper_room.toml").read_text(encoding="utf-8")
+    assert "steps = 5000\n" in world
+    path = tmp_path / "short.toml"
+    path.write_text(world.replace("steps = 5000\n", "steps = 60\n"), encoding="utf-8")
+    return path
+
+
 def test_live_pause_step_and_speed_act_on_the_running_filter(page: Page, tmp_path: Path) -> None:
     with live("paper_room", "--paused", "--association", "known", out=tmp_path) as command:
         page.goto(command.url)
@@ -98,11 +108,9 @@ def test_live_pause_step_and_speed_act_on_the_running_filter(page: Page, tmp_pat
     assert json.loads((tmp_path / "summary.json").read_text())["runs"][0]["steps"] == 5000
 
 
-def test_live_camera_shows_its_frames_and_what_became_of_what_it_saw(page: Page, tmp_path: Path) -> None:
-    world = (Path(bslam.__file__).parent / "scenarios/paper_room.toml").read_text(encoding="utf-8")
-    assert "steps = 5000\n" in world
-    short = tmp_path / "short.toml"
-    short.write_text(world.replace("steps = 5000\n", "steps = 60\n"), encoding="utf-8")
+def test_live_camera_shows_its_frames_and_what_became_of_what_it_saw(
+    page: Page, short: Path, tmp_path: Path
+) -> None:
     with live(short, "--sensor", "camera", "--speed", "inf", out=tmp_path) as command:
         page.goto(command.url)
         expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
@@ -122,6 +130,23 @@ def test_live_camera_shows_its_frames_and_what_became_of_what_it_saw(page: Page,
     assert watched == tum(trace.time_us, trace.pose)
     entry = json.loads((tmp_path / "summary.json").read_text())["runs"][0]
     assert entry["sightings"] == len(log.sightings.time_us)
+
+
+def test_live_recording_plays_as_it_was_recorded(page: Page, short: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    assert main(["run", str(short), "--record", "--pictures", "0", "--out", str(out)]) == 0
+    with live(out / "short_seed0.mcap", "--paused", out=tmp_path / "live") as command:
+        page.goto(command.url)
+        click(page, "Step")
+        expect(page.get_by_text("paused · step 1 of 60 · time 0.04 s")).to_be_visible()
+        click(page, "as fast as it goes")
+        click(page, "Play")
+        expect(page.get_by_text("finished · step 60 of 60")).to_be_visible()
+        assert command.end()[0] == 0
+    recorded = (out / "short_seed0.estimate.tum").read_text()
+    assert (tmp_path / "live/short_seed0.estimate.tum").read_text() == recorded
+    entry = json.loads((tmp_path / "live/summary.json").read_text())["runs"][0]
+    assert entry["recording"]["different"] == 0 and entry["recording"]["states"] > 50
 
 
 def test_live_two_pages_show_one_run(page: Page, tmp_path: Path) -> None:
