@@ -142,7 +142,7 @@ class Robot:
     sensor_yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
     sighting_delay_us: int = setting(SIGHTING_DELAY_US, 0)
     sighting_correlation_m: float = setting(CORRELATION_M, 0.0)  # way over which a beacon's errors stay alike
-    sighting_scale_sd: float = setting(SCALE_SD, 0.0)  # by which all distances of a beacon are too long or short
+    sighting_scale_sd: float = setting(SCALE_SD, 0.0)  # all distances of a beacon too long by this part
     left_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
     right_radius_m: float | None = setting(WHEEL_RADIUS_M, None)
     ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)

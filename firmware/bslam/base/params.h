@@ -72,7 +72,7 @@
     REAL(range_sd_fraction, 0.02, 0.0, 10.0, "noise of the distance in proportion to it") \
     REAL(range_sd_per_m, 0.009, 0.0, 10.0, "noise of the distance from apparent size: proportional to r^2") \
     REAL(range_scale_sd, 0.0, 0.0, 1.0, \
-         "a beacon's distances are all too long or too short by so much: its size is not its kind's (0: no)") \
+         "all distances of a beacon are too long or too short by so much, as is its size (0: no)") \
     REAL(bearing_only_variance_factor, 3.0, 1.0, 1000.0, \
          "direction variance times this where no distance comes") \
     REAL(bearing_only_curvature_factor, 100.0, 0.0, 1e6, \

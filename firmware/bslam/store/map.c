@@ -250,7 +250,9 @@ static void read_beacons(passage_t *passage, const header_t *header, const targe
         record_t record = {.machine = NO_MACHINE};
         move_record(passage, &record);
         values += (uint32_t)bslam_beacon_dim(record.beacon.kind);
-        further += record.beacon.kind == BSLAM_BEACON_RAY ? 2u : record.beacon.kind == BSLAM_BEACON_SIZED ? 1u : 0u;
+        further += record.beacon.kind == BSLAM_BEACON_RAY     ? 2u
+                   : record.beacon.kind == BSLAM_BEACON_SIZED ? 1u
+                                                              : 0u;
         const uint32_t uid = record.beacon.uid;
         require(passage, uid >= least_uid && uid < header->next_uid, BSLAM_MAP_CONTENT);
         require(passage, record.machine == NO_MACHINE || record.machine < header->machines,
@@ -324,9 +326,9 @@ static bool is_saved(const bslam_ekf_t *ekf, int index)
 static bool next_value(const bslam_ekf_t *ekf, place_t *place)
 {
     place->value++;
-    while (
-        place->beacon < ekf->beacon_count &&
-        (!is_saved(ekf, place->beacon) || place->value >= bslam_beacon_dim(ekf->beacons[place->beacon].kind))) {
+    while (place->beacon < ekf->beacon_count &&
+           (!is_saved(ekf, place->beacon) ||
+            place->value >= bslam_beacon_dim(ekf->beacons[place->beacon].kind))) {
         place->beacon++;
         place->value = 0;
     }

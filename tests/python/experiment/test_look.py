@@ -139,7 +139,12 @@ def test_look_says_name_place_and_marks(seen, pictures, tmp_path, capsys):
         (
             candidate((10, 10, 50, 90)),
             candidate(
-                (60, 10, 90, 90), object="my red box", object_margin=0.8, range_m=None, range_sd_m=None, range_noise_sd_m=None
+                (60, 10, 90, 90),
+                object="my red box",
+                object_margin=0.8,
+                range_m=None,
+                range_sd_m=None,
+                range_noise_sd_m=None,
             ),
             candidate((0, 10, 9, 90), bearing_rad=None, range_m=None, marks=frozenset({"cut_left"})),
         ),

@@ -61,7 +61,7 @@ class Sighting:
 
 @dataclass
 class Beacon:
-    """A beacon of the map: "point", "sized" or "ray" with its state values' count, or "known" with its place."""
+    """A beacon of the map: "point", "sized" or "ray" with its state values' count; "known" with its place."""
 
     label: int
     kind: str

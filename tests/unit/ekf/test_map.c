@@ -265,7 +265,8 @@ static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
         const bslam_beacon_t *removed = &full.beacons[gone];
         twin_t expected = twin_of(&full);
         expected.mean = dense_without(&expected.mean, removed->at, bslam_beacon_dim(removed->kind));
-        expected.covariance = dense_without(&expected.covariance, removed->at, bslam_beacon_dim(removed->kind));
+        expected.covariance =
+            dense_without(&expected.covariance, removed->at, bslam_beacon_dim(removed->kind));
         bslam_ekf_remove(&ekf, gone);
         twin_assert(&ekf, &expected, 0);
         assert_int_equal(ekf.beacon_count, full.beacon_count - 1);

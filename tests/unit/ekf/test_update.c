@@ -79,10 +79,10 @@ static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const 
         const double quadratic_m = (double)params->range_sd_per_m * range_m * range_m;
         const bool is_sized = ekf->beacons[plan->beacon].kind == BSLAM_BEACON_SIZED;
         const double common_m = is_sized ? 0 : (double)params->range_scale_sd * range_m;
-        append(m, &rows, 0, (double)sighting->range_m - range_m,
-               (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m +
-                common_m * common_m) /
-                   weight);
+        append(
+            m, &rows, 0, (double)sighting->range_m - range_m,
+            (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m + common_m * common_m) /
+                weight);
     }
 }
 
