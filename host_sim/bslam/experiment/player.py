@@ -40,7 +40,8 @@ class Pace:
         self.speed = speed  # so many times as fast as the robot drives; inf: as fast as it goes
         self.playing = False
         self._turn = threading.Condition()
-        self._stopping, self._due = False, 0
+        self.stopping = False
+        self._due = 0
         self._anchor: tuple[float, float] | None = None  # clock and time of the log at which this pace began
 
     def play(self) -> None:
@@ -73,7 +74,7 @@ class Pace:
         with self._turn:
             self.playing = self.playing if playing is None else playing
             self.speed = self.speed if speed is None else speed
-            self._stopping = self._stopping or stopping
+            self.stopping = self.stopping or stopping
             self._due = self._due + steps if steps else 0
             self._anchor = None
             self._turn.notify_all()
@@ -84,7 +85,7 @@ class Pace:
         halting: called before it waits for the user or for the clock.
         """
         with self._turn:
-            while not self._stopping:
+            while not self.stopping:
                 if self._due:
                     self._due -= 1
                     return
@@ -149,6 +150,8 @@ class Player:
             state, message = FAILED, str(error)
         except Exception as error:  # whatever it is, the page says so and the command ends as it must
             state, message = FAILED, f"{type(error).__name__}: {error}"
+        if state == FAILED and self.pace.stopping:
+            return  # Ctrl-C also ends an emulator, which then fails
         self.moment = self._books.moment(state, message=message)
 
     def frame(

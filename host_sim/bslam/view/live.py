@@ -112,14 +112,14 @@ class Page:
         drawn.on_change("data", lambda _attribute, _old, _new: self._note_drawn())
         self._status.js_on_change("text", CustomJS(args={"drawn": drawn}, code=_SAY_DRAWN))
         self._pause = Button(label="Play", button_type="primary", width=90)
-        step = Button(label="Step", width=90)
+        self._step = Button(label="Step", width=90)
         speed = RadioButtonGroup(labels=list(SPEEDS))
         if controls.speed in SPEEDS.values():
             speed.active = list(SPEEDS.values()).index(controls.speed)
         self._pause.on_click(self._toggle)
-        step.on_click(controls.step)
+        self._step.on_click(controls.step)
         speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
-        bar = row(self._pause, step, Div(text="times real speed:"), speed)
+        bar = row(self._pause, self._step, Div(text="times real speed:"), speed)
         parts = {"bar": bar, "status": self._status, "room": self._room_plot(), "error": self._error_plot()}
         parts |= {"camera": self._camera, "told": self._told}
         for name, part in parts.items():
@@ -203,7 +203,7 @@ class Page:
             return
         self._drawn = moment
         self._pause.label = "Pause" if self._controls.playing else "Play"
-        self._pause.disabled = moment.state in (FINISHED, FAILED)
+        self._pause.disabled = self._step.disabled = moment.state in (FINISHED, FAILED)
         words = self._words(moment)
         self._under_way = words != self._status.text
         self._status.text = words
