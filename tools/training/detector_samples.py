@@ -118,16 +118,18 @@ def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], proc
 
 
 def gather_boxes(
-    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel, processes: int
+    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel | None, processes: int
 ) -> BoxSamples:
-    """Proposals of the worlds' frames, each looked at twice: as it is, and in other colours.
+    """Proposals of the worlds' frames by a detector's cells (None: the built-in one's), each looked at twice:
+    as it is, and in other colours.
 
     The second look has RECOLOURED added to its world's number. What is a beacon hangs on shape, size, place
     more than on its colour: a detector that has seen red signs and no other red things takes those for signs.
     """
     seeds = list(seeds)
     seeds += [seed + RECOLOURED for seed in seeds]
-    work = partial(_boxes_of_world, folder, lens, style, model_of(detector))
+    model = None if detector is None else model_of(detector)
+    work = partial(_boxes_of_world, folder, lens, style, model)
     return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
 
@@ -157,7 +159,7 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
     return CellSamples(np.concatenate(features), label, np.full(len(label), seed, np.int32))
 
 
-def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> BoxSamples:
+def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel | None, seed: int) -> BoxSamples:
     world = replace(read_world(folder, lens, style, seed % RECOLOURED), seed=seed)
     front_end = FrontEnd([camera_of(lens, seed % RECOLOURED)], model)
     parts = []

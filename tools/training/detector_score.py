@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from bslam.core.vision import DetectorModel, FrontEnd
 from training.detector_samples import clutter_share, model_of
-from training.render_set import camera_of, read_world
+from training.render_set import World, camera_of, read_world
 from training.truth import NOTHING, counts, owners
 
 DUPLICATE = -3
@@ -92,8 +92,23 @@ def look_at_worlds(
     with ProcessPoolExecutor(processes) as pool:
         parts = list(tqdm(pool.map(work, seeds), total=len(seeds), desc=f"looking {lens}", unit="world"))
     found = np.concatenate([detections for detections, _ in parts])
+    return sorted_sightings(found, np.concatenate([objects for _, objects in parts]))
+
+
+def sorted_sightings(found: NDArray[np.void], objects: NDArray[np.void]) -> Sightings:
+    """Detections in any order, as Sightings has them."""
     found = found[np.argsort(-found["score"], kind="stable")]
-    return Sightings(_mark_duplicates(found), np.concatenate([objects for _, objects in parts]))
+    return Sightings(_mark_duplicates(found), objects)
+
+
+def objects_of(world: World) -> NDArray[np.void]:
+    """The objects of a world's frames that count."""
+    seen = world.seen
+    objects = [
+        (world.seed, seen["frame"][row], row, seen["beacon_id"][row], seen["kind"][row], seen["range_m"][row])
+        for row in np.flatnonzero(counts(seen))
+    ]
+    return np.array(objects, OBJECT)
 
 
 def score(seen: Sightings, precision: float, clutter_is_accepted: bool = False) -> Score:
@@ -139,13 +154,7 @@ def _look_at_world(
             detections.append(
                 (seed, frame, one.score, row, one.beacon_class - 1, true_kind, on_clutter[i], overlap[i])
             )
-    good = np.flatnonzero(counts(world.seen))
-    seen = world.seen
-    objects = [
-        (seed, seen["frame"][row], row, seen["beacon_id"][row], seen["kind"][row], seen["range_m"][row])
-        for row in good
-    ]
-    return np.array(detections, DETECTION), np.array(objects, OBJECT)
+    return np.array(detections, DETECTION), objects_of(world)
 
 
 def _mark_duplicates(detections: NDArray[np.void]) -> NDArray[np.void]:
