@@ -36,6 +36,8 @@ ODOMETRY_COLUMNS = {
 }
 SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m")
 """Columns of sightings that a detector may leave out."""
+CLASS = "beacon_class"
+"""Column of sightings that a detector may leave out: the kind of beacon."""
 SIGNATURE_SIZE = 71
 """Values of a signature: how a sighting looks (firmware/bslam/vision/signature.h)."""
 SIGNATURES = "signatures.npy"
@@ -79,6 +81,9 @@ class Sightings:
     )
     range_sd_m: NDArray[np.float64] | None = None  # (m,)
     signature: NDArray[np.float32] | None = None  # (m, SIGNATURE_SIZE) how each looks; None: nobody knows
+    beacon_class: NDArray[np.int64] | None = (
+        None  # (m,) the detector's kind of beacon, 1 to 254; 0, None: it has none
+    )
 
 
 @dataclass(frozen=True)
@@ -274,6 +279,8 @@ def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
     for name in SIGHTING_NOISE:
         if getattr(sightings, name) is not None:
             columns[name] = _texts(getattr(sightings, name), float)
+    if sightings.beacon_class is not None:
+        columns[CLASS] = _texts(sightings.beacon_class, int)
     return columns
 
 
@@ -316,6 +323,7 @@ _COLUMNS = {
         "0 or radians from 1e-5 to pi", lambda v: (v == 0) | ((v >= 1e-5) & (v <= math.pi))
     ),
     "range_sd_m": Column("0 or a number from 0.001 to 1e4", lambda v: (v == 0) | ((v >= 1e-3) & (v <= 1e4))),
+    CLASS: Column("an integer from 0 to 254", lambda values: is_count(values) & (values <= 254)),
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,
     "y_m": _NUMBER,
@@ -367,7 +375,7 @@ def _require_tick_range(table: Table, robot: Robot) -> None:
 
 def _read_sightings(folder: Path) -> Sightings:
     layout = _columns("time_us", "beacon_id", "bearing_rad")
-    optional = _columns("range_m", "mappable", *SIGHTING_NOISE)
+    optional = _columns("range_m", "mappable", *SIGHTING_NOISE, CLASS)
     table = read_table(_require_csv(folder, "sightings"), [layout], optional)
     table.require_order("time_us", strict=False)
     return Sightings(
@@ -378,6 +386,7 @@ def _read_sightings(folder: Path) -> Sightings:
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
         **{name: table.values.get(name) for name in SIGHTING_NOISE},
         signature=_read_signatures(folder / SIGNATURES, table.rows),
+        beacon_class=table.integers(CLASS) if CLASS in table.values else None,
     )
 
 

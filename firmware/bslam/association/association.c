@@ -16,7 +16,6 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     match->distance2 = -1;
     match->score = 0;
     match->lead = 0;
-    match->near = -1;
     match->sure = false;
     return mappable;
 }

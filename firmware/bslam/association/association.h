@@ -22,6 +22,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< neither near enough to a beacon to match nor far enough to be new
+    BSLAM_REASON_FAR,          ///< it may be new, but its distance is too doubtful to start a beacon
     BSLAM_REASON_LOOKS,        ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
@@ -46,7 +47,6 @@ typedef struct bslam_match {
     bslam_real_t distance2;  ///< to the chosen beacon in the method's own measure; negative: not computed
     bslam_real_t score;      ///< svm: log odds of that beacon against a new one; else 0
     bslam_real_t lead;       ///< svm: by how much the score leads that of any other beacon, and of a new one
-    int32_t near;            ///< svm, new: the candidate that it is not, by its looks; else -1
     bool sure;               ///< svm: sure enough to learn from; else false
 } bslam_match_t;
 

@@ -1,9 +1,13 @@
 #include "bslam/association/looks.h"
 
+#include "bslam/math/logarithm.h"
+
 #include <string.h>
 
 static const bslam_look_t BLANK = {.machine = BSLAM_NO_MACHINE, .twin = BSLAM_NO_MACHINE};
 static const uint32_t MICROMETRES_PER_M = 1000000;
+
+enum { SEEN_AS_MAX = 32 };
 
 bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds, int32_t seed_count)
 {
@@ -80,6 +84,43 @@ bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t
                                 const bslam_sample_t *sample)
 {
     return opinion_of(looks, params, looks->of[index].machine, sample);
+}
+
+// ---- classes ----------------------------------------------------------------------------------------------
+
+static bool is_evidence(uint8_t beacon_class)
+{
+    return beacon_class >= 1 && beacon_class <= BSLAM_LOOKS_CLASSES;
+}
+
+bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                    uint8_t beacon_class)
+{
+    if (!is_evidence(beacon_class)) {
+        return 0;
+    }
+    const uint8_t *seen_as = looks->of[index].seen_as;
+    int all = 0;
+    for (int k = 0; k < BSLAM_LOOKS_CLASSES; k++) {
+        all += seen_as[k];
+    }
+    const bslam_real_t doubt = params->class_doubt;
+    const bslam_real_t as_this = (bslam_real_t)seen_as[beacon_class - 1] + doubt;
+    return bslam_ln(BSLAM_LOOKS_CLASSES * as_this / ((bslam_real_t)all + BSLAM_LOOKS_CLASSES * doubt));
+}
+
+/// Counts; what was long ago counts less.
+static void note_class(bslam_look_t *look, uint8_t beacon_class)
+{
+    if (!is_evidence(beacon_class)) {
+        return;
+    }
+    if (look->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
+        for (int k = 0; k < BSLAM_LOOKS_CLASSES; k++) {
+            look->seen_as[k] /= 2;
+        }
+    }
+    look->seen_as[beacon_class - 1]++;
 }
 
 // ---- learning ---------------------------------------------------------------------------------------------
@@ -172,19 +213,20 @@ static bool settle_machine(bslam_looks_t *looks, const bslam_params_t *params, i
 }
 
 void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
-                       uint32_t way_um, const float signature[BSLAM_SAMPLE_FEATURES])
+                       uint32_t way_um, const bslam_sighting_t *sighting)
 {
     bslam_look_t *look = &looks->of[index];
     const uint32_t least_um = (uint32_t)(params->learn_way_m * (bslam_real_t)MICROMETRES_PER_M);
     bslam_sample_t sample;
-    if ((look->is_taught && way_um - look->taught_um < least_um) ||
-        bslam_sample_encode(signature, &sample) != BSLAM_OK) {
+    if (look->is_taught && way_um - look->taught_um < least_um) {
         return;
     }
     look->is_taught = true;
     look->taught_um = way_um;
-    if (settle_machine(looks, params, index, count, &sample) &&
-        bslam_learner_show(&looks->learner, look->machine, signature) == BSLAM_OK) {
+    note_class(look, sighting->beacon_class);
+    if (sighting->signature != NULL && bslam_sample_encode(sighting->signature, &sample) == BSLAM_OK &&
+        settle_machine(looks, params, index, count, &sample) &&
+        bslam_learner_show(&looks->learner, look->machine, sighting->signature) == BSLAM_OK) {
         looks->counters.taught++;
     }
 }

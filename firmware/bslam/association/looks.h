@@ -8,16 +8,19 @@
 #define BSLAM_ASSOCIATION_LOOKS_H
 
 #include "bslam/base/params.h"
+#include "bslam/base/types.h"
 #include "bslam/svm/learner.h"
 
 #define BSLAM_NO_MACHINE (-1)
+/// Classes 1 to this many are evidence; what a detector calls higher ones is none.
+#define BSLAM_LOOKS_CLASSES 8
 
 /// What happened since init. Never decreases.
 typedef struct bslam_looks_counters {
     uint32_t taught;   ///< sightings that a machine was shown
     uint32_t unsure;   ///< matches that none was shown, because they may be wrong
     uint32_t shared;   ///< times that a beacon was found to look like another and took its machine
-    uint32_t retired;  ///< beacons taken out because they were in another's place
+    uint32_t retired;  ///< beacons taken out because another was in the same place
     uint32_t parted;   ///< times that a beacon got a machine of its own again
     uint32_t no_slot;  ///< beacons that got no machine when they were first seen, because none was free
 } bslam_looks_counters_t;
@@ -28,12 +31,12 @@ typedef struct bslam_look {
     int16_t twin;        ///< the machine that takes its sightings for its own, too
     uint8_t twin_count;  ///< how often, less how often it did not
     uint8_t disowned;    ///< how often its own machine, a shared one, refused it, less how often not
-    uint8_t alone;       ///< a doubted beacon: how often it was seen without the one whose place it is in
+    uint8_t alone;       ///< how often it was seen without near_uid, or that without it
     uint8_t ousted;      ///< how many beacons were retired for being in this one's place
-    bool is_doubted;
     bool is_taught;
-    uint32_t near_uid;   ///< of the beacon whose place a doubted one is in
-    uint32_t taught_um;  ///< the robot's way when it was taught last
+    uint32_t near_uid;                     ///< an older beacon in the same place
+    uint32_t taught_um;                    ///< the robot's way when it was taught last
+    uint8_t seen_as[BSLAM_LOOKS_CLASSES];  ///< how often as which class, from 1 on
 } bslam_look_t;
 
 /// Private but for the counters.
@@ -60,11 +63,16 @@ void bslam_looks_clear(bslam_looks_t *looks);
 bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                 const bslam_sample_t *sample);
 
+/// Log odds that beacon `index` is seen as this class, against a beacon of which nothing is known; 0 for a
+/// class that is no evidence.
+bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                    uint8_t beacon_class);
+
 /// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone way_um. Its
-/// machine is shown it, unless the last one was a few centimetres ago; a machine is found for a beacon that
-/// has none. O(machines).
+/// class is noted and its machine is shown it, unless the last one was a few centimetres ago; a machine is
+/// found for a beacon that has none. O(machines).
 void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
-                       uint32_t way_um, const float signature[BSLAM_SAMPLE_FEATURES]);
+                       uint32_t way_um, const bslam_sighting_t *sighting);
 
 /// Beacon `index` of `count` leaves the map; those behind it move up.
 void bslam_looks_forget(bslam_looks_t *looks, int index, int count);

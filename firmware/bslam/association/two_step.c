@@ -3,12 +3,14 @@
 #include "bslam/association/given.h"
 #include "bslam/association/internal.h"
 #include "bslam/math/logarithm.h"
+#include "bslam/model/noise.h"
 
 /// A sighting against a beacon.
 typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against a new one
     bslam_real_t distance2;
     bslam_opinion_t opinion;
+    bslam_real_t class_odds;
 } candidate_t;
 
 static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
@@ -37,7 +39,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     const bslam_sighting_t *sighting = &frame->sightings[i];
     bslam_innovation_t innovation;
     bslam_weight_t weight;
-    if (bslam_classes_differ(sighting, &frame->ekf->beacons[beacon]) ||
+    if ((frame->looks == NULL && bslam_classes_differ(sighting, &frame->ekf->beacons[beacon])) ||
         bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_given_weigh(frame->ekf, given, &innovation, &weight) != BSLAM_OK) {
@@ -48,8 +50,13 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     if (sample != NULL) {
         found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
     }
-    found->score =
-        weight.log_density - log_new(frame->params, sighting) + looks_score(frame->params, &found->opinion);
+    found->class_odds = 0;
+    if (frame->looks != NULL) {
+        found->class_odds =
+            bslam_looks_class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
+    }
+    found->score = weight.log_density - log_new(frame->params, sighting) +
+                   looks_score(frame->params, &found->opinion) + found->class_odds;
     return true;
 }
 
@@ -89,7 +96,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
     bslam_match_t *match = &matches[i];
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
-    candidate_t best = {0, -1, {0.0f, 0.0f}};
+    candidate_t best = {0, -1, {0.0f, 0.0f}, 0};
     bslam_real_t second = 0;
     bool has_second = false;
     match->beacon = -1;
@@ -199,7 +206,7 @@ static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_
     for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
         candidate_t one;
         if (!is_taken(frame, matches, b) && weigh(frame, given, i, b, sample, &one) &&
-            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
+            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f && one.class_odds >= 0 &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high) {
             return true;
         }
@@ -207,24 +214,39 @@ static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_
     return false;
 }
 
+/// Whether a sighting's distance is too doubtful to start a beacon: from afar a Gaussian is no likeness of
+/// where it may be. A robot that sees nothing that it knows takes what it gets.
+static bool is_far(const bslam_sighting_frame_t *frame, int i, const bslam_match_t *matches)
+{
+    const bslam_sighting_t *sighting = &frame->sightings[i];
+    const bslam_real_t sd_m = frame->params->new_range_sd_m;
+    int known = 0;
+    for (int k = 0; k < frame->count; k++) {
+        known += matches[k].verdict == BSLAM_VERDICT_MATCH ? 1 : 0;
+    }
+    return known >= frame->params->new_far_matches && sighting->has_range &&
+           bslam_range_variance_m2(frame->params, sighting, sighting->range_m) > sd_m * sd_m;
+}
+
 /// What becomes of a sighting that matches no beacon.
 static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
                         bslam_match_t *matches)
 {
     bslam_match_t *match = &matches[i];
-    const int32_t near = match->beacon;
     const bool is_duplicate = match->reason == BSLAM_REASON_DUPLICATE;
-    const bool is_near = near >= 0 && match->score > -frame->params->defer_score;
+    const bool is_near = match->beacon >= 0 && match->score > -frame->params->defer_score;
     leave_open(match);
     if (is_duplicate) {
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_DUPLICATE;
+    } else if (!is_near && is_far(frame, i, matches)) {
+        match->verdict = BSLAM_VERDICT_REJECT;
+        match->reason = BSLAM_REASON_FAR;
     } else if (!is_near && looks_like_another(frame, given, i, matches)) {
         match->reason = BSLAM_REASON_LOOKS;
     } else if (!is_near) {
         match->verdict = BSLAM_VERDICT_NEW;
         match->reason = BSLAM_REASON_NONE;
-        match->near = near;
     }
 }
 

@@ -110,6 +110,14 @@
     REAL(looks_offset, -0.5, -100.0, 100.0, "svm: log odds of the decision value 0") \
     REAL(looks_low, 8.0, 0.0, 100.0, "svm: looks speak against a match by this much at most") \
     REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
+    REAL(class_doubt, 0.1, 1e-3, 1e3, \
+         "svm: a beacon counts as seen so often as each class before it is seen at all") \
+    REAL(new_range_sd_m, 0.5, 1e-3, 1e6, \
+         "svm: a sighting whose distance is less sure than this starts no beacon") \
+    INTEGER(new_far_matches, 2, 0, 250, "svm: where its frame has so many matches") \
+    REAL(double_m, 1.0, 0.0, 1e3, "svm: two beacons nearer than this may be one") \
+    REAL(double_sd_m, 0.1, 0.0, 1e3, "svm: whose two places differ by about this") \
+    REAL(double_d2, 9.0, 0.0, 1e3, "svm: and by no more than this squared Mahalanobis distance") \
     REAL(far_d2, 300.0, 0.0, 1e6, \
          "svm: a sighting that clearly looks like a beacon up to here, but is no candidate, is not new") \
     REAL(learn_d2, 9.0, 0.0, 1e6, "svm: a machine learns from matches nearer than this") \
@@ -121,9 +129,11 @@
          "svm: a decision value above this says that a beacon looks like another machine's") \
     INTEGER(share_sightings, 12, 1, 250, "svm: so often before it shares that machine, or leaves one again") \
     INTEGER(doubt_sightings, 25, 1, 250, \
-            "svm: a new beacon in another's place, seen so often and never with it, is retired") \
+            "svm: of two beacons in one place, seen so often and never both, one is retired") \
     INTEGER(learn_budget, 600, 0, 1000000, "svm: pieces of training after each frame") \
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
+    REAL(confirm_way_m, 0.0, 0.0, 100.0, \
+         "of which one counts when the robot has gone this far since the last that did") \
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none")
 // clang-format on

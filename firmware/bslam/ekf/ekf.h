@@ -64,6 +64,8 @@ typedef struct bslam_beacon {
     uint32_t sightings;  ///< that were fused, the one that started it included
     uint32_t gated;      ///< sightings taken for it that its gate rejected
     uint32_t way_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
+    uint32_t view_um;    ///< the same when it was last counted in views
+    uint16_t views;      ///< sightings far enough apart to count towards its confirmation
     bool confirmed;
     uint8_t beacon_class;
 } bslam_beacon_t;

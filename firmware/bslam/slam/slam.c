@@ -1,5 +1,6 @@
 #include "bslam/slam/slam.h"
 
+#include "bslam/association/doubles.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
@@ -12,9 +13,6 @@ static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
-
-// Beacons that are retired for being in one's place before it is that one that leaves.
-enum { OUSTED_MAX = 3 };
 
 bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id)
 {
@@ -281,6 +279,18 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
     slam->counters.frozen += reason == BSLAM_REASON_FROZEN ? 1u : 0u;
 }
 
+/// A sighting counts towards a beacon's confirmation if the robot has gone far enough since the last that
+/// did.
+static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon)
+{
+    const uint32_t least_um = (uint32_t)(slam->params.confirm_way_m * MICROMETRES_PER_M);
+    if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
+        beacon->view_um = slam->way_um;
+        beacon->views++;
+        beacon->confirmed = beacon->views >= slam->params.confirm_sightings;
+    }
+}
+
 /// Fuses a sighting with the beacon that association chose.
 static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beacon,
                        bslam_innovation_t *innovation, bslam_account_t *account)
@@ -304,7 +314,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beac
     beacon->sightings++;
     beacon->way_um = slam->way_um;
     beacon->last_seen_us = time_us;
-    beacon->confirmed = beacon->confirmed || beacon->sightings >= (uint32_t)slam->params.confirm_sightings;
+    count_view(slam, beacon);
 }
 
 static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
@@ -322,6 +332,8 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->last_seen_us = time_us;
     beacon->sightings = 1;
     beacon->way_um = slam->way_um;
+    beacon->view_um = slam->way_um;
+    beacon->views = 1;
     beacon->confirmed = slam->params.confirm_sightings <= 1;
     fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;
@@ -407,63 +419,8 @@ static void drop_beacon(bslam_slam_t *slam, int index)
     bslam_ekf_remove(&slam->ekf, index);
 }
 
-/// True if the last frame matched a beacon, or made it.
-static bool is_seen(const bslam_slam_t *slam, int index, int count)
-{
-    for (int i = 0; i < count; i++) {
-        const bslam_account_t *account = &slam->accounts[i];
-        const bool used = account->outcome == BSLAM_OUTCOME_MATCHED || account->outcome == BSLAM_OUTCOME_NEW;
-        if (used && account->beacon_uid == slam->ekf.beacons[index].uid) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/// A new beacon in another's place: one that has never been seen together with that other is the same seen
-/// amiss, and leaves. When that happens again and again, the other has gone and leaves instead. True if one
-/// left.
-static bool settle_doubt(bslam_slam_t *slam, int index, int count)
-{
-    bslam_look_t *look = &slam->looks->of[index];
-    const int other = find_uid(&slam->ekf, look->near_uid);
-    if (other < 0 || is_seen(slam, other, count)) {
-        look->is_doubted = false;
-        return false;
-    }
-    look->alone++;
-    if (look->alone < slam->params.doubt_sightings) {
-        return false;
-    }
-    bslam_look_t *place = &slam->looks->of[other];
-    place->ousted++;
-    const bool is_gone = place->ousted >= OUSTED_MAX;
-    look->is_doubted = false;
-    drop_beacon(slam, is_gone ? other : index);
-    slam->looks->counters.retired++;
-    return true;
-}
-
-static void settle_doubts(bslam_slam_t *slam, int count)
-{
-    for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        if (slam->looks->of[b].is_doubted && is_seen(slam, b, count) && settle_doubt(slam, b, count)) {
-            return;
-        }
-    }
-}
-
-/// Notes whose place a new beacon is in.
-static void doubt(bslam_slam_t *slam, int index, uint32_t near_uid)
-{
-    bslam_look_t *look = &slam->looks->of[index];
-    look->is_doubted = true;
-    look->near_uid = near_uid;
-    look->alone = 0;
-}
-
 /// Machines learn from what a frame surely showed, and train for a bounded time.
-static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
+static void learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
     if (slam->looks == NULL || slam->is_frozen || slam->params.association != BSLAM_ASSOCIATION_SVM) {
         return;
@@ -471,21 +428,21 @@ static void learn_looks(bslam_slam_t *slam, const bslam_sighting_t *sightings, i
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
-        if (sightings[i].signature == NULL || (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED)) {
+        if (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED) {
             continue;
         }
         const int index = find_uid(&slam->ekf, account->beacon_uid);
-        if (is_new && slam->matches[i].near >= 0) {
-            doubt(slam, index, slam->ekf.beacons[slam->matches[i].near].uid);
-        }
         if (is_new || slam->matches[i].sure) {
             bslam_looks_teach(slam->looks, &slam->params, index, slam->ekf.beacon_count, slam->way_um,
-                              sightings[i].signature);
+                              &sightings[i]);
         } else {
             slam->looks->counters.unsure++;
         }
     }
-    settle_doubts(slam, count);
+    const int leaves = bslam_doubles_settle(slam->looks, &slam->ekf, &slam->params, time_us);
+    if (leaves != BSLAM_NO_DOUBLE) {
+        drop_beacon(slam, leaves);
+    }
     (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
 }
 
@@ -564,7 +521,7 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         const bslam_associate_fn associate = bslam_associate_method(&slam->params);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        learn_looks(slam, sightings, count);
+        learn_looks(slam, time_us, sightings, count);
         tidy_map(slam, time_us, mount);
     } else {
         for (int i = 0; i < count; i++) {

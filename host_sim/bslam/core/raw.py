@@ -47,21 +47,20 @@ class Library:
 
     def sightings(
         self,
-        rows: Sequence[tuple[float, float, int, bool, float, float]],
+        rows: Sequence[tuple[float, float, int, int, float, float]],
         signature: NDArray[np.float32] | None = None,
     ) -> Any:
-        """Rows (bearing_rad, range_m or NaN, label, mappable, bearing_sd_rad, range_sd_m) as a C array.
+        """Rows (bearing_rad, range_m or NaN, label, beacon_class, bearing_sd_rad, range_sd_m) as a C array.
 
         signature: (rows, n) float32, C-contiguous; the array is good as long as it is.
         """
         array = self.ffi.new("bslam_sighting_t[]", len(rows))
-        not_mappable = 255  # BSLAM_CLASS_NOT_MAPPABLE; a macro has no place in an ffi declaration
         for sighting, row in zip(array, rows, strict=True):
-            bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m = row
+            bearing_rad, range_m, label, beacon_class, bearing_sd_rad, range_sd_m = row
             sighting.bearing_rad = bearing_rad
             sighting.has_range = range_m == range_m
             sighting.range_m = range_m if range_m == range_m else 0.0
-            sighting.beacon_class = 0 if mappable else not_mappable
+            sighting.beacon_class = beacon_class
             sighting.label = label
             sighting.bearing_sd_rad = bearing_sd_rad
             sighting.range_sd_m = range_sd_m

@@ -11,6 +11,7 @@ from bslam.core.learner import SIGNATURE_SIZE, encode
 from bslam.core.raw import library
 from bslam.errors import BslamError
 
+_NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE; a macro has no place in an ffi declaration
 # What velocity_states = 1 allows of other parameters: the only contradictions that there are.
 _BESIDE_VELOCITY_STATES = {
     "scale_states": "0",
@@ -204,17 +205,20 @@ class Slam:
         bearing_sd_rad: Sequence[float] | None = None,
         range_sd_m: Sequence[float] | None = None,
         signature: NDArray[np.float32] | None = None,
+        beacon_class: Sequence[int] | None = None,
     ) -> list[Account]:
         """One image: equal lengths; range NaN: direction only; label -1: no identity.
 
         The noise as the detector gives it; 0, or none at all: as the parameters have it. signature (m, 71):
-        how each looks; None: nobody knows.
+        how each looks; None: nobody knows. beacon_class: the detector's kind of each, 1 to 254; 0, or none at
+        all: it does not say.
 
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
         silent = [0.0] * len(bearing_rad)
         noise = (bearing_sd_rad or silent, range_sd_m or silent)
-        rows = list(zip(bearing_rad, range_m, label, mappable, *noise, strict=True))
+        classes = told_classes(mappable, beacon_class)
+        rows = list(zip(bearing_rad, range_m, label, classes, *noise, strict=True))
         if signature is not None:
             signature = _checked_signatures(signature, len(rows))
         try:
@@ -361,6 +365,12 @@ class Slam:
     def lose_pose(self) -> None:
         """Says that nobody knows where the robot is; sightings are used for nothing until it is found."""
         self._lib.bslam_slam_lose_pose(self._slam)
+
+
+def told_classes(mappable: Sequence[bool], beacon_class: Sequence[int] | None) -> list[int]:
+    """As C has them: 0 where none is told, 255 for what is not to be mapped."""
+    told = beacon_class or [0] * len(mappable)
+    return [one if is_mappable else _NOT_MAPPABLE for one, is_mappable in zip(told, mappable, strict=True)]
 
 
 def _checked_signatures(signature: NDArray[np.float32], count: int) -> NDArray[np.float32]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
@@ -30,7 +30,8 @@ class AccountLike(Protocol):
 
 
 class Ledger:
-    """Counts associations. A beacon of the map has the true identity of the sighting that made it.
+    """Counts associations. A beacon of the map has the true identity that most of its sightings had so far, the
+    first of equals.
 
     wrong_associations  matched with a beacon of another identity; a moving thing or clutter with any
     false_new           a new beacon although one of that identity is in the map
@@ -41,7 +42,7 @@ class Ledger:
 
     def __init__(self, uids_in_map: Callable[[], Iterable[int]]) -> None:
         self._uids_in_map = uids_in_map
-        self._identity: dict[int, int] = {}
+        self._shown: defaultdict[int, Counter[int]] = defaultdict(Counter)  # by beacon, identity: sightings
         self._counts: Counter[str] = Counter()
 
     def book(self, true_id: Sequence[int], mappable: Sequence[bool], accounts: Sequence[AccountLike]) -> None:
@@ -64,11 +65,11 @@ class Ledger:
 
     def know(self, uid: int, identity: int) -> None:
         """A beacon that was in the map from the start."""
-        self._identity[uid] = identity
+        self._shown[uid][identity] += 1
 
     def identity(self, uid: int) -> int:
         """True identity of a beacon of the map, CLUTTER if there is none."""
-        return self._identity.get(uid, CLUTTER)
+        return self._shown[uid].most_common(1)[0][0] if uid in self._shown else CLUTTER
 
     def counts(self) -> SightingCounts:
         """The sums so far."""
@@ -84,18 +85,17 @@ class Ledger:
 
     def _identities_in_map(self, made: set[int]) -> set[int]:
         """Identities mapped before this frame and not removed since."""
-        return {
-            self._identity[uid] for uid in self._uids_in_map() if uid not in made and uid in self._identity
-        }
+        return {self.identity(uid) for uid in self._uids_in_map() if uid not in made and uid in self._shown}
 
     def _book_one(self, identity: int, account: AccountLike, mapped: set[int]) -> None:
         self._counts["sightings"] += 1
         is_beacon = identity != CLUTTER
         if account.result == "matched":
             self._counts["wrong"] += not is_beacon or self.identity(account.beacon_uid) != identity
+            self._shown[account.beacon_uid][identity] += 1
         elif account.result == "new":
             self._counts["false_new"] += is_beacon and identity in mapped
-            self._identity[account.beacon_uid] = identity
+            self._shown[account.beacon_uid][identity] += 1
             mapped.add(identity)
         else:
             self._counts[account.result] += 1

@@ -110,6 +110,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
     if options.sensor == "camera":
         params |= defaults.CAMERA
+        if options.association != "known":
+            params |= defaults.CAMERA_UNKNOWN_IDENTITY
     if log.collection == "mrclam":
         params |= defaults.REAL_LOG
         if options.association != "known":

@@ -329,6 +329,7 @@ class Frames:
         self._true_id: list[int] = sightings.beacon_id.tolist()
         self._columns = columns_for_filter(sightings, options)
         self._signature = sightings.signature if uses_looks(options) else None
+        self._class = None if sightings.beacon_class is None else sightings.beacon_class.tolist()
         self._next = 0
 
     def waiting_before(self, until_us: int | None) -> bool:
@@ -345,6 +346,7 @@ class Frames:
         columns: list[Any] = [column[rows] for column in self._columns]
         if self._signature is not None:
             columns += [None] * (SIGNATURE - len(columns)) + [self._signature[rows]]
+            columns += [] if self._class is None else [self._class[rows]]
         return self._time_us[frame], self._true_id[rows], columns
 
 

@@ -116,7 +116,7 @@ def signatures(first: int, part: NDArray[np.float32]) -> bytes:
     return bytes((first, len(part))) + part.astype("<f4").tobytes()
 
 
-def sightings(rows: Sequence[tuple[float, float, int, bool, float, float]], signed: bool, most: int) -> bytes:
+def sightings(rows: Sequence[tuple[float, float, int, int, float, float]], signed: bool, most: int) -> bytes:
     """Rows as `bslam.core.raw.Library.sightings` takes them; of more than `most` only the number counts.
 
     signed: the signatures of all have been sent.
@@ -124,7 +124,7 @@ def sightings(rows: Sequence[tuple[float, float, int, bool, float, float]], sign
     count, rows = len(rows), rows[:most]
     table = np.zeros(len(rows), dtype=_SIGHTING)
     if rows:
-        bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m = zip(*rows, strict=True)
+        bearing_rad, range_m, label, beacon_class, bearing_sd_rad, range_sd_m = zip(*rows, strict=True)
         with np.errstate(over="ignore"):
             has_range = ~np.isnan(np.array(range_m, dtype=np.float64))
             table["bearing_rad"] = bearing_rad
@@ -132,7 +132,7 @@ def sightings(rows: Sequence[tuple[float, float, int, bool, float, float]], sign
             table["bearing_sd_rad"] = bearing_sd_rad
             table["range_sd_m"] = range_sd_m
         table["label"] = label
-        table["beacon_class"] = np.where(mappable, 0, _NOT_MAPPABLE)
+        table["beacon_class"] = beacon_class
         table["flags"] = has_range | signed << 1
     return bytes((min(count, 255),)) + table.tobytes()
 

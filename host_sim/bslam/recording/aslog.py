@@ -84,6 +84,7 @@ def _sightings(frames: list[Frame]) -> Sightings:
     def column(name: str, kind: Any) -> Any:
         return np.array([value for frame in frames for value in getattr(frame, name)], dtype=kind)
 
+    classed = bool(frames) and all(frame.beacon_class is not None for frame in frames)
     noisy = bool(frames) and all(frame.bearing_sd_rad is not None for frame in frames)
     signatures = [frame.signature for frame in frames if frame.signature is not None]
     return Sightings(
@@ -98,6 +99,7 @@ def _sightings(frames: list[Frame]) -> Sightings:
         bearing_sd_rad=column("bearing_sd_rad", np.float64) if noisy else None,
         range_sd_m=column("range_sd_m", np.float64) if noisy else None,
         signature=np.concatenate(signatures) if frames and len(signatures) == len(frames) else None,
+        beacon_class=column("beacon_class", np.int64) if classed else None,
     )
 
 

@@ -63,6 +63,7 @@ class Frame:
     bearing_sd_rad: list[float] | None = None
     range_sd_m: list[float] | None = None
     signature: NDArray[np.float32] | None = None  # (m, 71)
+    beacon_class: list[int] | None = None
     true_id: list[int] | None = None  # beacon_id of each, -1: of none; None: nobody knows
     accounts: list[Account] | None = None  # None: the frame was refused
     refused: str | None = None
@@ -152,6 +153,8 @@ def _frame_to(one: Frame) -> Json:
             row["true_id"] = one.true_id[i]
         if one.signature is not None:
             row["signature"] = _text(one.signature[i])
+        if one.beacon_class is not None:
+            row["beacon_class"] = one.beacon_class[i]
         if one.accounts is not None:
             row["account"] = asdict(one.accounts[i])
         rows.append(row)
@@ -162,7 +165,7 @@ def _frame_to(one: Frame) -> Json:
 def _frame_from(content: Json) -> Frame:
     rows = content["sightings"]
     range_m = [math.nan if row["range_m"] is None else row["range_m"] for row in rows]
-    identified = bool(rows) and "true_id" in rows[0]
+    identified, classed = (bool(rows) and name in rows[0] for name in ("true_id", "beacon_class"))
     return Frame(
         content["time_us"],
         _column(rows, "bearing_rad"),
@@ -172,6 +175,7 @@ def _frame_from(content: Json) -> Frame:
         _column(rows, "bearing_sd_rad") if content["noisy"] else None,
         _column(rows, "range_sd_m") if content["noisy"] else None,
         _stacked(_column(rows, "signature")) if content["signed"] else None,
+        _column(rows, "beacon_class") if classed else None,
         _column(rows, "true_id") if identified else None,
         None if content["refused"] else [Account(**one) for one in _column(rows, "account")],
         content["refused"],

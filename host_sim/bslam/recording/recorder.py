@@ -53,9 +53,11 @@ class Recorder:
         bearing_sd_rad: list[float] | None = None,
         range_sd_m: list[float] | None = None,
         signature: NDArray[np.float32] | None = None,
+        beacon_class: list[int] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
-        inputs = (time_us, bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m, signature)
+        columns = (bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m)
+        inputs = (time_us, *columns, signature, beacon_class)
         accounts, refusal = self._attempt("sightings", *inputs)
         self._end_step(Frame(*inputs, self.true_id, accounts, _status(refusal)), refusal)
         return list(accounts)

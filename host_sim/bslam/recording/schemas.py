@@ -63,6 +63,7 @@ _SIGHTING = _object(
     bearing_sd_rad=_NUMBER,
     range_sd_m=_NUMBER,
     signature=_TEXT,
+    beacon_class=_WHOLE,
     true_id=_WHOLE,
     account=_ACCOUNT,
 )

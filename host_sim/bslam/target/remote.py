@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.core.errors import CoreError
 from bslam.core.raw import library
-from bslam.core.slam import Account, Beacon, Slam
+from bslam.core.slam import Account, Beacon, Slam, told_classes
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
@@ -129,11 +129,13 @@ class RemoteSlam:
         bearing_sd_rad: Sequence[float] | None = None,
         range_sd_m: Sequence[float] | None = None,
         signature: NDArray[np.float32] | None = None,
+        beacon_class: Sequence[int] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
         silent = [0.0] * len(bearing_rad)
         noise = (bearing_sd_rad or silent, range_sd_m or silent)
-        rows = list(zip(bearing_rad, range_m, label, mappable, *noise, strict=True))
+        classes = told_classes(mappable, beacon_class)
+        rows = list(zip(bearing_rad, range_m, label, classes, *noise, strict=True))
         signed, most = signature is not None, self._client.info.sightings_max
         payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
         if signature is not None:

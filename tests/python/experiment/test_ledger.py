@@ -43,6 +43,7 @@ def test_right_matches_count_as_nothing_but_sightings(ledger, in_map):
 def test_wrong_associations_are_of_other_identity_clutter_or_moving_things(ledger, in_map):
     in_map += [10]
     book(ledger, (3, True, Account("new", 10)))
+    book(ledger, *[(3, True, Account("matched", 10))] * 4)
     book(
         ledger,
         (5, True, Account("matched", 10)),  # another beacon
@@ -58,6 +59,16 @@ def test_matching_a_beacon_that_clutter_made_is_wrong(ledger, in_map):
     book(ledger, (CLUTTER, True, Account("new", 10)))
     book(ledger, (3, True, Account("matched", 10)))
     assert ledger.counts().wrong_associations == 1
+
+
+def test_a_beacon_is_what_most_of_its_sightings_were_so_far(ledger, in_map):
+    in_map += [10]
+    book(ledger, (CLUTTER, True, Account("new", 10)))
+    book(ledger, *[(3, True, Account("matched", 10))] * 5)
+    assert ledger.identity(10) == 3
+    assert ledger.counts().wrong_associations == 2  # until three of its sightings outnumbered the first
+    book(ledger, (CLUTTER, True, Account("matched", 10)))
+    assert ledger.counts().wrong_associations == 3
 
 
 def test_false_new_needs_a_beacon_of_that_identity_in_the_map(ledger, in_map):

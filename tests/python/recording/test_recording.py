@@ -50,7 +50,7 @@ times = st.integers(-(2**62), 2**62)
 def frames(draw):
     count = draw(st.integers(0, 3))
     rows = {"min_size": count, "max_size": count}
-    noisy, signed, known, refused = (draw(st.booleans()) for _ in range(4))
+    noisy, signed, classed, known, refused = (draw(st.booleans()) for _ in range(5))
     table = np.random.default_rng(draw(st.integers(0, 9))).standard_normal((count, 71)).astype(np.float32)
     return Frame(
         time_us=draw(times),
@@ -61,6 +61,7 @@ def frames(draw):
         bearing_sd_rad=draw(st.lists(floats, **rows)) if noisy else None,
         range_sd_m=draw(st.lists(floats, **rows)) if noisy else None,
         signature=table if signed else None,
+        beacon_class=draw(st.lists(st.integers(0, 254), **rows)) if classed and count else None,
         true_id=draw(st.lists(st.integers(-1, 99), **rows)) if known and count else None,
         accounts=None if refused else draw(st.lists(accounts, **rows)),
         refused="BSLAM_E_TIME" if refused else None,

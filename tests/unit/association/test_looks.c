@@ -1,5 +1,7 @@
 #include "support.h"
 
+#include <math.h>
+
 #include "bslam/association/looks.h"
 
 static bslam_looks_t looks;
@@ -36,13 +38,20 @@ static void train(void)
     }
 }
 
+static void show(int index, int count, const float *signature)
+{
+    bslam_sighting_t sighting = unit_polar(0, 4, -1);
+    sighting.signature = signature;
+    bslam_looks_teach(&looks, &params, index, count, way_um, &sighting);
+}
+
 /// A sure sighting of beacon `index` of `count`, which looks like an object, a good way after the last.
 static void teach(int index, int count, int object, int view)
 {
     float signature[BSLAM_SAMPLE_FEATURES];
     view_of(object, view, signature);
     way_um += 150000;
-    bslam_looks_teach(&looks, &params, index, count, way_um, signature);
+    show(index, count, signature);
     train();
 }
 
@@ -93,11 +102,12 @@ static void test_a_robot_that_stands_still_teaches_once(void **state)
     float signature[BSLAM_SAMPLE_FEATURES];
     view_of(0, 0, signature);
     for (int i = 0; i < 5; i++) {
-        bslam_looks_teach(&looks, &params, 0, 1, way_um, signature);
+        show(0, 1, signature);
     }
     assert_int_equal(looks.counters.taught, 1);
     // The way counts modulo 2^32 micrometres.
-    bslam_looks_teach(&looks, &params, 0, 1, way_um - 1, signature);
+    way_um--;
+    show(0, 1, signature);
     assert_int_equal(looks.counters.taught, 2);
 }
 
@@ -168,11 +178,45 @@ static void test_forget_while_the_machine_is_in_training(void **state)
     float signature[BSLAM_SAMPLE_FEATURES];
     view_of(0, 90, signature);
     way_um += 150000;
-    bslam_looks_teach(&looks, &params, 0, 3, way_um, signature);
+    show(0, 3, signature);
     (void)bslam_learner_work(&looks.learner, 5);
     bslam_looks_forget(&looks, 0, 3);
     train();
     assert_true(value_of(0, 1, 60) > 0);  // what was beacon 1
+}
+
+static void see_class(uint8_t beacon_class, int times)
+{
+    bslam_sighting_t sighting = unit_polar(0, 4, -1);
+    sighting.beacon_class = beacon_class;
+    for (int i = 0; i < times; i++) {
+        way_um += 150000;
+        bslam_looks_teach(&looks, &params, 0, 1, way_um, &sighting);
+    }
+}
+
+static void test_class_odds_are_of_counts_with_a_little_doubt(void **state)
+{
+    params.class_doubt = BSLAM_R(0.5);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, 3), 0, 1e-6);
+    see_class(3, 6);
+    see_class(7, 2);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, 3), log(8 * 6.5 / 12), 1e-5);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, 7), log(8 * 2.5 / 12), 1e-5);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, 1), log(8 * 0.5 / 12), 1e-5);
+    see_class(BSLAM_CLASS_NONE, 3);
+    see_class(BSLAM_LOOKS_CLASSES + 1, 3);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, 3), log(8 * 6.5 / 12), 1e-5);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, BSLAM_CLASS_NONE), 0, 0);
+    assert_near(bslam_looks_class_odds(&looks, &params, 0, BSLAM_LOOKS_CLASSES + 1), 0, 0);
+}
+
+static void test_a_class_seen_for_long_is_unlearned_again(void **state)
+{
+    see_class(3, 300);
+    assert_true(bslam_looks_class_odds(&looks, &params, 0, 5) < -2);
+    see_class(5, 40);
+    assert_true(bslam_looks_class_odds(&looks, &params, 0, 5) > 1);
 }
 
 static void test_all_beacons_alike_end_with_one_machine(void **state)
@@ -224,6 +268,8 @@ static void test_clear_forgets_all(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_class_odds_are_of_counts_with_a_little_doubt, setup),
+        cmocka_unit_test_setup(test_a_class_seen_for_long_is_unlearned_again, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
         cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_machine, setup),
         cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),

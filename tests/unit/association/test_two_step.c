@@ -49,6 +49,9 @@ static bslam_params_t svm_params(void)
     params.looks_low = 8;
     params.looks_high = 4;
     params.far_d2 = 300;
+    params.class_doubt = BSLAM_R(0.1);
+    params.new_range_sd_m = 100;
+    params.new_far_matches = 1;
     params.learn_d2 = 9;
     params.learn_lead = 4;
     params.learn_margin = 0;
@@ -162,7 +165,40 @@ static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
     const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
     const decision_t d = decide(&ekf, &params, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    assert_int_equal(d.matches[0].near, 0);
+}
+
+static void test_a_class_counts_as_its_log_odds_say(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    looks.of[0].seen_as[2] = 10;
+    bslam_sighting_t seen = unit_polar(0, 4, -1);
+    seen.beacon_class = 3;
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score,
+                position_score(&params, 4, 0) + log(8 * 10.1 / 10.8), 1e-3);
+    seen.beacon_class = 4;
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    assert_near(d.matches[0].score, position_score(&params, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
+}
+
+static void test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known(void **state)
+{
+    bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_sighting_t seen[] = {unit_polar(1.5, 12, -1), unit_polar(0, 4, -1)};
+    seen[0].range_sd_m = BSLAM_R(0.8);
+    params.new_range_sd_m = BSLAM_R(0.7);
+    decision_t d = decide(&ekf, &params, seen, 2);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_FAR, -1);
+    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    d = decide(&ekf, &params, seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    seen[0].range_sd_m = BSLAM_R(0.6);
+    d = decide(&ekf, &params, seen, 2);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    seen[0] = unit_direction(1.5, -1);
+    d = decide(&ekf, &params, seen, 2);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_far_but_clearly_alike_is_not_new(void **state)
@@ -326,6 +362,8 @@ static void test_given_takes_no_more_than_it_has_room_for(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_a_class_counts_as_its_log_odds_say, setup),
+        cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
         cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),

@@ -556,6 +556,32 @@ static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void *
     }
 }
 
+static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.confirm_sightings = 3;
+    params.confirm_way_m = BSLAM_R(0.1);
+    bslam_slam_t slam = started(params);
+    const bslam_sighting_t seen = unit_polar(0, 4, 0);
+    int64_t time_us = 0;
+    for (int i = 0; i < 10; i++, time_us += STEP_US) {
+        see(&slam, time_us, &seen, 1);
+        drive(&slam, time_us + STEP_US, 0, 0);
+    }
+    assert_false(beacon(&slam, 0).confirmed);
+    for (int i = 0; i < 2; i++, time_us += STEP_US) {
+        drive(&slam, time_us + STEP_US, 0.06, 0.06);  // too little for one more, enough for two
+        assert_false(beacon(&slam, 0).confirmed);
+        see(&slam, time_us + STEP_US, &seen, 1);
+    }
+    assert_false(beacon(&slam, 0).confirmed);
+    for (int i = 0; i < 2; i++, time_us += STEP_US) {
+        drive(&slam, time_us + STEP_US, 0.06, 0.06);
+        see(&slam, time_us + STEP_US, &seen, 1);
+    }
+    assert_true(beacon(&slam, 0).confirmed);
+}
+
 static void test_sightings_one_sighting_confirms_where_that_is_asked(void **state)
 {
     bslam_params_t params = unit_params();
@@ -1168,6 +1194,7 @@ int main(void)
         cmocka_unit_test(test_sightings_order_within_a_frame_does_not_matter),
 
         cmocka_unit_test(test_sightings_beacon_is_confirmed_by_its_number_of_sightings),
+        cmocka_unit_test(test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts),
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
         cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),

@@ -30,6 +30,9 @@ static bslam_params_t svm_params(void)
     params.learn_way_m = 0;
     params.learn_budget = 2000;
     params.doubt_sightings = 5;
+    params.double_m = 1;
+    params.double_sd_m = BSLAM_R(0.2);
+    params.double_d2 = 9;
     return params;
 }
 
@@ -154,7 +157,7 @@ static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **s
     assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_E_NO_BEACON);
 }
 
-/// Another object where beacon 0 is, which is not seen with it.
+/// Another object where beacon 0 is, as well as its distance tells, which is not seen with it.
 static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void **state)
 {
     see_two(20);

@@ -1,0 +1,86 @@
+#include "bslam/association/doubles.h"
+
+// Beacons that have left for being in one's place before it is that one that leaves.
+enum { OUSTED_MAX = 3 };
+
+static bool is_seen(const bslam_ekf_t *ekf, int index, int64_t time_us)
+{
+    return ekf->beacons[index].last_seen_us == time_us;
+}
+
+/// Whether two beacons may stand in the same place, as far as the map knows.
+static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
+{
+    const int at = ekf->beacons[a].at;
+    const int bt = ekf->beacons[b].at;
+    if (ekf->beacons[a].kind != BSLAM_BEACON_POINT || ekf->beacons[b].kind != BSLAM_BEACON_POINT) {
+        return false;
+    }
+    const bslam_real_t dx = ekf->mean[at] - ekf->mean[bt];
+    const bslam_real_t dy = ekf->mean[at + 1] - ekf->mean[bt + 1];
+    if (dx * dx + dy * dy > params->double_m * params->double_m) {
+        return false;
+    }
+    const bslam_real_t *p = ekf->covariance;
+    const bslam_real_t floor_m2 = params->double_sd_m * params->double_sd_m;
+    const bslam_real_t xx = floor_m2 + bslam_symmat_get(p, at, at) + bslam_symmat_get(p, bt, bt) -
+                            2 * bslam_symmat_get(p, at, bt);
+    const bslam_real_t yy = floor_m2 + bslam_symmat_get(p, at + 1, at + 1) +
+                            bslam_symmat_get(p, bt + 1, bt + 1) - 2 * bslam_symmat_get(p, at + 1, bt + 1);
+    const bslam_real_t xy = bslam_symmat_get(p, at + 1, at) + bslam_symmat_get(p, bt + 1, bt) -
+                            bslam_symmat_get(p, at + 1, bt) - bslam_symmat_get(p, bt + 1, at);
+    const bslam_real_t det = xx * yy - xy * xy;
+    return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->double_d2 * det;
+}
+
+/// Of a pair in one place, what the frame adds. True if one of them must leave.
+static bool count_pair(bslam_look_t *younger, uint32_t older_uid, bool together, int32_t limit)
+{
+    if (younger->near_uid != older_uid || together) {
+        younger->near_uid = older_uid;
+        younger->alone = 0;
+    }
+    younger->alone = (uint8_t)(younger->alone + (together ? 0 : 1));
+    return younger->alone >= limit;
+}
+
+/// Which of two leaves: the one with fewer sightings, unless others have left for the same beacon again and
+/// again: then that one is no longer there.
+static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, int a, int b)
+{
+    const int less = ekf->beacons[a].sightings < ekf->beacons[b].sightings ? a : b;
+    const int more = less == a ? b : a;
+    looks->of[more].ousted++;
+    return looks->of[more].ousted >= OUSTED_MAX ? more : less;
+}
+
+/// The oldest other beacon in the place of beacon `index`; BSLAM_NO_DOUBLE if there is none.
+static int find_other(const bslam_ekf_t *ekf, const bslam_params_t *params, int index)
+{
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        if (b != index && is_one_place(ekf, params, index, b)) {
+            return b;
+        }
+    }
+    return BSLAM_NO_DOUBLE;
+}
+
+int bslam_doubles_settle(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                         int64_t time_us)
+{
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        const int other = is_seen(ekf, b, time_us) ? find_other(ekf, params, b) : BSLAM_NO_DOUBLE;
+        if (other == BSLAM_NO_DOUBLE) {
+            continue;
+        }
+        const int younger = ekf->beacons[other].uid > ekf->beacons[b].uid ? other : b;
+        const int older = younger == b ? other : b;
+        if (count_pair(&looks->of[younger], ekf->beacons[older].uid, is_seen(ekf, other, time_us),
+                       params->doubt_sightings)) {
+            looks->of[younger].alone = 0;
+            looks->counters.retired++;
+            return who_leaves(looks, ekf, b, other);
+        }
+    }
+    return BSLAM_NO_DOUBLE;
+}
