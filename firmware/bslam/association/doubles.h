@@ -1,5 +1,5 @@
-/// Two beacons of the map in one place, of which one is a mistake, or no longer there. MATH "Two in one
-/// place".
+/// Two beacons of the map in one place, of which one is a mistake, or no longer there. MATH
+/// "Position and looks".
 #ifndef BSLAM_ASSOCIATION_DOUBLES_H
 #define BSLAM_ASSOCIATION_DOUBLES_H
 

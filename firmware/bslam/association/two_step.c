@@ -10,7 +10,6 @@ typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against a new one
     bslam_real_t distance2;
     bslam_opinion_t opinion;
-    bslam_real_t class_odds;
 } candidate_t;
 
 static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
@@ -32,6 +31,15 @@ static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinio
            clip(odds, -params->looks_low, params->looks_high);
 }
 
+/// What the detector's class adds to the score.
+static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
+{
+    return frame->looks == NULL
+               ? 0
+               : bslam_looks_class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
+}
+
 /// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
 static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, int beacon,
                   const bslam_sample_t *sample, candidate_t *found)
@@ -50,13 +58,8 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     if (sample != NULL) {
         found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
     }
-    found->class_odds = 0;
-    if (frame->looks != NULL) {
-        found->class_odds =
-            bslam_looks_class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
-    }
     found->score = weight.log_density - log_new(frame->params, sighting) +
-                   looks_score(frame->params, &found->opinion) + found->class_odds;
+                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
     return true;
 }
 
@@ -96,7 +99,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
     bslam_match_t *match = &matches[i];
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
-    candidate_t best = {0, -1, {0.0f, 0.0f}, 0};
+    candidate_t best = {0, -1, {0.0f, 0.0f}};
     bslam_real_t second = 0;
     bool has_second = false;
     match->beacon = -1;
@@ -206,7 +209,8 @@ static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_
     for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
         candidate_t one;
         if (!is_taken(frame, matches, b) && weigh(frame, given, i, b, sample, &one) &&
-            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f && one.class_odds >= 0 &&
+            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
+            class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high) {
             return true;
         }

@@ -23,8 +23,8 @@ CAMERA: Final[dict[str, int | float]] = {
     "new_per_m2": 0.003,
 }
 
-# With identity unknown, besides: the detector believes in things that are no beacon, mostly for a few metres of
-# way. A beacon counts once the robot has seen it from twenty places; until then it serves, and nothing is
+# With identity unknown, besides: the detector believes in things that are no beacon, mostly for a few metres
+# of way. A beacon counts once the robot has seen it from twenty places; until then it serves, and nothing is
 # thrown away. Its errors are its own for a metre of way, so one beacon mapped twice stands in two places.
 # Tried on paper_room, seeds 100:108.
 CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {

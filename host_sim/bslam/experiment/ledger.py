@@ -30,8 +30,8 @@ class AccountLike(Protocol):
 
 
 class Ledger:
-    """Counts associations. A beacon of the map has the true identity that most of its sightings had so far, the
-    first of equals.
+    """Counts associations. A beacon of the map has the true identity that most of its sightings had so far,
+    the first of equals.
 
     wrong_associations  matched with a beacon of another identity; a moving thing or clutter with any
     false_new           a new beacon although one of that identity is in the map

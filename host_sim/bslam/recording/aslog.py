@@ -84,9 +84,10 @@ def _sightings(frames: list[Frame]) -> Sightings:
     def column(name: str, kind: Any) -> Any:
         return np.array([value for frame in frames for value in getattr(frame, name)], dtype=kind)
 
-    classed = bool(frames) and all(frame.beacon_class is not None for frame in frames)
-    noisy = bool(frames) and all(frame.bearing_sd_rad is not None for frame in frames)
-    signatures = [frame.signature for frame in frames if frame.signature is not None]
+    def told(name: str) -> bool:
+        return bool(frames) and all(getattr(frame, name) is not None for frame in frames)
+
+    noisy = told("bearing_sd_rad")
     return Sightings(
         time_us=np.repeat(
             np.array([frame.time_us for frame in frames], dtype=np.int64),
@@ -98,8 +99,8 @@ def _sightings(frames: list[Frame]) -> Sightings:
         mappable=column("mappable", np.bool_),
         bearing_sd_rad=column("bearing_sd_rad", np.float64) if noisy else None,
         range_sd_m=column("range_sd_m", np.float64) if noisy else None,
-        signature=np.concatenate(signatures) if frames and len(signatures) == len(frames) else None,
-        beacon_class=column("beacon_class", np.int64) if classed else None,
+        signature=np.concatenate([frame.signature for frame in frames]) if told("signature") else None,
+        beacon_class=column("beacon_class", np.int64) if told("beacon_class") else None,
     )
 
 
