@@ -8,12 +8,18 @@ static bool is_seen(const bslam_ekf_t *ekf, int index, int64_t time_us)
     return ekf->beacons[index].last_seen_us == time_us;
 }
 
+/// Whether a beacon's first two state values are its place.
+static bool has_place(const bslam_beacon_t *beacon)
+{
+    return beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_SIZED;
+}
+
 /// Whether two beacons may stand in the same place, as far as the map knows.
 static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
 {
     const int at = ekf->beacons[a].at;
     const int bt = ekf->beacons[b].at;
-    if (ekf->beacons[a].kind != BSLAM_BEACON_POINT || ekf->beacons[b].kind != BSLAM_BEACON_POINT) {
+    if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b])) {
         return false;
     }
     const bslam_real_t dx = ekf->mean[at] - ekf->mean[bt];
