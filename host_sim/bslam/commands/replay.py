@@ -14,7 +14,7 @@ from bslam.experiment.batch import Job, make_jobs, run_batch
 from bslam.experiment.datasets import find_directory
 from bslam.experiment.mrclam import ROBOTS, robots_in
 from bslam.experiment.rerun import options_of
-from bslam.experiment.sources import FolderSource, MrclamSource, RecordingSource, Source
+from bslam.experiment.sources import DlrSource, FolderSource, MrclamSource, RecordingSource, Source
 from bslam.recording.reader import SUFFIX
 
 SUMMARY = "run the filter on recorded logs"
@@ -25,6 +25,7 @@ EXAMPLES = """examples:
   bslam replay csv recordings/* --filter standard --out out/standard
   bslam replay mrclam MRCLAM_Dataset6 --robot 3
   bslam replay mrclam MRCLAM_Dataset1 MRCLAM_Dataset6 --set huber_d=3
+  bslam replay dlr dlr_spatial_cognition --association known
 
 A recording (.mcap) runs again as it ran: its own inputs in their order with its own parameters, and every
 state is held against the recorded one; exit status 1 if a bit differs. With --set or --params it runs
@@ -32,8 +33,9 @@ otherwise, and nothing is compared.
 csv: DIR is a folder with odometry.csv, sightings.csv, robot.toml and, if known, truth.csv and beacons.csv.
 mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mapping data; all robots without
 --robot; figures after rigid alignment.
+dlr: DIR is the DLR Spatial Cognition data set, held against its least-squares solution after rigid alignment.
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
-COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam"}  # folders of the data directory
+COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam", "dlr": ""}  # folders of the data directory
 _OF_THE_RECORDING = ("observation", "association", "filter", "sigma", "motion", "velocity_states", "noise")
 """Options that a recording has decided."""
 
@@ -81,7 +83,7 @@ def jobs_of(arguments: argparse.Namespace, kind: str, directories: list[str]) ->
 def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:
     for path in paths:
         if not path.endswith(SUFFIX):
-            raise BslamError(f"'{path}': allowed: csv DIR, mrclam DIR, or recordings, FILE{SUFFIX}")
+            raise BslamError(f"'{path}': allowed: csv DIR, mrclam DIR, dlr DIR, or recordings, FILE{SUFFIX}")
     for name, default in arguments.defaults.items():
         if getattr(arguments, name) != default:
             option = f"--{name.replace('_', '-')}"
@@ -125,6 +127,8 @@ def log_sources(kind: str, directories: list[str], robot: int | None) -> list[So
     folders = [find_directory(name, COLLECTIONS[kind]) for name in directories]
     if kind == "csv":
         return [FolderSource(folder) for folder in folders]
+    if kind == "dlr":
+        return [DlrSource(folder) for folder in folders]
     return [MrclamSource(folder, number) for folder in folders for number in _robots(folder, robot)]
 
 

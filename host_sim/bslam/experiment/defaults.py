@@ -59,6 +59,17 @@ REAL_LOG: Final[dict[str, int | float]] = {
     "sighting_delay_us": REAL_ODOMETRY_LEAD_US + _IMAGE_DELAY_US,
 }
 
+# What the file says of each step's noise, as it grows with the way; no speed is known to be steady. Sightings
+# err by up to many times what it says, and a gate refuses too many of them.
+DLR: Final[dict[str, int | float]] = {
+    "velocity_states": 0,
+    "left_speed_sd_mps": 0.0,
+    "right_speed_sd_mps": 0.0,
+    "forward_sd_per_sqrt_m": 0.0095,
+    "turn_sd_per_sqrt_m": 0.041,
+    "gate_d2": 0,
+}
+
 # Association wants sharp noise where consistency wants it inflated: with identity unknown, these instead.
 REAL_LOG_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
     "scale_sd": 0.08,

@@ -118,6 +118,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
             params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
         if options.velocity_states:
             params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
+    if log.collection == "dlr":
+        params |= defaults.DLR
     return params | dict(options.parameters)
 
 

@@ -13,10 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.experiment.ledger import Ledger, corrupt_identities
+from bslam.experiment.local_map import LocalMap
 from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
 from bslam.experiment.trace import MapBeacon, Trace
 from bslam.experiment.truth import step_times_us
@@ -109,9 +111,10 @@ def _run(
     return trace
 
 
-def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Slam:
-    looks = uses_looks(options)
-    return Slam(params, beacons_max=beacons_max, real=options.real, looks=looks, seeds=log.seeds)
+def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Any:
+    looks, most = uses_looks(options), SIZE_CLASSES[-1]
+    slam = Slam(params, beacons_max=min(beacons_max, most), real=options.real, looks=looks, seeds=log.seeds)
+    return LocalMap(slam, most) if beacons_max > most else slam
 
 
 def uses_looks(options: RunOptions) -> bool:

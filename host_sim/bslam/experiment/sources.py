@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bslam.experiment.align import Rigid
 from bslam.experiment.camera import CameraStore, camera_log
+from bslam.experiment.dlr import load_dlr
 from bslam.experiment.mrclam import best_truth, load_mrclam
 from bslam.log import SIGNATURES, Log, read_folder
 from bslam.recording import Recording, load
@@ -129,6 +130,27 @@ class FolderSource(_Unshared):
 
     def load(self) -> Log:
         return read_folder(self.path)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class DlrSource(_Unshared):
+    """The DLR Spatial Cognition data set, held against its least-squares solution."""
+
+    directory: Path
+
+    align: ClassVar[bool] = True
+    truth_kind: ClassVar[str] = "least squares"
+    has_looks: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        return self.directory.resolve().name
+
+    def load(self) -> Log:
+        return load_dlr(self.directory)
 
     def walls_m(self) -> NDArray[np.float64]:
         return np.empty((0, 4))
