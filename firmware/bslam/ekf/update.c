@@ -23,8 +23,7 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
-    memset(out, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof *out);
-    bslam_symmat_add_columns(ekf->covariance, ekf->dim, 0, 3, row->base, out);
+    bslam_symmat_first_columns(ekf->covariance, ekf->dim, row->base, out);
     if (bslam_row_has_velocity(row)) {
         bslam_symmat_add_columns(ekf->covariance, ekf->dim, BSLAM_STATE_FORWARD, 2, row->base + 3, out);
     }
@@ -188,14 +187,26 @@ static void flush(bslam_ekf_t *ekf)
     }
 }
 
+/// What the correction so far says of a measurement.
+static bslam_real_t foreseen(const bslam_ekf_t *ekf, const bslam_row_t *row)
+{
+    return ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
+}
+
 /// Takes the column P hᵀ, which stands in the next free pending slot, into the correction and the pending
 /// down-dates.
 static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s)
 {
     const bslam_real_t *column = ekf->pending[ekf->pending_count];
     const bslam_real_t step = innovation / s;
-    for (int i = 0; i < ekf->dim; i++) {
-        ekf->correction[i] += column[i] * step;
+    if (ekf->has_correction) {
+        for (int i = 0; i < ekf->dim; i++) {
+            ekf->correction[i] += column[i] * step;
+        }
+    } else {
+        for (int i = 0; i < ekf->dim; i++) {
+            ekf->correction[i] = column[i] * step;
+        }
     }
     ekf->pending_scale[ekf->pending_count] = -1 / s;
     ekf->pending_count++;
@@ -210,7 +221,7 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
     }
     bslam_real_t *column = ekf->pending[ekf->pending_count];
     bslam_ekf_project(ekf, row, column);
-    const bslam_real_t left = innovation - bslam_ekf_dot(row, ekf->correction);
+    const bslam_real_t left = innovation - foreseen(ekf, row);
     accept_column(ekf, left, bslam_ekf_dot(row, column) + variance);
 }
 
@@ -238,12 +249,12 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     bslam_real_t *range_column = ekf->pending[ekf->pending_count + 1];
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
-    const bslam_real_t bearing_left = innovation->bearing_rad - bslam_ekf_dot(bearing_row, ekf->correction);
+    const bslam_real_t bearing_left = innovation->bearing_rad - foreseen(ekf, bearing_row);
     bslam_ekf_project(ekf, bearing_row, bearing_column);
     hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
     if (innovation->has_range) {
         bslam_ekf_project(ekf, &innovation->range_row, range_column);
-        range_left = innovation->range_m - bslam_ekf_dot(&innovation->range_row, ekf->correction);
+        range_left = innovation->range_m - foreseen(ekf, &innovation->range_row);
         hph.xx = bslam_ekf_dot(&innovation->range_row, range_column);
         hph.xy = bslam_ekf_dot(&innovation->range_row, bearing_column);
     }
@@ -290,12 +301,16 @@ static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
 /// mean <- exp(correction) mean, whose translation is V(turn) correction; with turn = 0, mean + correction.
 static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 {
-    memset(ekf->shift, 0, sizeof ekf->shift);
     move_position(ekf, BSLAM_STATE_X, turn_rad);
+    ekf->shift[BSLAM_STATE_THETA] = 0;
     ekf->mean[BSLAM_STATE_THETA] =
         bslam_angle_wrap(ekf->mean[BSLAM_STATE_THETA] + ekf->correction[BSLAM_STATE_THETA]);
     for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
         ekf->mean[i] += ekf->correction[i];
+        ekf->shift[i] = 0;
+    }
+    for (int i = ekf->dim; i < BSLAM_SYMMAT_PADDED(ekf->dim); i++) {
+        ekf->shift[i] = 0;
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &ekf->beacons[b];
@@ -309,6 +324,8 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
         if (beacon->kind == BSLAM_BEACON_RAY) {
             ekf->mean[at + 2] = bslam_angle_wrap(ekf->mean[at + 2] + ekf->correction[at + 2]);
             ekf->mean[at + 3] += ekf->correction[at + 3];
+            ekf->shift[at + 2] = 0;
+            ekf->shift[at + 3] = 0;
         }
     }
 }
@@ -346,6 +363,5 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params)
     } else {
         flush(ekf);
     }
-    memset(ekf->correction, 0, sizeof ekf->correction);
     ekf->has_correction = false;
 }

@@ -65,26 +65,86 @@ void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count
     }
 }
 
-void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4])
+void bslam_symmat_first_columns(const bslam_real_t *restrict m, int n, const bslam_real_t factors[3],
+                                bslam_real_t *restrict out)
 {
+    const bslam_real_t a = factors[0];
+    const bslam_real_t b = factors[1];
+    const bslam_real_t c = factors[2];
+    for (int i = 0; i < 3; i++) {
+        out[i] =
+            a * bslam_symmat_get(m, i, 0) + b * bslam_symmat_get(m, i, 1) + c * bslam_symmat_get(m, i, 2);
+    }
+    const bslam_real_t *row = m + bslam_symmat_row(3);
+    for (int i = 3; i < n; i++) {
+        out[i] = a * row[0] + b * row[1] + c * row[2];
+        row += ((size_t)i / 4 + 1) * 4;
+    }
+    for (int i = n; i < BSLAM_SYMMAT_PADDED(n); i++) {
+        out[i] = 0;
+    }
+}
+
+/// The factors of four rows, by row and term.
+typedef struct factors {
+    bslam_real_t by[4][4];
+} factors_t;
+
+static inline void fill_factors(const bslam_symmat_term_t *term, int k, int i, factors_t *factors)
+{
+    const bslam_real_t *row_factors = term->row_factors + i;
+    factors->by[0][k] = term->scale * row_factors[0];
+    factors->by[1][k] = term->scale * row_factors[1];
+    factors->by[2][k] = term->scale * row_factors[2];
+    factors->by[3][k] = term->scale * row_factors[3];
+}
+
+/// One column of four rows of the same length: what the four terms have there is read once for all.
+static inline void add_column(const factors_t *f, bslam_real_t a, bslam_real_t b, bslam_real_t c,
+                              bslam_real_t d, bslam_real_t *r0, bslam_real_t *r1, bslam_real_t *r2,
+                              bslam_real_t *r3)
+{
+    *r0 += f->by[0][0] * a + f->by[0][1] * b + f->by[0][2] * c + f->by[0][3] * d;
+    *r1 += f->by[1][0] * a + f->by[1][1] * b + f->by[1][2] * c + f->by[1][3] * d;
+    *r2 += f->by[2][0] * a + f->by[2][1] * b + f->by[2][2] * c + f->by[2][3] * d;
+    *r3 += f->by[3][0] * a + f->by[3][1] * b + f->by[3][2] * c + f->by[3][3] * d;
+}
+
+/// Four rows from i on, a multiple of four, so that all are filled up to the same length. On a Cortex-M4F the
+/// factors stay in registers.
+static void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_term_t terms[4])
+{
+    const int filled = i + 4;
+    bslam_real_t *restrict r1 = r0 + filled;
+    bslam_real_t *restrict r2 = r1 + filled;
+    bslam_real_t *restrict r3 = r2 + filled;
     const bslam_real_t *restrict c0 = terms[0].columns;
     const bslam_real_t *restrict c1 = terms[1].columns;
     const bslam_real_t *restrict c2 = terms[2].columns;
     const bslam_real_t *restrict c3 = terms[3].columns;
-    bslam_real_t *restrict row = m;
-    for (int i = 0; i < n; i++) {
-        const bslam_real_t f0 = terms[0].scale * terms[0].row_factors[i];
-        const bslam_real_t f1 = terms[1].scale * terms[1].row_factors[i];
-        const bslam_real_t f2 = terms[2].scale * terms[2].row_factors[i];
-        const bslam_real_t f3 = terms[3].scale * terms[3].row_factors[i];
-        const int filled = (i / 4 + 1) * 4;
-        for (int j = 0; j < filled; j += 4) {
-            row[j] += f0 * c0[j] + f1 * c1[j] + f2 * c2[j] + f3 * c3[j];
-            row[j + 1] += f0 * c0[j + 1] + f1 * c1[j + 1] + f2 * c2[j + 1] + f3 * c3[j + 1];
-            row[j + 2] += f0 * c0[j + 2] + f1 * c1[j + 2] + f2 * c2[j + 2] + f3 * c3[j + 2];
-            row[j + 3] += f0 * c0[j + 3] + f1 * c1[j + 3] + f2 * c2[j + 3] + f3 * c3[j + 3];
-        }
-        row += filled;
+    factors_t f;
+    fill_factors(&terms[0], 0, i, &f);
+    fill_factors(&terms[1], 1, i, &f);
+    fill_factors(&terms[2], 2, i, &f);
+    fill_factors(&terms[3], 3, i, &f);
+    for (const bslam_real_t *end = c0 + filled; c0 != end; c0 += 4, c1 += 4, c2 += 4, c3 += 4) {
+        add_column(&f, c0[0], c1[0], c2[0], c3[0], r0, r1, r2, r3);
+        add_column(&f, c0[1], c1[1], c2[1], c3[1], r0 + 1, r1 + 1, r2 + 1, r3 + 1);
+        add_column(&f, c0[2], c1[2], c2[2], c3[2], r0 + 2, r1 + 2, r2 + 2, r3 + 2);
+        add_column(&f, c0[3], c1[3], c2[3], c3[3], r0 + 3, r1 + 3, r2 + 3, r3 + 3);
+        r0 += 4;
+        r1 += 4;
+        r2 += 4;
+        r3 += 4;
+    }
+}
+
+void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4])
+{
+    bslam_real_t *row = m;
+    for (int i = 0; i < n; i += 4) {
+        add_four_rows(row, i, terms);
+        row += 4 * (i + 4);
     }
 }
 

@@ -51,16 +51,21 @@ static inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t 
 void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count, const bslam_real_t *factors,
                               bslam_real_t *out);
 
+/// out[0..n) = the sum of factors[k] * column k of the n x n matrix, k < 3 <= n; out is 0 from there up to
+/// BSLAM_SYMMAT_PADDED(n). O(n).
+void bslam_symmat_first_columns(const bslam_real_t *m, int n, const bslam_real_t factors[3],
+                                bslam_real_t *out);
+
 /// One symmetric term of a sum: row i of the matrix gets row_factors[i] * columns[0..i].
 typedef struct bslam_symmat_term {
-    const bslam_real_t *row_factors;  ///< [n]
+    const bslam_real_t *row_factors;  ///< [BSLAM_SYMMAT_PADDED(n)], what stands behind n finite
     bslam_real_t scale;               ///< multiplies row_factors
     const bslam_real_t *columns;      ///< [BSLAM_SYMMAT_PADDED(n)]
 } bslam_symmat_term_t;
 
 /// m += the sum of four terms, in one pass over the triangle. The sum must be symmetric (pairs of terms may
 /// be each other's mirror image). This is where a filter step spends its time: 4 multiply-adds an element.
-/// O(4 n^2 / 2).
+/// The rows behind n up to a multiple of four, which are no part of the matrix, change too. O(4 n^2 / 2).
 void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t terms[4]);
 
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
