@@ -301,16 +301,12 @@ static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
 /// mean <- exp(correction) mean, whose translation is V(turn) correction; with turn = 0, mean + correction.
 static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 {
+    memset(ekf->shift, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof ekf->shift[0]);
     move_position(ekf, BSLAM_STATE_X, turn_rad);
-    ekf->shift[BSLAM_STATE_THETA] = 0;
     ekf->mean[BSLAM_STATE_THETA] =
         bslam_angle_wrap(ekf->mean[BSLAM_STATE_THETA] + ekf->correction[BSLAM_STATE_THETA]);
     for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
         ekf->mean[i] += ekf->correction[i];
-        ekf->shift[i] = 0;
-    }
-    for (int i = ekf->dim; i < BSLAM_SYMMAT_PADDED(ekf->dim); i++) {
-        ekf->shift[i] = 0;
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &ekf->beacons[b];
@@ -324,8 +320,6 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
         if (beacon->kind == BSLAM_BEACON_RAY) {
             ekf->mean[at + 2] = bslam_angle_wrap(ekf->mean[at + 2] + ekf->correction[at + 2]);
             ekf->mean[at + 3] += ekf->correction[at + 3];
-            ekf->shift[at + 2] = 0;
-            ekf->shift[at + 3] = 0;
         }
     }
 }
