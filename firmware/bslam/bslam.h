@@ -12,6 +12,7 @@
 #include "bslam/link/parser.h"
 #include "bslam/recovery/recovery.h"
 #include "bslam/slam/fingerprint.h"
+#include "bslam/store/guard.h"
 #include "bslam/store/slots.h"
 #include "bslam/svm/learner.h"
 

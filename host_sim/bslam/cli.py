@@ -18,6 +18,7 @@ from bslam.commands import (
     compare,
     console,
     export,
+    faults,
     live,
     look,
     params,
@@ -43,6 +44,7 @@ COMMANDS: dict[str, ModuleType] = {
     "console": console,
     "export": export,
     "scenario": scenario,
+    "faults": faults,
     "params": params,
 }
 

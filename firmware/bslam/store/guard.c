@@ -1,0 +1,75 @@
+#include "bslam/store/guard.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define START 0x9e3779b9u
+#define FACTOR 0x85ebca6bu  // odd, so that every step can be undone
+
+static uint32_t add(uint32_t sum, const void *bytes, size_t size)
+{
+    const uint8_t *from = bytes;
+    for (size_t at = 0; at + sizeof(uint32_t) <= size; at += sizeof(uint32_t)) {
+        uint32_t word;
+        memcpy(&word, &from[at], sizeof word);
+        sum ^= word;
+        sum = (sum << 7 | sum >> 25) * FACTOR;
+    }
+    return sum;
+}
+
+/// A count that may itself be damaged, for a length that must not be.
+static size_t bounded(int32_t count, int32_t most)
+{
+    return count < 0 ? 0 : (size_t)(count < most ? count : most);
+}
+
+static uint32_t checksum_of(const bslam_slam_t *slam)
+{
+    const bslam_ekf_t *ekf = &slam->ekf;
+    const size_t rows = bslam_symmat_row((int)bounded(ekf->dim, BSLAM_STATE_MAX));
+    const size_t counts = offsetof(bslam_ekf_t, beacons) - offsetof(bslam_ekf_t, dim);
+    const size_t flags = sizeof *ekf - offsetof(bslam_ekf_t, pending_count);
+    const size_t rest = offsetof(bslam_slam_t, accounts) - offsetof(bslam_slam_t, odometry);
+    uint32_t sum = add(START, &slam->params, sizeof slam->params);
+    sum = add(sum, ekf->mean, sizeof ekf->mean);
+    sum = add(sum, ekf->covariance, rows * sizeof ekf->covariance[0]);
+    sum = add(sum, &ekf->dim, counts);
+    sum = add(sum, ekf->beacons, bounded(ekf->beacon_count, BSLAM_BEACONS_MAX) * sizeof ekf->beacons[0]);
+    sum = add(sum, ekf->correction, sizeof ekf->correction);  // 0 between frames, and added to
+    sum = add(sum, &ekf->pending_count, flags);
+    return add(sum, &slam->odometry, rest);
+}
+
+void bslam_guard_init(bslam_guard_t *guard, bslam_slam_t *copy)
+{
+    *guard = (bslam_guard_t){.copy = copy};
+}
+
+void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam)
+{
+    guard->checksum = checksum_of(slam);
+    guard->is_sealed = true;
+    if (guard->copy != NULL) {
+        memcpy(guard->copy, slam, sizeof *slam);
+    }
+}
+
+bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam)
+{
+    if (guard->is_sealed && checksum_of(slam) == guard->checksum) {
+        return BSLAM_OK;
+    }
+    guard->counters.corrupt++;
+    return BSLAM_E_STATE;
+}
+
+bslam_status_t bslam_guard_restore(bslam_guard_t *guard, bslam_slam_t *slam)
+{
+    if (!guard->is_sealed || guard->copy == NULL || checksum_of(guard->copy) != guard->checksum) {
+        return BSLAM_E_STATE;
+    }
+    memcpy(slam, guard->copy, sizeof *slam);
+    guard->counters.restored++;
+    return BSLAM_OK;
+}

@@ -1,0 +1,75 @@
+"""`bslam faults`: inject every fault, and hold what happens against what is promised."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from tqdm import tqdm
+
+from bslam.commands.arguments import positive_count
+from bslam.errors import BslamError
+from bslam.experiment.faults.drives import drive_faults
+from bslam.experiment.faults.inputs import input_faults
+from bslam.experiment.faults.memory import memory_faults
+from bslam.experiment.faults.promise import Fault
+from bslam.experiment.output import write_json
+
+SUMMARY = "inject every fault, and compare what happens with what is promised (docs/FAULTS.md)"
+EXAMPLES = """examples:
+  bslam faults
+  bslam faults --only "power loss" --only kidnapping --seeds 60
+  bslam faults --unprotected --only "RAM bit flip"
+
+Writes faults.json. Exit status 1 if a promise is not kept. --unprotected injects them without what
+protects from them: then no promise should be kept."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "--only", action="append", metavar="NAME", help="faults whose name has this in it; may be repeated"
+    )
+    parser.add_argument(
+        "--seeds", type=positive_count, default=3, metavar="N", help="drives for each fault (default: 3)"
+    )
+    parser.add_argument("--unprotected", action="store_true", help="switch off what protects from each")
+    parser.add_argument("--out", type=Path, default=Path("out") / "faults", metavar="DIR")
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    faults = all_faults(arguments.seeds)
+    chosen = [one for one in faults if not arguments.only or any(word in one.name for word in arguments.only)]
+    if not chosen:
+        raise BslamError(f"--only {', '.join(arguments.only)}: no such fault; allowed: {_names(faults)}")
+    results = []
+    for fault in tqdm(chosen, unit="fault", disable=None):
+        measured = fault.inject(not arguments.unprotected)
+        verdict = "as promised" if measured.kept else "NOT AS PROMISED"
+        tqdm.write(f"{fault.name}: {fault.promise} | {measured.text} | {verdict}")
+        results.append(
+            {
+                "name": fault.name,
+                "promise": fault.promise,
+                "protection": fault.protection,
+                "measured": measured.text,
+                "kept": measured.kept,
+            }
+        )
+    kept = sum(bool(one["kept"]) for one in results)
+    write_json(
+        arguments.out / "faults.json",
+        {"schema": 1, "protected": not arguments.unprotected, "faults": results},
+    )
+    print(f"{kept} of {len(results)} as promised")
+    return 0 if kept == len(results) else 1
+
+
+def all_faults(seeds: int, cut_every: int = 1) -> list[Fault]:
+    """Every fault that is promised to be survived: so many drives each, a power cut every few bytes."""
+    return [*input_faults(), *drive_faults(seeds), *memory_faults(cut_every)]
+
+
+def _names(faults: list[Fault]) -> str:
+    return ", ".join(one.name for one in faults)

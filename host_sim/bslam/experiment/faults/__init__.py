@@ -1,0 +1,1 @@
+"""Every fault that is promised to be survived, injected and measured: docs/FAULTS.md."""
