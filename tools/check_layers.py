@@ -52,7 +52,8 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "link": frozenset({"errors"}),
     "target": frozenset({"errors", "core", "link"}),
     "recording": LOG | {"core"},
-    "experiment": LOG | {"moment", "rig", "core", "world", "target", "recording", "algorithms"},
+    "experiment": LOG
+    | {"moment", "rig", "modelfile", "core", "world", "link", "target", "recording", "algorithms"},
     "view": LOG | {"moment"},
 }
 # The command line ties the parts together and may import them all.
