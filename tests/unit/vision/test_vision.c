@@ -340,33 +340,6 @@ static void test_end_candidates_come_surest_first(void **state)
     }
 }
 
-/// True if a candidate overlaps the rectangle by a half.
-static bool is_candidate(double left, double top, double right, double bottom)
-{
-    const bslam_box_t truth = {real(left), real(top), real(right), real(bottom)};
-    int32_t count = 0;
-    const bslam_candidate_t *found = bslam_vision_candidates(&vision, &count);
-    for (int i = 0; i < count; i++) {
-        if (bslam_box_overlap(&found[i].outline, &truth) > BSLAM_R(0.5)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static void test_end_box_of_another_size_than_its_kind_is_no_candidate(void **state)
-{
-    // The wall is 4.6 m away: 60 px are a metre, the kind "small" is 18 px high, "tall" 121 px.
-    paint_room();
-    paint(100, 60, 124, 80, 200, 30, 30);
-    detector.kind_bias[2] = 1;  // small
-    assert_int_equal(show(0, true), BSLAM_OK);
-    assert_true(is_candidate(99.5, 59.5, 123.5, 79.5));
-    detector.kind_bias[1] = 2;  // tall
-    assert_int_equal(show(0, true), BSLAM_OK);
-    assert_false(is_candidate(99.5, 59.5, 123.5, 79.5));
-}
-
 static void test_end_same_frames_give_the_same_state(void **state)
 {
     paint_room();
@@ -515,7 +488,6 @@ int main(void)
         TEST(test_end_rectangle_moved_by_cells_moves_its_box),
         TEST(test_end_brighter_light_gives_the_same_boxes),
         TEST(test_end_candidates_come_surest_first),
-        TEST(test_end_box_of_another_size_than_its_kind_is_no_candidate),
         TEST(test_end_same_frames_give_the_same_state),
         TEST(test_blob_features_are_means_over_the_cells),
         TEST(test_end_noise_keeps_within_all_bounds),
