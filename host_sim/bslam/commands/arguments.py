@@ -13,6 +13,7 @@ import joblib
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
+from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.experiment.options import (
     ASSOCIATIONS,
     FILTERS,
@@ -122,8 +123,16 @@ def scenario_source(
 ) -> ScenarioSource:
     """The simulated drive that the options ask for."""
     if arguments.sensor == "camera":
-        return CameraSource(arguments.scenario, seed, sigma_mps, noise, _rig(arguments), CAMERA_STORE)
+        threshold = TOLD_THRESHOLD if _is_told(arguments.association) else UNTOLD_THRESHOLD
+        rig = _rig(arguments)
+        return CameraSource(arguments.scenario, seed, sigma_mps, noise, rig, CAMERA_STORE, threshold)
     return ScenarioSource(arguments.scenario, seed, sigma_mps, noise)
+
+
+def _is_told(association: Any) -> bool:
+    """Whether every method that is asked for, one or a list, gets the identities: all see the same."""
+    methods = association if isinstance(association, list) else [association]
+    return all(method is not None and method[0] == "known" for method in methods)
 
 
 def _rig(arguments: argparse.Namespace) -> str:

@@ -43,7 +43,7 @@ class FakeFrontEnd:
     calls: ClassVar[list[tuple[int, bool]]] = []
 
     def __init__(self, cameras, threshold):
-        assert len(cameras) == 3 and threshold == camera._THRESHOLD
+        assert len(cameras) == 3 and threshold == camera.TOLD_THRESHOLD
 
     def see(self, rgb, camera, moved):
         assert rgb.shape == (240, 320, 3)
@@ -142,3 +142,12 @@ def test_aim_without_a_pan_unit_stays():
     aim = Aim(RIG)
     aim.turn([0.5], time_s=0.0, step_s=0.1)
     assert aim.angle_rad == 0.0 and not aim.moved
+
+
+def test_camera_log_leaves_out_what_the_detector_is_less_sure_of(short, tmp_path, monkeypatch):
+    looks = (candidate(), replace(candidate(), score=0.0))
+    monkeypatch.setattr(FakeFrontEnd, "looks", looks)
+    store = CameraStore(tmp_path)
+    assert len(camera_log(short, 1, None, None, RIG, store).sightings.time_us) == 8
+    told = camera_log(short, 1, None, None, RIG, store, camera.TOLD_THRESHOLD)
+    assert len(told.sightings.time_us) == 16
