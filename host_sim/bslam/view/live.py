@@ -10,6 +10,7 @@ import base64
 import html
 import io
 import math
+import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, Protocol
 
@@ -20,7 +21,7 @@ from bokeh.models import Button, ColumnDataSource, CustomJS, Div, HoverTool, Rad
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
-from bslam.moment import FAILED, FINISHED, Moment, Shown, Spot, Stage, Told
+from bslam.moment import FAILED, FINISHED, RUNNING, Moment, Shown, Spot, Stage, Told
 from bslam.view.frames import RIGHT, UNKNOWN, WRONG, Mark, annotate
 from bslam.view.style import BAND, BEACON, ESTIMATE, SECOND, TRUTH, WALL
 
@@ -41,6 +42,7 @@ RESULT_COLOURS: Final = {
 _ON_FRAME: Final = {"matched": RIGHT, "new": "#5ab4ff", "rejected": WRONG, "refused": WRONG}
 RESULT_WORDS: Final = {"matched": "fused", "new": "new beacon"}
 _REFRESH_MS: Final = 20
+_SLOW_S: Final = 0.25
 _ROWS_MOST: Final = 4000  # of a path: more than a screen has pixels only costs time
 _SIGMAS: Final = 2.0  # size of the ellipses
 _RAY_M: Final = 3.0  # of a sighting without a distance and without a beacon
@@ -51,13 +53,23 @@ _SIDE_PX: Final = 560
 
 
 # Each part is a document of its own in it: where a text changes, only that text is laid out anew.
+_KEY: Final = {
+    "true path": TRUTH,
+    "estimated path": ESTIMATE,
+    "true beacon": "#b48a00",
+    "mapped beacon, 2 sigma": SECOND,
+}
+# Beside the plot: in it, it would be drawn anew with every step.
+_LEGEND: Final = " ".join(
+    f"<b style='color: {colour}; padding: 0 0.5em'>{words}</b>" for words, colour in _KEY.items()
+)
 _TEMPLATE: Final = """
 {% block contents %}
 <div style="display: flex; gap: 1em; flex-wrap: wrap; align-items: center">
   {{ embed(roots.bar) }}{{ embed(roots.status) }}
 </div>
 <div style="display: flex; gap: 0.5em">
-  <div>{{ embed(roots.room) }}{{ embed(roots.error) }}</div>
+  <div>{{ embed(roots.room) }}{{ embed(roots.legend) }}{{ embed(roots.error) }}</div>
   <div>{{ embed(roots.camera) }}{{ embed(roots.told) }}</div>
 </div>
 {% endblock %}
@@ -102,8 +114,9 @@ class Page:
         self._stage, self._moment, self._controls = stage, moment, controls
         self._drawn: Moment | None = None
         self._under_way = False  # something was sent that the browser has not drawn yet
-        self._rows = 0  # of the course that are in the document
-        self._truth: NDArray[np.float64] | None = None
+        # Rows of the course that are in the document, and the truth that they belong to, by source.
+        self._sent: dict[str, tuple[int, NDArray[np.float64] | None]] = {}
+        self._slowly_s = 0.0
         self._sources = {name: ColumnDataSource(columns) for name, columns in _EMPTY.items()}
         self._sources["walls"].data = dict(zip(("x0", "y0", "x1", "y1"), stage.walls_m.T, strict=True))
         self._status, self._told = Div(), Div(width=_SIDE_PX)
@@ -121,7 +134,7 @@ class Page:
         speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
         bar = row(self._pause, self._step, Div(text="times real speed:"), speed)
         parts = {"bar": bar, "status": self._status, "room": self._room_plot(), "error": self._error_plot()}
-        parts |= {"camera": self._camera, "told": self._told}
+        parts |= {"camera": self._camera, "told": self._told, "legend": Div(text=_LEGEND)}
         for name, part in parts.items():
             part.name = name
             document.add_root(part)
@@ -134,6 +147,7 @@ class Page:
 
     def _note_drawn(self) -> None:
         self._under_way = False
+        self.refresh()
 
     def _toggle(self) -> None:
         if self._controls.playing:
@@ -159,16 +173,16 @@ class Page:
         )
         source = self._sources
         plot.segment("x0", "y0", "x1", "y1", source=source["walls"], color=WALL, line_width=3)
-        line = {"legend_label": "true path", "line_width": 3, "line_alpha": 0.5, "color": TRUTH}
+        line = {"line_width": 3, "line_alpha": 0.5, "color": TRUTH}
         plot.line("x", "y", source=source["truth"], **line)
-        plot.line("x", "y", source=source["path"], color=ESTIMATE, legend_label="estimated path")
+        plot.line("x", "y", source=source["path"], color=ESTIMATE)
         plot.segment("x0", "y0", "x1", "y1", source=source["rays"], color="colour", line_width=1.5)
-        star = {"color": BEACON, "line_color": "#6b4b00", "size": 16, "legend_label": "true beacon"}
+        star = {"color": BEACON, "line_color": "#6b4b00", "size": 16}
         plot.scatter("x", "y", source=source["beacons"], marker="star", **star)
         outline = {"fill_color": None, "line_color": SECOND, "line_alpha": "alpha", "line_width": 1.5}
         plot.ellipse("x", "y", "width", "height", "angle", source=source["map"], **outline)
-        label = {"legend_label": "mapped beacon, 2 sigma", "color": SECOND, "alpha": "alpha", "size": 11}
-        crosses = plot.scatter("x", "y", source=source["map"], marker="cross", **label)
+        cross = {"color": SECOND, "alpha": "alpha", "size": 11}
+        crosses = plot.scatter("x", "y", source=source["map"], marker="cross", **cross)
         plot.ellipse(
             "x", "y", "width", "height", "angle", source=source["doubt"], fill_alpha=0.2, color=ESTIMATE
         )
@@ -176,9 +190,6 @@ class Page:
         plot.scatter("x", "y", source=source["robots"], size=11, color="colour", line_color="white")
         tips = [("beacon", "@name"), ("sightings", "@sightings"), ("sd, m", "@sd_m{0.000}")]
         plot.add_tools(HoverTool(renderers=[crosses], tooltips=tips))
-        plot.legend.location = "bottom_center"
-        plot.legend.orientation = "horizontal"
-        plot.add_layout(plot.legend[0], "below")
         return plot
 
     def _error_plot(self) -> Any:
@@ -190,8 +201,10 @@ class Page:
             y_axis_label="m",
             title="position error" + (" after alignment so far" if self._stage.aligned else ""),
         )
-        plot.line("t", "sd", source=self._sources["path"], color=BAND, legend_label="2 sigma, by the filter")
-        plot.line("t", "error", source=self._sources["path"], color=ESTIMATE, legend_label="error")
+        plot.line(
+            "t", "sd", source=self._sources["errors"], color=BAND, legend_label="2 sigma, by the filter"
+        )
+        plot.line("t", "error", source=self._sources["errors"], color=ESTIMATE, legend_label="error")
         plot.legend.location = "top_left"
         plot.legend.background_fill_alpha = 0.5
         return plot
@@ -207,11 +220,12 @@ class Page:
         words = self._words(moment)
         self._under_way = words != self._status.text
         self._status.text = words
-        self._send_course(moment)
+        self._send_paths(moment)
         self._send_robot(moment)
-        self._sources["beacons"].data = _columns(("x", "y"), moment.true_beacons_m)
-        self._sources["map"].data = _map_columns(moment.beacons)
-        self._told.text = _told_table(moment.told[:_TOLD_SHOWN])
+        now_s = time.monotonic()
+        if moment.state != RUNNING or now_s - self._slowly_s > _SLOW_S:
+            self._slowly_s = now_s
+            self._send_slowly(moment)
         if moment.shown is not None:
             self._camera.text = _camera_html(moment.shown)
 
@@ -228,23 +242,30 @@ class Page:
             text += f"<br><b>{html.escape(moment.message)}</b>"
         return text
 
-    def _send_course(self, moment: Moment) -> None:
+    def _send_slowly(self, moment: Moment) -> None:
+        """What costs the browser much and nobody can read so fast."""
+        self._sources["beacons"].data = _columns(("x", "y"), moment.true_beacons_m)
+        self._sources["map"].data = _map_columns(moment.beacons)
+        self._told.text = _told_table(moment.told[:_TOLD_SHOWN])
+        course = moment.course
+        self._send_rows("errors", moment, (course.time_s, course.error_m, _SIGMAS * course.sd_m))
+
+    def _send_paths(self, moment: Moment) -> None:
+        course = moment.course
+        self._send_rows("path", moment, (course.estimate[:, 0], course.estimate[:, 1]))
+        self._send_rows("truth", moment, (course.truth[:, 0], course.truth[:, 1]))
+
+    def _send_rows(self, name: str, moment: Moment, columns: Sequence[NDArray[np.float64]]) -> None:
         """The rows that were added; all of them where the truth was moved."""
-        course, thin = moment.course, max(1, self._stage.steps // _ROWS_MOST)
-        end = len(course.time_s)
-        moved, self._truth = course.truth.base is not self._truth, course.truth.base
-        first = 0 if moved else -(-self._rows // thin) * thin
-        self._rows = end
-        new = slice(first, end, thin)
-        xy, sd_m = course.estimate[new, :2], _SIGMAS * course.sd_m[new]
-        path = np.column_stack([xy, course.time_s[new], course.error_m[new], sd_m])
-        tables = {"path": path, "truth": course.truth[new, :2]}
-        for name, table in tables.items():
-            columns = _columns(_EMPTY[name], table)
-            if moved:
-                self._sources[name].data = columns
-            else:
-                self._sources[name].stream(columns)
+        thin, truth = max(1, self._stage.steps // _ROWS_MOST), moment.course.truth.base
+        sent, of_truth = self._sent.get(name, (0, None))
+        first = -(-sent // thin) * thin if of_truth is truth else 0
+        new = {key: one[first::thin] for key, one in zip(_EMPTY[name], columns, strict=True)}
+        self._sent[name] = (len(columns[0]), truth)
+        if of_truth is truth:
+            self._sources[name].stream(new)
+        else:
+            self._sources[name].data = new
 
     def _send_robot(self, moment: Moment) -> None:
         course = moment.course
@@ -285,7 +306,8 @@ class Page:
 _EMPTY: Final[dict[str, dict[str, list[Any]]]] = {
     "walls": {"x0": [], "y0": [], "x1": [], "y1": []},
     "truth": {"x": [], "y": []},
-    "path": {"x": [], "y": [], "t": [], "error": [], "sd": []},
+    "path": {"x": [], "y": []},
+    "errors": {"t": [], "error": [], "sd": []},
     "beacons": {"x": [], "y": []},
     "map": {
         name: [] for name in ("x", "y", "width", "height", "angle", "alpha", "name", "sightings", "sd_m")
