@@ -70,7 +70,7 @@ def test_a_state_that_differs_is_exit_status_1(recording, tmp_path, capsys, monk
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["short"], "allowed: csv DIR, mrclam DIR, or recordings"),
+        (["short"], "or recordings, FILE.mcap"),
         (["csv"], "no DIR"),
         (["nothing.mcap"], "cannot be read"),
         (["RECORDING", "--filter", "standard"], "--filter: a recording runs with its own"),
