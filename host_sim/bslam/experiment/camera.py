@@ -211,7 +211,8 @@ def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: flo
         measured = [one for one in seeing.candidates if one.bearing_rad is not None]
         rows = [_row(step, one, picture.identity) for one in measured]
         yield Glance(step, camera, picture.rgb, tuple(measured), rows)
-        surest_rad = [one.bearing_rad for one in measured if one.score >= UNTOLD_THRESHOLD]
+        surest = (one.bearing_rad for one in measured if one.score >= UNTOLD_THRESHOLD)
+        surest_rad = [bearing_rad for bearing_rad in surest if bearing_rad is not None]
         aim.turn(surest_rad, step * step_s, step_s)
 
 
