@@ -92,6 +92,7 @@ proof: setup ## what takes longer: `make test`, every core, the same bits over 5
 	@$(PYTHON) tools/same_bits.py --steps 5000
 	@$(PYTHON) tools/kill_sweep.py --runs 1000
 	@$(PYTHON) tools/same_bits.py --steps 5000 --rig wide180
+	@$(BSLAM) faults --out out/faults
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay
