@@ -28,6 +28,7 @@ from bslam.experiment.runner import FrameFeed, Watcher, run_log
 from bslam.experiment.sources import RecordingSource, ScenarioSource, Source
 from bslam.experiment.trace import Trace
 from bslam.log import Log, write_folder
+from bslam.target.lines import TargetError
 
 _LOST = (
     "a process died (killed, or out of memory) before this run was finished; fewer --jobs need less memory"
@@ -139,6 +140,8 @@ def execute(job: Job, out: Path) -> Outcome:
         return _execute(job, out)
     except BslamError as error:
         return Outcome(job.name, failed_entry(job, str(error)), bad_input=str(error))
+    except TargetError as error:  # the robot at the other end went: there is nothing to look into here
+        return Outcome(job.name, failed_entry(job, str(error)), crash=f"{error}\n")
     except Exception as error:  # a run that crashes is an outcome; the others go on
         entry = failed_entry(job, f"{type(error).__name__}: {error}")
         return Outcome(job.name, entry, crash=traceback.format_exc())
