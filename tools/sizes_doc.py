@@ -142,7 +142,7 @@ def budget(filter_costs: dict[tuple[str, int], int], frame: int) -> list[Row]:
 def flash_rows() -> list[Row]:
     flash = flash_by_layer()
     slam = sum(flash[layer] for layer in SLAM_LAYERS)
-    return [*((name, flash[name]) for name in sorted(flash)), ("all but vision", slam)]
+    return [*((name, flash[name]) for name in sorted(flash)), ("all but vision, store, recovery", slam)]
 
 
 def ram_rows() -> Iterator[Row]:

@@ -85,6 +85,33 @@ void bslam_symmat_first_columns(const bslam_real_t *restrict m, int n, const bsl
     }
 }
 
+#if defined(__SSE2__) || defined(__ARM_NEON)
+
+/// Four rows from i on, a multiple of four, so that all are filled up to the same length. With vector
+/// instructions four columns of a row are one step. The same bits as below: each element has the same sum.
+static void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_term_t terms[4])
+{
+    const bslam_real_t *restrict c0 = terms[0].columns;
+    const bslam_real_t *restrict c1 = terms[1].columns;
+    const bslam_real_t *restrict c2 = terms[2].columns;
+    const bslam_real_t *restrict c3 = terms[3].columns;
+    const int filled = i + 4;
+    for (int k = i; k < filled; k++, row += filled) {
+        const bslam_real_t f0 = terms[0].scale * terms[0].row_factors[k];
+        const bslam_real_t f1 = terms[1].scale * terms[1].row_factors[k];
+        const bslam_real_t f2 = terms[2].scale * terms[2].row_factors[k];
+        const bslam_real_t f3 = terms[3].scale * terms[3].row_factors[k];
+        for (int j = 0; j < filled; j += 4) {
+            row[j] += f0 * c0[j] + f1 * c1[j] + f2 * c2[j] + f3 * c3[j];
+            row[j + 1] += f0 * c0[j + 1] + f1 * c1[j + 1] + f2 * c2[j + 1] + f3 * c3[j + 1];
+            row[j + 2] += f0 * c0[j + 2] + f1 * c1[j + 2] + f2 * c2[j + 2] + f3 * c3[j + 2];
+            row[j + 3] += f0 * c0[j + 3] + f1 * c1[j + 3] + f2 * c2[j + 3] + f3 * c3[j + 3];
+        }
+    }
+}
+
+#else
+
 /// The factors of four rows, by row and term.
 typedef struct factors {
     bslam_real_t by[4][4];
@@ -138,6 +165,8 @@ static void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_t
         r3 += 4;
     }
 }
+
+#endif
 
 void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4])
 {

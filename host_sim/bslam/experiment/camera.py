@@ -37,7 +37,7 @@ CORRELATION_M = 0.1
 # What a beacon's directions have in common for a whole drive, and no front end can know. Added to its noise;
 # and the same of its distances, as a part of them.
 _BEARING_BIAS_RAD = 0.004
-_RANGE_BIAS = 0.01
+_RANGE_BIAS = 0.02
 # Of a candidate's score: what is less sure is not in the log. Both are lower than where training has a
 # precision of .95, since a filter makes more of a sighting than it loses by a false one. Where identity is
 # told, no false one is used; else half of the sightings between the two would be of no beacon. Tried on
@@ -52,9 +52,9 @@ SEEN = np.dtype(
         ("frame", np.int64),  # which is the step
         ("beacon_id", np.int64),  # the beacon that covers most of the box; -1: none does
         ("bearing_rad", np.float64),  # in the robot's frame
-        ("bearing_sd_rad", np.float64),
+        ("bearing_sd_rad", np.float64),  # what the front end says
         ("range_m", np.float64),  # from the camera; NaN: not measured
-        ("range_sd_m", np.float64),  # 0: no range
+        ("range_noise_sd_m", np.float64),  # 0: no range
         ("signature", np.float32, SIGNATURE_SIZE),
         ("beacon_class", np.int64),  # the detector's kind of beacon, from 1
         ("score", np.float64),  # the detector's: larger is surer
@@ -86,8 +86,10 @@ class CameraDrive:
             bearing_rad=self.seen["bearing_rad"].copy(),
             range_m=self.seen["range_m"].copy(),
             mappable=np.ones(len(self.seen), dtype=np.bool_),
-            bearing_sd_rad=self.seen["bearing_sd_rad"].copy(),
-            range_sd_m=self.seen["range_sd_m"].copy(),
+            bearing_sd_rad=np.hypot(self.seen["bearing_sd_rad"], _BEARING_BIAS_RAD),
+            range_sd_m=np.hypot(
+                self.seen["range_noise_sd_m"], _RANGE_BIAS * np.nan_to_num(self.seen["range_m"])
+            ),
             signature=np.ascontiguousarray(self.seen["signature"]),
             beacon_class=self.seen["beacon_class"].copy(),
         )
@@ -236,12 +238,11 @@ class Aim:
 
 def _row(step: int, one: Candidate, identity: NDArray[np.int16]) -> tuple[Any, ...]:
     assert one.bearing_rad is not None and one.bearing_sd_rad is not None
-    bearing_sd_rad = math.hypot(one.bearing_sd_rad, _BEARING_BIAS_RAD)
-    range_m, range_sd_m = math.nan, 0.0
+    range_m, range_noise_sd_m = math.nan, 0.0
     if one.range_m is not None and one.range_noise_sd_m is not None:
-        range_m, range_sd_m = one.range_m, math.hypot(one.range_noise_sd_m, _RANGE_BIAS * one.range_m)
+        range_m, range_noise_sd_m = one.range_m, one.range_noise_sd_m
     beacon_id = covering_beacon(one.outline, identity)
-    noise = (bearing_sd_rad, range_m, range_sd_m)
+    noise = (one.bearing_sd_rad, range_m, range_noise_sd_m)
     return step, beacon_id, one.bearing_rad, *noise, one.signature, one.beacon_class, one.score
 
 

@@ -74,7 +74,7 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     assert seen.bearing_rad.tolist() == [0.1] * 16
     np.testing.assert_array_equal(seen.range_m, [2.0, math.nan] * 8)
     np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.004))
-    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.03, 0.02), 0.0] * 8)
+    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.03, 0.04), 0.0] * 8)
     assert log.robot.sighting_scale_sd > 0
     assert log.robot.wheel_speed_sigma_mps == 0.6
 
