@@ -45,7 +45,7 @@ def test_a_target_that_does_not_exist_is_bad_input(folder, tmp_path, capsys, tar
     except SystemExit as end:
         status = end.code
     assert status == 2
-    assert "allowed: host, qemu:mps2_an385" in capsys.readouterr().err.splitlines()[-1]
+    assert "allowed: host, qemu:microbit, qemu:mps2_an385" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_double_on_a_target_is_bad_input(folder, tmp_path, capsys):
