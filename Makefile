@@ -57,8 +57,9 @@ RUN_LOG := MRCLAM_Dataset6
 RUN_DATA := $(or $(BSLAM_DATA),$(wildcard ../shared/data))
 
 .PHONY: run
-run: setup-run ## the main job: the paper's room, then a real log where the data is at hand
+run: setup-run ## the main job: the paper's room, by sightings and by images, then a real log if at hand
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
+	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --out out/run_camera
 ifneq ($(wildcard $(RUN_DATA)/mrclam/$(RUN_LOG)),)
 	$(BSLAM) replay mrclam $(RUN_LOG) --robot 3 --out out/replay
 else
