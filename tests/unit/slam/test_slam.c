@@ -463,6 +463,31 @@ static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
     assert_int_equal(bslam_slam_counters(&slam)->down_weighted, 1);
 }
 
+static void test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is_not_used(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.range_scale_sd = BSLAM_R(0.1);
+    bslam_sighting_t as_first = unit_polar(0.3, 4, 9);
+    as_first.beacon_class = 3;
+    bslam_slam_t with_distance = running(params);
+    see_one(&with_distance, 11 * STEP_US, as_first);
+    drive(&with_distance, 11 * STEP_US, 0.02, 0.03);
+    bslam_slam_t direction_only = with_distance;
+    bslam_slam_t same_class = with_distance;
+    bslam_sighting_t again = unit_polar(0.29, 4.4, 9);
+    again.beacon_class = 7;
+    see_one(&with_distance, 12 * STEP_US, again);
+    again.beacon_class = 3;
+    see_one(&same_class, 12 * STEP_US, again);
+    again.has_range = false;
+    see_one(&direction_only, 12 * STEP_US, again);
+    assert_account(&with_distance, 0, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE);
+    assert_memory_equal(with_distance.ekf.mean, direction_only.ekf.mean, sizeof direction_only.ekf.mean);
+    assert_memory_equal(with_distance.ekf.covariance, direction_only.ekf.covariance,
+                        sizeof direction_only.ekf.covariance);
+    assert_memory_not_equal(with_distance.ekf.mean, same_class.ekf.mean, sizeof same_class.ekf.mean);
+}
+
 static void test_sightings_beyond_the_maps_room_are_rejected_and_the_first_are_added(void **state)
 {
     bslam_slam_t slam = started(unit_params());
@@ -1188,6 +1213,7 @@ int main(void)
         cmocka_unit_test(test_sightings_ambiguous_are_rejected),
         cmocka_unit_test(test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_ratio),
         cmocka_unit_test(test_sightings_beyond_huber_are_counted_and_weighted),
+        cmocka_unit_test(test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is_not_used),
         cmocka_unit_test(test_sightings_beyond_the_maps_room_are_rejected_and_the_first_are_added),
         cmocka_unit_test(test_sightings_more_rays_than_room_are_rejected_but_points_are_not),
         cmocka_unit_test(test_sightings_empty_frame_is_a_frame),
