@@ -142,6 +142,22 @@ static bslam_real_t growth(bslam_real_t now, bslam_real_t then)
     return now > then ? now - then : 0;
 }
 
+/// The distance of a remembered sighting: a sized beacon's by its scale, with that scale's doubt; what the
+/// scale of another may be is all doubt.
+static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon,
+                          const bslam_sighting_t *sighting, bslam_clue_t *clue)
+{
+    const bslam_ekf_t *ekf = &slam->ekf;
+    const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
+    const int at = beacon->at + BSLAM_POINT_DIM;
+    const bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
+    const bslam_real_t common = slam->params.range_scale_sd;
+    const bslam_real_t scale_var = is_sized ? bslam_symmat_get(ekf->covariance, at, at) : common * common;
+    clue->range_m = sighting->range_m / scale;
+    clue->range_var_m2 = bslam_range_variance_m2(&slam->params, sighting, clue->range_m) +
+                         scale_var * clue->range_m * clue->range_m;
+}
+
 /// A remembered sighting as it looks from where the robot is now, by odometry.
 static void make_clue(const bslam_slam_t *slam, const bslam_memory_t *memory, bslam_clue_t *clue)
 {
@@ -156,7 +172,6 @@ static void make_clue(const bslam_slam_t *slam, const bslam_memory_t *memory, bs
     const bslam_sighting_t *sighting = &memory->sighting;
     *clue = (bslam_clue_t){.sensor = bslam_pose_compose(&robot, &memory->mount),
                            .bearing_rad = sighting->bearing_rad,
-                           .range_m = sighting->range_m,
                            .has_range = sighting->has_range};
     bslam_ekf_beacon_position(ekf, beacon, &clue->x_m, &clue->y_m);
     const bslam_sym2_t place = bslam_ekf_beacon_covariance(ekf, beacon);
@@ -168,7 +183,8 @@ static void make_clue(const bslam_slam_t *slam, const bslam_memory_t *memory, bs
     clue->bearing_var_rad2 =
         bslam_bearing_variance_rad2(&slam->params, sighting) + turn_var + drift_m2 / (range_m * range_m);
     if (sighting->has_range) {
-        clue->range_var_m2 = bslam_range_variance_m2(&slam->params, sighting, sighting->range_m) + drift_m2;
+        make_distance(slam, &ekf->beacons[beacon], sighting, clue);
+        clue->range_var_m2 += drift_m2;
     }
 }
 

@@ -12,6 +12,7 @@ static const double beacons[BEACONS][2] = {{3, 1}, {4, -2}, {6, 2}, {5, 4}};
 static bslam_slam_t slam;
 static bslam_recovery_t recovery;
 static int64_t now_us;
+static double stretch = 1;  // by which all distances are measured too long
 
 static int setup(void **state)
 {
@@ -32,7 +33,7 @@ static void look_from(double x, double y, double theta, int count)
     for (int i = 0; i < count; i++) {
         const double dx = beacons[i][0] - x;
         const double dy = beacons[i][1] - y;
-        seen[i] = unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), hypot(dx, dy), i);
+        seen[i] = unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), stretch * hypot(dx, dy), i);
     }
     now_us += STEP_US;
     const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
@@ -101,6 +102,25 @@ static void test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_k
     assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
 }
 
+static void test_recovery_goes_by_the_beacons_own_scales(void **state)
+{
+    slam.params.range_scale_sd = BSLAM_R(0.1);
+    look_on(50, 0, 0, 0, BEACONS);
+    for (int b = 0; b < BEACONS; b++) {
+        assert_int_equal(slam.ekf.beacons[b].kind, BSLAM_BEACON_SIZED);
+        const int at = slam.ekf.beacons[b].at + BSLAM_POINT_DIM;
+        slam.ekf.mean[at] = BSLAM_R(1.2);
+        for (int i = 0; i < slam.ekf.dim; i++) {
+            bslam_symmat_set(slam.ekf.covariance, at, i, i == at ? BSLAM_R(1e-4) : 0);
+        }
+    }
+    stretch = 1.2;
+    look_on(10, 1, 2, 2.5, BEACONS);
+    stretch = 1;
+    assert_int_equal(recovery.counters.found, 1);
+    assert_at(1, 2, 2.5);
+}
+
 static void test_recovery_by_two_beacons_takes_time(void **state)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -151,6 +171,7 @@ int main(void)
         cmocka_unit_test_setup(test_recovery_of_a_robot_that_stays_changes_nothing, setup),
         cmocka_unit_test_setup(test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_kept,
                                setup),
+        cmocka_unit_test_setup(test_recovery_goes_by_the_beacons_own_scales, setup),
         cmocka_unit_test_setup(test_recovery_by_two_beacons_takes_time, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),
