@@ -112,7 +112,7 @@
     REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
     REAL(class_doubt, 0.1, 1e-3, 1e3, \
          "svm: a beacon counts as seen so often as each class before it is seen at all") \
-    REAL(new_range_sd_m, 0.5, 1e-3, 1e6, \
+    REAL(new_range_sd_m, 0.7, 1e-3, 1e6, \
          "svm: a sighting whose distance is less sure than this starts no beacon") \
     INTEGER(new_far_matches, 2, 0, 250, "svm: where its frame has so many matches") \
     REAL(double_m, 1.0, 0.0, 1e3, "svm: two beacons nearer than this may be one") \

@@ -26,6 +26,12 @@ def pairs() -> Log:
     return a_drive("pairs")
 
 
+@pytest.fixture(scope="module")
+def harder_pairs() -> Log:
+    """Where position alone goes wrong: on the other drive it hardly does."""
+    return simulate(replace(load_scenario("pairs"), steps=STEPS), 0, SIGMA_MPS)
+
+
 def mean_error_m(log: Log, trace: Trace) -> float:
     assert log.truth is not None
     off = trace.pose[:, :2] - np.stack([log.truth.x_m, log.truth.y_m], axis=1)
@@ -51,23 +57,23 @@ def test_pairs_are_told_apart(pairs: Log) -> None:
     trace, known = run_log(pairs, SVM), run_log(pairs, RunOptions())
     assert trace.counts.wrong_associations < 0.001 * trace.counts.sightings
     assert trace.counts.deferred < 0.01 * trace.counts.sightings
-    assert mean_error_m(pairs, trace) < 1.25 * mean_error_m(pairs, known)
+    assert mean_error_m(pairs, trace) < 1.1 * mean_error_m(pairs, known)
 
 
 @pytest.mark.parametrize("off", [("learn_budget", 0), ("looks_weight", 0.0)])
-def test_pairs_are_not_told_apart_without_machines(pairs: Log, off: tuple[str, float]) -> None:
-    trace = run_log(pairs, replace(SVM, parameters=(off,)))
-    assert trace.counts.wrong_associations > 0.005 * trace.counts.sightings
+def test_pairs_are_not_told_apart_without_machines(harder_pairs: Log, off: tuple[str, float]) -> None:
+    trace = run_log(harder_pairs, replace(SVM, parameters=(off,)))
+    assert trace.counts.wrong_associations > 0.03 * trace.counts.sightings
 
 
-def test_without_signatures_position_alone_decides(pairs: Log) -> None:
-    log = replace(pairs, sightings=replace(pairs.sightings, signature=None))
+def test_without_signatures_position_alone_decides(harder_pairs: Log) -> None:
+    log = replace(harder_pairs, sightings=replace(harder_pairs.sightings, signature=None))
     blind = run_log(log, SVM)
-    off = run_log(pairs, replace(SVM, parameters=(("looks_weight", 0.0),)))
+    off = run_log(harder_pairs, replace(SVM, parameters=(("looks_weight", 0.0),)))
     assert blind.counters["taught"] == 0
     # Where looks weigh nothing, what is left of them is who is retired and who may wait.
-    assert blind.counts.wrong_associations > 0.005 * blind.counts.sightings
-    assert off.counts.wrong_associations > 0.005 * off.counts.sightings
+    assert blind.counts.wrong_associations > 0.03 * blind.counts.sightings
+    assert off.counts.wrong_associations > 0.03 * off.counts.sightings
 
 
 def with_classes(log: Log, share_right: float) -> Log:
