@@ -18,6 +18,7 @@ _COLUMNS = (
     ("rmse cm", lambda e: _cm(e, "rmse")),
     ("last 50 s", lambda e: _scaled(e, "position_error_last_50s_m")),
     ("odometry", lambda e: _scaled(e, "dead_reckoning_error_m")),
+    ("bound", lambda e: _scaled(e, "bound_error_m")),
     ("NEES", lambda e: _number(e, "nees_mean", ".2f")),
     ("map cm", lambda e: _scaled(e, "map_rmse_m")),
     ("mapped", lambda e: _number(e, "beacons_mapped", ".4g")),

@@ -177,6 +177,7 @@ def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
     more: dict[str, Callable[[Cell], str]] = {
         "Mean error of a run, best to worst": lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
         "First, last 50 s": lambda c: f"{c.first_50s_cm:.2f}, {c.last_50s_cm:.2f}",
+        "Bound: Jacobians at the truth": lambda c: "-" if c.bound_cm is None else f"{c.bound_cm:.2f}",
         "Odometry alone": lambda c: f"{c.dead_reckoning_cm:.0f}",
         "NEES": lambda c: f"{c.nees_mean:.2f}",
         "Steps below its 95 % quantile": lambda c: f"{100.0 * c.nees_inside_95:.1f} %",

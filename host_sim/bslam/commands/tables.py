@@ -96,11 +96,14 @@ def picture(sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -
 
 def _rows(cells: Sequence[Cell]) -> list[list[str]]:
     """What is printed: paper / here."""
-    rows = [["cm: paper / here", *STATISTICS, "first 50 s", "last 50 s", "NEES", "inside 95 %", "lost"]]
+    rows = [
+        ["cm: paper / here", *STATISTICS, "first 50 s", "last 50 s", "bound", "NEES", "inside 95 %", "lost"]
+    ]
     for cell in cells:
         paper = cell.paper_cm or {}
         pairs = [f"{paper.get(name, float('nan')):g} / {cell.error_cm[name]:.2f}" for name in STATISTICS]
-        rest = [f"{cell.first_50s_cm:.2f}", f"{cell.last_50s_cm:.2f}", f"{cell.nees_mean:.2f}"]
+        rest = [f"{cell.first_50s_cm:.2f}", f"{cell.last_50s_cm:.2f}"]
+        rest += ["-" if cell.bound_cm is None else f"{cell.bound_cm:.2f}", f"{cell.nees_mean:.2f}"]
         rest += [f"{100 * cell.nees_inside_95:.1f} %", f"{cell.lost}/{cell.runs}"]
         rows.append([f"sigma {cell.sigma_mps:g} {cell.observation}", *pairs, *rest])
     return rows

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.experiment.align import Rigid, fit_rigid
+from bslam.experiment.bound import has_bound, mean_bound_m
 from bslam.experiment.consistency import POSE_95, nees
 from bslam.experiment.options import RunOptions, uses_velocity_states, wheel_noise
 from bslam.experiment.trace import Trace
@@ -85,6 +86,8 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
     if evaluation is not None:
         entry |= _position_figures(evaluation)
         entry |= _map_figures(log, trace, evaluation)
+        if has_bound(log, options) and np.isfinite(evaluation.truth).all():
+            entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
         entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
     return entry
 

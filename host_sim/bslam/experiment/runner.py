@@ -21,7 +21,7 @@ from bslam.experiment.ledger import Ledger, corrupt_identities
 from bslam.experiment.local_map import LocalMap
 from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
 from bslam.experiment.trace import MapBeacon, Trace
-from bslam.experiment.truth import step_times_us
+from bslam.experiment.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
 from bslam.recording import Recorder, RecordingWriter
 from bslam.recording.aslog import start_of, true_poses
@@ -154,8 +154,7 @@ class _Run:
         """Give the true beacons to the filter. Raises BslamError if their frame is not the start's."""
         if log.beacons is None:
             raise BslamError(f"{log.name}: --known-map: the log has no beacons.csv")
-        truth = log.truth
-        if truth is not None and max(abs(truth.x_m[0]), abs(truth.y_m[0]), abs(truth.theta_rad[0])) > 1e-6:
+        if log.truth is not None and not starts_at_origin(log.truth):
             raise BslamError(f"{log.name}: --known-map: its beacons are not in the frame of the start pose")
         columns = (log.beacons.beacon_id.tolist(), log.beacons.x_m.tolist(), log.beacons.y_m.tolist())
         for identity, x_m, y_m in zip(*columns, strict=True):

@@ -48,6 +48,7 @@ class Cell:
     first_50s_cm: float
     last_50s_cm: float
     dead_reckoning_cm: float
+    bound_cm: float | None  # what a filter linearised at the truth leaves, see bound.py; None: not computed
     nees_mean: float
     nees_inside_95: float  # share of steps, all runs, each alone below the 95 % quantile
     nees_band: tuple[float, float]  # 95 % band of the NEES averaged over the runs at one step
@@ -88,6 +89,7 @@ def make_cell(sigma_mps: float, observation: str, outcomes: Sequence[Outcome]) -
         first_50s_cm=mean_of("position_error_first_50s_m", 100.0),
         last_50s_cm=mean_of("position_error_last_50s_m", 100.0),
         dead_reckoning_cm=mean_of("dead_reckoning_error_m", 100.0),
+        bound_cm=mean_of("bound_error_m", 100.0) if all("bound_error_m" in one for one in entries) else None,
         nees_mean=mean_of("nees_mean"),
         nees_inside_95=mean_of("nees_inside_95"),
         nees_band=band,
@@ -147,6 +149,9 @@ def _table(cells: Sequence[Cell]) -> list[str]:
         "Mean error, best to worst run": lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
         "Mean error, first 50 s": lambda c: f"{c.first_50s_cm:.2f}",
         "Mean error, last 50 s": lambda c: f"{c.last_50s_cm:.2f}",
+        "Mean error of the bound: Jacobians at the truth": lambda c: (
+            "-" if c.bound_cm is None else f"{c.bound_cm:.2f}"
+        ),
         "Mean error of odometry alone": lambda c: f"{c.dead_reckoning_cm:.0f}",
         "NEES (3 is consistent)": lambda c: f"{c.nees_mean:.2f}",
         "Steps below the 95 % quantile": lambda c: f"{100 * c.nees_inside_95:.1f} %",

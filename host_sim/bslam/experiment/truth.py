@@ -35,6 +35,11 @@ def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float
     return poses, known
 
 
+def starts_at_origin(truth: Truth) -> bool:
+    """True if the truth's frame is that of the start pose, as the map's is."""
+    return max(abs(truth.x_m[0]), abs(truth.y_m[0]), abs(truth.theta_rad[0])) <= 1e-6
+
+
 def is_dense(truth: Truth) -> bool:
     """True if the truth covers the drive without long gaps, so that a way can be measured on it."""
     return len(truth.time_us) > 1 and float(np.mean(np.diff(truth.time_us) <= INTERPOLATE_US)) > 0.99
