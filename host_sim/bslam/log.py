@@ -34,6 +34,8 @@ ODOMETRY_COLUMNS = {
     "ticks": ("left_ticks", "right_ticks"),
     "velocity": ("v_mps", "omega_radps"),
 }
+GYRO = "gyro_radps"
+"""Column of odometry that a robot without a gyro leaves out."""
 SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m")
 """Columns of sightings that a detector may leave out."""
 CLASS = "beacon_class"
@@ -65,6 +67,9 @@ class Odometry:
     time_us: NDArray[np.int64]  # (n,)
     a: NDArray[np.float64]  # (n,)
     b: NDArray[np.float64]  # (n,)
+    gyro_radps: NDArray[np.float64] | None = (
+        None  # (n,) mean turn rate over the same interval; NaN: not told there; None: no gyro
+    )
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,7 @@ WHEEL_NOISES = ("speedometer", "actuation")
 WHEELBASE_M = number(1e-3, 10.0)
 WHEEL_RADIUS_M = number(1e-4, 10.0)
 WHEEL_SPEED_SIGMA_MPS = number(0.0, 100.0)
+GYRO_SIGMA_RADPS = number(1e-6, 100.0)
 BEARING_SIGMA_RAD = number(0.0, 3.2)
 RANGE_SIGMA_FLOOR_M = number(0.0, 100.0)
 RANGE_SIGMA_FRACTION = number(0.0, 10.0)
@@ -153,6 +159,7 @@ class Robot:
     ticks_per_revolution: int | None = setting(integer(1, 10_000_000), None)
     counter_bits: int | None = setting(integer(2, 32), None)
     wheel_noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
+    gyro_sigma_radps: float = setting(GYRO_SIGMA_RADPS, 0.02)  # each reading, independent
 
 
 @dataclass(frozen=True)
@@ -204,11 +211,14 @@ def write_folder(log: Log, path: str | Path) -> None:
     odometry, sightings = log.odometry, log.sightings
     number = int if odometry.kind == "ticks" else float
     a_name, b_name = ODOMETRY_COLUMNS[odometry.kind]
+    gyro_radps = odometry.gyro_radps
+    gyro = {} if gyro_radps is None else {GYRO: _texts_or_empty(gyro_radps)}
     tables: dict[str, dict[str, list[str]] | None] = {
         "odometry": {
             "time_us": _texts(odometry.time_us, int),
             a_name: _texts(odometry.a, number),
             b_name: _texts(odometry.b, number),
+            **gyro,
         },
         "sightings": _sightings_texts(sightings),
         "truth": None if log.truth is None else _texts_by_field(log.truth),
@@ -238,6 +248,7 @@ def first_steps(log: Log, steps: int) -> Log:
         time_us=log.odometry.time_us[kept],
         a=log.odometry.a[kept],
         b=log.odometry.b[kept],
+        gyro_radps=None if log.odometry.gyro_radps is None else log.odometry.gyro_radps[kept],
     )
     seen = log.sightings.time_us <= odometry.time_us[-1]
     columns = {one.name: getattr(log.sightings, one.name) for one in fields(log.sightings)}
@@ -258,6 +269,10 @@ def _texts(values: NDArray[Any], kind: Callable[[Any], Any]) -> list[str]:
     return [repr(kind(value)) for value in values.tolist()]
 
 
+def _texts_or_empty(values: NDArray[np.float64]) -> list[str]:
+    return ["" if math.isnan(one) else repr(one) for one in values.tolist()]
+
+
 def _texts_by_field(table: Truth | Beacons) -> dict[str, list[str]]:
     columns = {field.name: getattr(table, field.name) for field in fields(table)}
     return {
@@ -273,7 +288,7 @@ def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
         "bearing_rad": _texts(sightings.bearing_rad, float),
     }
     if not np.isnan(sightings.range_m).all():
-        columns["range_m"] = ["" if math.isnan(one) else repr(one) for one in sightings.range_m.tolist()]
+        columns["range_m"] = _texts_or_empty(sightings.range_m)
     if not sightings.mappable.all():
         columns["mappable"] = _texts(sightings.mappable, int)
     for name in SIGHTING_NOISE:
@@ -310,6 +325,7 @@ _COLUMNS = {
     "right_ticks": _COUNT,
     "v_mps": _NUMBER,
     "omega_radps": _NUMBER,
+    GYRO: Column("a number from -1000 to 1000, or empty", lambda v: np.abs(v) <= 1000.0, empty=math.nan),
     "beacon_id": Column(
         f"an integer from 0 to {BEACON_ID_MAX}, or empty in sightings",
         lambda values: is_count(values) & (values <= BEACON_ID_MAX),
@@ -351,13 +367,14 @@ def _columns(*names: str) -> dict[str, Column]:
 
 def _read_odometry(folder: Path, robot: Robot) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
-    table = read_table(_require_csv(folder, "odometry"), layouts)
+    table = read_table(_require_csv(folder, "odometry"), layouts, _columns(GYRO))
     table.require_rows("allowed: at least one")
     table.require_order("time_us", strict=True)
     kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
     if kind == "ticks":
         _require_tick_range(table, robot)
-    return Odometry(kind, table.integers("time_us"), table.values[a_name], table.values[b_name])
+    a, b = table.values[a_name], table.values[b_name]
+    return Odometry(kind, table.integers("time_us"), a, b, table.values.get(GYRO))
 
 
 def _require_tick_range(table: Table, robot: Robot) -> None:

@@ -21,6 +21,7 @@ from bslam.log import (
     Robot,
     Sightings,
     Truth,
+    first_steps,
     read_folder,
     wrap_rad,
     write_folder,
@@ -127,6 +128,14 @@ def test_write_then_read_keeps_the_noise_that_the_detector_gives(tmp_path: Path)
     log = replace(log, sightings=replace(log.sightings, **noise))
     write_folder(log, tmp_path)
     assert_same_log(log, read_folder(tmp_path))
+
+
+def test_write_then_read_keeps_the_gyro_and_where_it_said_nothing(tmp_path: Path) -> None:
+    log = a_log()
+    log = replace(log, odometry=replace(log.odometry, gyro_radps=np.array([1.0 / 3.0, math.nan])))
+    write_folder(log, tmp_path)
+    assert_same_log(log, read_folder(tmp_path))
+    assert first_steps(log, 1).odometry.gyro_radps == pytest.approx([1.0 / 3.0])
 
 
 finite = st.floats(-1e6, 1e6)

@@ -131,6 +131,7 @@ def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
         "wheelbase_m": robot.wheelbase_m,
         "left_speed_sd_mps": robot.wheel_speed_sigma_mps,
         "right_speed_sd_mps": robot.wheel_speed_sigma_mps,
+        "gyro_sd_radps": robot.gyro_sigma_radps,
         "mount_x_m": robot.sensor_x_m,
         "mount_y_m": robot.sensor_y_m,
         "mount_yaw_rad": robot.sensor_yaw_rad,

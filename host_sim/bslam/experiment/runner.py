@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -111,6 +112,13 @@ def _run(
     return trace
 
 
+def _gyro(odometry: Odometry) -> list[float | None]:
+    """The gyro's rate of each row, or None."""
+    if odometry.gyro_radps is None:
+        return [None] * len(odometry.time_us)
+    return [None if math.isnan(one) else one for one in odometry.gyro_radps.tolist()]
+
+
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Any:
     looks, most = uses_looks(options), SIZE_CLASSES[-1]
     slam = Slam(params, beacons_max=min(beacons_max, most), real=options.real, looks=looks, seeds=log.seeds)
@@ -167,7 +175,7 @@ class _Run:
         slam, kind, clock, times_us = self.slam, odometry.kind, self._clock, self.times_us
         number = np.int64 if kind == "ticks" else np.float64
         a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
-        rows = list(zip(odometry.time_us.tolist(), a, b, strict=True))
+        rows = list(zip(odometry.time_us.tolist(), a, b, _gyro(odometry), strict=True))
         if len(times_us) > len(rows):  # the start stands before the first row, which already moves
             self._start_clock(times_us[0])
         else:

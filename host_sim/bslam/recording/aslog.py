@@ -75,7 +75,8 @@ def _odometry(recording: Recording, readings: list[Reading]) -> Odometry:
         place = int(np.flatnonzero(np.diff(time_us) <= 0)[0]) + 1
         raise BslamError(f"{recording.path}: odometry at {time_us[place]} us: allowed: after the one before")
     a, b = (np.array([getattr(one, name) for one in readings], dtype=np.float64) for name in "ab")
-    return Odometry(kinds[0], time_us, a, b)
+    gyro_radps = np.array([one.gyro_radps for one in readings], dtype=np.float64)  # None becomes NaN
+    return Odometry(kinds[0], time_us, a, b, None if np.isnan(gyro_radps).all() else gyro_radps)
 
 
 def _sightings(frames: list[Frame]) -> Sightings:

@@ -39,8 +39,8 @@ class Recorder:
         if len(self.calls) - 1 in self.refuse:
             raise CoreError("BSLAM_E_TIME", "refused")
 
-    def odometry(self, kind, time_us, a, b):
-        self._take(kind, time_us, a, b)
+    def odometry(self, kind, time_us, a, b, gyro_radps):
+        self._take(kind, time_us, a, b, *(() if gyro_radps is None else (gyro_radps,)))
 
     def sightings(self, time_us, bearing_rad, range_m, label, mappable):
         self._take("frame", time_us, bearing_rad, range_m, label, mappable)
@@ -177,6 +177,12 @@ def test_the_first_row_of_velocities_only_marks_the_start(log):
     assert recorder.calls[0] == ("velocity", 40_000, 1.0, 0.0)
     assert trace.time_us.tolist() == [40_000, 80_000]
     assert trace.steps == 1
+
+
+def test_a_gyro_s_rates_go_with_their_rows(log):
+    odometry = replace(log.odometry, gyro_radps=np.array([0.25] + [math.nan] * (len(log.odometry.a) - 1)))
+    _, recorder = run(replace(log, odometry=odometry))
+    assert [call[4:] for call in recorder.calls if call[0] == "wheels"][:2] == [(0.25,), ()]
 
 
 def test_ticks_are_whole_numbers(made, log):
