@@ -5,7 +5,7 @@
 BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board.mk))
 
 # What boards may use.
-CORTEX_M_SOURCES := $(wildcard firmware/port/cortex_m/*.c)
+PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # and the front end for pictures.
 HOST_SIZES := -DSESSION_VISION=1 \
@@ -13,7 +13,7 @@ HOST_SIZES := -DSESSION_VISION=1 \
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := firmware/app/session.c firmware/app/seeing.c firmware/app/text.c
+APP_SOURCES := $(patsubst %,firmware/app/%.c,session records stored seeing text)
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -51,7 +51,7 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c firmware/port/posix/port.c
+HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(wildcard firmware/port/*.c firmware/port/posix/*.c)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk

@@ -4,10 +4,17 @@
 
 #include "models/beacons.h"
 
-bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera_t *camera)
+/// No frame streams in, and none has been looked at.
+static void clear(seeing_t *seeing)
 {
     seeing->row_bytes = 0;
+    seeing->takes_rows = false;
     seeing->count = 0;
+}
+
+bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera_t *camera)
+{
+    clear(seeing);
     seeing->vision.camera_count = 0;
     if (index < 0 || index >= BSLAM_CAMERAS_MAX) {
         return BSLAM_E_COUNT;
@@ -16,18 +23,22 @@ bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera
     return bslam_vision_init(&seeing->vision, &bslam_beacons_model, seeing->cameras, index + 1);
 }
 
-bslam_status_t seeing_begin(seeing_t *seeing, int camera, bslam_pixel_format_t format)
+static bslam_status_t begin(seeing_t *seeing, int camera, bslam_pixel_format_t format)
 {
-    seeing->row_bytes = 0;
-    seeing->count = 0;
+    clear(seeing);
     if (camera < 0 || camera >= seeing->vision.camera_count) {
         return BSLAM_E_COUNT;
     }
     const bslam_camera_t *lens = &seeing->cameras[camera];
-    const bslam_status_t status =
-        bslam_vision_begin(&seeing->vision, camera, format, lens->width_px, lens->height_px);
+    return bslam_vision_begin(&seeing->vision, camera, format, lens->width_px, lens->height_px);
+}
+
+bslam_status_t seeing_begin(seeing_t *seeing, int camera, bslam_pixel_format_t format)
+{
+    const bslam_status_t status = begin(seeing, camera, format);
     if (status == BSLAM_OK) {
-        seeing->row_bytes = (size_t)lens->width_px * (format == BSLAM_PIXELS_RGB888 ? 3 : 2);
+        const size_t pixel_bytes = format == BSLAM_PIXELS_RGB888 ? 3 : 2;
+        seeing->row_bytes = (size_t)seeing->cameras[camera].width_px * pixel_bytes;
         seeing->filled = 0;
     }
     return status;
@@ -46,6 +57,21 @@ bslam_status_t seeing_take(seeing_t *seeing, uint8_t byte)
     return bslam_vision_row(&seeing->vision, seeing->row);
 }
 
+bslam_status_t seeing_begin_rows(seeing_t *seeing, int camera)
+{
+    const bslam_status_t status = begin(seeing, camera, BSLAM_PIXELS_RGB565);
+    seeing->takes_rows = status == BSLAM_OK;
+    return status;
+}
+
+bslam_status_t seeing_take_row(seeing_t *seeing, const void *pixels)
+{
+    if (!seeing->takes_rows) {
+        return BSLAM_E_COUNT;
+    }
+    return bslam_vision_row(&seeing->vision, pixels);
+}
+
 static bslam_sighting_t as_sighting(const bslam_candidate_t *candidate)
 {
     const bool has_range = candidate->has_range;
@@ -62,8 +88,7 @@ static bslam_sighting_t as_sighting(const bslam_candidate_t *candidate)
 
 bslam_status_t seeing_look(seeing_t *seeing, bool robot_moved)
 {
-    seeing->row_bytes = 0;
-    seeing->count = 0;
+    clear(seeing);
     const bslam_status_t status = bslam_vision_end(&seeing->vision, robot_moved);
     int32_t count = 0;
     const bslam_candidate_t *found = bslam_vision_candidates(&seeing->vision, &count);

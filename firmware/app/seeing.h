@@ -19,6 +19,7 @@ typedef struct seeing {
     uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];
     size_t row_bytes;  ///< of the frame that streams in; 0: there is none
     size_t filled;     ///< bytes of the row that have come
+    bool takes_rows;   ///< a frame streams in by whole rows
     bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];
     int count;  ///< of sightings in the last finished frame
 } seeing_t;
@@ -32,6 +33,10 @@ bslam_status_t seeing_begin(seeing_t *seeing, int camera, bslam_pixel_format_t f
 
 /// The next byte of the frame, row after row. bslam_vision_row's statuses.
 bslam_status_t seeing_take(seeing_t *seeing, uint8_t byte);
+
+/// The same for a frame in RGB565 that comes in whole rows. A frame begun in the other way ends it.
+bslam_status_t seeing_begin_rows(seeing_t *seeing, int camera);
+bslam_status_t seeing_take_row(seeing_t *seeing, const void *pixels);
 
 /// Looks at the frame: its sightings, in the robot's axes, stand in seeing->sightings until the next frame
 /// begins. bslam_vision_end's statuses.

@@ -1,7 +1,7 @@
 #include "app/session.h"
 
-#include <string.h>
-
+#include "app/records.h"
+#include "app/stored.h"
 #include "port/port.h"
 
 #define NO_DETAIL 255
@@ -11,29 +11,7 @@
 #define FLAG_LOOKS 2u
 #define FLAG_AS_IT_IS 4u
 #define FLAG_GYRO 1u
-#define FLAG_RANGE 1u
-#define FLAG_SIGNATURE 2u
-#define FLAG_BEACON 1u
-#define FLAG_CONFIRMED 1u
 #define FLAG_MOVED 1u
-
-static const char *param_name(int id)
-{
-    return bslam_params_info(id)->name;
-}
-
-/// Of all parameters' names with their closing zeros: two tables that agree in it agree in every id.
-static uint16_t names_crc(void)
-{
-    uint16_t crc = BSLAM_CRC16_START;
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const char *name = param_name(id);
-        for (size_t i = 0; i <= strlen(name); i++) {
-            crc = bslam_crc16_add(crc, (uint8_t)name[i]);
-        }
-    }
-    return bslam_crc16_end(crc);
-}
 
 // ---- messages applied: the payload in, a status out
 // ---------------------------------------------------------
@@ -74,15 +52,17 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
             session->params = session->slam.params;
         } else {
             session->uses_looks = (flags & FLAG_LOOKS) != 0;
-            forget_seeds(session);
             bslam_params_default(&session->params);
         }
+        forget_seeds(session);
         keep(session, BSLAM_OK);
     }
 }
 
+/// Where the host wishes it, and where identity is told by looks.
 static uint8_t attach_looks(session_t *session)
 {
+    session->uses_looks |= session->params.association == BSLAM_ASSOCIATION_SVM;
     if (!session->uses_looks) {
         return BSLAM_OK;
     }
@@ -97,14 +77,20 @@ static uint8_t attach_looks(session_t *session)
 #endif
 }
 
+/// The status of the library or the link, and which parameter it is about.
+static uint8_t start_over(session_t *session, int *bad_id)
+{
+    const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, bad_id);
+    session->fingerprint = BSLAM_FINGERPRINT_START;
+    return status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
+}
+
 static void apply_reset(session_t *session, bslam_link_reader_t *reader)
 {
     if (is_whole(session, reader)) {
         int bad_id = NO_DETAIL;
-        const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
-        session->last_status = status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
+        session->last_status = start_over(session, &bad_id);
         session->detail = (uint8_t)bad_id;
-        session->fingerprint = BSLAM_FINGERPRINT_START;
     }
 }
 
@@ -130,6 +116,7 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
         const uint32_t began = port_ticks();
         keep(session, bslam_slam_odometry(&session->slam, &reading));
         session->ticks = port_ticks() - began;
+        session->moves++;
     }
 }
 
@@ -192,24 +179,11 @@ static const float *signature_of(const session_t *session, int sighting)
 
 #endif
 
-static void read_sighting(bslam_link_reader_t *reader, const float *signature, bslam_sighting_t *sighting)
-{
-    sighting->bearing_rad = bslam_link_get_real(reader);
-    sighting->range_m = bslam_link_get_real(reader);
-    sighting->bearing_sd_rad = bslam_link_get_real(reader);
-    sighting->range_sd_m = bslam_link_get_real(reader);
-    sighting->label = bslam_link_get_i32(reader);
-    sighting->beacon_class = bslam_link_get_u8(reader);
-    const uint8_t flags = bslam_link_get_u8(reader);
-    sighting->has_range = (flags & FLAG_RANGE) != 0;
-    sighting->signature = (flags & FLAG_SIGNATURE) != 0 ? signature : NULL;
-}
-
 static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
 {
     const int count = bslam_link_get_u8(reader);
     for (int i = 0; i < count && i < BSLAM_SIGHTINGS_MAX; i++) {
-        read_sighting(reader, signature_of(session, i), &session->sightings[i]);
+        record_get_sighting(reader, signature_of(session, i), &session->sightings[i]);
     }
     // Of too many, which the library refuses, there is no room to read all.
     if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
@@ -270,71 +244,11 @@ static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
-/// What is stored: every parameter in the order of the table, as float32, which holds all that the link can
-/// set, then names_crc and a CRC over all before.
-#define STORED_BYTES_MAX (4 * 128 + 4)
-
-static uint16_t crc_of(const uint8_t *bytes, size_t count)
-{
-    uint16_t crc = BSLAM_CRC16_START;
-    for (size_t i = 0; i < count; i++) {
-        crc = bslam_crc16_add(crc, bytes[i]);
-    }
-    return bslam_crc16_end(crc);
-}
-
-static size_t stored_size(void)
-{
-    return 4 * (size_t)bslam_params_count() + 4;
-}
-
-static bool save_params(const bslam_params_t *params)
-{
-    uint8_t bytes[STORED_BYTES_MAX];
-    const size_t size = stored_size();
-    if (size > sizeof bytes) {
-        return false;
-    }
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const float value = (float)bslam_params_get(params, id);
-        memcpy(&bytes[4 * id], &value, sizeof value);
-    }
-    const uint16_t names = names_crc();
-    memcpy(&bytes[size - 4], &names, sizeof names);
-    const uint16_t crc = crc_of(bytes, size - 2);
-    memcpy(&bytes[size - 2], &crc, sizeof crc);
-    return port_save(bytes, size);
-}
-
-/// False, and the defaults: nothing is stored, or not by an image with these parameters, or damaged.
-static bool load_params(bslam_params_t *params)
-{
-    uint8_t bytes[STORED_BYTES_MAX];
-    const size_t size = stored_size();
-    uint16_t names = 0;
-    uint16_t crc = 0;
-    bslam_params_default(params);
-    if (size > sizeof bytes || !port_load(bytes, size)) {
-        return false;
-    }
-    memcpy(&names, &bytes[size - 4], sizeof names);
-    memcpy(&crc, &bytes[size - 2], sizeof crc);
-    bool good = names == names_crc() && crc == crc_of(bytes, size - 2);
-    for (int id = 0; id < bslam_params_count() && good; id++) {
-        float value;
-        memcpy(&value, &bytes[4 * id], sizeof value);
-        good = bslam_params_set(params, id, value) == BSLAM_OK;
-    }
-    if (!good) {
-        bslam_params_default(params);
-    }
-    return good;
-}
-
 static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
 {
     if (is_whole(session, reader)) {
-        session->last_status = save_params(&session->params) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+        session->last_status =
+            stored_params_save(&session->params) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
     }
 }
 
@@ -406,24 +320,9 @@ static void apply_look(session_t *session, bslam_link_reader_t *reader)
 // ---- answers: from the state as it stands, so that one that was lost can be given again
 // -----------------------
 
-static void put_pose(session_t *session, bslam_link_writer_t *out)
-{
-    const bslam_pose_t pose = bslam_slam_pose(&session->slam);
-    bslam_real_t lower[6];
-    bslam_slam_pose_covariance(&session->slam, lower);
-    bslam_link_put_real(out, pose.x_m);
-    bslam_link_put_real(out, pose.y_m);
-    bslam_link_put_real(out, pose.theta_rad);
-    for (int i = 0; i < 6; i++) {
-        bslam_link_put_real(out, lower[i]);
-    }
-}
-
 static void put_step(session_t *session, bslam_link_writer_t *out)
 {
-    put_pose(session, out);
-    bslam_link_put_u64(out, session->fingerprint);
-    bslam_link_put_u32(out, session->ticks);
+    record_put_step(out, &session->slam, session->fingerprint, session->ticks);
 }
 
 static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
@@ -438,7 +337,7 @@ static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_
     bslam_link_put_u16(out, BSLAM_SIGHTINGS_MAX);
     bslam_link_put_u16(out, BSLAM_HISTORY_MAX);
     bslam_link_put_u16(out, (uint16_t)bslam_params_count());
-    bslam_link_put_u16(out, names_crc());
+    bslam_link_put_u16(out, stored_names_crc());
     bslam_link_put_u32(out, port_ticks_hz());
     const uint8_t *build_id = port_build_id();
     for (int i = 0; i < PORT_BUILD_ID_BYTES; i++) {
@@ -452,26 +351,11 @@ static void answer_step(session_t *session, bslam_link_reader_t *reader, bslam_l
     put_step(session, out);
 }
 
-static void put_account(bslam_link_writer_t *out, const bslam_account_t *account)
-{
-    bslam_link_put_u8(out, (uint8_t)account->outcome);
-    bslam_link_put_u8(out, (uint8_t)account->reason);
-    bslam_link_put_u8(out, account->has_beacon ? FLAG_BEACON : 0);
-    bslam_link_put_u32(out, account->beacon_uid);
-    bslam_link_put_real(out, account->test_ratio);
-    bslam_link_put_real(out, account->weight);
-}
-
 static void answer_sightings(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
     put_step(session, out);
-    int count = 0;
-    const bslam_account_t *accounts = bslam_slam_accounts(&session->slam, &count);
-    bslam_link_put_u8(out, (uint8_t)count);
-    for (int i = 0; i < count; i++) {
-        put_account(out, &accounts[i]);
-    }
+    record_put_accounts(out, &session->slam);
 }
 
 static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
@@ -498,23 +382,6 @@ static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bsla
     bslam_link_put_real(out, pose.theta_rad);
 }
 
-static void put_beacon(bslam_link_writer_t *out, const bslam_beacon_view_t *beacon)
-{
-    bslam_link_put_u32(out, beacon->uid);
-    bslam_link_put_i32(out, beacon->label);
-    bslam_link_put_u8(out, (uint8_t)beacon->kind);
-    bslam_link_put_u8(out, beacon->confirmed ? FLAG_CONFIRMED : 0);
-    bslam_link_put_u8(out, beacon->beacon_class);
-    bslam_link_put_u32(out, beacon->sightings);
-    bslam_link_put_real(out, beacon->x_m);
-    bslam_link_put_real(out, beacon->y_m);
-    bslam_link_put_real(out, beacon->covariance_m2.xx);
-    bslam_link_put_real(out, beacon->covariance_m2.xy);
-    bslam_link_put_real(out, beacon->covariance_m2.yy);
-    bslam_link_put_real(out, beacon->range_m);
-    bslam_link_put_real(out, beacon->phi_rad);
-}
-
 static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     const int total = bslam_slam_beacon_count(&session->slam);
@@ -526,7 +393,7 @@ static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_li
     for (int i = 0; i < count; i++) {
         bslam_beacon_view_t view;
         if (bslam_slam_beacon(&session->slam, first + i, &view) == BSLAM_OK) {
-            put_beacon(out, &view);
+            record_put_beacon(out, &view);
         }
     }
 }
@@ -536,21 +403,10 @@ _Static_assert(2 + sizeof(bslam_counters_t) + sizeof(bslam_looks_counters_t) +
                    BSLAM_LINK_PAYLOAD_MAX,
                "the counters are one answer");
 
-/// Counters are structs of nothing but uint32_t.
-static void put_counters(bslam_link_writer_t *out, const void *counters, size_t size)
-{
-    const uint8_t *bytes = counters;
-    for (size_t at = 0; at < size; at += sizeof(uint32_t)) {
-        uint32_t value;
-        memcpy(&value, &bytes[at], sizeof value);
-        bslam_link_put_u32(out, value);
-    }
-}
-
 static void answer_counters(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    put_counters(out, &session->slam.counters, sizeof session->slam.counters);
+    record_put_counters(out, &session->slam.counters, sizeof session->slam.counters);
 #if SESSION_LOOKS
     const bslam_looks_counters_t *looks = &session->looks.counters;
     const bslam_learner_counters_t *learner = &session->looks.learner.counters;
@@ -560,9 +416,9 @@ static void answer_counters(session_t *session, bslam_link_reader_t *reader, bsl
     const bslam_looks_counters_t *looks = &no_looks;
     const bslam_learner_counters_t *learner = &no_learner;
 #endif
-    put_counters(out, looks, sizeof *looks);
-    put_counters(out, learner, sizeof *learner);
-    put_counters(out, &session->parser.counters, sizeof session->parser.counters);
+    record_put_counters(out, looks, sizeof *looks);
+    record_put_counters(out, learner, sizeof *learner);
+    record_put_counters(out, &session->parser.counters, sizeof session->parser.counters);
     bslam_link_put_u32(out, session->repeated);
     bslam_link_put_u32(out, session->replayed);
 }
@@ -579,20 +435,6 @@ static void answer_look(session_t *session, bslam_link_reader_t *reader, bslam_l
     bslam_link_put_u8(out, (uint8_t)session->seeing.count);
 }
 
-static void put_seen(bslam_link_writer_t *out, const bslam_sighting_t *sighting)
-{
-    bslam_link_put_real(out, sighting->bearing_rad);
-    bslam_link_put_real(out, sighting->range_m);
-    bslam_link_put_real(out, sighting->bearing_sd_rad);
-    bslam_link_put_real(out, sighting->range_sd_m);
-    bslam_link_put_i32(out, sighting->label);
-    bslam_link_put_u8(out, sighting->beacon_class);
-    bslam_link_put_u8(out, (sighting->has_range ? FLAG_RANGE : 0) | FLAG_SIGNATURE);
-    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
-        bslam_link_put_real(out, sighting->signature[k]);
-    }
-}
-
 /// One a message: a frame of default size has no room for two.
 static void answer_seen(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
@@ -600,7 +442,7 @@ static void answer_seen(session_t *session, bslam_link_reader_t *reader, bslam_l
     const bool there = index < session->seeing.count;
     bslam_link_put_u8(out, there ? 1 : 0);
     if (there) {
-        put_seen(out, &session->seeing.sightings[index]);
+        record_put_sighting(out, &session->seeing.sightings[index], true);
     }
 }
 
@@ -738,24 +580,60 @@ void session_take(session_t *session, uint8_t byte)
     }
 }
 
+/// The robot's own cameras, if it has any; their number, 0 if the front end refuses one.
+static int open_eyes(session_t *session)
+{
+#if SESSION_VISION
+    int count = 0;
+    const bslam_camera_t *cameras = port_cameras(&count);
+    for (int i = 0; i < count; i++) {
+        if (seeing_set_camera(&session->seeing, i, &cameras[i]) != BSLAM_OK) {
+            return 0;
+        }
+    }
+    return count;
+#else
+    (void)session;
+    return 0;
+#endif
+}
+
+/// What was stored; else the defaults, but that what a camera sees has no label.
+static uint8_t start_with_params(session_t *session, bool has_eyes)
+{
+    int bad_id = NO_DETAIL;
+    if (stored_params_load(&session->params)) {
+        const uint8_t status = start_over(session, &bad_id);
+        if (status == BSLAM_OK) {
+            return status;
+        }
+        bslam_params_default(&session->params);  // they contradict each other
+    }
+    if (has_eyes) {
+        session->params.association = SESSION_LOOKS ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
+    }
+    return start_over(session, &bad_id);
+}
+
 void session_init(session_t *session)
 {
-    int bad_id = 0;
     *session = (session_t){0};
-    const bool stored = load_params(&session->params);
-    bslam_status_t status = bslam_slam_init(&session->slam, &session->params, &bad_id);
-    if (stored && status != BSLAM_OK) {  // they contradict each other
-        bslam_params_default(&session->params);
-        status = bslam_slam_init(&session->slam, &session->params, &bad_id);
-    }
-    session->fingerprint = BSLAM_FINGERPRINT_START;
+    const bool has_eyes = open_eyes(session) > 0;
+    const uint8_t status = start_with_params(session, has_eyes);
     bslam_link_writer_t out;
     // A delimiter first: whatever the line had before the start is no part of this frame.
     const uint8_t delimiter = 0;
     port_write(&delimiter, 1);
     begin(session, &out, SESSION_READY, 0, port_time_us());
-    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u8(&out, status);
     send(session, &out);
+}
+
+/// A report of the robot's own, whose frame stands in session->out.
+static void begin_report(session_t *session, bslam_link_writer_t *out, uint8_t type, int64_t time_us)
+{
+    session->report_sequence++;
+    begin(session, out, type, session->report_sequence, time_us);
 }
 
 void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks)
@@ -767,13 +645,73 @@ void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ti
     const uint32_t began = port_ticks();
     const bslam_status_t status = bslam_slam_odometry(&session->slam, &reading);
     session->ticks = port_ticks() - began;
+    if (left_ticks != session->left_ticks || right_ticks != session->right_ticks) {
+        session->moves++;
+    }
+    session->left_ticks = left_ticks;
+    session->right_ticks = right_ticks;
     end_step(session);
     bslam_link_writer_t out;
-    session->report_sequence++;
-    begin(session, &out, SESSION_POSE, session->report_sequence, time_us);
+    begin_report(session, &out, SESSION_POSE, time_us);
     bslam_link_put_u8(&out, (uint8_t)status);
     bslam_link_put_u32(&out, left_ticks);
     bslam_link_put_u32(&out, right_ticks);
     put_step(session, &out);
     send(session, &out);
 }
+
+#if SESSION_VISION
+
+static void report_sighting(session_t *session, int64_t time_us, int number)
+{
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_SIGHTED, time_us);
+    bslam_link_put_u8(&out, (uint8_t)number);
+    record_put_sighting(&out, &session->seeing.sightings[number], session->uses_looks);
+    send(session, &out);
+}
+
+/// Looks at the picture whose last row has come.
+static void look(session_t *session, const port_row_t *row)
+{
+    seeing_t *seeing = &session->seeing;
+    const uint32_t began = port_ticks();
+    bslam_status_t status = seeing_look(seeing, session->moves != session->moves_seen[row->camera]);
+    session->moves_seen[row->camera] = session->moves;
+    if (status == BSLAM_OK) {
+        status = bslam_slam_sightings(&session->slam, row->time_us, seeing->sightings, seeing->count);
+    }
+    session->ticks += port_ticks() - began;
+    end_step(session);
+    for (int i = 0; i < seeing->count; i++) {
+        report_sighting(session, row->time_us, i);
+    }
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_LOOKED, row->time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u8(&out, (uint8_t)row->camera);
+    bslam_link_put_u8(&out, (uint8_t)bslam_vision_reason(&seeing->vision));
+    bslam_link_put_u8(&out, (uint8_t)seeing->count);
+    put_step(session, &out);
+    record_put_accounts(&out, &session->slam);
+    send(session, &out);
+}
+
+void session_take_row(session_t *session, const port_row_t *row)
+{
+    const uint32_t began = port_ticks();
+    bslam_status_t status = BSLAM_OK;
+    if (row->is_first) {
+        session->ticks = 0;
+        status = seeing_begin_rows(&session->seeing, row->camera);
+    }
+    if (status == BSLAM_OK) {
+        status = seeing_take_row(&session->seeing, row->pixels);
+    }
+    session->ticks += port_ticks() - began;
+    if (row->is_last && status == BSLAM_OK) {
+        look(session, row);
+    }
+}
+
+#endif

@@ -9,7 +9,7 @@
 
 #include "app/seeing.h"
 #include "bslam/bslam.h"
-#include "bslam/link/crc16.h"
+#include "port/port.h"
 
 /// 0: the robot learns no looks, which saves bslam_looks_t, the largest part of its memory.
 #ifndef SESSION_LOOKS
@@ -45,8 +45,10 @@ typedef enum session_message {
 
 /// What the robot sends of itself.
 typedef enum session_report {
-    SESSION_READY = 0x40,  ///< once after start-up
-    SESSION_POSE = 0x41    ///< after a step of the robot's own odometry
+    SESSION_READY = 0x40,    ///< once after start-up
+    SESSION_POSE = 0x41,     ///< after a reading of the robot's own encoders
+    SESSION_SIGHTED = 0x42,  ///< each thing that a picture of the robot's own camera shows, then
+    SESSION_LOOKED = 0x43    ///< what became of them
 } session_report_t;
 
 /// Statuses of the link itself; those of the library are below, from 0 up.
@@ -75,7 +77,13 @@ typedef struct session {
     uint32_t id;  ///< the host's number of this session
     bool open;
     bool takes_fingerprints;
-    bool uses_looks;  ///< as the host wishes
+    bool uses_looks;
+    uint32_t left_ticks;  ///< of the robot's own encoders, when they were last read
+    uint32_t right_ticks;
+    uint32_t moves;  ///< readings that showed a movement
+#if SESSION_VISION
+    uint32_t moves_seen[BSLAM_CAMERAS_MAX];  ///< when each camera's last picture was looked at
+#endif
     uint16_t last_sequence;
     uint16_t report_sequence;
     uint8_t last_status;
@@ -97,5 +105,11 @@ void session_take(session_t *session, uint8_t byte);
 
 /// A reading of the robot's own encoders; reports it, and the pose.
 void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks);
+
+#if SESSION_VISION
+/// A row of a picture of the robot's own camera. The last one puts what the picture shows into the filter,
+/// and reports it; of a picture whose first rows did not come nothing is used.
+void session_take_row(session_t *session, const port_row_t *row);
+#endif
 
 #endif

@@ -1,4 +1,7 @@
 /// What a board gives to the application: all that a port is. docs/PORTING.md says how to write one.
+///
+/// Whatever a board has not got it leaves out: port/absent.c says so for it. A misspelt name does not pass
+/// for left out, since -Wmissing-prototypes refuses it.
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
 
@@ -27,18 +30,37 @@ uint32_t port_ticks_hz(void);
 #define PORT_BUILD_ID_BYTES 20
 const uint8_t *port_build_id(void);
 
+/// The end: resets a robot; under an emulator ends it with this exit status.
+_Noreturn void port_exit(int status);
+
+// ---- what a board may leave out ---------------------------------------------------------------------------
+
 /// Tells the watchdog that the main loop is alive.
 void port_watchdog(void);
 
-/// The counters of both wheel encoders, if the robot has them and a reading is due. They may roll over.
-bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks);
+/// The counters of both wheel encoders, as they were at *time_us, if the robot has them and a reading is due.
+/// They may roll over.
+bool port_encoders(int64_t *time_us, uint32_t *left_ticks, uint32_t *right_ticks);
+
+/// The robot's cameras, as bslam/vision/lens.h describes them, and how many there are.
+struct bslam_camera;
+const struct bslam_camera *port_cameras(int *count);
+
+/// A row of a picture. A camera's rows come from the uppermost to the lowest one; no two pictures overlap.
+typedef struct port_row {
+    const uint16_t *pixels;  ///< RGB565, as many as the camera's picture is wide; good until the next call
+    int64_t time_us;         ///< when the picture was taken: the same for all its rows
+    int camera;
+    bool is_first;
+    bool is_last;
+} port_row_t;
+
+/// The next row, if one has come.
+bool port_camera_row(port_row_t *row);
 
 /// Keeps bytes over a restart, the same number at each call, a few hundred; and gives them back. False: the
 /// board has no memory for that, it failed, or nothing was ever kept.
 bool port_save(const uint8_t *bytes, size_t count);
 bool port_load(uint8_t *bytes, size_t count);
-
-/// The end: resets a robot; under an emulator ends it with this exit status.
-_Noreturn void port_exit(int status);
 
 #endif

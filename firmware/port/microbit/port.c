@@ -91,27 +91,6 @@ void port_watchdog(void)
     (void)port_time_us();
 }
 
-bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
-{
-    (void)left_ticks;
-    (void)right_ticks;
-    return false;
-}
-
-bool port_save(const uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
-}
-
-bool port_load(uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
-}
-
 void port_exit(int status)
 {
     semihosting_exit(status);

@@ -1,10 +1,9 @@
 /// Arm's MPS2 boards as QEMU has them: AN385 (Cortex-M3), AN386 (M4F), AN500 (M7), AN505 (M33). They differ
-/// in where the serial line is, UART_BASE. A board without a robot: what a robot would measure comes over the
-/// link.
-#include "port/port.h"
-
+/// in where the serial line is, UART_BASE. Boards without a robot: what a robot would measure comes over the
+/// link, or from a film at FILM_ADDRESS, the upper half of RAM.
 #include "port/cortex_m/semihosting.h"
 #include "port/cortex_m/systick.h"
+#include "port/film.h"
 
 /// The CMSDK UART.
 typedef struct uart {
@@ -27,6 +26,7 @@ void port_init(void)
     UART->baud_divider = CORE_HZ / BAUD;
     UART->control = CONTROL_SEND_AND_RECEIVE;
     systick_start();
+    film_start((const film_t *)FILM_ADDRESS);
 }
 
 int port_read(void)
@@ -56,31 +56,6 @@ uint32_t port_ticks(void)
 uint32_t port_ticks_hz(void)
 {
     return CORE_HZ;
-}
-
-void port_watchdog(void)
-{
-}
-
-bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
-{
-    (void)left_ticks;
-    (void)right_ticks;
-    return false;
-}
-
-bool port_save(const uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
-}
-
-bool port_load(uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
 }
 
 void port_exit(int status)

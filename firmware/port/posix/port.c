@@ -3,27 +3,48 @@
 /// wheels turn steadily, one 4/3 as fast as the other.
 #define _POSIX_C_SOURCE 200809L
 
-#include "port/port.h"
+#include "port/film.h"
 
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
-void port_init(void)
+static bool has_film;
+static int64_t start_us;
+
+static int64_t now_us(void)
 {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-#define STEP_MS 10
+void port_init(void)
+{
+    start_us = now_us();
+    const char *path = getenv("BSLAM_FILM");
+    struct stat about;
+    const int file = path != NULL ? open(path, O_RDONLY) : -1;
+    if (file >= 0 && fstat(file, &about) == 0) {
+        const void *film = mmap(NULL, (size_t)about.st_size, PROT_READ, MAP_PRIVATE, file, 0);
+        has_film = film != MAP_FAILED;
+        if (has_film) {
+            film_start(film);
+        }
+    }
+}
 
-/// Waits, where a board would return at once: for what comes next, or where there are encoders for the time
-/// of their reading. The end of the input is the end.
+/// Waits, where a board would return at once: for what comes next, with a film for a moment only. The end of
+/// the input is the end.
 int port_read(void)
 {
     uint8_t byte = 0;
     struct pollfd waiting = {.fd = STDIN_FILENO, .events = POLLIN};
-    if (getenv("BSLAM_ENCODERS") != NULL && poll(&waiting, 1, STEP_MS) == 0) {
+    if (has_film && poll(&waiting, 1, 0) == 0) {
         return -1;
     }
     if (read(STDIN_FILENO, &byte, 1) != 1) {
@@ -46,9 +67,7 @@ void port_write(const uint8_t *bytes, size_t count)
 
 int64_t port_time_us(void)
 {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+    return now_us() - start_us;
 }
 
 uint32_t port_ticks(void)
@@ -66,22 +85,6 @@ const uint8_t *port_build_id(void)
 {
     static const uint8_t none[PORT_BUILD_ID_BYTES];
     return none;
-}
-
-void port_watchdog(void)
-{
-}
-
-bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
-{
-    static uint32_t readings;
-    if (getenv("BSLAM_ENCODERS") == NULL) {
-        return false;
-    }
-    readings++;
-    *left_ticks = 3 * readings & 0xffffu;
-    *right_ticks = 4 * readings & 0xffffu;
-    return true;
 }
 
 /// The file that the environment variable BSLAM_STORE names.

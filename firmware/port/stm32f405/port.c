@@ -3,11 +3,10 @@
 /// them.
 ///
 /// QEMU's netduinoplus2 runs the same image. It has neither clock tree nor encoders; that its clock control
-/// reads as zero, which a real one never does, tells it.
-#include "port/port.h"
-
+/// reads as zero, which a real one never does, tells it. Its robot is then a film in flash.
 #include "port/cortex_m/semihosting.h"
 #include "port/cortex_m/systick.h"
+#include "port/film.h"
 
 #define REGISTER(address) (*(volatile uint32_t *)(address))
 
@@ -104,6 +103,8 @@ void port_init(void)
         IWDG_KR = 0x5555u;
         IWDG_PR = 4u;  // 32 kHz / 64, 4096 of these: 8 s
         IWDG_KR = 0xccccu;
+    } else {
+        film_start((const film_t *)FILM_ADDRESS);
     }
     start_serial();
     systick_start();
@@ -164,29 +165,19 @@ void port_watchdog(void)
     }
 }
 
-bool port_encoders(uint32_t *left_ticks, uint32_t *right_ticks)
+bool port_encoders(int64_t *time_us, uint32_t *left_ticks, uint32_t *right_ticks)
 {
-    if (is_emulated || port_time_us() < next_step_us) {
+    *time_us = port_time_us();
+    if (is_emulated) {
+        return film_encoders(*time_us, time_us, left_ticks, right_ticks);
+    }
+    if (*time_us < next_step_us) {
         return false;
     }
     next_step_us += STEP_US;
     *left_ticks = REGISTER(TIM3 + 0x24u) & 0xffffu;
     *right_ticks = REGISTER(TIM4 + 0x24u) & 0xffffu;
     return true;
-}
-
-bool port_save(const uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
-}
-
-bool port_load(uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
 }
 
 void port_exit(int status)

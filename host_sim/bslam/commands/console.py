@@ -10,16 +10,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bslam.commands.arguments import add_filter_options, run_options
 from bslam.commands.report import table_of
 from bslam.errors import BslamError
+from bslam.experiment.options import ASSOCIATIONS
 from bslam.experiment.runner import run_log
+from bslam.link.messages import PoseReport
 from bslam.log import Log, read_folder
 from bslam.recording import RecordingWriter
-from bslam.recording.entries import Call, Counters, Gap, Map, Reading, Start, State
+from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, Start, State
 from bslam.recording.recorder import MAP_PERIOD_US
 from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
-from bslam.target.remote import RemoteSlam
+from bslam.target.remote import RemoteSlam, Told
 from bslam.world.simulate import load_scenario, simulate
 
 SUMMARY = "show a connected robot's pose, map and counters; set its parameters; record it"
@@ -127,7 +131,8 @@ def _watch(arguments: argparse.Namespace) -> int:
         if arguments.record is None:
             _follow(slam, screen, None, arguments)
         else:
-            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max)
+            looks = slam.params["association"] == ASSOCIATIONS.index("svm")
+            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max, looks)
             start.about.update(slam.target_description())
             with RecordingWriter(arguments.record, start) as writer:
                 if not arguments.reset:
@@ -206,16 +211,16 @@ class _Watch:
         """Take what has come."""
         reports = self._slam.reports(timeout_s)
         if self._writer is None:
-            self.time_us = reports[-1][0] if reports else self.time_us
+            self.time_us = reports[-1].time_us if reports else self.time_us
             return
         if self._slam.reports_lost > self._lost:
             self._writer.put(Gap(self._slam.reports_lost - self._lost))
             self._lost = self._slam.reports_lost
-        for time_us, report, refused in reports:
-            self._writer.put(Reading("ticks", time_us, report.left_ticks, report.right_ticks, None, refused))
-            step = report.step
-            self._writer.put(State(time_us, step.pose, step.covariance, step.fingerprint))
-            self.time_us = time_us
+        for told in reports:
+            self._writer.put(_input_of(told))
+            step = told.report.step
+            self._writer.put(State(told.time_us, step.pose, step.covariance, step.fingerprint))
+            self.time_us = told.time_us
         if self.time_us - self._map_us >= MAP_PERIOD_US:
             self._map_us = self.time_us
             self._note_map()
@@ -229,6 +234,27 @@ class _Watch:
         assert self._writer is not None
         self._writer.put(Map(self._slam.beacons()))
         self._writer.put(Counters(self._slam.counters()))
+
+
+def _input_of(told: Told) -> Reading | Frame:
+    """What the filter was given."""
+    report, time_us = told.report, told.time_us
+    if isinstance(report, PoseReport):
+        return Reading("ticks", time_us, report.left_ticks, report.right_ticks, None, told.refused)
+    seen, silent = told.seen, [-1] * len(told.seen)
+    signatures = [one.signature for one in seen if one.signature is not None]
+    return Frame(
+        time_us,
+        [one.bearing_rad for one in seen],
+        [one.range_m for one in seen],
+        silent,
+        [True] * len(seen),
+        [one.bearing_sd_rad for one in seen],
+        [one.range_sd_m for one in seen],
+        np.stack(signatures) if signatures else None,
+        accounts=told.accounts if told.refused is None else None,
+        refused=told.refused,
+    )
 
 
 # ---- what is shown -----------------------------------------------------------------------------------------

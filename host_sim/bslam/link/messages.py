@@ -47,6 +47,8 @@ class Report(IntEnum):
 
     READY = 0x40
     POSE = 0x41
+    SIGHTED = 0x42
+    LOOKED = 0x43
 
 
 LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE", 0x44: "LOOKS"}
@@ -62,7 +64,8 @@ _PARAM_ID = struct.Struct("<H")
 _PARAM = struct.Struct("<Hf")
 _REPORT = struct.Struct("<BII")
 _CAMERA = struct.Struct("<BBHH9f")
-_SEEN = struct.Struct("<4fiBB71f")
+_SEEN = struct.Struct("<4fiBB")
+_LOOKED = struct.Struct("<4B")
 _VALUE = struct.Struct("<f")
 _POSE_AT = struct.Struct("<B3f")
 _STEP = struct.Struct("<9fQI")
@@ -264,18 +267,40 @@ class Seen:
     range_m: float  # NaN: none
     bearing_sd_rad: float
     range_sd_m: float
-    signature: NDArray[np.float32]  # (71,)
+    signature: NDArray[np.float32] | None  # (71,)
 
 
 def read_seen(body: bytes) -> Seen:
-    bearing_rad, range_m, bearing_sd_rad, range_sd_m, _, _, flags, *signature = _SEEN.unpack(body[1:])
-    has_range = bool(flags & 1)
-    looks = np.array(signature, dtype=np.float32)
-    return Seen(bearing_rad, range_m if has_range else math.nan, bearing_sd_rad, range_sd_m, looks)
+    """The sighting that follows the first byte of an answer to SEEN, or of SIGHTED."""
+    bearing_rad, range_m, bearing_sd_rad, range_sd_m, _, _, flags = _SEEN.unpack_from(body, 1)
+    has_range, signed = bool(flags & 1), bool(flags & 2)
+    looks = np.frombuffer(body[1 + _SEEN.size :], "<f4").astype(np.float32)
+    if looks.shape != ((_SIGNATURE_BYTES // 4) * signed,):
+        raise struct.error(f"a sighting of {len(body)} bytes")
+    range_m = range_m if has_range else math.nan
+    return Seen(bearing_rad, range_m, bearing_sd_rad, range_sd_m, looks if signed else None)
+
+
+@dataclass(frozen=True)
+class LookReport:
+    """A picture of the robot's own camera: what became of it, how many things it shows, and where it led."""
+
+    status: int
+    camera: int
+    reason: int  # bslam_vision_reason_t
+    count: int
+    step: Step
+    accounts: list[RawAccount]
+
+
+def read_look_report(payload: bytes) -> LookReport:
+    status, camera_index, reason, count = _LOOKED.unpack_from(payload)
+    body = payload[_LOOKED.size :]
+    return LookReport(status, camera_index, reason, count, read_step(body), read_accounts(body))
 
 
 def read_accounts(body: bytes) -> list[RawAccount]:
-    """The accounts that follow the step in an answer to SIGHTINGS."""
+    """The accounts that follow a step."""
     count = body[_STEP.size]
     records = body[_STEP.size + 1 :]
     if len(records) != count * _ACCOUNT.size:

@@ -98,7 +98,7 @@ class Client:
         self._reports.clear()
 
     def _keep_report(self, frame: Frame) -> None:
-        if frame.type == Report.POSE:
+        if frame.type in (Report.POSE, Report.SIGHTED, Report.LOOKED):
             if self._last_report is not None:
                 self.reports_lost += (frame.sequence - self._last_report - 1) % (1 << 16)
             self._last_report = frame.sequence

@@ -63,6 +63,17 @@ def qemu_machines() -> dict[str, str]:
     return found
 
 
+def film_arguments(board: str, film: Path) -> list[str]:
+    """QEMU's arguments to put a film where the board looks for one. Raises BslamError."""
+    flags = (ROOT / "firmware" / "port" / board / "board.mk").read_text(encoding="utf-8")
+    address = re.search(r"-DFILM_ADDRESS=(0x[0-9a-f]+)u", flags)
+    if address is None:
+        raise BslamError(f"{board} looks for no film; allowed: boards with FILM_ADDRESS in their board.mk")
+    if not film.is_file():
+        raise BslamError(f"{film} is missing; allowed: a film, as `tools/make_film.py` writes it")
+    return ["-device", f"loader,file={film},addr={address[1]},force-raw=on"]
+
+
 def open_line(target: str) -> Line:
     """The line that a word of `--target` names. Raises BslamError if it cannot be: never something else."""
     kind, _, name = target.partition(":")
@@ -76,7 +87,7 @@ def open_line(target: str) -> Line:
 
 
 def allowed_targets() -> str:
-    """In the words of an error."""
+    """In the words of an error. qemu:BOARD:FILM, too, with a film that the robot drives by."""
     return f"host, {', '.join(f'qemu:{board}' for board in qemu_machines())}, serial:DEVICE, process:PROGRAM"
 
 
@@ -85,7 +96,8 @@ class QemuLine:
 
     ns_per_instruction: int | None = NS_PER_INSTRUCTION
 
-    def __init__(self, board: str) -> None:
+    def __init__(self, name: str) -> None:
+        board, _, film = name.partition(":")
         machines = qemu_machines()
         if board not in machines:
             raise BslamError(f"target 'qemu:{board}' does not exist; allowed: {allowed_targets()}")
@@ -95,7 +107,7 @@ class QemuLine:
         self._image = BUILD_DIR / board / "robot.elf"
         if not self._image.is_file():
             raise BslamError(f"{self._image} is missing: build it with: make firmware TARGET={board}")
-        self._board = board
+        self._film = film_arguments(board, Path(film)) if film else []
         self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
         self._first = b""
         self._socket, self._process = self._start(machines[board])
@@ -109,7 +121,7 @@ class QemuLine:
         listener.settimeout(START_TIMEOUT_S)
         command = [QEMU, "-M", machine, "-display", "none", "-monitor", "none", "-kernel", str(self._image)]
         command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
-        command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line"]
+        command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line", *self._film]
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )

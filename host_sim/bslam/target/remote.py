@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,20 @@ from bslam.core.slam import Account, Beacon, Slam, told_classes
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
-from bslam.link.messages import NO_DETAIL, Message, PoseReport, Step
+from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a robot told of itself: a reading of its own encoders, or a picture of its own camera."""
+
+    time_us: int
+    report: PoseReport | LookReport
+    refused: str | None  # the status by which the filter refused it
+    seen: list[Seen] = field(default_factory=list)  # what the picture shows
+    accounts: list[Account] = field(default_factory=list)
 
 
 class RemoteSlam:
@@ -47,6 +59,7 @@ class RemoteSlam:
         self._looks = looks
         self._check_image(beacons_max)
         self._step: Step | None = None
+        self._sighted: list[Seen] = []  # of a picture whose report has not come yet
         self._instructions: list[int] = []
         self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
         self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
@@ -268,6 +281,7 @@ class RemoteSlam:
         if answer.status:
             self._ensure(answer, f"parameter {list(self._values)[answer.detail]}")
         self._client.drop_reports()
+        self._sighted = []
 
     def set_param(self, name: str, value: float) -> None:
         """Set a parameter for the next `reset`. Raises BslamError."""
@@ -279,14 +293,26 @@ class RemoteSlam:
         """Have the robot keep the parameters as set over a restart. Raises TargetError if it cannot."""
         self._client.ask(Message.PARAM_SAVE)
 
-    def reports(self, timeout_s: float | None) -> list[tuple[int, PoseReport, str | None]]:
-        """Readings of the robot's own encoders since the last call, awaited so long (None: only those from
-        before its last answer): time in us, report, and the name of the status by which it was refused.
+    def reports(self, timeout_s: float | None) -> list[Told]:
+        """What the robot told of itself since the last call, awaited so long (None: only what it had told
+        before its last answer).
         """
-        found = []
+        found: list[Told] = []
         for frame in self._client.listen(timeout_s):
-            report = messages.read_pose_report(frame.payload)
-            found.append((frame.time_us, report, self._refusal(report.status)))
+            if frame.type == Report.SIGHTED:
+                kept = self._sighted if frame.payload[0] else []  # a report may have been lost
+                self._sighted = [*kept, messages.read_seen(frame.payload)]
+                continue
+            is_reading = frame.type == Report.POSE
+            read = messages.read_pose_report if is_reading else messages.read_look_report
+            report = read(frame.payload)
+            refused = self._refusal(report.status)
+            if isinstance(report, LookReport):
+                accounts = [self._account(one) for one in report.accounts]
+                found.append(Told(frame.time_us, report, refused, self._sighted, accounts))
+                self._sighted = []
+            else:
+                found.append(Told(frame.time_us, report, refused))
             self._step = report.step
         return found
 

@@ -1,15 +1,19 @@
 """Pictures over the link: the robot's own front end sees what the host's sees, to the bit."""
 
-from dataclasses import astuple, replace
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bslam.cli import main
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.core.vision import FrontEnd
-from bslam.link.messages import CameraRecord
+from bslam.errors import BslamError
+from bslam.link.messages import CameraRecord, LookReport, PoseReport
+from bslam.recording import load
+from bslam.recording.entries import Frame
 from bslam.rig import load_rig
 from bslam.target.lines import ProcessLine, open_line
 from bslam.target.remote import RemoteSlam
@@ -17,6 +21,7 @@ from bslam.world.camera.renderer import Renderer
 from bslam.world.camera.rgb565 import to_rgb565
 from bslam.world.camera.worlds import dress
 from bslam.world.simulate import load_scenario, true_drive
+from make_film import camera_record, make_film, smaller
 
 ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"
 STEPS = (240, 300, 330, 420, 570)
@@ -25,12 +30,7 @@ STEPS = (240, 300, 330, 420, 570)
 @pytest.fixture(scope="module")
 def camera():
     """Of half the pixels each way, since QEMU's serial line takes 50 us a byte."""
-    whole = load_rig("three60").cameras[1]
-    lens = whole.lens
-    sides = {name: getattr(lens, name) // 2 for name in ("width_px", "height_px")}
-    lengths = {name: getattr(lens, name) / 2 for name in ("fx_px", "fy_px")}
-    centre = {name: (getattr(lens, name) - 0.5) / 2 for name in ("cx_px", "cy_px")}
-    return replace(whole, lens=replace(lens, **sides, **lengths, **centre))
+    return smaller(load_rig("three60").cameras[1], 2)
 
 
 @pytest.fixture(scope="module")
@@ -42,24 +42,13 @@ def pictures(camera):
     return [to_rgb565(renderer.render(pose, 0.04 * i).rgb) for i, pose in enumerate(poses)]
 
 
-def record(camera):
-    """The camera as it goes over the link."""
-    lens = camera.lens
-    kind, *numbers = astuple(lens)
-    mounting = (camera.yaw_rad, camera.pitch_rad, camera.z_m)
-    return CameraRecord(0 if kind == "pinhole" else 1, *numbers, *mounting)
-    return CameraRecord(
-        0 if lens.kind == "pinhole" else 1, *numbers, camera.yaw_rad, camera.pitch_rad, camera.z_m
-    )
-
-
 @pytest.mark.parametrize(("target", "last"), [(f"process:{ROBOT}", 5), ("qemu:mps2_an386", 2)])
 def test_a_robot_that_is_sent_pictures_sees_and_maps_what_the_host_does(target, last, camera, pictures):
     params = {"association": 2, "velocity_states": 0}
     here, eyes = Slam(params, beacons_max=80), FrontEnd([camera])
     count = 0
     with RemoteSlam(open_line(target), params, 20, fingerprints=True) as there:
-        there.set_camera(0, record(camera))
+        there.set_camera(0, camera_record(camera))
         chain = 0xCBF29CE484222325
         for step, picture in enumerate(pictures[:last]):
             time_us = (step + 1) * 40_000
@@ -86,10 +75,10 @@ def test_pictures_that_cannot_be_are_refused(camera, pictures):
         with pytest.raises(CoreError, match="BSLAM_E_COUNT"):
             robot.look(40_000, 0, pictures[0], True)  # no camera yet
         with pytest.raises(CoreError, match="BSLAM_E_COUNT"):
-            robot.set_camera(9, record(camera))
+            robot.set_camera(9, camera_record(camera))
         with pytest.raises(CoreError, match="BSLAM_E_PARAMETER"):
-            robot.set_camera(0, CameraRecord(**(vars(record(camera)) | {"fx_px": -1.0})))
-        robot.set_camera(0, record(camera))
+            robot.set_camera(0, CameraRecord(**(vars(camera_record(camera)) | {"fx_px": -1.0})))
+        robot.set_camera(0, camera_record(camera))
         with pytest.raises(CoreError, match="BSLAM_E_COUNT"):
             robot.look(40_000, 0, pictures[0][:100], True)  # rows are missing
         with pytest.raises(CoreError, match="BSLAM_E_COUNT"):
@@ -97,3 +86,105 @@ def test_pictures_that_cannot_be_are_refused(camera, pictures):
         here = FrontEnd([camera]).see(pictures[0]).candidates
         seen, _ = robot.look(120_000, 0, pictures[0], True)
         assert len(seen) == sum(one.bearing_rad is not None for one in here)
+
+
+# ---- a robot with wheels and a camera of its own, which a film moves ---------------------------------------
+
+TURN, SHOTS = 24, 4
+
+
+@pytest.fixture(scope="module")
+def film(camera, tmp_path_factory):
+    path = tmp_path_factory.mktemp("film") / "turn"
+    make_film(path, "paper_room", 0, camera, SHOTS, TURN)
+    return path
+
+
+def shots_of(film, camera):
+    """The pictures of a film as it has them."""
+    sides = (camera.lens.height_px, camera.lens.width_px)
+    data = film.read_bytes()[-SHOTS * 2 * sides[0] * sides[1] :]
+    return np.frombuffer(data, "<u2").reshape(SHOTS, *sides)
+
+
+@pytest.mark.parametrize("target", [f"process:{ROBOT}", "qemu:mps2_an386:FILM"])
+def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(target, film, camera, monkeypatch):
+    monkeypatch.setenv("BSLAM_FILM", str(film))
+    told = []
+    with RemoteSlam(open_line(target.replace("FILM", str(film))), None, 20) as robot:
+        params = robot.host_params
+        while len(told) < (TURN + SHOTS) * 3 // 2:
+            told += robot.reports(5.0)
+        assert robot.reports_lost == 0
+    here, eyes, shots = Slam(params, beacons_max=80, looks=True), FrontEnd([camera]), shots_of(film, camera)
+    looks, count = 0, 0
+    for step, one in enumerate(told, start=1):
+        assert one.refused is None
+        if isinstance(one.report, PoseReport):
+            here.odometry("ticks", one.time_us, one.report.left_ticks, one.report.right_ticks)
+            assert one.time_us == (step - looks) * 40_000
+        else:
+            expected = [c for c in eyes.see(shots[looks % SHOTS]).candidates if c.bearing_rad is not None]
+            assert [c.bearing_rad for c in expected] == [seen.bearing_rad for seen in one.seen]
+            looks, count = looks + 1, count + len(expected)
+            bearings = [c.bearing_rad for c in expected]
+            ranges = [np.nan if c.range_m is None else c.range_m for c in expected]
+            sds = [c.bearing_sd_rad for c in expected], [c.range_sd_m or 0.0 for c in expected]
+            signatures = np.stack([c.signature for c in expected]) if expected else None
+            columns = (bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *sds, signatures)
+            assert one.accounts == here.sightings(one.time_us, *columns)
+        assert here.pose() == one.report.step.pose
+        assert here.pose_covariance_lower() == one.report.step.covariance
+    assert looks >= SHOTS and count > 0
+
+
+def test_its_console_recording_replays_to_the_same_bits(film, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("BSLAM_FILM", str(film))
+    path = tmp_path / "seen.mcap"
+    words = ["console", f"process:{ROBOT}", "--reset", "--record", str(path), "--seconds", "2"]
+    assert main(words) == 0
+    assert main(["replay", str(path), "--pictures", "0", "--out", str(tmp_path / "out")]) == 0
+    assert "states are the recorded ones to the bit" in capsys.readouterr().out
+    frames = [one for one in load(path).entries if isinstance(one, Frame)]
+    assert any(one.signature is not None for one in frames)
+
+
+def test_rows_that_a_picture_over_the_link_broke_into_are_not_mixed_with_it(film, camera, monkeypatch):
+    """The host sends a picture of its own while the robot's camera delivers rows: what is reported as seen is
+    whole, and the link's picture is refused or seen as it is.
+    """
+    monkeypatch.setenv("BSLAM_FILM", str(film))
+    eyes, shots = FrontEnd([camera]), shots_of(film, camera)
+    known = [
+        [c.bearing_rad for c in eyes.see(shots[i % SHOTS]).candidates if c.bearing_rad is not None]
+        for i in range(3 * SHOTS)
+    ]
+    with RemoteSlam(open_line(f"process:{ROBOT}"), None, 20) as robot:
+        told = []
+        for attempt in range(3):
+            with suppress(CoreError):  # refused: rows came in between
+                robot.look((attempt + 1) * 10**7, 0, shots[0], True)
+            told += robot.reports(0.2)
+    seen = [[one.bearing_rad for one in t.seen] for t in told if isinstance(t.report, LookReport)]
+    assert all(one in known for one in seen)
+
+
+def test_a_film_that_is_none_is_a_robot_at_rest(tmp_path, monkeypatch, film):
+    for name, data in {
+        "empty": bytes(64),
+        "cut": b"FILM" + bytes(60),
+        "magic": b"MOVI" + film.read_bytes()[4:],
+    }.items():
+        (tmp_path / name).write_bytes(data)
+        monkeypatch.setenv("BSLAM_FILM", str(tmp_path / name))
+        with RemoteSlam(open_line(f"process:{ROBOT}"), None, 20) as robot:
+            assert robot.counters()["odometry"] == 0
+            with pytest.raises(CoreError, match="BSLAM_E_COUNT"):
+                robot.look(40_000, 0, np.zeros((8, 8), np.uint16), True)
+
+
+def test_a_film_that_cannot_be_shown_is_bad_input(tmp_path):
+    with pytest.raises(BslamError, match="allowed: a film"):
+        open_line(f"qemu:mps2_an386:{tmp_path}/none")
+    with pytest.raises(BslamError, match="FILM_ADDRESS"):
+        open_line(f"qemu:microbit:{tmp_path}/none")

@@ -3,6 +3,7 @@
 import random
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bslam.cli import main
@@ -18,6 +19,7 @@ from bslam.log import first_steps
 from bslam.recording import load
 from bslam.target import client
 from bslam.target.client import Client
+from bslam.target.film import write_film
 from bslam.target.lines import ProcessLine, TargetError, open_line
 from bslam.target.remote import RemoteSlam
 from bslam.world.simulate import load_scenario, simulate
@@ -59,9 +61,10 @@ def same(one, other):
 
 
 @pytest.fixture
-def moving(monkeypatch):
+def moving(monkeypatch, tmp_path):
     """Robots drive by themselves."""
-    monkeypatch.setenv("BSLAM_ENCODERS", "1")
+    write_film(tmp_path / "wheels", 10_000, np.array([[3, 4]]))
+    monkeypatch.setenv("BSLAM_FILM", str(tmp_path / "wheels"))
 
 
 class BadLine:
@@ -321,8 +324,9 @@ def test_a_robot_s_own_readings_are_reported_and_lost_ones_are_counted(robot_lin
     found = []
     while len(found) < 8:
         found += robot.reports(1.0)
-    assert [r.left_ticks for _, r, _ in found[-3:]] == [3 * n for n in range(len(found) - 2, len(found) + 1)]
-    assert all(refused is None for _, _, refused in found)
+    ticks = [told.report.left_ticks for told in found]
+    assert ticks == [3 * n for n in range(ticks[0] // 3, ticks[0] // 3 + len(found))]
+    assert all(told.refused is None for told in found)
     assert robot.reports_lost == 0
     robot._client._last_report -= 2  # as if two had not come
     robot.reports(1.0)
