@@ -51,7 +51,8 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(wildcard firmware/port/*.c firmware/port/posix/*.c)
+HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(wildcard firmware/port/*.c) \
+    firmware/port/posix/port.c
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk

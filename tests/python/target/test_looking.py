@@ -56,15 +56,11 @@ def test_a_robot_that_is_sent_pictures_sees_and_maps_what_the_host_does(target, 
                 slam.odometry("wheels", time_us, 0.3, 0.3)
             chain = here.fingerprint(chain)
             seen, accounts = there.look(time_us, 0, picture, True)
-            expected = [one for one in eyes.see(picture).candidates if one.bearing_rad is not None]
+            expected = bearing_candidates(eyes, picture)
             count += len(seen)
             assert [one.bearing_rad for one in seen] == [one.bearing_rad for one in expected]
             assert all((a.signature == b.signature).all() for a, b in zip(seen, expected, strict=True))
-            ranges = [np.nan if one.range_m is None else one.range_m for one in expected]
-            range_sds = [one.range_sd_m or 0.0 for one in expected]
-            columns = [[one.bearing_rad for one in expected], ranges, [-1] * len(seen), [True] * len(seen)]
-            bearing_sds = [one.bearing_sd_rad for one in expected]
-            assert accounts == here.sightings(time_us, *columns, bearing_sds, range_sds)
+            assert accounts == here.sightings(time_us, *columns_of(expected)[:-1])
             chain = here.fingerprint(chain)
             assert there.fingerprint(0) == chain
     assert count > 0
@@ -107,6 +103,19 @@ def shots_of(film, camera):
     return np.frombuffer(data, "<u2").reshape(SHOTS, *sides)
 
 
+def bearing_candidates(eyes, picture):
+    return [one for one in eyes.see(picture).candidates if one.bearing_rad is not None]
+
+
+def columns_of(candidates):
+    """What they tell the filter, as `Slam.sightings` takes it."""
+    bearings = [c.bearing_rad for c in candidates]
+    ranges = [np.nan if c.range_m is None else c.range_m for c in candidates]
+    sds = [c.bearing_sd_rad for c in candidates], [c.range_sd_m or 0.0 for c in candidates]
+    signatures = np.stack([c.signature for c in candidates]) if candidates else None
+    return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *sds, signatures
+
+
 @pytest.mark.parametrize("target", [f"process:{ROBOT}", "qemu:mps2_an386:FILM"])
 def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(target, film, camera, monkeypatch):
     monkeypatch.setenv("BSLAM_FILM", str(film))
@@ -124,14 +133,10 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(targe
             here.odometry("ticks", one.time_us, one.report.left_ticks, one.report.right_ticks)
             assert one.time_us == (step - looks) * 40_000
         else:
-            expected = [c for c in eyes.see(shots[looks % SHOTS]).candidates if c.bearing_rad is not None]
+            expected = bearing_candidates(eyes, shots[looks % SHOTS])
             assert [c.bearing_rad for c in expected] == [seen.bearing_rad for seen in one.seen]
             looks, count = looks + 1, count + len(expected)
-            bearings = [c.bearing_rad for c in expected]
-            ranges = [np.nan if c.range_m is None else c.range_m for c in expected]
-            sds = [c.bearing_sd_rad for c in expected], [c.range_sd_m or 0.0 for c in expected]
-            signatures = np.stack([c.signature for c in expected]) if expected else None
-            columns = (bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *sds, signatures)
+            columns = columns_of(expected)
             assert one.accounts == here.sightings(one.time_us, *columns)
         assert here.pose() == one.report.step.pose
         assert here.pose_covariance_lower() == one.report.step.covariance
@@ -155,10 +160,7 @@ def test_rows_that_a_picture_over_the_link_broke_into_are_not_mixed_with_it(film
     """
     monkeypatch.setenv("BSLAM_FILM", str(film))
     eyes, shots = FrontEnd([camera]), shots_of(film, camera)
-    known = [
-        [c.bearing_rad for c in eyes.see(shots[i % SHOTS]).candidates if c.bearing_rad is not None]
-        for i in range(3 * SHOTS)
-    ]
+    known = [[c.bearing_rad for c in bearing_candidates(eyes, shots[i % SHOTS])] for i in range(3 * SHOTS)]
     with RemoteSlam(open_line(f"process:{ROBOT}"), None, 20) as robot:
         told = []
         for attempt in range(3):
