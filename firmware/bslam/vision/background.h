@@ -85,12 +85,20 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
 
 /// Histogram bin of a tone: 16 of light, 12 steps each; 8 of each chroma, 8 steps each but for the middle
 /// one, which has the greys on both sides of 0, and those at the ends, which are open.
+static inline int32_t bslam_light_bin(int32_t light)
+{
+    return light < 192 ? light * 171 >> 11 : 15;  // a twelfth, exact up to 192
+}
+
+static inline int32_t bslam_chroma_bin(int32_t chroma)
+{
+    return chroma <= -32 ? 0 : chroma >= 24 ? 7 : chroma / 8 + 4;
+}
+
 static inline int32_t bslam_tone_bin(bslam_tone_t tone)
 {
-    const int32_t light = tone.light < 192 ? tone.light * 171 >> 11 : 15;  // a twelfth, exact up to 192
-    const int32_t reddish = tone.reddish <= -32 ? 0 : tone.reddish >= 24 ? 7 : tone.reddish / 8 + 4;
-    const int32_t bluish = tone.bluish <= -32 ? 0 : tone.bluish >= 24 ? 7 : tone.bluish / 8 + 4;
-    return light << 6 | reddish << 3 | bluish;
+    return bslam_light_bin(tone.light) << 6 | bslam_chroma_bin(tone.reddish) << 3 |
+           bslam_chroma_bin(tone.bluish);
 }
 
 /// Distance of two tones: chroma counts twice.

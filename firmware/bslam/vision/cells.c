@@ -1,6 +1,9 @@
 #include "bslam/vision/cells.h"
 
 #include <stddef.h>
+#include <string.h>
+
+#include "bslam/math/bytes.h"
 
 /// Limits of the features: beyond them a difference says no more.
 #define LIGHT_MAX 96
@@ -9,6 +12,9 @@
 #define OFTEN BSLAM_FREQUENT_MAX
 #define SELDOM 6
 #define STEP BSLAM_CELL_STEP
+/// A byte in all four of a word.
+#define FOUR 0x01010101U
+#define ROWS_MAX (BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX)
 
 static int32_t least(int32_t a, int32_t b)
 {
@@ -53,6 +59,18 @@ static uint8_t difference(uint8_t a, uint8_t b)
 static void fill_steps(const bslam_cells_t *cells, int32_t a, int32_t b, int32_t count,
                        uint8_t *restrict into)
 {
+#if BSLAM_HAS_BYTES
+    for (int32_t i = 0; i < count; i += BSLAM_WORD_BYTES) {
+        const uint32_t red =
+            bslam_bytes_apart(bslam_word_at(cells->red + a + i), bslam_word_at(cells->red + b + i));
+        const uint32_t green =
+            bslam_bytes_apart(bslam_word_at(cells->green + a + i), bslam_word_at(cells->green + b + i));
+        const uint32_t blue =
+            bslam_bytes_apart(bslam_word_at(cells->blue + a + i), bslam_word_at(cells->blue + b + i));
+        bslam_word_put(into + i,
+                       bslam_bytes_plus(bslam_bytes_plus(red, green), bslam_bytes_plus(green, blue)));
+    }
+#else
     for (int32_t i = 0; i < count; i += STEP) {
         const uint8_t *red_a = cells->red + a + i, *red_b = cells->red + b + i;
         const uint8_t *green_a = cells->green + a + i, *green_b = cells->green + b + i;
@@ -65,6 +83,7 @@ static void fill_steps(const bslam_cells_t *cells, int32_t a, int32_t b, int32_t
             into[i + k] = (uint8_t)(step < 255 ? step : 255);
         }
     }
+#endif
 }
 
 static uint8_t colour_step(const bslam_cells_t *cells, int32_t a, int32_t b)
@@ -133,148 +152,166 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
     *x++ = (int16_t)(above_floor >= 0 ? clamp(tone.light - wall.light, -96, 0) : 0);
 }
 
-static void fill_tables(const bslam_background_t *background, const int16_t *weights,
-                        bslam_cell_tables_t *tables)
+/// Tables of the tones' bins; nearly all bins are empty.
+static void fill_bins(const bslam_background_t *background, const int16_t *weights,
+                      bslam_cell_tables_t *tables)
 {
+    memset(tables, 0, sizeof *tables);
     for (int32_t bin = 0; bin < BSLAM_TONE_BINS; bin++) {
         const int32_t wall = background->counts[BSLAM_ZONE_WALL][bin];
         const int32_t floor = background->counts[BSLAM_ZONE_FLOOR][bin];
         const int32_t ceiling = background->counts[BSLAM_ZONE_CEILING][bin];
-        tables->sums[bin] = weights[7] * least(wall, OFTEN) + weights[8] * least(wall, SELDOM) +
-                            weights[9] * least(floor, OFTEN) + weights[10] * least(floor, SELDOM) +
-                            weights[11] * least(ceiling, OFTEN);
-        tables->frequent[bin] = (uint16_t)(least(wall, OFTEN) | least(floor, OFTEN) << 8);
+        if ((wall | floor | ceiling) != 0) {
+            tables->sums[bin] = weights[7] * least(wall, OFTEN) + weights[8] * least(wall, SELDOM) +
+                                weights[9] * least(floor, OFTEN) + weights[10] * least(floor, SELDOM) +
+                                weights[11] * least(ceiling, OFTEN);
+            tables->frequent[bin] = (uint16_t)(least(wall, OFTEN) | least(floor, OFTEN) << 8);
+        }
     }
 }
 
-/// All that follows takes STEP cells of a row at a time, in 16 bits where that suffices, so that a compiler
-/// can use vector instructions.
-typedef struct cells_in {
-    const uint8_t *light;
-    const int8_t *reddish, *bluish;
-    const uint8_t *spread, *step_x, *step_y;
-    const int16_t *floor_row;
-} cells_in_t;
+// Distances from the tones of the floor, the wall, the ceiling and from grey are the bytes of a word, the
+// first lowest. Those of the three channels add up by an addition that stops at 255, and begin with
+// DISTANCE_ZERO: so it stops at DISTANCE_MAX.
+#define DISTANCE_ZERO (255 - DISTANCE_MAX)
+#define ALL_BUT_GREY 0x00FFFFFFU
+enum { TO_WALL = 1 };
 
-static int16_t least16(int16_t a, int16_t b)
+static uint32_t word_of(int32_t floor, int32_t wall, int32_t ceiling, int32_t grey)
 {
-    return a < b ? a : b;
+    return (uint8_t)floor | (uint32_t)(uint8_t)wall << 8 | (uint32_t)(uint8_t)ceiling << 16 |
+           (uint32_t)(uint8_t)grey << 24;
 }
 
-static int16_t most16(int16_t a, int16_t b)
+static void fill_lights(const bslam_background_t *background, const int16_t *w, bslam_light_terms_t *terms)
 {
-    return a > b ? a : b;
-}
-
-static int16_t apart(int16_t a, int16_t b)
-{
-    return (int16_t)(most16(a, b) - least16(a, b));
-}
-
-/// Bin of a chroma, as bslam_tone_bin has it: division by 8 rounds towards 0.
-static int16_t chroma_bin(int16_t chroma)
-{
-    const int16_t eighth = (int16_t)((int16_t)(chroma + (chroma < 0 ? 7 : 0)) >> 3);
-    return (int16_t)(least16(most16(eighth, -4), 3) + 4);
-}
-
-static void fill_bins(const cells_in_t *in, uint16_t bins[STEP])
-{
-    for (int32_t k = 0; k < STEP; k++) {
-        const uint16_t twelfth = (uint16_t)((uint16_t)(in->light[k] * 171) >> 11);
-        const uint16_t light = twelfth < 15 ? twelfth : 15;
-        bins[k] = (uint16_t)(light << 6 | chroma_bin(in->reddish[k]) << 3 | chroma_bin(in->bluish[k]));
+    const int32_t wall = background->tone[BSLAM_ZONE_WALL].light;
+    const uint32_t tones = word_of(background->tone[BSLAM_ZONE_FLOOR].light, wall,
+                                   background->tone[BSLAM_ZONE_CEILING].light, 0);
+    for (int32_t light = 0; light < BSLAM_LIGHTS; light++) {
+        const uint32_t apart = bslam_bytes_apart((uint32_t)light * FOUR, tones) & ALL_BUT_GREY;
+        const int32_t brighter = clamp(light - wall, -LIGHT_MAX, LIGHT_MAX);
+        terms[light] = (bslam_light_terms_t){
+            .value = w[0] * brighter + w[1] * magnitude(brighter),
+            .distances = bslam_bytes_least(apart, FOUR * DISTANCE_MAX) + FOUR * DISTANCE_ZERO,
+            .bin = bslam_light_bin(light) << 6,
+            .above_floor = w[21] * least(brighter, 0) - w[20] * DISTANCE_ZERO,
+        };
     }
 }
 
-/// Adds what distances from the room's tones say.
-static void add_tones(const cells_in_t *in, const bslam_background_t *background, const int16_t *w,
-                      int16_t row, int32_t sums[STEP])
+/// The same for a chroma: `tones` are those of floor, wall and ceiling and grey, 128 more than the chroma;
+/// weight that of the distance from the wall's; its bins are `step` apart.
+static void fill_chromas(uint32_t tones, int32_t weight, int32_t step, bslam_chroma_terms_t *terms)
+{
+    for (int32_t chroma = -128; chroma < 128; chroma++) {
+        const uint32_t apart = bslam_bytes_apart((uint32_t)(chroma + 128) * FOUR, tones);
+        const uint32_t twice = bslam_bytes_plus(apart, apart & ALL_BUT_GREY);
+        terms[(uint8_t)chroma] = (bslam_chroma_terms_t){
+            .value = weight * least(bslam_byte_of(apart, TO_WALL), CHROMA_MAX),
+            .distances = bslam_bytes_least(twice, FOUR * DISTANCE_MAX),
+            .bin = bslam_chroma_bin(chroma) * step,
+        };
+    }
+}
+
+/// Tables of all that depends on one channel of a tone.
+static void fill_channels(const bslam_background_t *background, const int16_t *w,
+                          bslam_channel_tables_t *tables)
 {
     const bslam_tone_t wall = background->tone[BSLAM_ZONE_WALL];
     const bslam_tone_t floor = background->tone[BSLAM_ZONE_FLOOR];
     const bslam_tone_t ceiling = background->tone[BSLAM_ZONE_CEILING];
-    int16_t walls[STEP], floors[STEP], ceilings[STEP];
-    for (int32_t k = 0; k < STEP; k++) {
-        const int16_t light = in->light[k], reddish = (int16_t)in->reddish[k],
-                      bluish = (int16_t)in->bluish[k];
-        const int16_t brighter = (int16_t)(light - wall.light);
-        const int16_t red_off = apart(reddish, wall.reddish), blue_off = apart(bluish, wall.bluish);
-        const int16_t to_wall = (int16_t)(apart(light, wall.light) + 2 * (red_off + blue_off));
-        const int16_t to_floor = (int16_t)(apart(light, floor.light) +
-                                           2 * (apart(reddish, floor.reddish) + apart(bluish, floor.bluish)));
-        const int16_t to_ceiling =
-            (int16_t)(apart(light, ceiling.light) +
-                      2 * (apart(reddish, ceiling.reddish) + apart(bluish, ceiling.bluish)));
-        walls[k] = least16(to_wall, DISTANCE_MAX);
-        floors[k] = least16(to_floor, DISTANCE_MAX);
-        ceilings[k] = least16(to_ceiling, DISTANCE_MAX);
-        sums[k] += w[0] * most16(least16(brighter, LIGHT_MAX), -LIGHT_MAX) +
-                   w[1] * least16(apart(light, wall.light), LIGHT_MAX) + w[2] * least16(red_off, CHROMA_MAX) +
-                   w[3] * least16(blue_off, CHROMA_MAX);
-    }
-    for (int32_t k = 0; k < STEP; k++) {
-        const int16_t nearest = least16(walls[k], least16(floors[k], ceilings[k]));
-        const int16_t colour = (int16_t)(apart(in->reddish[k], 0) + apart(in->bluish[k], 0));
-        sums[k] +=
-            w[4] * floors[k] + w[5] * ceilings[k] + w[6] * nearest + w[15] * least16(colour, DISTANCE_MAX);
-    }
-    for (int32_t k = 0; k < STEP; k++) {
-        const int16_t brighter = (int16_t)(in->light[k] - wall.light);
-        const int16_t darker = least16(most16(brighter, -LIGHT_MAX), 0);
-        const int16_t is_above = in->floor_row[k] >= row ? -1 : 0;
-        sums[k] += w[20] * (int16_t)(walls[k] & is_above) + w[21] * (int16_t)(darker & is_above);
+    fill_lights(background, w, tables->light);
+    fill_chromas(word_of(floor.reddish, wall.reddish, ceiling.reddish, 0) ^ FOUR * 128, w[2], 8,
+                 tables->reddish);
+    fill_chromas(word_of(floor.bluish, wall.bluish, ceiling.bluish, 0) ^ FOUR * 128, w[3], 1, tables->bluish);
+}
+
+/// What textures weigh, and their words.
+typedef struct texture {
+    int32_t by_spread, by_step_x, by_step_y;
+    uint32_t spread, step_x, step_y;
+} texture_t;
+
+static inline int32_t texture_sum(const texture_t *t, int32_t k)
+{
+    return t->by_spread * bslam_byte_of(t->spread, k) + t->by_step_x * bslam_byte_of(t->step_x, k) +
+           t->by_step_y * bslam_byte_of(t->step_y, k);
+}
+
+/// What a row of cells adds up to by texture and by the place: `places` of the present row, by where the
+/// floor begins.
+static void sum_texture(const bslam_view_t *view, const int16_t *w, int32_t first, const int32_t *places,
+                        int32_t of_row, int32_t *restrict sums)
+{
+    const uint8_t *spread = view->tones->spread + first;
+    const uint8_t *step_x = view->step_x + first, *step_y = view->step_y + first;
+    const int16_t *floor_row = view->floor_line->row;
+    const int32_t columns = view->frame->columns;
+    texture_t t = {.by_spread = w[12], .by_step_x = w[13], .by_step_y = w[14]};
+    for (int32_t i = 0; i < columns; i += BSLAM_WORD_BYTES) {
+        t.spread = bslam_bytes_least(bslam_word_at(spread + i), FOUR * CHROMA_MAX);
+        t.step_x = bslam_bytes_least(bslam_word_at(step_x + i), FOUR * DISTANCE_MAX);
+        t.step_y = bslam_bytes_least(bslam_word_at(step_y + i), FOUR * DISTANCE_MAX);
+        sums[i] = of_row + places[floor_row[i]] + texture_sum(&t, 0);
+        sums[i + 1] = of_row + places[floor_row[i + 1]] + texture_sum(&t, 1);
+        sums[i + 2] = of_row + places[floor_row[i + 2]] + texture_sum(&t, 2);
+        sums[i + 3] = of_row + places[floor_row[i + 3]] + texture_sum(&t, 3);
     }
 }
 
-/// Adds what texture and the place above the floor say.
-static void add_place(const cells_in_t *in, const int16_t *w, int16_t row, int32_t sums[STEP])
+/// Values of a row's cells: by their tones, and the sums of the rest.
+static void decide_row(const bslam_view_t *view, const bslam_cell_tables_t *bins,
+                       const bslam_channel_tables_t *channels, const int16_t *w, int32_t row,
+                       const int32_t *restrict sums, uint16_t *restrict frequent, int8_t *restrict values)
 {
-    for (int32_t k = 0; k < STEP; k++) {
-        const int16_t above = (int16_t)(in->floor_row[k] - row);
-        sums[k] += w[12] * least16(in->spread[k], CHROMA_MAX) + w[13] * least16(in->step_x[k], DISTANCE_MAX) +
-                   w[14] * least16(in->step_y[k], DISTANCE_MAX) + w[16] * least16(most16(above, -8), 40) +
-                   w[17] * least16(most16(above, -3), 3);
-    }
-}
-
-static void finish(const int32_t *restrict sums, int8_t *restrict values)
-{
-    int16_t whole[STEP];
-    for (int32_t k = 0; k < STEP; k++) {
-        whole[k] = (int16_t)clamp(sums[k] / (1 << BSLAM_CELL_WEIGHT_SHIFT), -127, 127);
-    }
-    for (int32_t k = 0; k < STEP; k++) {
-        values[k] = (int8_t)whole[k];
+    const int32_t first = row * view->frame->columns;
+    const uint8_t *lights = view->tones->light + first;
+    const uint8_t *reddish = (const uint8_t *)view->tones->reddish + first;
+    const uint8_t *bluish = (const uint8_t *)view->tones->bluish + first;
+    const int16_t *floor_row = view->floor_line->row;
+    const uint32_t by_distance = bslam_halves(w[4], w[5]);
+    const int32_t by_nearest = w[6], by_colour = w[15], by_wall = w[20];
+    for (int32_t i = 0; i < view->frame->columns; i++) {
+        const bslam_light_terms_t *a = &channels->light[lights[i]];
+        const bslam_chroma_terms_t *b = &channels->reddish[reddish[i]], *c = &channels->bluish[bluish[i]];
+        const uint32_t distances =
+            bslam_bytes_plus(a->distances, bslam_bytes_plus(b->distances, c->distances));
+        const uint32_t nearer = bslam_bytes_least(distances, distances >> 8);
+        const int32_t bin = a->bin + b->bin + c->bin;
+        int32_t sum = sums[i] + a->value + b->value + c->value + bins->sums[bin];
+        sum = bslam_halves_dot(bslam_bytes_even(distances), by_distance, sum);
+        sum += by_nearest * bslam_byte_of(bslam_bytes_least(nearer, nearer >> 8), 0) +
+               by_colour * bslam_byte_of(distances, 3);
+        if (floor_row[i] >= row) {
+            sum += a->above_floor + by_wall * bslam_byte_of(distances, TO_WALL);
+        }
+        frequent[i] = bins->frequent[bin];
+        values[i] = (int8_t)most(clamp(sum / (1 << BSLAM_CELL_WEIGHT_SHIFT), -128, 127), -127);
     }
 }
 
 void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine,
-                        bslam_cell_tables_t *tables, uint16_t *frequent, int8_t *values)
+                        bslam_cell_tables_t *tables, bslam_channel_tables_t *channels, uint16_t *frequent,
+                        int8_t *values)
 {
     const int32_t columns = view->frame->columns, rows = view->frame->rows;
     const int32_t horizon = bslam_horizon_row(view->camera);
     const int16_t *w = machine->weights;
-    fill_tables(view->background, w, tables);
+    const int32_t bias = machine->bias - DISTANCE_ZERO * (w[4] + w[5] + w[6] + w[15]);
+    int32_t places[2 * ROWS_MAX + 1];  // what the place above the floor adds, from -ROWS_MAX rows on
+    int32_t sums[BSLAM_COLUMNS_MAX + BSLAM_WORD_BYTES];
+    fill_bins(view->background, w, tables);
+    fill_channels(view->background, w, channels);
+    for (int32_t above = -ROWS_MAX; above <= ROWS_MAX; above++) {
+        places[ROWS_MAX + above] = w[16] * clamp(above, -8, 40) + w[17] * clamp(above, -3, 3);
+    }
     for (int32_t row = 0; row < rows; row++) {
         const int32_t up = clamp(horizon - row, -30, 30);
-        const int32_t of_row = machine->bias + w[18] * up + w[19] * most(up, 0);
-        for (int32_t column = 0; column < columns; column += STEP) {
-            const int32_t i = row * columns + column;  // a step may end in the next row, which comes later
-            const cells_in_t in = {
-                view->tones->light + i,        view->tones->reddish + i, view->tones->bluish + i,
-                view->tones->spread + i,       view->step_x + i,         view->step_y + i,
-                view->floor_line->row + column};
-            uint16_t bins[STEP];
-            int32_t sums[STEP];
-            fill_bins(&in, bins);
-            for (int32_t k = 0; k < STEP; k++) {
-                sums[k] = of_row + tables->sums[bins[k]];
-                frequent[i + k] = tables->frequent[bins[k]];
-            }
-            add_tones(&in, view->background, w, (int16_t)row, sums);
-            add_place(&in, w, (int16_t)row, sums);
-            finish(sums, values + i);
-        }
+        const int32_t of_row = bias + w[18] * up + w[19] * most(up, 0);
+        const int32_t first = row * columns;
+        sum_texture(view, w, first, places + ROWS_MAX - row, of_row, sums);
+        decide_row(view, tables, channels, w, row, sums, frequent + first, values + first);
     }
 }

@@ -35,12 +35,34 @@ typedef struct bslam_cell_machine {
     int32_t bias;
 } bslam_cell_machine_t;
 
-/// What each bin adds to a cell's sum in the present frame, worked out once a frame, and the view's
+/// What each bin of tones adds to a cell's sum in the present frame, worked out once a frame, and the view's
 /// `frequent` of its tones.
 typedef struct bslam_cell_tables {
     int32_t sums[BSLAM_TONE_BINS];
     uint16_t frequent[BSLAM_TONE_BINS];
 } bslam_cell_tables_t;
+
+/// Scratch: what each channel of a tone adds. A multiple of 16 bytes each, which costs a core less to find.
+#define BSLAM_LIGHTS 194
+typedef struct bslam_light_terms {
+    int32_t value;
+    uint32_t distances;  ///< from tones of the room (cells.c), a byte each
+    int32_t bin;
+    int32_t above_floor;  ///< of a cell that is not below the floor line
+} bslam_light_terms_t;
+
+typedef struct bslam_chroma_terms {
+    int32_t value;
+    uint32_t distances;
+    int32_t bin;
+    int32_t unused;
+} bslam_chroma_terms_t;
+
+typedef struct bslam_channel_tables {
+    bslam_light_terms_t light[BSLAM_LIGHTS];
+    bslam_chroma_terms_t reddish[256];  ///< [(uint8_t)reddish]
+    bslam_chroma_terms_t bluish[256];
+} bslam_channel_tables_t;
 
 /// The machine of a model, rounded to whole numbers.
 bslam_cell_machine_t bslam_cell_machine(const bslam_svm_t *svm);
@@ -53,8 +75,10 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
                          int16_t features[BSLAM_CELL_FEATURES]);
 
 /// Fills the view's values and frequent, given as arrays to write to: the machine's sum over
-/// bslam_cell_features, with tables that it works out first.
+/// bslam_cell_features, with tables that it works out first. The floor line's rows are within the frame, or
+/// one above it.
 void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine,
-                        bslam_cell_tables_t *tables, uint16_t *frequent, int8_t *values);
+                        bslam_cell_tables_t *tables, bslam_channel_tables_t *channels, uint16_t *frequent,
+                        int8_t *values);
 
 #endif

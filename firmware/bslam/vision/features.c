@@ -1,11 +1,7 @@
 #include "bslam/vision/features.h"
 
-#include <string.h>
+#include "bslam/vision/box_sums.h"
 
-/// Columns or rows of cells beside a box that count as its surroundings.
-#define STRIP 2
-#define ZONES 3
-#define CELLS_ENOUGH 16
 #define CONTRAST_FEATURES 6
 
 static int32_t least(int32_t a, int32_t b)
@@ -23,297 +19,12 @@ static float clampf(float value, float low, float high)
     return value < low ? low : value > high ? high : value;
 }
 
-/// A rectangle of cells: [left, right) by [top, bottom).
-typedef struct area {
-    int32_t left, top, right, bottom;
-} area_t;
-
-/// Sums over the cells of a zone.
-typedef struct zone {
-    int32_t cells;
-    int32_t light, reddish, bluish;
-} zone_t;
-
-/// Sums over the cells of a rectangle; all whole numbers of 32 bits.
-typedef struct sums {
-    int32_t cells;
-    int32_t light, reddish, bluish;
-    int32_t spread;
-    int32_t value;        ///< decision values of the cells
-    int32_t wall, floor;  ///< how frequent the tones are in the zones' histograms
-    // What follows only of what is inside the box.
-    int32_t light_sq, reddish_sq, bluish_sq;
-    int32_t step_x, step_y;
-    int32_t likely;  ///< cells whose value is above 0
-} sums_t;
-
-/// An area within the frame: every row, or every other one.
-typedef struct rows {
-    int32_t first, end, stride;  ///< of rows
-    int32_t left, right;         ///< columns [left, right)
-} rows_t;
-
-/// Means of every other row of a large area are as good.
-static int32_t stride_of(int32_t cells)
-{
-    return cells > CELLS_ENOUGH ? 2 : 1;
-}
-
-static rows_t rows_of(const bslam_view_t *view, area_t area)
-{
-    const int32_t cells = (area.right - area.left) * (area.bottom - area.top);
-    const int32_t left = most(area.left, 0), right = least(area.right, view->frame->columns);
-    return (rows_t){.first = most(area.top, 0),
-                    .end = least(area.bottom, view->frame->rows),
-                    .stride = stride_of(cells),
-                    .left = left,
-                    .right = right > left ? right : left};
-}
-
-static sums_t sum_inside(const bslam_view_t *view, area_t area)
-{
-    sums_t sums = {0};
-    const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, area);
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        const int32_t start = row * view->frame->columns, end = start + rows.right;
-        sums.cells += rows.right - rows.left;
-        for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t light = tones->light[i];
-            const int32_t reddish = (int32_t)tones->reddish[i], bluish = (int32_t)tones->bluish[i];
-            const int32_t value = (int32_t)view->values[i], frequent = view->frequent[i];
-            sums.light += light;
-            sums.reddish += reddish;
-            sums.bluish += bluish;
-            sums.spread += tones->spread[i];
-            sums.value += value;
-            sums.wall += frequent & 255;
-            sums.floor += frequent >> 8;
-            sums.light_sq += light * light;
-            sums.reddish_sq += reddish * reddish;
-            sums.bluish_sq += bluish * bluish;
-            sums.step_x += view->step_x[i];
-            sums.step_y += view->step_y[i];
-            sums.likely += value > 0 ? 1 : 0;
-        }
-    }
-    return sums;
-}
-
-/// A strip along a side of a box, outside.
-static area_t strip_of(const bslam_proposal_t *p, bslam_side_t side)
-{
-    switch (side) {
-    case BSLAM_SIDE_LEFT:
-        return (area_t){p->left - STRIP, p->top, p->left, p->bottom};
-    case BSLAM_SIDE_RIGHT:
-        return (area_t){p->right, p->top, p->right + STRIP, p->bottom};
-    case BSLAM_SIDE_TOP:
-        return (area_t){p->left, p->top - STRIP, p->right, p->top};
-    default:
-        return (area_t){p->left, p->bottom, p->right, p->bottom + STRIP};
-    }
-}
-
-static sums_t sum_beside(const bslam_view_t *view, const bslam_proposal_t *p, bslam_side_t side)
-{
-    sums_t sums = {0};
-    const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, strip_of(p, side));
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        const int32_t start = row * view->frame->columns, end = start + rows.right;
-        sums.cells += rows.right - rows.left;
-        for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t frequent = view->frequent[i];
-            sums.light += tones->light[i];
-            sums.reddish += tones->reddish[i];
-            sums.bluish += tones->bluish[i];
-            sums.spread += tones->spread[i];
-            sums.value += view->values[i];
-            sums.wall += frequent & 255;
-            sums.floor += frequent >> 8;
-        }
-    }
-    return sums;
-}
-
-static zone_t zone_of(const sums_t *sums)
-{
-    return (zone_t){sums->cells, sums->light, sums->reddish, sums->bluish};
-}
-
-static void merge(sums_t *into, const sums_t *from)
-{
-    int32_t *a = &into->cells;
-    const int32_t *b = &from->cells;
-    for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
-        a[i] += b[i];
-    }
-}
-
-/// Columns of cells summed at a time; a constant, so that a compiler can use vector instructions.
-#define LANES 16
-
-/// Sums down LANES columns: of a row of zones, and of the whole box.
-typedef struct lanes {
-    int16_t light[LANES], reddish[LANES], bluish[LANES];
-    uint16_t spread[LANES], step_x[LANES], step_y[LANES], wall[LANES], floor[LANES];
-    int16_t value[LANES];
-    uint8_t likely[LANES];
-    uint32_t light_sq[LANES], reddish_sq[LANES], bluish_sq[LANES];
-} lanes_t;
-
-static void add_bytes(uint16_t *restrict sums, const uint8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] = (uint16_t)(sums[k] + bytes[k]);
-    }
-}
-
-static void add_signed(int16_t *restrict sums, const int8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] = (int16_t)(sums[k] + bytes[k]);
-    }
-}
-
-static void add_squares(uint32_t *restrict sums, const int8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] += (uint16_t)(bytes[k] * bytes[k]);
-    }
-}
-
-/// Adds the cells from `i` on; what is beyond the box is not read out.
-static void add_row(lanes_t *restrict lanes, const bslam_view_t *view, int32_t i)
-{
-    const uint8_t *restrict light = view->tones->light + i;
-    const uint16_t *restrict frequent = view->frequent + i;
-    const int8_t *restrict values = view->values + i;
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->light[k] = (int16_t)(lanes->light[k] + light[k]);
-        lanes->light_sq[k] += (uint16_t)(light[k] * light[k]);
-    }
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->wall[k] = (uint16_t)(lanes->wall[k] + (frequent[k] & 255));
-        lanes->floor[k] = (uint16_t)(lanes->floor[k] + (frequent[k] >> 8));
-    }
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->likely[k] = (uint8_t)(lanes->likely[k] + (values[k] > 0 ? 1 : 0));
-    }
-    add_signed(lanes->reddish, view->tones->reddish + i);
-    add_signed(lanes->bluish, view->tones->bluish + i);
-    add_signed(lanes->value, values);
-    add_squares(lanes->reddish_sq, view->tones->reddish + i);
-    add_squares(lanes->bluish_sq, view->tones->bluish + i);
-    add_bytes(lanes->spread, view->tones->spread + i);
-    add_bytes(lanes->step_x, view->step_x + i);
-    add_bytes(lanes->step_y, view->step_y + i);
-}
-
-/// The box's zones: rows and columns that they begin at, and one past the last.
-typedef struct grid {
-    int32_t left[ZONES + 1], top[ZONES + 1];
-    int32_t stride[ZONES];  ///< of a row of zones; 0 if it is not the same in all of them
-} grid_t;
-
-static area_t zone_area(const grid_t *grid, int32_t row, int32_t column)
-{
-    return (area_t){grid->left[column], grid->top[row], grid->left[column + 1], grid->top[row + 1]};
-}
-
-static grid_t grid_of(const bslam_proposal_t *p)
-{
-    grid_t grid;
-    for (int32_t i = 0; i <= ZONES; i++) {
-        grid.left[i] = p->left + i * (p->right - p->left) / ZONES;
-        grid.top[i] = p->top + i * (p->bottom - p->top) / ZONES;
-    }
-    // The narrowest and the widest zone of a row; where they differ it is by one column.
-    const int32_t narrow = (p->right - p->left) / ZONES, wide = (p->right - p->left + ZONES - 1) / ZONES;
-    for (int32_t row = 0; row < ZONES; row++) {
-        const int32_t height = grid.top[row + 1] - grid.top[row];
-        const int32_t stride = stride_of(narrow * height);
-        grid.stride[row] = stride == stride_of(wide * height) ? stride : 0;
-    }
-    return grid;
-}
-
-/// Adds what was summed of a row of zones down the columns from `first` on, and forgets it.
-static void take_zones(const grid_t *grid, int32_t first, lanes_t *lanes, zone_t zones[ZONES])
-{
-    int32_t column = 0;
-    for (int32_t k = 0; k < LANES && first + k < grid->left[ZONES]; k++) {
-        while (first + k >= grid->left[column + 1]) {
-            column++;
-        }
-        zones[column].light += lanes->light[k];
-        zones[column].reddish += lanes->reddish[k];
-        zones[column].bluish += lanes->bluish[k];
-    }
-    memset(lanes->light, 0, sizeof lanes->light);
-    memset(lanes->reddish, 0, sizeof lanes->reddish);
-    memset(lanes->bluish, 0, sizeof lanes->bluish);
-}
-
-static void take_texture(const lanes_t *lanes, int32_t count, sums_t *inside)
-{
-    for (int32_t k = 0; k < count; k++) {
-        inside->spread += lanes->spread[k];
-        inside->value += lanes->value[k];
-        inside->wall += lanes->wall[k];
-        inside->floor += lanes->floor[k];
-        inside->light_sq += (int32_t)lanes->light_sq[k];
-        inside->reddish_sq += (int32_t)lanes->reddish_sq[k];
-        inside->bluish_sq += (int32_t)lanes->bluish_sq[k];
-        inside->step_x += lanes->step_x[k];
-        inside->step_y += lanes->step_y[k];
-        inside->likely += lanes->likely[k];
-    }
-}
-
-/// Sums of the zones, and of the whole box, which is within the frame.
-static void sum_box(const bslam_view_t *view, const bslam_proposal_t *p, zone_t zones[ZONES * ZONES],
-                    sums_t *inside)
-{
-    const int32_t columns = view->frame->columns;
-    const grid_t grid = grid_of(p);
-    memset(inside, 0, sizeof *inside);
-    memset(zones, 0, ZONES * ZONES * sizeof zones[0]);
-    for (int32_t first = p->left; first < p->right; first += LANES) {
-        lanes_t lanes = {0};
-        for (int32_t r = 0; r < ZONES; r++) {
-            for (int32_t row = grid.top[r]; grid.stride[r] > 0 && row < grid.top[r + 1];
-                 row += grid.stride[r]) {
-                add_row(&lanes, view, row * columns + first);
-            }
-            take_zones(&grid, first, &lanes, zones + ZONES * r);
-        }
-        take_texture(&lanes, least(LANES, p->right - first), inside);
-    }
-    for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const int32_t stride = grid.stride[z / ZONES];
-        const area_t area = zone_area(&grid, z / ZONES, z % ZONES);
-        if (stride == 0) {
-            const sums_t sums = sum_inside(view, area);
-            zones[z] = zone_of(&sums);
-            merge(inside, &sums);
-            continue;
-        }
-        zones[z].cells = (area.bottom - area.top + stride - 1) / stride * (area.right - area.left);
-        inside->cells += zones[z].cells;
-        inside->light += zones[z].light;
-        inside->reddish += zones[z].reddish;
-        inside->bluish += zones[z].bluish;
-    }
-}
-
-static float mean(const sums_t *sums, int32_t sum)
+static float mean(const bslam_sums_t *sums, int32_t sum)
 {
     return sums->cells > 0 ? (float)sum / (float)sums->cells : 0.0f;
 }
 
-static float deviation(const sums_t *sums, int32_t sum, int32_t sum_sq)
+static float deviation(const bslam_sums_t *sums, int32_t sum, int32_t sum_sq)
 {
     const float m = mean(sums, sum);
     const float variance = mean(sums, sum_sq) - m * m;
@@ -416,9 +127,9 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     const float top = rays->top.slope, bottom = rays->bottom.slope;
     const float height_m = (float)view->camera->z_m;
     float share, ignored;
-    float wall_m = line_distance_m(view, p->left - STRIP, p->right + STRIP, &share);
-    const float left_m = line_distance_m(view, p->left - STRIP, p->left + 1, &ignored);
-    const float right_m = line_distance_m(view, p->right - 1, p->right + STRIP, &ignored);
+    float wall_m = line_distance_m(view, p->left - BSLAM_STRIP, p->right + BSLAM_STRIP, &share);
+    const float left_m = line_distance_m(view, p->left - BSLAM_STRIP, p->left + 1, &ignored);
+    const float right_m = line_distance_m(view, p->right - 1, p->right + BSLAM_STRIP, &ignored);
     const bool known = wall_m > 0;
     wall_m = known ? clampf(wall_m, 0.3f, 20.0f) : 1.0f;
     const float width_px = (float)(p->box.right_px - p->box.left_px);
@@ -453,7 +164,7 @@ static float *upright_features(const bslam_view_t *view, const rays_t *rays, flo
 
 /// How the box differs from a strip beside it. 6 features: light, chroma, the cells' values, spread, and how
 /// much the strip looks like wall and floor.
-static float *contrast_features(const sums_t *inside, const sums_t *beside, float *x)
+static float *contrast_features(const bslam_sums_t *inside, const bslam_sums_t *beside, float *x)
 {
     const bool seen = beside->cells > 0;
     const float reddish = mean(inside, inside->reddish) - mean(beside, beside->reddish);
@@ -479,7 +190,7 @@ static void fold(float *left, float *right, int32_t count)
 }
 
 /// Whether what is on both sides is the same. 2 features: light, chroma.
-static float *likeness_features(const sums_t *a, const sums_t *b, float *x)
+static float *likeness_features(const bslam_sums_t *a, const bslam_sums_t *b, float *x)
 {
     const bool seen = a->cells > 0 && b->cells > 0;
     const float light = mean(a, a->light) - mean(b, b->light);
@@ -504,10 +215,10 @@ static float *edge_features(const bslam_view_t *view, const bslam_proposal_t *p,
 }
 
 /// Means over the whole box. 15 features.
-static float *texture_features(const bslam_view_t *view, const sums_t *inside, float *x)
+static float *texture_features(const bslam_view_t *view, const bslam_sums_t *inside, float *x)
 {
     const bslam_tone_t wall = view->background->tone[BSLAM_ZONE_WALL];
-    const sums_t *s = inside;
+    const bslam_sums_t *s = inside;
     *x++ = mean(s, s->light) - (float)wall.light;
     *x++ = mean(s, s->reddish) - (float)wall.reddish;
     *x++ = mean(s, s->bluish) - (float)wall.bluish;
@@ -526,21 +237,27 @@ static float *texture_features(const bslam_view_t *view, const sums_t *inside, f
     return x;
 }
 
+static bslam_zone_sums_t whole_of(const bslam_sums_t *sums)
+{
+    return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
+}
+
 /// How the zones of the box differ from its mean. 2 features a zone: light, chroma.
-static float *zone_features(const zone_t zones[ZONES * ZONES], const sums_t *inside, float *x)
+static float *zone_features(const bslam_zone_sums_t zones[BSLAM_BOX_ZONES * BSLAM_BOX_ZONES],
+                            const bslam_sums_t *inside, float *x)
 {
     float *row = x;
-    const zone_t whole = zone_of(inside);
-    for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const zone_t *zone = zones[z].cells > 0 ? &zones[z] : &whole;
+    const bslam_zone_sums_t whole = whole_of(inside);
+    for (int32_t z = 0; z < BSLAM_BOX_ZONES * BSLAM_BOX_ZONES; z++) {
+        const bslam_zone_sums_t *zone = zones[z].cells > 0 ? &zones[z] : &whole;
         const float cells = (float)(zone->cells > 0 ? zone->cells : 1);
         const float reddish = (float)zone->reddish / cells - mean(inside, inside->reddish);
         const float bluish = (float)zone->bluish / cells - mean(inside, inside->bluish);
         *x++ = (float)zone->light / cells - mean(inside, inside->light);
         *x++ = sqrtf(reddish * reddish + bluish * bluish);
     }
-    for (; row < x; row += 2 * ZONES) {
-        fold(row, row + 2 * (ZONES - 1), 2);
+    for (; row < x; row += 2 * BSLAM_BOX_ZONES) {
+        fold(row, row + 2 * (BSLAM_BOX_ZONES - 1), 2);
     }
     return x;
 }
@@ -549,17 +266,18 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
                          float features[BSLAM_BLOB_FEATURES])
 {
     const bslam_proposal_t *p = proposal;
-    zone_t zones[ZONES * ZONES];
-    sums_t inside;
-    sum_box(view, p, zones, &inside);
+    bslam_zone_sums_t zones[BSLAM_BOX_ZONES * BSLAM_BOX_ZONES];
+    bslam_sums_t inside;
+    bslam_sum_box(view, p, zones, &inside);
     const rays_t rays = rays_of(view, &p->box);
     float *x = place_features(view, p, &rays, features);
-    const sums_t left = sum_beside(view, p, BSLAM_SIDE_LEFT), right = sum_beside(view, p, BSLAM_SIDE_RIGHT);
+    const bslam_sums_t left = bslam_sum_beside(view, p, BSLAM_SIDE_LEFT),
+                       right = bslam_sum_beside(view, p, BSLAM_SIDE_RIGHT);
     x = contrast_features(&inside, &left, x);
     x = contrast_features(&inside, &right, x);
     fold(x - 2 * CONTRAST_FEATURES, x - CONTRAST_FEATURES, CONTRAST_FEATURES);
     for (int32_t side = BSLAM_SIDE_TOP; side < BSLAM_SIDES; side++) {
-        const sums_t beside = sum_beside(view, p, (bslam_side_t)side);
+        const bslam_sums_t beside = bslam_sum_beside(view, p, (bslam_side_t)side);
         x = contrast_features(&inside, &beside, x);
     }
     x = likeness_features(&left, &right, x);

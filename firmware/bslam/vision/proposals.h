@@ -41,7 +41,10 @@ typedef struct bslam_proposals {
     uint32_t runs_dropped;   ///< since init: a frame so broken up that BSLAM_RUNS_MAX did not suffice
     uint32_t boxes_dropped;  ///< since init: BSLAM_PROPOSALS_MAX did not suffice
     bslam_proposal_t items[BSLAM_PROPOSALS_MAX];
-    bslam_run_t runs[BSLAM_RUNS_MAX];
+    union {
+        bslam_channel_tables_t channel_tables;  ///< while the cells are looked at,
+        bslam_run_t runs[BSLAM_RUNS_MAX];       ///< and then the runs of a segmentation
+    };
     uint8_t mask[BSLAM_CELLS_ROOM];  ///< 1: the present segmentation joins this cell
 } bslam_proposals_t;
 

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bytes.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
@@ -12,6 +13,8 @@
 /// than these shares of its cells are, in percent.
 #define BLACK_BELOW 16
 #define SATURATED_FROM 244
+/// Bits of a word's bytes of which a black cell has none, a saturated one all.
+#define HIGH_BITS 0xF0F0F0F0U
 #define BLACK_PERCENT 95
 #define SATURATED_PERCENT 60
 /// A frame whose cells' green differs by at most this is of one colour.
@@ -108,55 +111,52 @@ bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_
     return BSLAM_OK;
 }
 
-/// How many cells are black and saturated, and the range of their green.
+/// How many cells are black and saturated, and whether their green differs by more than FLAT_RANGE.
 typedef struct light {
     int32_t black, saturated;
-    uint8_t low, high;
+    bool varied;
 } light_t;
 
-static uint8_t lesser(uint8_t a, uint8_t b)
+static bool is_varied(const uint8_t *green, int32_t count)
 {
-    return a < b ? a : b;
-}
-
-static uint8_t greater(uint8_t a, uint8_t b)
-{
-    return a > b ? a : b;
-}
-
-static light_t light_of(const bslam_cells_t *cells, int32_t count)
-{
-    enum { STEP = BSLAM_CELL_STEP };
-    const uint8_t *red = cells->red, *green = cells->green, *blue = cells->blue;
-    uint16_t black[STEP] = {0}, saturated[STEP] = {0};
-    uint8_t low[STEP], high[STEP];
-    memset(low, 255, sizeof low);
-    memset(high, 0, sizeof high);
-    int32_t i = 0;
-    for (; i + STEP <= count; i += STEP) {
-        for (int32_t k = 0; k < STEP; k++) {
-            const uint8_t brightest = greater(greater(red[i + k], green[i + k]), blue[i + k]);
-            const uint8_t darkest = lesser(lesser(red[i + k], green[i + k]), blue[i + k]);
-            black[k] = (uint16_t)(black[k] + (brightest < BLACK_BELOW ? 1 : 0));
-            saturated[k] = (uint16_t)(saturated[k] + (darkest >= SATURATED_FROM ? 1 : 0));
-            low[k] = lesser(low[k], green[i + k]);
-            high[k] = greater(high[k], green[i + k]);
+    uint8_t low = 255, high = 0;
+    for (int32_t i = 0; i < count; i++) {
+        low = green[i] < low ? green[i] : low;
+        high = green[i] > high ? green[i] : high;
+        if (high - low > FLAT_RANGE) {
+            return true;
         }
     }
-    light_t light = {0, 0, 255, 0};
-    for (; i < count; i++) {
-        const uint8_t brightest = greater(greater(red[i], green[i]), blue[i]);
-        const uint8_t darkest = lesser(lesser(red[i], green[i]), blue[i]);
-        light.black += brightest < BLACK_BELOW ? 1 : 0;
-        light.saturated += darkest >= SATURATED_FROM ? 1 : 0;
-        light.low = lesser(light.low, green[i]);
-        light.high = greater(light.high, green[i]);
+    return false;
+}
+
+static void judge_cell(bslam_cell_t cell, light_t *light)
+{
+    const bool is_black = cell.red < BLACK_BELOW && cell.green < BLACK_BELOW && cell.blue < BLACK_BELOW;
+    const bool is_saturated =
+        cell.red >= SATURATED_FROM && cell.green >= SATURATED_FROM && cell.blue >= SATURATED_FROM;
+    light->black += is_black ? 1 : 0;
+    light->saturated += is_saturated ? 1 : 0;
+}
+
+/// Cells are looked at one by one only where one of the four in a word has no bit above BLACK_BELOW, or all
+/// that SATURATED_FROM has: few are.
+static light_t light_of(const bslam_cells_t *cells, int32_t count)
+{
+    light_t light = {.varied = is_varied(cells->green, count)};
+    int32_t i = 0;
+    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
+        const uint32_t red = bslam_word_at(cells->red + i), green = bslam_word_at(cells->green + i);
+        const uint32_t blue = bslam_word_at(cells->blue + i);
+        const uint32_t bright = (red | green | blue) & HIGH_BITS, dim = ~(red & green & blue) & HIGH_BITS;
+        if (bslam_has_zero_byte(bright) || bslam_has_zero_byte(dim)) {
+            for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++) {
+                judge_cell(bslam_cell_at(cells, i + k), &light);
+            }
+        }
     }
-    for (int32_t k = 0; k < STEP; k++) {
-        light.black += black[k];
-        light.saturated += saturated[k];
-        light.low = lesser(light.low, low[k]);
-        light.high = greater(light.high, high[k]);
+    for (; i < count; i++) {
+        judge_cell(bslam_cell_at(cells, i), &light);
     }
     return light;
 }
@@ -173,7 +173,7 @@ static bslam_vision_reason_t judge_light(const bslam_frame_t *frame)
     if (100 * saturated > SATURATED_PERCENT * count) {
         return BSLAM_VISION_OVEREXPOSED;
     }
-    return light.high - light.low <= FLAT_RANGE ? BSLAM_VISION_FLAT : BSLAM_VISION_NOTHING;
+    return light.varied ? BSLAM_VISION_NOTHING : BSLAM_VISION_FLAT;
 }
 
 static bslam_frame_t finished_frame(const bslam_vision_t *vision)
@@ -305,8 +305,8 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     }
     bslam_background_floor_line(background, frame, view.camera, &vision->tones, &vision->floor_line);
     bslam_cells_step(&view, vision->step_x, vision->step_y);
-    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables, vision->thumbnail.frequent,
-                       vision->values);
+    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables,
+                       &vision->proposals.channel_tables, vision->thumbnail.frequent, vision->values);
     bslam_proposals_find(&vision->proposals, &view);
     bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =

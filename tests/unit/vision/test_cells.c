@@ -16,6 +16,7 @@ static int8_t values[BSLAM_CELLS_ROOM];
 static bslam_background_t background;
 static bslam_floor_line_t floor_line;
 static bslam_cell_tables_t tables;
+static bslam_channel_tables_t channels;
 
 static const bslam_camera_t camera = {
     .lens = BSLAM_LENS_PINHOLE,
@@ -85,7 +86,7 @@ static void test_cells_decide_is_the_machine_on_the_features(void **state)
         }
         machine.bias = (int32_t)unit_random(&random, -20000, 20000);
         fill(seed);
-        bslam_cells_decide(&view, &machine, &tables, frequent, values);
+        bslam_cells_decide(&view, &machine, &tables, &channels, frequent, values);
         int inner = 0;
         for (int i = 0; i < CELLS; i++) {
             int16_t x[BSLAM_CELL_FEATURES];

@@ -1,0 +1,142 @@
+/// Four bytes of a word at a time: what a Cortex-M4 and its elders have instructions for (SIMD32 of the
+/// ACLE), and the same in portable C for all others, to the bit.
+///
+/// Loops over cells are written twice where that pays: over words, by these, where BSLAM_HAS_BYTES is 1; and
+/// over arrays of constant length elsewhere, which a compiler turns into vector instructions.
+#ifndef BSLAM_MATH_BYTES_H
+#define BSLAM_MATH_BYTES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+/// 1: the core has the instructions. A test may set it, to compare both ways on one machine.
+#ifndef BSLAM_HAS_BYTES
+#ifdef __ARM_FEATURE_SIMD32
+#define BSLAM_HAS_BYTES 1
+#else
+#define BSLAM_HAS_BYTES 0
+#endif
+#endif
+
+#ifdef __ARM_FEATURE_SIMD32
+#include <arm_acle.h>
+#endif
+
+enum { BSLAM_WORD_BYTES = 4 };
+
+static inline uint32_t bslam_word_at(const void *bytes)
+{
+    uint32_t word;
+    memcpy(&word, bytes, sizeof word);
+    return word;
+}
+
+static inline void bslam_word_put(void *bytes, uint32_t word)
+{
+    memcpy(bytes, &word, sizeof word);
+}
+
+#define BSLAM_EVEN_BYTES 0x00FF00FFU
+#define BSLAM_TOP_BITS 0x80808080U
+
+/// Each byte of a less that of b, at least 0.
+static inline uint32_t bslam_bytes_less(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __uqsub8(a, b);
+#else
+    const uint32_t wrapped = ((a | BSLAM_TOP_BITS) - (b & ~BSLAM_TOP_BITS)) ^ ((a ^ ~b) & BSLAM_TOP_BITS);
+    const uint32_t borrows = ((~a & b) | (~(a ^ b) & wrapped)) & BSLAM_TOP_BITS;
+    return wrapped & ~((borrows << 1) - (borrows >> 7));
+#endif
+}
+
+/// Each byte of a and that of b together, at most 255.
+static inline uint32_t bslam_bytes_plus(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __uqadd8(a, b);
+#else
+    return ~bslam_bytes_less(~a, b);
+#endif
+}
+
+static inline uint32_t bslam_bytes_least(uint32_t a, uint32_t b)
+{
+    return a - bslam_bytes_less(a, b);
+}
+
+/// How far each byte of a is from that of b.
+static inline uint32_t bslam_bytes_apart(uint32_t a, uint32_t b)
+{
+    return bslam_bytes_less(a, b) | bslam_bytes_less(b, a);
+}
+
+/// 1 in each byte where that of a is larger than that of b, else 0.
+static inline uint32_t bslam_bytes_above(uint32_t a, uint32_t b)
+{
+    return bslam_bytes_least(bslam_bytes_less(a, b), 0x01010101U);
+}
+
+static inline bool bslam_has_zero_byte(uint32_t bytes)
+{
+    return ((bytes - 0x01010101U) & ~bytes & BSLAM_TOP_BITS) != 0;
+}
+
+/// Byte k, counted from the lowest; in memory, too, on a machine of that byte order.
+static inline int32_t bslam_byte_of(uint32_t bytes, int32_t k)
+{
+    return (int32_t)(bytes >> 8 * k & 255);
+}
+
+/// The sum and the four bytes.
+static inline uint32_t bslam_bytes_sum(uint32_t bytes, uint32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __usada8(bytes, 0, sum);
+#else
+    const uint32_t pairs = (bytes & BSLAM_EVEN_BYTES) + (bytes >> 8 & BSLAM_EVEN_BYTES);
+    return sum + (pairs & 0xFFFFU) + (pairs >> 16);
+#endif
+}
+
+/// Bytes 0 and 2 as halves of a word.
+static inline uint32_t bslam_bytes_even(uint32_t bytes)
+{
+    return bytes & BSLAM_EVEN_BYTES;
+}
+
+/// Adds bytes 0 and 2 to the lower and upper half of sums, neither of which grows beyond 16 bits.
+static inline uint32_t bslam_bytes_add_even(uint32_t sums, uint32_t bytes)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __uxtab16(sums, bytes);
+#else
+    return sums + (bytes & BSLAM_EVEN_BYTES);
+#endif
+}
+
+/// Adds bytes 1 and 3.
+static inline uint32_t bslam_bytes_add_odd(uint32_t sums, uint32_t bytes)
+{
+    return bslam_bytes_add_even(sums, bytes >> 8 | bytes << 24);
+}
+
+/// Two numbers of 16 bits in a word, the first one lower.
+static inline uint32_t bslam_halves(int32_t low, int32_t high)
+{
+    return (uint16_t)low | (uint32_t)high << 16;
+}
+
+/// The sum and the products of the lower halves of a and b, and of the upper ones, as signed numbers.
+static inline int32_t bslam_halves_dot(uint32_t a, uint32_t b, int32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __smlad((int16x2_t)a, (int16x2_t)b, sum);
+#else
+    return sum + (int16_t)a * (int16_t)b + (int16_t)(a >> 16) * (int16_t)(b >> 16);
+#endif
+}
+
+#endif

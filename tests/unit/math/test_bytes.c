@@ -1,0 +1,91 @@
+// Four bytes at a time, against the same byte by byte.
+#include "bslam/math/bytes.h"
+
+#include "support.h"
+
+enum { ROUNDS = 20000 };
+
+/// Random bytes, of which many are at the ends of their range.
+static uint32_t random_word(unit_random_t *random)
+{
+    static const uint8_t ends[] = {0, 1, 127, 128, 254, 255};
+    uint32_t word = 0;
+    for (int k = 0; k < BSLAM_WORD_BYTES; k++) {
+        const int i = (int)unit_random(random, 0, 12);
+        const uint32_t byte = i < 6 ? ends[i] : (uint32_t)unit_random(random, 0, 256);
+        word |= byte << 8 * k;
+    }
+    return word;
+}
+
+static int least(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+static void test_bytes_are_each_as_a_number(void **state)
+{
+    unit_random_t random = {1};
+    for (int round = 0; round < ROUNDS; round++) {
+        const uint32_t a = random_word(&random), b = random_word(&random);
+        bool has_zero = false;
+        for (int k = 0; k < BSLAM_WORD_BYTES; k++) {
+            const int x = (int)(a >> 8 * k & 255), y = (int)(b >> 8 * k & 255);
+            assert_int_equal(bslam_byte_of(a, k), x);
+            assert_int_equal(bslam_byte_of(bslam_bytes_less(a, b), k), x > y ? x - y : 0);
+            assert_int_equal(bslam_byte_of(bslam_bytes_plus(a, b), k), least(x + y, 255));
+            assert_int_equal(bslam_byte_of(bslam_bytes_least(a, b), k), least(x, y));
+            assert_int_equal(bslam_byte_of(bslam_bytes_apart(a, b), k), x > y ? x - y : y - x);
+            assert_int_equal(bslam_byte_of(bslam_bytes_above(a, b), k), x > y ? 1 : 0);
+            has_zero = has_zero || x == 0;
+        }
+        assert_int_equal(bslam_has_zero_byte(a), has_zero);
+    }
+}
+
+static void test_sums_of_bytes_and_of_halves(void **state)
+{
+    unit_random_t random = {2};
+    for (int round = 0; round < ROUNDS; round++) {
+        const uint32_t a = random_word(&random), b = random_word(&random);
+        int sum = round;
+        uint32_t even = 0, odd = 0;
+        for (int k = 0; k < BSLAM_WORD_BYTES; k++) {
+            const uint32_t x = a >> 8 * k & 255;
+            sum += (int)x;
+            *(k % 2 == 0 ? &even : &odd) += x << 8 * (k & 2);
+        }
+        assert_int_equal(bslam_bytes_sum(a, (uint32_t)round), sum);
+        assert_int_equal(bslam_bytes_even(a), even);
+        assert_int_equal(bslam_bytes_add_even(7U << 16, a), even + (7U << 16));
+        assert_int_equal(bslam_bytes_add_odd(9U, a), odd + 9);
+        const int16_t low_a = (int16_t)a, high_a = (int16_t)(a >> 16);
+        const int16_t low_b = (int16_t)b, high_b = (int16_t)(b >> 16);
+        const int64_t dot = (int64_t)low_a * low_b + (int64_t)high_a * high_b;
+        if (dot < INT32_MAX - round) {
+            assert_int_equal(bslam_halves_dot(a, b, round), dot + round);
+        }
+        assert_int_equal(bslam_halves(low_a, high_a), a);
+    }
+}
+
+static void test_words_lie_anywhere(void **state)
+{
+    uint8_t bytes[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+    for (int at = 0; at <= 5; at++) {
+        uint8_t copy[9] = {0};
+        bslam_word_put(copy + at, bslam_word_at(bytes + at));
+        assert_memory_equal(copy + at, bytes + at, BSLAM_WORD_BYTES);
+        assert_int_equal(bslam_byte_of(bslam_word_at(bytes + at), 0), at);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bytes_are_each_as_a_number),
+        cmocka_unit_test(test_sums_of_bytes_and_of_halves),
+        cmocka_unit_test(test_words_lie_anywhere),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
