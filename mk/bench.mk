@@ -1,10 +1,16 @@
 # What a filter step costs, in instructions as callgrind counts them on the host: unlike time, the same from
-# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, tools/bench.py counts it.
+# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, tools/bench.py counts it, and
+# runs other people's programs beside it, as far as they are installed.
 
 .PHONY: bench
-bench: ## count the instructions of a filter step at several map sizes (valgrind)
+bench: ## a filter step's instructions (valgrind); time, memory, error beside MRPT, Eigen, GTSAM, LIBLINEAR (5 min)
 	@tools/setup.sh bench
 	@$(PYTHON) tools/bench.py
+
+.PHONY: bench-doc
+bench-doc: ## the same, written into docs/BENCHMARKS.md
+	@tools/setup.sh bench
+	@$(PYTHON) tools/bench.py --out docs
 
 .PHONY: bench-vision
 bench-vision: ## count the instructions a pixel of the vision front end (valgrind); renders what it looks at

@@ -1,16 +1,29 @@
-"""Instructions a filter step takes on this host, as callgrind counts them: `make bench`.
+"""What a filter step costs on this host, and what the same costs elsewhere: `make bench`.
 
-Compiles tests/bench/bench_step.c with the core for several map sizes at -O2 and counts the instructions of
-one step (odometry, then 2 to 4 sightings with distance, identity known, invariant filter). Unlike time, the
-counts are the same from run to run. Instructions are not cycles.
+Counts the instructions of one step (odometry, then 2 to 4 sightings with distance, identity known, invariant
+filter) with callgrind, then runs MRPT's, a textbook's and GTSAM's filter, LIBLINEAR and m2cgen on the same
+drives and signatures, as far as they are installed. Unlike time, counts are the same from run to run; times
+are compared within rounds in which every program runs once. Instructions are not cycles.
+
+    make bench                                                 # all, into out/bench/BENCHMARKS.md
+    .venv/bin/python tools/bench.py --step-only                # the core's own counts, 10 s
+    make bench-doc                                             # all, into docs/BENCHMARKS.md
 """
 
+import argparse
+import importlib.metadata
+import platform
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from markdown import Row, table
+from peers import filters, machines
+from peers.programs import PEERS, ROOT
+
 BUILD = ROOT / "build" / "bench"
 
 NEAR_OPTIMAL = {6: 7_500, 20: 35_000, 50: 153_000, 100: 550_000}
@@ -40,18 +53,137 @@ def instructions_per_step(program: Path, mode: str) -> int:
     return int(collected[1]) // int(done.stdout)
 
 
-def main() -> int:
-    """Prints the table; exits 1 if a step costs more than 1.5 x the near-optimal count from 20 beacons on."""
-    print("instructions a filter step, host -O2, callgrind; 2-4 sightings; instructions are not cycles")
-    print(f"{'beacons':>8} {'step':>10} {'near-optimal':>13} {'ratio':>6} {'with velocity states':>21}")
+def step_table() -> tuple[str, float]:
+    """The core's own step by map size, and the worst ratio to the near-optimal count from 20 beacons on."""
+    rows: list[Row] = []
     worst = 0.0
     for beacons, reference in NEAR_OPTIMAL.items():
         program = build(beacons)
         plain = instructions_per_step(program, "plain")
         velocity = instructions_per_step(program, "velocity")
-        ratio = plain / reference
-        worst = max(worst, ratio) if beacons >= 20 else worst
-        print(f"{beacons:>8} {plain:>10} {reference:>13} {ratio:>6.2f} {velocity:>21}")
+        worst = max(worst, plain / reference) if beacons >= 20 else worst
+        rows.append([beacons, f"{plain:,}", f"{reference:,}", f"{plain / reference:.2f}", f"{velocity:,}"])
+    head = ["beacons", "instructions a step", "near-optimal plain C", "ratio", "with velocity states"]
+    return table(head, rows), worst
+
+
+def machine_table(rounds: int) -> str:
+    """Support vector machines: training and decision."""
+    task = machines.make_task()
+    entrants = [one for one in machines.ENTRANTS if one.is_here()]
+    rows = [_machine_row(one, machines.measure(one, task, rounds)) for one in entrants]
+    head = ["", "training, us", "instructions", "decision, ns", "instructions", "flash, M4F", "right"]
+    tests = f"{len(task.tests[0])} tests"
+    sizes = f"{len(task.sets)} objects; {machines.OWN} views of each against {machines.RIVALS}; {tests}"
+    return f"{sizes}\n\n{table(head, rows)}"
+
+
+def _machine_row(one: machines.Entrant, result: machines.Result) -> Row:
+    train = ["-", "-"]
+    if one.trains:
+        train = [f"{result.train_ns / 1e3:.0f}", f"{result.train_instructions:,}"]
+    flash = "-" if result.flash_bytes is None else f"{result.flash_bytes:,}"
+    decide = [result.decide_ns, f"{result.decide_instructions:,}"]
+    return [one.name, *train, *decide, flash, f"{100.0 * result.right:.1f} %"]
+
+
+def missing() -> dict[str, str]:
+    """Peers that are not installed, and how they are."""
+    apt = {one.name: f"apt-get install {one.package}" for one in PEERS if not one.is_here()}
+    svm = {one.name: one.package for one in machines.ENTRANTS if one.package and not one.is_here()}
+    return apt | svm | ({} if filters.has_gtsam() else {"GTSAM": "pip install gtsam"})
+
+
+def about() -> str:
+    """Machine, date, compilers and versions."""
+    found = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+    lines = [f"{found[1] if found else platform.processor()}, {platform.system()} {platform.machine()}"]
+    lines += [_first_line("cc", "--version"), _first_line("valgrind", "--version")]
+    packages = ("libmrpt-slam-dev", "libeigen3-dev", "liblinear-dev")
+    lines += [f"{one} {version}" for one in packages if (version := _debian_version(one))]
+    for name in ("gtsam", "m2cgen", "scikit-learn"):
+        try:
+            lines.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return f"{date.today().isoformat()}: {'; '.join(lines)}."
+
+
+def _first_line(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\n")[0]
+
+
+def _debian_version(package: str) -> str:
+    command = ["dpkg-query", "--show", "--showformat=${Version}", package]
+    try:
+        return subprocess.run(command, capture_output=True, text=True).stdout
+    except FileNotFoundError:
+        return ""
+
+
+def sections(step: str, rounds: int) -> Iterator[str]:
+    """The page, piece by piece: each takes its time."""
+    yield f"{HEAD}\n{about()}\n"
+    absent = missing()
+    for name, command in absent.items():
+        print(f"left out: {name} is not installed: {command}", file=sys.stderr)
+    if absent:
+        names = "; ".join(f"{name} (`{command}`)" for name, command in absent.items())
+        yield f"Left out, not being installed: {names}.\n"
+    yield f"## The core's own step\n\n{step}\n{STEP_NOTE}\n"
+    yield f"## Time, in times of bslam's\n\n{filters.time_table(rounds)}\n{TIME_NOTE}\n"
+    yield f"## Instructions a step\n\n{filters.count_table()}"
+    yield f"## Memory kept between steps\n\n{filters.memory_table()}\n{MEMORY_NOTE}\n"
+    yield f"## Error, and landmarks made without identities\n\n{filters.accuracy_table()}\n{ACCURACY_NOTE}\n"
+    yield f"## Support vector machines\n\n{machine_table(rounds)}\n{MACHINE_NOTE}\n"
+
+
+HEAD = """# Benchmarks
+
+Written by `make bench-doc`; do not edit. `make bench` measures the same on your
+machine, with those of the others that are installed there.
+"""
+STEP_NOTE = """Instructions by callgrind, `-O2`; odometry and 2 to 4 sightings with distance, invariant
+filter. They are not cycles."""
+TIME_NOTE = f"""CPU time of a step with 2 to 4 sightings among so many beacons, all mapped, identities
+given, `-O2`: median of rounds in which each program runs once [least, largest] (goal). bslam in float,
+invariant, without velocity states; in brackets its own least time. MRPT is its range-bearing EKF-SLAM,
+the class behind its `kf-slam`, in its fastest form and as it comes; only its step is timed, not the
+making of its inputs. iSAM2 keeps all poses, so its time grows: here over {filters.GTSAM_STEPS} steps."""
+MEMORY_NOTE = """bslam: the one struct, in float. The others: what the heap holds after a step, without
+the drive itself and without what a step needs on the way."""
+ACCURACY_NOTE = """Mean position error of simulated drives of 200 s (seeds 100:104 and 100:102) whose wheels
+jitter by 0.3 m/s, the noise for which all have a model; without identities by nearest neighbour in
+Mahalanobis' distance in both programs that can. MRPT knows one sd for all distances. bslam counts all
+beacons that it holds. It has room for four times the beacons there are, 100 at most. GTSAM's error stands
+in EXPERIMENTS."""
+MACHINE_NOTE = """Signatures of rendered beacons. Training: one machine, one against the rest, to
+LIBLINEAR's default tolerance, from nothing; bslam on the 8-bit samples that the robot keeps. Decision:
+the values of all machines for one signature. Headers come from scikit-learn's LinearSVC on the same
+views; m2cgen computes in double, for which a Cortex-M4F calls a library that is not counted in its flash."""
+
+
+def main() -> int:
+    """Writes the page; exits 1 if a step costs more than 1.5 x the near-optimal count from 20 beacons on."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--step-only", action="store_true", help="only count the core's own step")
+    parser.add_argument("--rounds", type=int, default=7, metavar="N", help="of times (default: 7)")
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "out/bench", metavar="DIR", help="default: out/bench"
+    )
+    options = parser.parse_args()
+    step, worst = step_table()
+    if options.step_only:
+        print(step, end="")
+    else:
+        page = []
+        for section in sections(step, options.rounds):
+            print(section, flush=True)
+            page.append(section)
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / "BENCHMARKS.md").write_text("\n".join(page), encoding="utf-8")
     return 0 if worst <= 1.5 else 1
 
 

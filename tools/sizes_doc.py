@@ -9,13 +9,14 @@ import re
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, ROOT
 from check_image import CallGraph, output_of, read_frames, read_functions
+from markdown import Row, table
 from run_image import run_image
 from sizes import instance_bytes
 from training.render_set import RIGS, camera_of, render_world
@@ -51,14 +52,6 @@ PARTS = {
     "associate_mahalanobis": "3 sightings against the whole map",
     "train": "one training of a machine, mean, on made-up signatures that are hard to part",
 }
-
-Row = Sequence[object]
-
-
-def table(head: Row, rows: Iterable[Row]) -> str:
-    """A table in Markdown; the first column to the left, numbers to the right."""
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
 
 
 def flash_by_layer() -> dict[str, int]:

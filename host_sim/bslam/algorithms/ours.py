@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.algorithms.protocol import Landmark, Setup, Sighting
+from bslam.algorithms.protocol import Account, Landmark, Setup, Sighting
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.motion import Pose
@@ -34,6 +34,7 @@ class Bslam:
     def reset(self, seed: int) -> None:
         """See `Algorithm`. Nothing inside is random."""
         self._slam = self._new()
+        self._accounts: Sequence[Account] | None = None
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
@@ -44,10 +45,21 @@ class Bslam:
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""
+        kinds = [one.beacon_class or 0 for one in sightings]
         try:
-            self._slam.sightings(time_us, *_columns(sightings), signature=_signatures(sightings))
+            told = self._slam.sightings(time_us, *_columns(sightings), _signatures(sightings), kinds)
         except CoreError:
-            return  # the core has counted it
+            self._accounts = None  # the core has counted it
+            return
+        self._accounts = [Account(one.result, one.beacon_uid, one.reason) for one in told]
+
+    def accounts(self) -> Sequence[Account] | None:
+        """See `Algorithm`."""
+        return self._accounts
+
+    def uids(self) -> Iterable[int]:
+        """See `Algorithm`."""
+        return [one.uid for one in self._slam.beacons()]
 
     def pose(self) -> Pose:
         """See `Algorithm`."""
@@ -60,7 +72,7 @@ class Bslam:
     def map(self) -> Sequence[Landmark]:
         """The confirmed beacons."""
         return [
-            Landmark(one.x_m, one.y_m, one.label if one.label >= 0 else None, one.covariance)
+            Landmark(one.x_m, one.y_m, one.label if one.label >= 0 else None, one.covariance, one.uid)
             for one in self._slam.beacons()
             if one.confirmed
         ]

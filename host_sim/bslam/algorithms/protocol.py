@@ -55,6 +55,20 @@ class Sighting:
     """The same of the distance."""
     signature: NDArray[np.float32] | None = None
     """(71,) how it looks; None: nobody knows, or identities are given."""
+    beacon_class: int | None = None
+    """The detector's kind of beacon, 1 to 254; None: it does not say, or identities are given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What became of one sighting, for an algorithm that says so."""
+
+    result: str
+    """ "matched" with a beacon of the map, "new" beacon, "rejected" (gated out), "deferred" (undecided)."""
+    beacon_uid: int | None = None
+    """The beacon that it was matched with or that was made of it: a number that no other ever has."""
+    reason: str = "none"
+    """Why it was rejected: "class" if because the detector calls it a moving thing."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +81,8 @@ class Landmark:
     """Identity, if sightings had any."""
     covariance_m2: NDArray[np.float64] | None = None
     """(2, 2); None: not known."""
+    uid: int | None = None
+    """The number by which accounts name it; None: there are no accounts."""
 
 
 class Algorithm(Protocol):
@@ -75,6 +91,10 @@ class Algorithm(Protocol):
     Beyond these methods a class may have `pose_covariance() -> (3, 3)` of (x, y, theta), from which NEES is
     computed, and `needs_identity = True`, if it cannot do without labels: it gets them whatever
     --association says, and the table marks it.
+
+    Wrong associations can be counted of a class that has `accounts() -> Sequence[Account] | None` of the last
+    image's sightings (None: it refused the image), and `uids() -> Iterable[int]` of the beacons in its map,
+    provisional ones included.
 
     An exception ends the run and is reported with the algorithm's name; so do a pose or map that is not
     finite, and a call that takes longer than --call-limit.

@@ -202,7 +202,7 @@ def _say(
     """Print the table and what failed; the exit status."""
     every = arguments.map_every
     rows = [["algorithm", "mean cm", "max cm", "last 50 s", f"every {every}th", "/ map", "NEES", "map cm"]]
-    rows[0] += ["mapped", "of", "us/step", ""]
+    rows[0] += ["mapped", "of", "wrong", "us/step", ""]
     rows += [_row(line) for line in lines]
     print(table_of(rows))
     if options.association != "known":
@@ -239,6 +239,7 @@ def _row(line: dict[str, Any]) -> list[str]:
         cm("map_rmse_m"),
         number("beacons_mapped", ".4g"),
         number("beacons_true", ".4g"),
+        number("wrong_associations", ".4g"),
         number("step_us_median", ".0f"),
         ", ".join(troubles),
     ]

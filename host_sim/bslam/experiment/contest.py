@@ -216,6 +216,7 @@ _FIGURES: Final = {
     "map_rmse_m": ("map_rmse_m",),
     "beacons_mapped": ("beacons_mapped",),
     "beacons_true": ("beacons_true",),
+    "wrong_associations": ("wrong_associations",),
     "step_us_median": ("step_us_median",),
 }
 

@@ -12,7 +12,7 @@ from bslam.experiment.align import Rigid, fit_rigid
 from bslam.experiment.bound import has_bound, mean_bound_m
 from bslam.experiment.consistency import POSE_95, nees
 from bslam.experiment.options import RunOptions, uses_velocity_states, wheel_noise
-from bslam.experiment.trace import Trace
+from bslam.experiment.trace import SightingCounts, Trace
 from bslam.experiment.truth import dead_reckoning, is_dense, odometry_increments, truth_at
 from bslam.log import Log
 
@@ -72,7 +72,7 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         "path_m": _path_m(log, evaluation),
         "seen_any_share": float(np.mean(trace.seen[1:])) if trace.steps else 0.0,
         "beacons_mapped": sum(beacon.confirmed for beacon in trace.beacons),
-        **asdict(trace.counts),
+        **_count_figures(trace.counts),
         "refused_inputs": sum(trace.refusals.values()),
         "counters": trace.counters,
         "diverged": not np.isfinite(trace.pose).all(),
@@ -90,6 +90,11 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
             entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
         entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
     return entry
+
+
+def _count_figures(counts: SightingCounts) -> dict[str, int]:
+    figures = asdict(counts)
+    return figures if figures.pop("told") else {"sightings": counts.sightings}
 
 
 def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:

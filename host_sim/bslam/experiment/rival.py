@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from bslam.algorithms import Algorithm, Landmark, Setup, Sighting
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
+from bslam.experiment.ledger import Ledger
 from bslam.experiment.options import RunOptions, core_params
-from bslam.experiment.runner import Frames, beacons_to_hold
+from bslam.experiment.runner import MAPPABLE, Frames, beacons_to_hold
 from bslam.experiment.trace import MapBeacon, SightingCounts, Trace
 from bslam.experiment.truth import step_times_us, wheel_travel
 from bslam.log import Log
@@ -68,6 +69,8 @@ class _Drive:
         self._covariances: list[NDArray[np.float64]] = []
         self._seen: list[bool] = []
         self._sightings = 0
+        self._tells = hasattr(algorithm, "accounts") and hasattr(algorithm, "uids")
+        self._ledger = Ledger(getattr(algorithm, "uids", tuple))
         self._step_ns: list[int] = []
         self._times_us: list[int] = step_times_us(log).tolist()
         algorithm.reset(options.seed)
@@ -98,11 +101,25 @@ class _Drive:
         seen = False
         while self._frames.waiting_before(until_us):
             seen = True
-            time_us, _, columns = self._frames.take()
+            time_us, true_id, columns = self._frames.take()
             sightings = _as_sightings(columns)
             self._sightings += len(sightings)
             self._algorithm.observe(time_us, sightings)
+            if self._tells:
+                self._book(true_id, columns[MAPPABLE])
         self._seen.append(seen)
+
+    def _book(self, true_id: Sequence[int], mappable: Sequence[bool]) -> None:
+        algorithm: Any = self._algorithm
+        accounts = algorithm.accounts()
+        if accounts is None:
+            self._ledger.book_refused(true_id, mappable)
+        elif len(accounts) != len(true_id):
+            raise AlgorithmError(
+                f"accounts() returned {len(accounts)}; allowed: one for each of {len(true_id)}"
+            )
+        else:
+            self._ledger.book(true_id, mappable, accounts)
 
     def _keep(self, step: int) -> None:
         pose = self._algorithm.pose()
@@ -129,7 +146,7 @@ class _Drive:
             pose=np.array(self._poses, dtype=np.float64),
             covariance=np.array(self._covariances, dtype=np.float64),
             seen=np.array(self._seen, dtype=np.bool_),
-            counts=SightingCounts(sightings=self._sightings),
+            counts=self._ledger.counts() if self._tells else SightingCounts(self._sightings, told=False),
             beacons=tuple(self._map()),
             parameters={},
             step_us_median=float(np.median(self._step_ns)) * 1e-3 if self._step_ns else 0.0,
@@ -147,7 +164,7 @@ class _Drive:
         return MapBeacon(
             uid=number,
             label=-1 if landmark.label is None else landmark.label,
-            true_id=self._stands_for(x_m, y_m) if landmark.label is None else landmark.label,
+            true_id=self._identity(landmark, x_m, y_m),
             x_m=x_m,
             y_m=y_m,
             covariance_m2=np.full((2, 2), np.nan) if covariance is None else np.asarray(covariance),
@@ -156,6 +173,11 @@ class _Drive:
             range_m=math.hypot(x_m, y_m),
             phi_rad=math.atan2(y_m, x_m),
         )
+
+    def _identity(self, landmark: Landmark, x_m: float, y_m: float) -> int:
+        if landmark.label is not None:
+            return landmark.label
+        return self._ledger.identity(landmark.uid) if landmark.uid is not None else self._stands_for(x_m, y_m)
 
     def _stands_for(self, x_m: float, y_m: float) -> int:
         beacons = self._log.beacons
@@ -170,8 +192,8 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
     """The columns of a frame (`runner.columns_for_filter`) as objects; what is not known as None."""
     bearing_rad, range_m, label, mappable = columns[:4]
     nothing = [None] * len(bearing_rad)
-    bearing_sd, range_sd, signature = (
-        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in (4, 5, 6)
+    bearing_sd, range_sd, signature, kind = (
+        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in (4, 5, 6, 7)
     )
     return [
         Sighting(
@@ -182,8 +204,9 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
             bearing_sd_rad=sd_rad or None,
             range_sd_m=sd_m or None,
             signature=look,
+            beacon_class=told or None,
         )
-        for bearing, distance, identity, use, sd_rad, sd_m, look in zip(
-            bearing_rad, range_m, label, mappable, bearing_sd, range_sd, signature, strict=True
+        for bearing, distance, identity, use, sd_rad, sd_m, look, told in zip(
+            bearing_rad, range_m, label, mappable, bearing_sd, range_sd, signature, kind, strict=True
         )
     ]

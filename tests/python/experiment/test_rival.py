@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from bslam.algorithms.dead_reckoning import DeadReckoning
 from bslam.algorithms.ours import Bslam
 from bslam.errors import BslamError
 from bslam.experiment.methods import load_method, own_method, shipped_methods
+from bslam.experiment.metrics import summarise
 from bslam.experiment.options import RunOptions
-from bslam.experiment.rival import run_algorithm, setup_for
+from bslam.experiment.rival import AlgorithmError, run_algorithm, setup_for
 from bslam.experiment.runner import run_log
 from bslam.experiment.truth import dead_reckoning
+from bslam.log import first_steps
+from bslam.world.simulate import load_scenario, simulate
 
 
 class Scribe:
@@ -66,6 +70,39 @@ def test_our_core_as_an_algorithm_is_our_core_to_the_bit(made, observation, real
     places = [(one.label, one.x_m, one.y_m) for one in own.beacons if one.confirmed]
     assert [(one.label, one.x_m, one.y_m) for one in rival.beacons] == places
     assert len(places) == 3
+
+
+def test_our_core_as_an_algorithm_makes_the_same_mistakes():
+    log = first_steps(simulate(load_scenario("pairs"), seed=2), 400)
+    classes = (1 + log.sightings.beacon_id % 2).astype(np.int64)
+    log = replace(log, sightings=replace(log.sightings, beacon_class=classes))
+    for association in ("nearest", "svm"):
+        options = RunOptions(association=association)
+        rival, own = run_algorithm(log, options, Bslam, ignore), run_log(log, options)
+        assert rival.counts == own.counts
+        known = [(one.uid, one.true_id) for one in own.beacons if one.confirmed]
+        assert [one.true_id for one in rival.beacons] == [true_id for _, true_id in known]
+        assert rival.pose.tolist() == own.pose.tolist()
+    assert own.counts.sightings > 500
+
+
+def test_class_is_told_where_identities_are_not(made):
+    log = made.circle_log(3, seed=1)
+    signed = np.zeros((len(log.sightings.beacon_id), 71), np.float32)
+    kinds = (log.sightings.beacon_id % 3).astype(np.int64)
+    log = replace(log, sightings=replace(log.sightings, signature=signed, beacon_class=kinds))
+    scribe, _ = told(log, RunOptions(association="svm"))
+    assert [one.beacon_class for one in scribe.calls[1][2]] == [None, 2, 2]
+
+
+def test_who_says_nothing_of_sightings_has_no_wrong_ones(made):
+    log = made.circle_log(3, seed=1)
+    _, trace = told(log, RunOptions())
+    entry = summarise(log, trace, RunOptions(), None)
+    assert entry["sightings"] == 12 and "wrong_associations" not in entry and "told" not in entry
+    short = type("Short", (Scribe,), {"accounts": lambda self: [], "uids": lambda self: []})
+    with pytest.raises(AlgorithmError, match=r"accounts\(\) returned 0; allowed: one for each of 3"):
+        told(log, RunOptions(), short)
 
 
 def test_calls_come_in_order_of_time_from_the_start_on(made):

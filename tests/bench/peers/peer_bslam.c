@@ -1,0 +1,89 @@
+// The core. Words of the command line set parameters: association=2.
+#include "peer.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bslam/bslam.h"
+
+static bslam_slam_t slam;
+
+static void fail(const char *what)
+{
+    (void)fprintf(stderr, "bench: bslam: %s\n", what);
+    exit(1);
+}
+
+static void set(bslam_params_t *params, const char *name, size_t length, double value)
+{
+    for (int id = 0; id < bslam_params_count(); id++) {
+        const char *its = bslam_params_info(id)->name;
+        if (strlen(its) == length && strncmp(its, name, length) == 0 &&
+            bslam_params_set(params, id, (bslam_real_t)value) == BSLAM_OK) {
+            return;
+        }
+    }
+    fail(name);
+}
+
+void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count, int words, char **word)
+{
+    bslam_params_t params;
+    int bad_id = -1;
+    bslam_params_default(&params);
+    const double step_s = (double)(steps[count - 1].time_us) * 1e-6 / (count - 1);
+    params.wheelbase_m = (bslam_real_t)model->wheelbase_m;
+    params.left_speed_sd_mps = params.right_speed_sd_mps = (bslam_real_t)(model->wheel_sd_m / step_s);
+    params.bearing_sd_rad = (bslam_real_t)model->bearing_sd_rad;
+    params.range_sd_floor_m = (bslam_real_t)model->range_sd_floor_m;
+    params.range_sd_fraction = (bslam_real_t)model->range_sd_fraction;
+    params.range_sd_per_m = (bslam_real_t)model->range_sd_per_m;
+    for (int i = 1; i < words; i++) {
+        const char *equals = strchr(word[i], '=');
+        if (equals == NULL) {
+            fail(word[i]);
+        }
+        set(&params, word[i], (size_t)(equals - word[i]), atof(equals + 1));
+    }
+    if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
+        fail("a parameter is refused");
+    }
+}
+
+void peer_step(const bench_step_t *step, int number)
+{
+    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
+    for (int i = 0; i < step->count; i++) {
+        sightings[i] = (bslam_sighting_t){.bearing_rad = (bslam_real_t)step->sightings[i].bearing_rad,
+                                          .range_m = (bslam_real_t)step->sightings[i].range_m,
+                                          .has_range = true,
+                                          .label = step->sightings[i].label};
+    }
+    const bslam_odometry_reading_t wheels = {.time_us = step->time_us,
+                                             .source = BSLAM_ODOMETRY_WHEELS,
+                                             .left_m = (bslam_real_t)step->left_m,
+                                             .right_m = (bslam_real_t)step->right_m};
+    if ((number > 0 && bslam_slam_odometry(&slam, &wheels) != BSLAM_OK) ||
+        bslam_slam_sightings(&slam, step->time_us, sightings, step->count) != BSLAM_OK) {
+        fail("a step is refused");
+    }
+}
+
+void peer_pose(double pose[3])
+{
+    const bslam_pose_t here = bslam_slam_pose(&slam);
+    pose[0] = (double)here.x_m;
+    pose[1] = (double)here.y_m;
+    pose[2] = (double)here.theta_rad;
+}
+
+int peer_landmarks(void)
+{
+    return bslam_slam_beacon_count(&slam);
+}
+
+size_t peer_static_bytes(void)
+{
+    return sizeof slam;
+}
