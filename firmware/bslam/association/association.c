@@ -44,14 +44,53 @@ static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *
 
 // ---- known identity ---------------------------------------------------------------------------------------
 
-static int find_label(const bslam_ekf_t *ekf, int32_t label)
+// Provisional beacons of one label. More than a few in a second are no more than the false sightings there
+// are.
+enum { RIVALS_MAX = 8 };
+
+static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                                 int beacon)
 {
-    for (int b = 0; b < ekf->beacon_count; b++) {
-        if (ekf->beacons[b].label == label) {
-            return b;
-        }
+    bslam_innovation_t innovation;
+    bslam_real_t d2;
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+            BSLAM_OK ||
+        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
+        return -1;
     }
-    return -1;
+    return d2;
+}
+
+/// The beacon that a label tells. Until it is confirmed any sighting may be the false one, the first as well
+/// as those that contradict it: each of these starts a rival of the same label, and the first that is
+/// confirmed stays. So the nearest, and if the gate has that one out a new one.
+static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                        bslam_match_t *match)
+{
+    int rivals = 0;
+    for (int b = 0; b < frame->ekf->beacon_count; b++) {
+        const bslam_beacon_t *beacon = &frame->ekf->beacons[b];
+        if (beacon->label != sighting->label) {
+            continue;
+        }
+        match->verdict = BSLAM_VERDICT_MATCH;
+        if (beacon->confirmed) {
+            match->beacon = b;
+            return;
+        }
+        const bslam_real_t d2 = mahalanobis2(frame, sighting, b);
+        if (rivals == 0 || (d2 >= 0 && d2 < match->distance2)) {
+            match->beacon = b;
+            match->distance2 = d2;
+        }
+        rivals++;
+    }
+    const bslam_real_t gate_d2 = frame->params->gate_d2;
+    const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
+    if (rivals == 0 || (is_out && sighting->has_range && rivals < RIVALS_MAX)) {
+        match->verdict = BSLAM_VERDICT_NEW;
+        match->beacon = -1;
+    }
 }
 
 static bool label_is_repeated(const bslam_sighting_frame_t *frame, int i)
@@ -79,8 +118,7 @@ void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *m
         } else if (label_is_repeated(frame, i)) {
             match->reason = BSLAM_REASON_DUPLICATE;
         } else {
-            match->beacon = find_label(frame->ekf, sighting->label);
-            match->verdict = match->beacon >= 0 ? BSLAM_VERDICT_MATCH : BSLAM_VERDICT_NEW;
+            match_label(frame, sighting, match);
         }
     }
 }
@@ -142,19 +180,6 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
         bslam_angle_wrap(direction - sensor.pose.theta_rad - bslam_angle_wrap(sighting->bearing_rad)) /
         frame->params->nearest_threshold_rad;
     return difference * difference;
-}
-
-static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
-                                 int beacon)
-{
-    bslam_innovation_t innovation;
-    bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
-            BSLAM_OK ||
-        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
-        return -1;
-    }
-    return d2;
 }
 
 void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches)

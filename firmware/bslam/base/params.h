@@ -79,8 +79,8 @@
          "and plus this times the bend of the model, MATH 24") \
     REAL(correlation_m, 0.0, 0.0, 100.0, \
          "the errors of a beacon's sightings are alike until the robot has gone so far (0: they are not)") \
-    REAL(gate_d2, 25.0, 0.0, 1e6, \
-         "a sighting with a larger squared Mahalanobis distance is rejected (0: no gate)") \
+    REAL(gate_d2, 13.8, 0.0, 1e6, \
+         "a sighting with a larger squared Mahalanobis distance is rejected (13.8: one in 1000; 0: none)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \
     REAL(ray_inverse_distance_per_m, 0.2, 1e-4, 100.0, \
          "start value of a direction-only beacon's inverse distance") \

@@ -448,15 +448,33 @@ static void learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sightin
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
-/// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
-/// reason against it: it leaves if sightings contradicted it.
-static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
+/// Whether another beacon has its label: a confirmed one, or any.
+static bool has_rival(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, bool confirmed)
 {
-    const int64_t window_us = params->confirm_window_us;
-    if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        const bslam_beacon_t *other = &ekf->beacons[b];
+        if (other != beacon && other->label == beacon->label && (other->confirmed || !confirmed)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
+/// reason against it: it leaves if sightings contradicted it, or once another of its label is confirmed.
+static bool is_unconfirmed(const bslam_slam_t *slam, const bslam_beacon_t *beacon, int64_t time_us)
+{
+    const bslam_params_t *params = &slam->params;
+    const bool is_told = params->association == BSLAM_ASSOCIATION_KNOWN;
+    if (beacon->confirmed) {
         return false;
     }
-    return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
+    if (is_told && has_rival(&slam->ekf, beacon, true)) {
+        return true;
+    }
+    const bool is_late =
+        params->confirm_window_us > 0 && time_us - beacon->first_seen_us > params->confirm_window_us;
+    return is_late && (!is_told || beacon->gated > 0 || has_rival(&slam->ekf, beacon, false));
 }
 
 /// Rays whose distance is known become points; provisional beacons whose time is up leave.
@@ -464,7 +482,7 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
 {
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (is_unconfirmed(&slam->params, beacon, time_us)) {
+        if (is_unconfirmed(slam, beacon, time_us)) {
             drop_beacon(slam, b);
             slam->counters.removed++;
         } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {

@@ -435,6 +435,7 @@ static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_r
 {
     bslam_params_t params = unit_params();
     params.gate_d2 = 9;
+    params.confirm_sightings = 1;
     bslam_slam_t slam = started(params);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     drive(&slam, STEP_US, 0, 0);
@@ -661,9 +662,37 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
     drive(&slam, 6 * STEP_US, 0, 0);
     see_one(&slam, 6 * STEP_US, unit_polar(1.3, 9, 1));
-    assert_int_equal(bslam_slam_counters(&slam)->gated, 1);
+    // The other place starts a beacon anew, and the one that it contradicts leaves: its time is up.
+    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(beacon(&slam, 0).uid, 0);
+    assert_int_equal(beacon(&slam, 1).uid, 2);
+}
+
+static void
+test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.confirm_sightings = 4;
+    params.gate_d2 = 9;
+    bslam_slam_t slam = started(params);
+    // Every other sighting is a false one, and no two of these agree.
+    for (int i = 0; i < 8; i++) {
+        drive(&slam, i * (int64_t)STEP_US, 0, 0);
+        see_one(&slam, i * (int64_t)STEP_US,
+                i % 2 == 0 ? unit_polar(-1.5 + 0.25 * i, 3, 1) : unit_polar(0.5, 4, 1));
+        assert_int_equal(account(&slam, 0)->outcome,
+                         i % 2 == 0 || i == 1 ? BSLAM_OUTCOME_NEW : BSLAM_OUTCOME_MATCHED);
+    }
+    // Of the five of that label the right one is left, and what contradicts it from now on is rejected.
     assert_int_equal(bslam_slam_beacon_count(&slam), 1);
-    assert_int_equal(beacon(&slam, 0).label, 0);
+    assert_true(beacon(&slam, 0).confirmed);
+    assert_int_equal(beacon(&slam, 0).sightings, 4);
+    assert_near(beacon(&slam, 0).x_m, 4 * cos(0.5), 0.05);
+    assert_int_equal(bslam_slam_counters(&slam)->removed, 4);
+    drive(&slam, 8 * (int64_t)STEP_US, 0, 0);
+    see_one(&slam, 8 * (int64_t)STEP_US, unit_polar(-1, 9, 1));
+    assert_account(&slam, 0, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_GATE);
 }
 
 static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **state)
@@ -1224,6 +1253,8 @@ int main(void)
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
         cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),
+        cmocka_unit_test(
+            test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed),
         cmocka_unit_test(test_sightings_known_beacon_is_never_removed_but_a_ray_is),
         cmocka_unit_test(test_remove_beacon_then_its_label_is_new_again),
         cmocka_unit_test(test_sightings_ray_seen_from_aside_settles_into_a_point),
