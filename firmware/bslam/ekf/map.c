@@ -55,21 +55,15 @@ static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
     ekf->dim = at + 1;
 }
 
-/// A distance's standard deviation that all sightings of a beacon have in common.
-static bslam_real_t common_range_sd_m(const bslam_params_t *params, const bslam_sighting_t *sighting)
-{
-    return params->range_scale_sd * sighting->range_m;
-}
-
-static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
-                         const bslam_sighting_t *sighting)
+/// The sighted point, with which the caller may go on.
+static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t *params,
+                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting)
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t common_sd_m = common_range_sd_m(params, sighting);
     const bslam_real_t range_var =
-        bslam_range_variance_m2(params, sighting, sighting->range_m) + common_sd_m * common_sd_m;
+        bslam_scaled_range_variance_m2(params, sighting, sighting->range_m, bslam_unknown_scale_var(params));
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
@@ -85,6 +79,7 @@ static void append_point(bslam_ekf_t *ekf, const bslam_params_t *params, const b
     append_value(ekf, &x);
     append_value(ekf, &y);
     ekf->covariance[bslam_symmat_at(at + 1, at)] += yx;
+    return point;
 }
 
 /// As a point, and the scale: where it is larger, the point is nearer.
@@ -92,13 +87,10 @@ static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const b
                          const bslam_sighting_t *sighting)
 {
     static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
-    append_point(ekf, params, mount, sighting);
-    const bslam_pose_t pose = bslam_ekf_pose(ekf);
-    const bslam_sighted_point_t point =
-        bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t sd = params->range_scale_sd;
-    const bslam_real_t by_range = -sd * common_range_sd_m(params, sighting);
-    const new_value_t scale = {BY_NOTHING, 1, sd * sd};
+    const bslam_sighted_point_t point = append_point(ekf, params, mount, sighting);
+    const bslam_real_t scale_var = bslam_unknown_scale_var(params);
+    const bslam_real_t by_range = -scale_var * sighting->range_m;
+    const new_value_t scale = {BY_NOTHING, 1, scale_var};
     const int at = ekf->dim;
     append_value(ekf, &scale);
     ekf->covariance[bslam_symmat_at(at, at - 2)] = by_range * point.x_by_range;
@@ -159,7 +151,7 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
         ekf->sized_count++;
     } else {
         *index = append_beacon(ekf, BSLAM_BEACON_POINT);
-        append_point(ekf, params, mount, sighting);
+        (void)append_point(ekf, params, mount, sighting);
     }
     return BSLAM_OK;
 }

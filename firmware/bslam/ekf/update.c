@@ -95,7 +95,11 @@ static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beac
     case BSLAM_BEACON_RAY:
         return bslam_observe_ray(&pose, mount, state, seen);
     case BSLAM_BEACON_KNOWN:
-        return bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+        status = bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+        if (status == BSLAM_OK && beacon->known_scale > 0) {
+            bslam_observation_scale(seen, beacon->known_scale);
+        }
+        return status;
     case BSLAM_BEACON_SIZED:
         status = bslam_observe_point(&pose, mount, state[0], state[1], seen);
         if (status == BSLAM_OK) {
@@ -112,8 +116,9 @@ static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beac
 static bslam_real_t range_variance_m2(const bslam_params_t *params, const bslam_sighting_t *sighting,
                                       const bslam_beacon_t *beacon, bslam_real_t range_m)
 {
-    const bslam_real_t sd_m = beacon->kind == BSLAM_BEACON_SIZED ? 0 : params->range_scale_sd * range_m;
-    return bslam_range_variance_m2(params, sighting, range_m) + sd_m * sd_m;
+    const bool has_scale = beacon->kind == BSLAM_BEACON_SIZED || beacon->known_scale > 0;
+    return bslam_scaled_range_variance_m2(params, sighting, range_m,
+                                          has_scale ? 0 : bslam_unknown_scale_var(params));
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,

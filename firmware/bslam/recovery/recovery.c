@@ -54,7 +54,7 @@ bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, co
 static int find_label(const bslam_ekf_t *ekf, int32_t label)
 {
     for (int b = 0; b < ekf->beacon_count && label != BSLAM_LABEL_NONE; b++) {
-        if (ekf->beacons[b].label == label) {
+        if (ekf->beacons[b].label == label && ekf->beacons[b].confirmed) {  // not one of its rivals
             return b;
         }
     }
@@ -150,12 +150,15 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const bslam_ekf_t *ekf = &slam->ekf;
     const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
     const int at = beacon->at + BSLAM_POINT_DIM;
-    const bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
-    const bslam_real_t common = slam->params.range_scale_sd;
-    const bslam_real_t scale_var = is_sized ? bslam_symmat_get(ekf->covariance, at, at) : common * common;
+    bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
+    bslam_real_t scale_var =
+        is_sized ? bslam_symmat_get(ekf->covariance, at, at) : bslam_unknown_scale_var(&slam->params);
+    if (beacon->known_scale > 0) {
+        scale = beacon->known_scale;
+        scale_var = 0;
+    }
     clue->range_m = sighting->range_m / scale;
-    clue->range_var_m2 = bslam_range_variance_m2(&slam->params, sighting, clue->range_m) +
-                         scale_var * clue->range_m * clue->range_m;
+    clue->range_var_m2 = bslam_scaled_range_variance_m2(&slam->params, sighting, clue->range_m, scale_var);
 }
 
 /// A remembered sighting as it looks from where the robot is now, by odometry.

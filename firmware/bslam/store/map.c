@@ -16,6 +16,7 @@ enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
 // A covariance that was rounded to float32 may show a correlation a little beyond 1.
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.001);
+static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_WAY_UM = 1000000000u;
 
@@ -66,6 +67,7 @@ typedef struct passage {
     const bslam_map_source_t *source;
     uint32_t at;
     uint32_t crc;
+    uint32_t version;
     bslam_map_fault_t fault;  ///< the first that was found; nothing moves after it
 } passage_t;
 
@@ -162,8 +164,8 @@ static void move_header(passage_t *passage, header_t *header)
     const uint32_t order = move_whole(passage, ORDER, 2);
     require(passage, order != ORDER_SWAPPED, BSLAM_MAP_BYTE_ORDER);
     require(passage, order == ORDER, BSLAM_MAP_NO_MAP);
-    const uint32_t version = move_whole(passage, BSLAM_MAP_VERSION, 2);
-    require(passage, version == BSLAM_MAP_VERSION, BSLAM_MAP_OTHER_VERSION);
+    passage->version = move_whole(passage, BSLAM_MAP_VERSION, 2);
+    require(passage, passage->version >= 1 && passage->version <= BSLAM_MAP_VERSION, BSLAM_MAP_OTHER_VERSION);
     header->length = move_whole(passage, header->length, 4);
     header->beacons = move_whole(passage, header->beacons, 2);
     header->values = move_whole(passage, header->values, 2);
@@ -185,8 +187,10 @@ static void move_header(passage_t *passage, header_t *header)
 typedef struct record {
     bslam_beacon_t beacon;
     uint32_t machine;
+    bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m;
     bslam_real_t y_m;
+    uint8_t seen_as[BSLAM_LOOKS_CLASSES];
 } record_t;
 
 static void move_record(passage_t *passage, record_t *record)
@@ -198,9 +202,15 @@ static void move_record(passage_t *passage, record_t *record)
     beacon->beacon_class = (uint8_t)move_whole(passage, beacon->beacon_class, 1);
     record->machine = move_whole(passage, record->machine, 2);
     beacon->sightings = move_whole(passage, beacon->sightings, 4);
-    require(passage, move_whole(passage, 0, 4) == 0, BSLAM_MAP_CONTENT);
+    record->scale = move_real(passage, record->scale);
+    require(passage, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
     record->x_m = move_real(passage, record->x_m);
     record->y_m = move_real(passage, record->y_m);
+    if (passage->version >= 2) {
+        move_bytes(passage, record->seen_as, sizeof record->seen_as);
+    } else {  // version 1 knew neither
+        require(passage, record->scale == 0, BSLAM_MAP_CONTENT);
+    }
     require(passage, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
     require(passage, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
@@ -232,12 +242,15 @@ static void take_record(const target_t *target, const record_t *record)
     if (target->mode == BSLAM_MAP_FROZEN) {
         beacon->kind = BSLAM_BEACON_KNOWN;
     }
+    beacon->known_scale = beacon->kind == BSLAM_BEACON_KNOWN ? record->scale : 0;
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
     ekf->dim += bslam_beacon_dim(beacon->kind);
-    if (target->slam->looks != NULL && record->machine != NO_MACHINE) {
-        target->slam->looks->of[index].machine = (int16_t)record->machine;
+    if (target->slam->looks != NULL) {
+        bslam_look_t *look = &target->slam->looks->of[index];
+        look->machine = record->machine != NO_MACHINE ? (int16_t)record->machine : look->machine;
+        memcpy(look->seen_as, record->seen_as, sizeof look->seen_as);
     }
 }
 
@@ -573,6 +586,14 @@ static void read_machines(passage_t *passage, const header_t *header, bslam_lear
     }
 }
 
+/// What is known of a beacon's scale; 0: nothing, or nothing that can be.
+static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon)
+{
+    const bslam_real_t scale =
+        beacon->kind == BSLAM_BEACON_SIZED ? ekf->mean[beacon->at + BSLAM_POINT_DIM] : beacon->known_scale;
+    return bslam_in_range(scale, 0, SCALE_MAX) ? scale : 0;
+}
+
 // ---- the whole --------------------------------------------------------------------------------------------
 
 static void write_all(passage_t *passage, const bslam_slam_t *slam, uint32_t length)
@@ -592,8 +613,11 @@ static void write_all(passage_t *passage, const bslam_slam_t *slam, uint32_t len
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (is_saved(ekf, b)) {
             record_t record = {.beacon = ekf->beacons[b], .machine = NO_MACHINE};
+            record.scale = scale_of(ekf, &ekf->beacons[b]);
             if (slam->looks != NULL) {
-                record.machine = machine_number(slam, slam->looks->of[b].machine);
+                const bslam_look_t *look = &slam->looks->of[b];
+                record.machine = machine_number(slam, look->machine);
+                memcpy(record.seen_as, look->seen_as, sizeof record.seen_as);
             }
             bslam_ekf_beacon_position(ekf, b, &record.x_m, &record.y_m);
             move_record(passage, &record);

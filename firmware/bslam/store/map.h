@@ -10,7 +10,8 @@
 
 #include "bslam/slam/slam.h"
 
-#define BSLAM_MAP_VERSION 1
+/// What is written. Version 1, without class counts and scales, is read, too.
+#define BSLAM_MAP_VERSION 2
 
 /// Why a blob is refused.
 typedef enum bslam_map_fault {

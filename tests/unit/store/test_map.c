@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "bslam/model/noise.h"
 #include "bslam/store/crc32.h"
 
 static bslam_slam_t slam;
@@ -11,7 +12,7 @@ static bslam_looks_t other_looks;
 static uint8_t bytes[KEPT_BYTES_MAX];
 static uint32_t size;
 
-enum { BEACONS_AT = 28, BEACON_BYTES = 28 };
+enum { BEACONS_AT = 28, BEACON_BYTES = 36 };
 
 static int setup(void **state)
 {
@@ -183,6 +184,84 @@ static void test_map_write_leaves_out_provisional_beacons(void **state)
     assert_int_equal(bslam_slam_beacon_count(&other), 5);
 }
 
+static void test_map_load_gives_the_counts_of_classes_back(void **state)
+{
+    for (int b = 0; b < 4; b++) {
+        memset(looks.of[b].seen_as, b + 1, sizeof looks.of[b].seen_as);
+    }
+    size = kept_write(&slam, bytes);
+    for (int mode = BSLAM_MAP_LIVING; mode <= BSLAM_MAP_FROZEN; mode++) {
+        kept_empty(&other, &other_looks);
+        load((bslam_map_mode_t)mode);
+        for (int b = 0; b < 4; b++) {
+            assert_memory_equal(other_looks.of[b].seen_as, looks.of[b].seen_as, sizeof looks.of[b].seen_as);
+        }
+    }
+}
+
+static void test_map_load_frozen_keeps_the_scale_of_a_sized_beacon(void **state)
+{
+    bslam_params_t params = kept_params();
+    params.range_scale_sd = BSLAM_R(0.2);
+    params.confirm_sightings = 1;
+    int bad_id;
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    const bslam_sighting_t seen = unit_polar(0.5, 4, -1);
+    assert_int_equal(bslam_slam_sightings(&slam, 0, &seen, 1), BSLAM_OK);
+    slam.ekf.mean[slam.ekf.beacons[0].at + 2] = BSLAM_R(1.25);  // its distances come out a quarter too long
+    size = kept_write(&slam, bytes);
+    other.params.range_scale_sd = params.range_scale_sd;
+    load(BSLAM_MAP_FROZEN);
+    const bslam_pose_t mount = {0, 0, 0};
+    bslam_innovation_t innovation;
+    assert_int_equal(bslam_ekf_innovation(&other.ekf, &other.params, &mount, &seen, 0, &innovation),
+                     BSLAM_OK);
+    assert_near(innovation.range_m, 4 - 5, 1e-5);
+    assert_near(innovation.range_var_m2, bslam_range_variance_m2(&params, &seen, 5), 1e-6);
+    static uint8_t again[KEPT_BYTES_MAX];
+    const uint32_t second = kept_write(&other, again);
+    const bslam_map_source_t source = bslam_map_from_memory(again, second);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_FROZEN, &fault), BSLAM_OK);
+    assert_near(slam.ekf.beacons[0].known_scale, 1.25, 1e-6);
+}
+
+/// The map as version 1 had it: no counts of classes, no scales.
+static void make_version_1(void)
+{
+    const int count = bslam_slam_beacon_count(&slam);
+    for (int b = count - 1; b >= 0; b--) {
+        const uint32_t end = BEACONS_AT + BEACON_BYTES * (uint32_t)(b + 1);
+        memmove(&bytes[end - 8], &bytes[end], size - end);
+        size -= 8;
+        put_u32(end - BEACON_BYTES + 16, 0);
+    }
+    put_u32(4, 0x00010102);
+    put_u32(8, size);
+    seal();
+}
+
+static void test_map_load_of_version_1_gives_what_it_had(void **state)
+{
+    make_version_1();
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(bslam_slam_beacon_count(&other), bslam_slam_beacon_count(&slam));
+    for (int i = slam.ekf.base_dim; i < slam.ekf.dim; i++) {
+        assert_near(other.ekf.mean[i], slam.ekf.mean[i], 1e-6);
+    }
+    for (int b = 0; b < 4; b++) {
+        assert_int_equal(other_looks.of[b].machine, looks.of[b].machine);
+    }
+}
+
+static void test_map_load_of_version_1_with_a_scale_is_refused(void **state)
+{
+    make_version_1();
+    put_float(BEACONS_AT + 16, 1.0f);
+    seal();
+    assert_refused(BSLAM_MAP_CONTENT);
+}
+
 // ---- what is refused --------------------------------------------------------------------------------------
 
 static void test_map_load_truncated_anywhere_is_refused(void **state)
@@ -226,7 +305,7 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
     const wrong_t cases[] = {
         {"magic", 0, 0x4d4c5343, BSLAM_MAP_NO_MAP},
         {"byte order", 4, 0x00010201, BSLAM_MAP_BYTE_ORDER},
-        {"version 2", 4, 0x00020102, BSLAM_MAP_OTHER_VERSION},
+        {"version 3", 4, 0x00030102, BSLAM_MAP_OTHER_VERSION},
         {"version 0", 4, 0x00000102, BSLAM_MAP_OTHER_VERSION},
         {"beacons", 12, BSLAM_BEACONS_MAX + 1, BSLAM_MAP_BEACONS},
         {"no beacons, but values", 12, 12u << 16, BSLAM_MAP_CONTENT},
@@ -239,6 +318,8 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
         {"label", first + 4, 0x80000000, BSLAM_MAP_CONTENT},
         {"kind", first + 8, 3, BSLAM_MAP_CONTENT},
         {"machine", first + 8, 4u << 16, BSLAM_MAP_CONTENT},
+        {"scale NaN", first + 16, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
+        {"scale negative", first + 16, 0xbf800000, BSLAM_MAP_CONTENT},
         {"position NaN", first + 20, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
         {"state infinite", v + 4, 0x7f800000, BSLAM_MAP_NOT_FINITE},
         {"state huge", v + 4, 0x7f000000, BSLAM_MAP_NOT_FINITE},
@@ -288,6 +369,10 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_leaves_the_robot_without_a_place, setup),
         cmocka_unit_test_setup(test_map_load_frozen_changes_no_beacon_and_adds_none, setup),
         cmocka_unit_test_setup(test_map_write_leaves_out_provisional_beacons, setup),
+        cmocka_unit_test_setup(test_map_load_gives_the_counts_of_classes_back, setup),
+        cmocka_unit_test_setup(test_map_load_frozen_keeps_the_scale_of_a_sized_beacon, setup),
+        cmocka_unit_test_setup(test_map_load_of_version_1_gives_what_it_had, setup),
+        cmocka_unit_test_setup(test_map_load_of_version_1_with_a_scale_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_truncated_anywhere_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_with_a_byte_too_many_is_refused, setup),
         cmocka_unit_test_setup(test_map_check_finds_every_flipped_bit, setup),
