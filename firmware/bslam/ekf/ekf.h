@@ -68,7 +68,7 @@ typedef struct bslam_beacon {
     uint16_t views;      ///< sightings far enough apart to count towards its confirmation
     bool confirmed;
     uint8_t beacon_class;
-    bslam_real_t known_scale;  ///< of a known beacon whose distances come out too long by this; 0: nobody knows
+    bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
 } bslam_beacon_t;
 
 /// All members are the filter's own; read them through the functions below.
