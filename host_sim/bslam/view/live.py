@@ -1,7 +1,9 @@
 """The page that `bslam live` serves: a Bokeh document that follows a run, and tells it to wait or go on.
 
 A browser holds one document, a second one another; all show the same run. A document asks for the newest
-moment many times a second and sends what is new: of the paths only the rows that were added.
+moment many times a second and sends what is new. What moves at every step lies in a plot of its own, without
+axes and with one glyph, over that of the room: a browser draws the whole of a plot anew if anything in it
+changes. What nobody reads so fast is sent twice a second or so; of the paths only the rows that were added.
 """
 
 from __future__ import annotations
@@ -42,13 +44,18 @@ RESULT_COLOURS: Final = {
 _ON_FRAME: Final = {"matched": RIGHT, "new": "#5ab4ff", "rejected": WRONG, "refused": WRONG}
 RESULT_WORDS: Final = {"matched": "fused", "new": "new beacon"}
 _REFRESH_MS: Final = 20
-_SLOW_S: Final = 0.25
+_UNDER_WAY_MOST: Final = 2  # moments sent that the browser has not drawn: while it draws one the next travels
+_SLOW_S: Final = 0.4
 _ROWS_MOST: Final = 4000  # of a path: more than a screen has pixels only costs time
 _SIGMAS: Final = 2.0  # size of the ellipses
 _RAY_M: Final = 3.0  # of a sighting without a distance and without a beacon
 _NOSE_M: Final = 0.35  # how far the robot's heading is drawn
+_DOT_M: Final = 1e-3  # length of a line that is drawn as a dot, its ends being round
+_ROUND: Final = np.linspace(0.0, math.tau, 25)
 _TOLD_SHOWN: Final = 16
 _ROOM_PX: Final = 640
+_FRAME_PX: Final = (560.0, 480.0)  # at most, of the room's plot without its axes
+_BORDER: Final = {"min_border_left": 60, "min_border_top": 30, "min_border_bottom": 55, "min_border_right": 8}
 _SIDE_PX: Final = 560
 
 
@@ -69,16 +76,33 @@ _TEMPLATE: Final = """
   {{ embed(roots.bar) }}{{ embed(roots.status) }}
 </div>
 <div style="display: flex; gap: 0.5em">
-  <div>{{ embed(roots.room) }}{{ embed(roots.legend) }}{{ embed(roots.error) }}</div>
-  <div>{{ embed(roots.camera) }}{{ embed(roots.told) }}</div>
+  <div>
+    <div style="position: relative">
+      {{ embed(roots.room) }}
+      <div style="position: absolute; left: 0; top: 0; pointer-events: none">{{ embed(roots.now) }}</div>
+    </div>
+    {{ embed(roots.legend) }}{{ embed(roots.error) }}</div>
+  <div>
+    <img id="camera" alt="camera" width="{{ side_px }}" src="{{ frame }}"
+      {% if not has_camera %}hidden{% endif %}>
+    {{ embed(roots.told) }}
+  </div>
 </div>
 {% endblock %}
 """
 
 
-# After a frame of the browser's: a browser that is slow, or whose page nobody looks at, gets less and later,
-# instead of a queue that grows.
-_SAY_DRAWN: Final = "requestAnimationFrame(() => { drawn.data = {times: [drawn.data.times[0] + 1]} })"
+# The camera's frame goes into an image of the page's own: in a part of the document it would be made anew
+# each time. The rest after a frame of the browser's: a browser that is slow, or whose page nobody looks at,
+# gets less and later, instead of a queue that grows.
+_ON_STATUS: Final = """
+if (frame.data.src.length) document.getElementById("camera").src = frame.data.src[0]
+requestAnimationFrame(() => { drawn.data = {times: [drawn.data.times[0] + 1]} })
+"""
+
+
+_Line = tuple[NDArray[np.float64], str, float, float]
+"""Points (n, 2) in m, colour, width in px, alpha."""
 
 
 class Controls(Protocol):
@@ -113,17 +137,18 @@ class Page:
     ) -> None:
         self._stage, self._moment, self._controls = stage, moment, controls
         self._drawn: Moment | None = None
-        self._under_way = False  # something was sent that the browser has not drawn yet
+        self._under_way = 0  # moments that were sent and that the browser has not drawn yet
         # Rows of the course that are in the document, and the truth that they belong to, by source.
         self._sent: dict[str, tuple[int, NDArray[np.float64] | None]] = {}
         self._slowly_s = 0.0
+        self._drawn_rows = 0  # of the course, in the room's plot
         self._sources = {name: ColumnDataSource(columns) for name, columns in _EMPTY.items()}
         self._sources["walls"].data = dict(zip(("x0", "y0", "x1", "y1"), stage.walls_m.T, strict=True))
         self._status, self._told = Div(), Div(width=_SIDE_PX)
-        self._camera = Div(width=_SIDE_PX, height=450, visible=stage.has_camera)
         drawn = ColumnDataSource({"times": [0]})
         drawn.on_change("data", lambda _attribute, _old, _new: self._note_drawn())
-        self._status.js_on_change("text", CustomJS(args={"drawn": drawn}, code=_SAY_DRAWN))
+        told = {"drawn": drawn, "frame": self._sources["frame"]}
+        self._status.js_on_change("text", CustomJS(args=told, code=_ON_STATUS))
         self._pause = Button(label="Play", button_type="primary", width=90)
         self._step = Button(label="Step", width=90)
         speed = RadioButtonGroup(labels=list(SPEEDS))
@@ -133,8 +158,10 @@ class Page:
         self._step.on_click(controls.step)
         speed.on_change("active", lambda _attr, _old, new: controls.set_speed(list(SPEEDS.values())[new]))
         bar = row(self._pause, self._step, Div(text="times real speed:"), speed)
-        parts = {"bar": bar, "status": self._status, "room": self._room_plot(), "error": self._error_plot()}
-        parts |= {"camera": self._camera, "told": self._told, "legend": Div(text=_LEGEND)}
+        room = self._room_plot()
+        parts = {"bar": bar, "status": self._status, "room": room, "now": self._now_plot(room)}
+        parts["error"] = self._error_plot()
+        parts |= {"told": self._told, "legend": Div(text=_LEGEND)}
         for name, part in parts.items():
             part.name = name
             document.add_root(part)
@@ -142,11 +169,15 @@ class Page:
         document.title = f"bslam: {stage.title}"
         document.add_periodic_callback(self.refresh, _REFRESH_MS)
         self.refresh()
-        self._under_way = True  # until the browser has all of that
-        document.on_event("document_ready", lambda _event: self._note_drawn())
+        shown = self._sources["frame"].data["src"]
+        document.template_variables.update(
+            side_px=_SIDE_PX, has_camera=stage.has_camera, frame="".join(shown)
+        )
+        self._under_way = _UNDER_WAY_MOST  # until the browser has all of that
+        document.on_event("document_ready", lambda _event: self._note_drawn(all_of_it=True))
 
-    def _note_drawn(self) -> None:
-        self._under_way = False
+    def _note_drawn(self, all_of_it: bool = False) -> None:
+        self._under_way = 0 if all_of_it else max(self._under_way - 1, 0)
         self.refresh()
 
     def _toggle(self) -> None:
@@ -156,13 +187,12 @@ class Page:
             self._controls.play()
 
     def _room_plot(self) -> Any:
-        """Everything in the plane; as much of it as the walls and the truth take."""
+        """What stays or grows in the plane; as much of it as the walls and the truth take."""
         x_low, y_low, x_high, y_high = self._stage.extent_m
-        tall_px = min(max(int(_ROOM_PX * (y_high - y_low) / (x_high - x_low)), 300), 560)
+        px_per_m = min(_FRAME_PX[0] / (x_high - x_low), _FRAME_PX[1] / (y_high - y_low))
         plot = figure(
-            width=_ROOM_PX,
-            height=tall_px + 90,
-            match_aspect=True,
+            frame_width=round(px_per_m * (x_high - x_low)),
+            frame_height=round(px_per_m * (y_high - y_low)),
             x_range=Range1d(x_low, x_high),
             y_range=Range1d(y_low, y_high),
             tools="pan,wheel_zoom,box_zoom,reset,save",
@@ -170,26 +200,41 @@ class Page:
             x_axis_label="x, m",
             y_axis_label="y, m",
             title=self._stage.title,
+            **_BORDER,
         )
         source = self._sources
         plot.segment("x0", "y0", "x1", "y1", source=source["walls"], color=WALL, line_width=3)
         line = {"line_width": 3, "line_alpha": 0.5, "color": TRUTH}
         plot.line("x", "y", source=source["truth"], **line)
         plot.line("x", "y", source=source["path"], color=ESTIMATE)
-        plot.segment("x0", "y0", "x1", "y1", source=source["rays"], color="colour", line_width=1.5)
         star = {"color": BEACON, "line_color": "#6b4b00", "size": 16}
         plot.scatter("x", "y", source=source["beacons"], marker="star", **star)
         outline = {"fill_color": None, "line_color": SECOND, "line_alpha": "alpha", "line_width": 1.5}
         plot.ellipse("x", "y", "width", "height", "angle", source=source["map"], **outline)
         cross = {"color": SECOND, "alpha": "alpha", "size": 11}
         crosses = plot.scatter("x", "y", source=source["map"], marker="cross", **cross)
-        plot.ellipse(
-            "x", "y", "width", "height", "angle", source=source["doubt"], fill_alpha=0.2, color=ESTIMATE
-        )
-        plot.segment("x", "y", "x1", "y1", source=source["robots"], color="colour", line_width=3)
-        plot.scatter("x", "y", source=source["robots"], size=11, color="colour", line_color="white")
         tips = [("beacon", "@name"), ("sightings", "@sightings"), ("sd, m", "@sd_m{0.000}")]
         plot.add_tools(HoverTool(renderers=[crosses], tooltips=tips))
+        return plot
+
+    def _now_plot(self, room: Any) -> Any:
+        """What moves: lies over the room's plot, shows the same part of the plane, lets the mouse through."""
+        plot = figure(
+            frame_width=room.frame_width,
+            frame_height=room.frame_height,
+            x_range=room.x_range,
+            y_range=room.y_range,
+            tools="",
+            toolbar_location=None,
+            background_fill_color=None,
+            border_fill_color=None,
+            outline_line_color=None,
+            **_BORDER,
+        )
+        plot.axis.visible = False
+        plot.grid.visible = False
+        lines = {"color": "colour", "line_width": "width", "line_alpha": "alpha", "line_cap": "round"}
+        plot.multi_line("xs", "ys", source=self._sources["now"], **lines)
         return plot
 
     def _error_plot(self) -> Any:
@@ -212,22 +257,21 @@ class Page:
     def refresh(self) -> None:
         """Send what is new since the last time, unless the browser is still busy with that."""
         moment = self._moment()
-        if moment is self._drawn or self._under_way:
+        if moment is self._drawn or self._under_way >= _UNDER_WAY_MOST:
             return
         self._drawn = moment
         self._pause.label = "Pause" if self._controls.playing else "Play"
         self._pause.disabled = self._step.disabled = moment.state in (FINISHED, FAILED)
+        if moment.shown is not None:  # before the status, whose change shows it
+            self._sources["frame"].data = {"src": [_frame_url(moment.shown)]}
         words = self._words(moment)
-        self._under_way = words != self._status.text
+        self._under_way += words != self._status.text
         self._status.text = words
-        self._send_paths(moment)
-        self._send_robot(moment)
+        self._sources["now"].data = self._now(moment)
         now_s = time.monotonic()
         if moment.state != RUNNING or now_s - self._slowly_s > _SLOW_S:
             self._slowly_s = now_s
             self._send_slowly(moment)
-        if moment.shown is not None:
-            self._camera.text = _camera_html(moment.shown)
 
     def _words(self, moment: Moment) -> str:
         course = moment.course
@@ -249,11 +293,9 @@ class Page:
         self._told.text = _told_table(moment.told[:_TOLD_SHOWN])
         course = moment.course
         self._send_rows("errors", moment, (course.time_s, course.error_m, _SIGMAS * course.sd_m))
-
-    def _send_paths(self, moment: Moment) -> None:
-        course = moment.course
         self._send_rows("path", moment, (course.estimate[:, 0], course.estimate[:, 1]))
         self._send_rows("truth", moment, (course.truth[:, 0], course.truth[:, 1]))
+        self._drawn_rows = len(course.time_s)
 
     def _send_rows(self, name: str, moment: Moment, columns: Sequence[NDArray[np.float64]]) -> None:
         """The rows that were added; all of them where the truth was moved."""
@@ -267,43 +309,42 @@ class Page:
         else:
             self._sources[name].data = new
 
-    def _send_robot(self, moment: Moment) -> None:
+    def _now(self, moment: Moment) -> dict[str, list[Any]]:
+        """Lines, as columns: the last bits of both paths, rays, robots, the estimate's ellipse."""
         course = moment.course
         if not len(course.time_s):
-            return
+            return _EMPTY["now"]
         estimate, truth = course.estimate[-1], course.truth[-1]
-        poses = [(*estimate, ESTIMATE)]
-        if np.isfinite(truth).all():
-            poses.insert(0, (*truth, TRUTH))
-        robots: dict[str, list[Any]] = {name: [] for name in _EMPTY["robots"]}
-        for x_m, y_m, theta_rad, colour in poses:
-            nose_m = (x_m + _NOSE_M * math.cos(theta_rad), y_m + _NOSE_M * math.sin(theta_rad))
-            for name, value in zip(robots, (x_m, y_m, *nose_m, colour), strict=True):
-                robots[name].append(value)
-        self._sources["robots"].data = robots
-        self._sources["doubt"].data = _ellipses([(estimate[0], estimate[1], moment.covariance_m2)])
-        self._sources["rays"].data = self._rays(estimate, moment)
+        tail = slice(max(self._drawn_rows - 1, 0), None)
+        lines = [(course.truth[tail, :2], TRUTH, 3.0, 0.5), (course.estimate[tail, :2], ESTIMATE, 1.0, 1.0)]
+        lines += self._rays(estimate, moment)
+        lines.append((_ellipse(estimate[:2], moment.covariance_m2), ESTIMATE, 1.5, 1.0))
+        lines += _robot(truth, TRUTH) if np.isfinite(truth).all() else []
+        lines += _robot(estimate, ESTIMATE)
+        points, colour, width, alpha = zip(*lines, strict=True)
+        xs, ys = ([one[:, axis].tolist() for one in points] for axis in (0, 1))
+        return {"xs": xs, "ys": ys, "colour": list(colour), "width": list(width), "alpha": list(alpha)}
 
-    def _rays(self, pose: NDArray[np.float64], moment: Moment) -> dict[str, Any]:
+    def _rays(self, pose: NDArray[np.float64], moment: Moment) -> list[_Line]:
         """From the sensor along each bearing of the newest frame, as far as the sighting says."""
         x_m, y_m, yaw_rad = self._stage.sensor
         c, s = math.cos(pose[2]), math.sin(pose[2])
         x0, y0 = pose[0] + c * x_m - s * y_m, pose[1] + s * x_m + c * y_m
         spots = {one.uid: one for one in moment.beacons}
-        rays: dict[str, list[Any]] = {name: [] for name in _EMPTY["rays"]}
+        rays: list[_Line] = []
         for told in moment.frame:
             spot = spots.get(-1 if told.beacon_uid is None else told.beacon_uid)
             reach_m = told.range_m
             if reach_m is None:
                 reach_m = _RAY_M if spot is None else math.hypot(spot.x_m - x0, spot.y_m - y0)
             course_rad = pose[2] + yaw_rad + told.bearing_rad
-            ends = (x0, y0, x0 + reach_m * math.cos(course_rad), y0 + reach_m * math.sin(course_rad))
-            for name, value in zip(rays, (*ends, RESULT_COLOURS[told.result]), strict=True):
-                rays[name].append(value)
+            end = (x0 + reach_m * math.cos(course_rad), y0 + reach_m * math.sin(course_rad))
+            rays.append((np.array([(x0, y0), end]), RESULT_COLOURS[told.result], 1.5, 1.0))
         return rays
 
 
 _EMPTY: Final[dict[str, dict[str, list[Any]]]] = {
+    "frame": {"src": []},
     "walls": {"x0": [], "y0": [], "x1": [], "y1": []},
     "truth": {"x": [], "y": []},
     "path": {"x": [], "y": []},
@@ -312,10 +353,22 @@ _EMPTY: Final[dict[str, dict[str, list[Any]]]] = {
     "map": {
         name: [] for name in ("x", "y", "width", "height", "angle", "alpha", "name", "sightings", "sd_m")
     },
-    "rays": {"x0": [], "y0": [], "x1": [], "y1": [], "colour": []},
-    "robots": {"x": [], "y": [], "x1": [], "y1": [], "colour": []},
-    "doubt": {"x": [], "y": [], "width": [], "height": [], "angle": []},
+    "now": {"xs": [], "ys": [], "colour": [], "width": [], "alpha": []},
 }
+
+
+def _robot(pose: NDArray[np.float64], colour: str) -> list[_Line]:
+    """A dot, and a line where it looks to."""
+    ahead = np.array([math.cos(pose[2]), math.sin(pose[2])])
+    ends = [np.array([pose[:2], pose[:2] + reach_m * ahead]) for reach_m in (_DOT_M, _NOSE_M)]
+    return [(ends[0], colour, 11.0, 1.0), (ends[1], colour, 3.0, 1.0)]
+
+
+def _ellipse(at_m: NDArray[np.float64], covariance_m2: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Its outline, at _SIGMAS."""
+    variances, directions = np.linalg.eigh(covariance_m2)
+    radii_m = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
+    return at_m + (np.column_stack([np.cos(_ROUND), np.sin(_ROUND)]) * radii_m) @ directions.T
 
 
 def _columns(names: Iterable[str], table: NDArray[np.float64]) -> dict[str, Any]:
@@ -367,9 +420,10 @@ def _told_row(one: Told) -> str:
     return f"<tr style='{style}'>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"
 
 
-def _camera_html(shown: Shown) -> str:
+def _frame_url(shown: Shown) -> str:
+    """The frame with its boxes, as a browser takes it in place of an address."""
     marks = [Mark(one.outline, one.lines, _ON_FRAME.get(one.result, UNKNOWN)) for one in shown.boxes]
     buffer = io.BytesIO()
     annotate(shown.rgb, marks, shown.caption).save(buffer, format="JPEG", quality=80)
     data = base64.b64encode(buffer.getvalue()).decode()
-    return f'<img alt="camera" width="{_SIDE_PX}" src="data:image/jpeg;base64,{data}">'
+    return f"data:image/jpeg;base64,{data}"
