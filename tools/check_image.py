@@ -23,6 +23,7 @@ CALLED_BY_POINTER = (
     (r"bslam_slam_|associate_ticks", r"bslam_associate_"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
+    (r"read_head|kept_", r"(erase|write|read)$"),
 )
 """Callers, and whom they may call through a pointer."""
 

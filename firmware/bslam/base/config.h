@@ -52,7 +52,7 @@
 #endif
 
 /// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: an
-/// instance takes about 135 KB for QVGA and four cameras, 125 KB for one, 52 KB for QQVGA and one.
+/// instance takes about 117 KB for QVGA and four cameras, 107 KB for one, 46 KB for QQVGA and one.
 #ifndef BSLAM_IMAGE_WIDTH_MAX
 #define BSLAM_IMAGE_WIDTH_MAX 320
 #endif

@@ -64,6 +64,16 @@ typedef struct bslam_channel_tables {
     bslam_chroma_terms_t bluish[256];
 } bslam_channel_tables_t;
 
+/// What is made of a frame's cells, [rows][columns].
+typedef struct bslam_cell_notes {
+    uint16_t frequent[BSLAM_CELLS_ROOM];  ///< as the view has it; so the values
+    int8_t values[BSLAM_CELLS_ROOM];
+    union {
+        bslam_cell_tables_t tables;      ///< while these are worked out,
+        uint8_t mask[BSLAM_CELLS_ROOM];  ///< and then 1: the present segmentation joins this cell
+    };
+} bslam_cell_notes_t;
+
 /// The machine of a model, rounded to whole numbers.
 bslam_cell_machine_t bslam_cell_machine(const bslam_svm_t *svm);
 

@@ -490,10 +490,15 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
     propose_components(proposals, view, find_components(proposals, frame), pass);
 }
 
-void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view)
+void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view, bslam_run_t *runs,
+                          uint8_t *mask)
 {
     proposals->count = 0;
+    proposals->runs = runs;
+    proposals->mask = mask;
     for (int32_t pass = 0; pass < PASSES; pass++) {
         segment(proposals, view, pass);
     }
+    proposals->runs = NULL;
+    proposals->mask = NULL;
 }

@@ -22,7 +22,7 @@ typedef struct bslam_proposal {
     bslam_box_t box;       ///< to the pixel
 } bslam_proposal_t;
 
-/// Scratch for one segmentation.
+/// Cells side by side that a segmentation joins.
 #define BSLAM_RUNS_MAX 1024
 typedef struct bslam_run {
     uint16_t parent;
@@ -41,11 +41,8 @@ typedef struct bslam_proposals {
     uint32_t runs_dropped;   ///< since init: a frame so broken up that BSLAM_RUNS_MAX did not suffice
     uint32_t boxes_dropped;  ///< since init: BSLAM_PROPOSALS_MAX did not suffice
     bslam_proposal_t items[BSLAM_PROPOSALS_MAX];
-    union {
-        bslam_channel_tables_t channel_tables;  ///< while the cells are looked at,
-        bslam_run_t runs[BSLAM_RUNS_MAX];       ///< and then the runs of a segmentation
-    };
-    uint8_t mask[BSLAM_CELLS_ROOM];  ///< 1: the present segmentation joins this cell
+    bslam_run_t *runs;  ///< scratch of bslam_proposals_find, and NULL after it
+    uint8_t *mask;
 } bslam_proposals_t;
 
 /// Moves each side of a box by up to a cell to where the colour steps most along it, then adds the box,
@@ -73,8 +70,10 @@ typedef struct bslam_edge {
 bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
                               int32_t line);
 
-/// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice.
-void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view);
+/// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice. Scratch, whose content does not matter before or
+/// after: BSLAM_RUNS_MAX runs, BSLAM_CELLS_ROOM cells.
+void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view, bslam_run_t *runs,
+                          uint8_t *mask);
 
 /// Intersection over union of two boxes.
 bslam_real_t bslam_box_overlap(const bslam_box_t *a, const bslam_box_t *b);

@@ -93,9 +93,9 @@ static int16_t brighter(int16_t a, int16_t b)
 }
 
 /// Keeps the upper 2x2 sums of a row of cells.
-static void begin_cells(bslam_thumbnail_t *t, int32_t pairs)
+static void begin_cells(bslam_row_sums_t *sums, int32_t pairs)
 {
-    memcpy(t->upper_quads, t->quads, (size_t)pairs * sizeof t->quads[0]);
+    memcpy(sums->upper_quads, sums->quads, (size_t)pairs * sizeof sums->quads[0]);
 }
 
 /// Joins them with the lower ones: sums of halves of cells, the darkest and the brightest of their quarters.
@@ -141,45 +141,45 @@ static void fill_cells(bslam_cells_t *restrict cells, int32_t first, const uint3
 }
 
 /// The cells of a row, from `first` on.
-static void finish_cells(bslam_thumbnail_t *t, int32_t first, int32_t columns)
+static void finish_cells(bslam_cells_t *cells, const bslam_row_sums_t *row, int32_t first, int32_t columns)
 {
     for (int32_t i = 0; i < columns; i += SUMS_A_STEP) {
         uint32_t sums[SUMS_A_STEP];
         int16_t ranges[SUMS_A_STEP];
-        join_halves(sums, ranges, t->quads + 2 * i, t->darkest + 2 * i, t->brightest + 2 * i);
-        fill_cells(&t->cells, first + i, sums, ranges);
+        join_halves(sums, ranges, row->quads + 2 * i, row->darkest + 2 * i, row->brightest + 2 * i);
+        fill_cells(cells, first + i, sums, ranges);
     }
 }
 
 /// Turns two summed rows into a row of the half-resolution copy and the upper or lower half of a row of
 /// cells.
-static void reduce_two_rows(bslam_thumbnail_t *t)
+static void reduce_two_rows(bslam_thumbnail_t *t, bslam_row_sums_t *sums)
 {
     const int32_t columns = t->width_px / BSLAM_CELL_PX, pairs = t->width_px / 2;
-    reduce_rows(t->quads, t->pair_sums, t->half + t->rows_seen / 2 * pairs, pairs);
+    reduce_rows(sums->quads, sums->pairs, t->half + t->rows_seen / 2 * pairs, pairs);
     if (t->rows_seen % BSLAM_CELL_PX == 3) {
-        join_quads(t->quads, t->upper_quads, t->darkest, t->brightest, pairs);
-        finish_cells(t, t->rows_seen / BSLAM_CELL_PX * columns, columns);
+        join_quads(sums->quads, sums->upper_quads, sums->darkest, sums->brightest, pairs);
+        finish_cells(&t->cells, sums, t->rows_seen / BSLAM_CELL_PX * columns, columns);
     } else {
-        begin_cells(t, pairs);
+        begin_cells(sums, pairs);
     }
 }
 
-bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, const void *pixels)
+bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_t *sums, const void *pixels)
 {
     bslam_thumbnail_t *t = thumbnail;
     if (t->rows_seen >= t->height_px) {
         return BSLAM_E_COUNT;
     }
     const int32_t pairs = t->width_px / 2;
-    uint32_t *sums = t->rows_seen % 2 == 0 ? t->pair_sums : t->quads;
+    uint32_t *into = t->rows_seen % 2 == 0 ? sums->pairs : sums->quads;
     if (t->format == BSLAM_PIXELS_RGB565) {
-        sum_pairs_565(sums, pixels, pairs);
+        sum_pairs_565(into, pixels, pairs);
     } else {
-        sum_pairs_888(sums, pixels, pairs);
+        sum_pairs_888(into, pixels, pairs);
     }
     if (t->rows_seen % 2 == 1) {
-        reduce_two_rows(t);
+        reduce_two_rows(t, sums);
     }
     t->rows_seen++;
     return BSLAM_OK;

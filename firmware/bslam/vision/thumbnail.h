@@ -6,7 +6,7 @@
 #define BSLAM_VISION_THUMBNAIL_H
 
 #include "bslam/base/status.h"
-#include "bslam/vision/frame.h"
+#include "bslam/vision/cells.h"
 
 /// A frame's width is a multiple of this, its height of BSLAM_CELL_PX; both at least BSLAM_IMAGE_SIDE_MIN.
 #define BSLAM_IMAGE_WIDTH_STEP 8
@@ -20,19 +20,23 @@ typedef enum bslam_pixel_format {
 /// Pixel pairs of a row, with room for a step of cells.
 #define BSLAM_PAIRS_ROOM (BSLAM_IMAGE_WIDTH_MAX / 2 + 2 * BSLAM_CELL_STEP)
 
-typedef struct bslam_thumbnail {
-    bslam_pixel_format_t format;
-    int32_t width_px;
-    int32_t height_px;
-    int32_t rows_seen;                       ///< of the frame that is streaming in
-    uint32_t pair_sums[BSLAM_PAIRS_ROOM];    ///< of an upper row of two
+/// What is summed of a row of cells until it is finished. Scratch of a frame that streams in.
+typedef struct bslam_row_sums {
+    uint32_t pairs[BSLAM_PAIRS_ROOM];        ///< of an upper row of two
     uint32_t quads[BSLAM_PAIRS_ROOM];        ///< of 2x2 pixels
     uint32_t upper_quads[BSLAM_PAIRS_ROOM];  ///< of a row of cells
     int16_t darkest[BSLAM_PAIRS_ROOM];
     int16_t brightest[BSLAM_PAIRS_ROOM];
+} bslam_row_sums_t;
+
+typedef struct bslam_thumbnail {
+    bslam_pixel_format_t format;
+    int32_t width_px;
+    int32_t height_px;
+    int32_t rows_seen;  ///< of the frame that is streaming in
     union {
-        bslam_cells_t cells;                  ///< until the frame's colours have been looked at,
-        uint16_t frequent[BSLAM_CELLS_ROOM];  ///< and then the view's table of this name (cells.h)
+        bslam_cells_t cells;       ///< until the frame's colours have been looked at,
+        bslam_cell_notes_t notes;  ///< and then what is made of them
     };
     uint16_t half[BSLAM_HALF_MAX + BSLAM_CELL_STEP];
 } bslam_thumbnail_t;
@@ -43,8 +47,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_begin(bslam_thumbnail_t *thumbna
                                                       bslam_pixel_format_t format, int32_t width_px,
                                                       int32_t height_px);
 
-/// The next row, uppermost first, of width_px pixels. BSLAM_E_COUNT, and nothing changed, if the frame has
-/// all its rows already.
-BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, const void *pixels);
+/// The next row, uppermost first, of width_px pixels. The sums are the same ones for all rows of a frame,
+/// whatever they held before. BSLAM_E_COUNT, and nothing changed, if the frame has all its rows already.
+BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_t *sums,
+                                                    const void *pixels);
 
 #endif

@@ -99,7 +99,7 @@ bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_
 
 bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
 {
-    return bslam_thumbnail_row(&vision->thumbnail, pixels);
+    return bslam_thumbnail_row(&vision->thumbnail, &vision->row_sums, pixels);
 }
 
 bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)
@@ -200,10 +200,10 @@ static bslam_view_t view_of(const bslam_vision_t *vision, const bslam_frame_t *f
         .background = &vision->backgrounds[vision->camera],
         .floor_line = &vision->floor_line,
         .tones = &vision->tones,
-        .frequent = vision->thumbnail.frequent,
+        .frequent = vision->thumbnail.notes.frequent,
         .step_x = vision->step_x,
         .step_y = vision->step_y,
-        .values = vision->values,
+        .values = vision->thumbnail.notes.values,
     };
     return view;
 }
@@ -305,9 +305,10 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     }
     bslam_background_floor_line(background, frame, view.camera, &vision->tones, &vision->floor_line);
     bslam_cells_step(&view, vision->step_x, vision->step_y);
-    bslam_cells_decide(&view, &vision->machines[camera], &vision->cell_tables,
-                       &vision->proposals.channel_tables, vision->thumbnail.frequent, vision->values);
-    bslam_proposals_find(&vision->proposals, &view);
+    bslam_cell_notes_t *notes = &vision->thumbnail.notes;
+    bslam_cells_decide(&view, &vision->machines[camera], &notes->tables, &vision->channel_tables,
+                       notes->frequent, notes->values);
+    bslam_proposals_find(&vision->proposals, &view, vision->runs, notes->mask);
     bslam_uprights_propose(&vision->proposals, &view);
     vision->candidate_count =
         bslam_detector_judge(detector, vision->model->classes, vision->model->class_count, &view,

@@ -39,8 +39,10 @@ typedef struct bslam_vision {
     bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
     bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
     union {
-        bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];  ///< of a frame that has been looked at
-        bslam_cell_tables_t cell_tables;                     ///< while its cells are
+        bslam_row_sums_t row_sums;                           ///< while a frame streams in,
+        bslam_channel_tables_t channel_tables;               ///< while its cells are looked at,
+        bslam_run_t runs[BSLAM_RUNS_MAX];                    ///< while they are joined,
+        bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];  ///< and of a frame that has been looked at
     };
     bslam_thumbnail_t thumbnail;
     bslam_proposals_t proposals;
@@ -48,7 +50,6 @@ typedef struct bslam_vision {
     bslam_tones_t tones;
     uint8_t step_x[BSLAM_CELLS_ROOM];
     uint8_t step_y[BSLAM_CELLS_ROOM];
-    int8_t values[BSLAM_CELLS_ROOM];
 } bslam_vision_t;
 
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are

@@ -215,7 +215,7 @@ class FrontEnd:
         """Decision values (rows, columns) of the last frame's cells, 32 steps for 1."""
         thumbnail = self._vision.thumbnail
         shape = (thumbnail.height_px // 4, thumbnail.width_px // 4)
-        return self._library.copy_of(self._vision.values, shape[0] * shape[1], np.int8).reshape(shape)
+        return self._library.copy_of(thumbnail.notes.values, shape[0] * shape[1], np.int8).reshape(shape)
 
     def floor_distances(self) -> NDArray[np.float32]:
         """Distance of the floor line in each column of cells, m; 0: not known."""

@@ -96,7 +96,8 @@ class QemuLine:
 
     ns_per_instruction: int | None = NS_PER_INSTRUCTION
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *more: str) -> None:
+        """`name` as in --target: BOARD or BOARD:FILM; `more` arguments for QEMU."""
         board, _, film = name.partition(":")
         machines = qemu_machines()
         if board not in machines:
@@ -107,7 +108,7 @@ class QemuLine:
         self._image = BUILD_DIR / board / "robot.elf"
         if not self._image.is_file():
             raise BslamError(f"{self._image} is missing: build it with: make firmware TARGET={board}")
-        self._film = film_arguments(board, Path(film)) if film else []
+        self._more = [*more, *(film_arguments(board, Path(film)) if film else [])]
         self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
         self._first = b""
         self._socket, self._process = self._start(machines[board])
@@ -121,7 +122,8 @@ class QemuLine:
         listener.settimeout(START_TIMEOUT_S)
         command = [QEMU, "-M", machine, "-display", "none", "-monitor", "none", "-kernel", str(self._image)]
         command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
-        command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line", *self._film]
+        command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line"]
+        command += ["-qmp", f"unix:{path}.qmp,server=on,wait=off", *self._more]
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )
@@ -155,6 +157,15 @@ class QemuLine:
     def read(self, timeout_s: float) -> bytes:
         first, self._first = self._first, b""
         return first or _receive(self._socket, timeout_s, self._gone)
+
+    def restart(self) -> None:
+        """Press the board's reset button: RAM is as it was at the start, flash is kept."""
+        with socket.socket(socket.AF_UNIX) as monitor:
+            monitor.connect(str(Path(self._folder.name) / "line.qmp"))
+            monitor.sendall(b'{"execute": "qmp_capabilities"} {"execute": "system_reset"}')
+            said = b""
+            while b'"RESET"' not in said:
+                said += _receive(monitor, START_TIMEOUT_S, self._gone)
 
     def _gone(self) -> str:
         self._process.kill()

@@ -350,7 +350,8 @@ static void test_end_same_frames_give_the_same_state(void **state)
     (void)start(state);
     assert_int_equal(show(0, true), BSLAM_OK);
     assert_int_equal(show(0, true), BSLAM_OK);
-    assert_memory_equal(vision.values, before.values, sizeof vision.values);
+    assert_memory_equal(vision.thumbnail.notes.values, before.thumbnail.notes.values,
+                        sizeof vision.thumbnail.notes.values);
     assert_int_equal(vision.proposals.count, before.proposals.count);
     for (int i = 0; i < vision.proposals.count; i++) {
         const bslam_box_t *box = &vision.proposals.items[i].box, *other = &before.proposals.items[i].box;
@@ -376,7 +377,7 @@ static int plain_zone(const bslam_proposal_t *box, int zone, double sums[MEANS])
             sums[LIGHT] += tone.light;
             sums[SPREAD] += tone.spread;
             sums[STEP_X] += vision.step_x[i];
-            sums[LIKELY] += vision.values[i] > 0 ? 1 : 0;
+            sums[LIKELY] += vision.thumbnail.notes.values[i] > 0 ? 1 : 0;
             sums[FLOOR] += seen < BSLAM_FREQUENT_MAX ? seen : BSLAM_FREQUENT_MAX;
             cells++;
         }
