@@ -6,6 +6,10 @@ identity on the same drives; diverged runs. Beside each mean its 95 % interval o
 
 Two ablations of `svm` stand beside the methods: `untrained`, machines that are never trained
 (learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0).
+`--photographs`: simulated sightings whose signatures are of ETH-80's photographs, an object a beacon
+(tools/training/eth80.py). `--classes`, of a camera's sightings: as `seen`, `none`, or `usual`, what the
+beacon is called most often on the drive, with the distance that it would have had as that: what evidence over
+frames could reach at best. `--set` changes a parameter of `svm` and its ablations.
 `--looks` prints how alike simulated signatures are to a camera's instead: top-1 of LinearSVC, C = 10, by
 views a beacon, on the given worlds (the camera's: tools/measure_learner.py).
 `.venv/bin/python tools/measure_association.py pairs lookalikes --sigma 0.6,1.0 --seeds 100:110`
@@ -16,6 +20,7 @@ import itertools
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +29,13 @@ from scipy import stats
 from sklearn.svm import LinearSVC
 
 from bslam.experiment.batch import make_jobs, run_batch
+from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.experiment.options import Number, RunOptions
 from bslam.experiment.sources import CameraSource, ScenarioSource
+from bslam.log import Log, Sightings
+from bslam.world.kinds import KINDS
 from bslam.world.simulate import load_scenario, simulate
+from training.eth80 import PhotographedSource
 
 CAMERA_STORE = Path("out") / "camera"
 ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
@@ -37,11 +46,42 @@ METHODS = ("known", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
 VIEWS = (1, 2, 4, 10)
 TEST_VIEWS, FAR_M = 30, 6.5
 
+CLASSES = ("seen", "none", "usual")
+
 Entry = dict[str, Any]
 
 
-def options_of(method: str, sensor: str, sigma_mps: float, seed: int) -> RunOptions:
-    """One run of a method; an ablation is `svm` with a parameter changed."""
+@dataclass(frozen=True)
+class ClassedSource(CameraSource):
+    """A camera's drive with other classes than its detector's."""
+
+    classes: str = "seen"
+
+    def load(self) -> Log:
+        log = super().load()
+        if self.classes == "none":
+            return replace(log, sightings=replace(log.sightings, beacon_class=None))
+        return replace(log, sightings=as_usual(log.sightings)) if self.classes == "usual" else log
+
+
+def as_usual(seen: Sightings) -> Sightings:
+    """With each beacon called what it is called most often, and distances for that height."""
+    assert seen.beacon_class is not None and seen.range_sd_m is not None
+    usual = seen.beacon_class.copy()
+    for beacon in np.unique(seen.beacon_id[seen.beacon_id >= 0]):
+        rows = seen.beacon_id == beacon
+        usual[rows] = np.bincount(seen.beacon_class[rows]).argmax()
+    height_m = np.array([1.0, *(kind.height_m for kind in KINDS.values())])
+    factor = height_m[usual] / height_m[seen.beacon_class]
+    return replace(
+        seen, beacon_class=usual, range_m=seen.range_m * factor, range_sd_m=seen.range_sd_m * factor
+    )
+
+
+def options_of(
+    method: str, sensor: str, sigma_mps: float, seed: int, changes: Sequence[tuple[str, Number]] = ()
+) -> RunOptions:
+    """One run of a method; an ablation is `svm` with a parameter changed. `changes`: others, of `svm`."""
     association = "svm" if method in ABLATIONS else method
     return RunOptions(
         association=association,
@@ -49,8 +89,21 @@ def options_of(method: str, sensor: str, sigma_mps: float, seed: int) -> RunOpti
         sigma_mps=sigma_mps,
         noise="speedometer",
         seed=seed,
-        parameters=ABLATIONS.get(method, ()),
+        parameters=(*ABLATIONS.get(method, ()), *(changes if association == "svm" else ())),
     )
+
+
+def source_of(
+    arguments: argparse.Namespace, world: str, seed: int, sigma_mps: float, method: str
+) -> ScenarioSource:
+    """Where the sightings come from."""
+    drive = (world, seed, sigma_mps, "speedometer")
+    if arguments.photographs:
+        return PhotographedSource(*drive)
+    if arguments.sensor == "camera":
+        threshold = TOLD_THRESHOLD if method == "known" else UNTOLD_THRESHOLD
+        return ClassedSource(*drive, arguments.rig, CAMERA_STORE, threshold, arguments.classes)
+    return ScenarioSource(*drive)
 
 
 def run_all(arguments: argparse.Namespace) -> dict[tuple[str, float, str], list[Entry]]:
@@ -59,11 +112,8 @@ def run_all(arguments: argparse.Namespace) -> dict[tuple[str, float, str], list[
     sources: list[ScenarioSource] = []
     options: list[RunOptions] = []
     for (world, sigma_mps, method), seed in itertools.product(grid, arguments.seeds):
-        if arguments.sensor == "camera":
-            sources.append(CameraSource(world, seed, sigma_mps, "speedometer", arguments.rig, CAMERA_STORE))
-        else:
-            sources.append(ScenarioSource(world, seed, sigma_mps, "speedometer"))
-        options.append(options_of(method, arguments.sensor, sigma_mps, seed))
+        sources.append(source_of(arguments, world, seed, sigma_mps, method))
+        options.append(options_of(method, arguments.sensor, sigma_mps, seed, arguments.changes))
     outcomes = run_batch(make_jobs(sources, options, None, 0), arguments.out, arguments.jobs).outcomes
     entries = [outcome.entry for outcome in outcomes]
     seeds = len(arguments.seeds)
@@ -124,6 +174,12 @@ def print_looks(worlds: Sequence[str], seeds: Sequence[int]) -> None:
         print(f"| {world} seed {seed}, {len(there)} | {cells} |")
 
 
+def change(text: str) -> tuple[str, Number]:
+    """A parameter and its value."""
+    name, _, value = text.partition("=")
+    return name, float(value) if "." in value else int(value)
+
+
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(
@@ -140,6 +196,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("out") / "association")
     parser.add_argument("--looks", action="store_true")
+    parser.add_argument("--photographs", action="store_true")
+    parser.add_argument("--classes", choices=CLASSES, default="seen")
+    parser.add_argument(
+        "--set", dest="changes", action="append", default=[], type=change, metavar="NAME=VALUE"
+    )
     arguments = parser.parse_args(argv)
     unknown = set(arguments.methods) - set(METHODS)
     if unknown:

@@ -10,9 +10,9 @@ left to do. Prints top-1 % over all objects, mean over --splits, and what traini
 from __future__ import annotations
 
 import argparse
+import contextlib
 import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,10 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.svm import LinearSVC
 
 from bslam.core.learner import Learner
-from bslam.experiment.datasets import data_root
+from bslam.errors import BslamError
+from training.eth80 import archive_path
 from training.looks import Views, generic, photographs, rendered
 
-ARCHIVE = Path("eth80/eth80_half_64px_rgba.tar")
 COST = 10.0
 APART_DEG = 20.0
 
@@ -126,11 +126,9 @@ def main() -> None:
     views = rendered(options.scenario, options.world, options.frames, least=34)
     name = f"{options.scenario}, world {options.world}"
     report(name, views, (1, 2, 8, 24), split_at_random, options.splits, seeds)
-    root = data_root()
-    if root and (root / ARCHIVE).is_file():
-        report(
-            "ETH-80", photographs(root / ARCHIVE), (1, 4, 10, 24), split_by_direction, options.splits, seeds
-        )
+    with contextlib.suppress(BslamError):  # where it is not at hand
+        views = photographs(archive_path())
+        report("ETH-80", views, (1, 4, 10, 24), split_by_direction, options.splits, seeds)
 
 
 if __name__ == "__main__":

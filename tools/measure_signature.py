@@ -13,16 +13,11 @@ cross-validation, as `train_beacons.py` does it.
 """
 
 import argparse
-import io
-import os
-import tarfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from sklearn.svm import LinearSVC
 
 from bslam.core.vision import FrontEnd
@@ -30,6 +25,7 @@ from bslam.rig import load_rig
 from bslam.world.camera import BeaconLook, Renderer, Scene, dress, free_pose
 from bslam.world.scenario import load_scenario
 from measure_outline import is_counted, rough_box
+from training.eth80 import WALL_GREY, Picture, View, archive_path, read_photographs
 from training.fit import choose_cost, fit, one_vs_rest
 
 TEST_VIEWS = 15
@@ -42,10 +38,8 @@ TRIES_A_VIEW = 12
 OTHER_LIGHT = 1000
 ROBOT_COST = 10.0
 
-ETH80 = Path("eth80/eth80_half_64px_rgba.tar")
 APART_RAD = np.radians(20.0)
 SPLITS = 5
-WALL = 166  # of the grey that the photographed objects are put before
 FRAME_PX = (240, 320)
 CORNER_PX = (56, 96)
 
@@ -138,31 +132,14 @@ def measure_scene(name: str, seed: int, views: int) -> None:
 
 # --- Photographs
 
-Views = dict[tuple[str, int, int], NDArray[np.uint8]]  # (object, degrees from above, degrees round) -> RGBA
-
-
-def data_folder() -> Path:
-    """Where real data is: BSLAM_DATA, else ../shared/data."""
-    return Path(os.environ.get("BSLAM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
-
-
-def read_photographs(path: Path) -> Views:
-    """The photographs of a tar, by object and direction."""
-    views: Views = {}
-    with tarfile.open(path) as archive:
-        for member in archive.getmembers():
-            file = archive.extractfile(member)
-            if file is not None and member.name.endswith(".png"):
-                name, polar, azimuth = Path(member.name).stem.rsplit("-", 2)
-                views[name, int(polar), int(azimuth)] = np.array(Image.open(io.BytesIO(file.read())))
-    return views
+Views = dict[View, Picture]
 
 
 def photographed(front_end: FrontEnd, picture: NDArray[np.uint8], own_ground: bool) -> NDArray[np.float32]:
     """The signature of an object: its picture at twice its size, so that the half-resolution copy is it."""
     mask = picture[:, :, 3] > 0
-    shown = picture[:, :, :3] if own_ground else np.where(mask[:, :, None], picture[:, :, :3], WALL)
-    frame = np.full((*FRAME_PX, 3), WALL, np.uint8)
+    shown = picture[:, :, :3] if own_ground else np.where(mask[:, :, None], picture[:, :, :3], WALL_GREY)
+    frame = np.full((*FRAME_PX, 3), WALL_GREY, np.uint8)
     top, left = CORNER_PX
     large = np.kron(shown, np.ones((2, 2, 1))).astype(np.uint8)
     frame[top : top + large.shape[0], left : left + large.shape[1]] = large
@@ -243,12 +220,7 @@ def main() -> None:
         name, seed = scene.rsplit(":", 1)
         measure_scene(name, int(seed), arguments.views)
     if arguments.photographs:
-        path = data_folder() / ETH80
-        if not path.is_file():
-            raise SystemExit(
-                f"no {path}: get ETH-80 from its authors and let BSLAM_DATA name the directory of eth80/"
-            )
-        views = read_photographs(path)
+        views = read_photographs(archive_path())
         for own_ground in (False, True):
             measure_photographs(views, arguments.views, own_ground)
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
-import tarfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from bslam.core.vision import FrontEnd
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, Scene, Seen, dress, free_pose, make_world
 from bslam.world.scenario import load_scenario
 from training.detector_samples import blank_detector, model_of
+from training.eth80 import WALL_GREY, read_photographs
 
 SEEN_PX_MIN = 150
 SEEN_SHARE_MIN = 0.7
@@ -25,9 +23,6 @@ BOX_SD_PX = 1.0  # how far a detector's box is off, each side
 NEAR_M = 6.0
 FRAMES_FIRST = 20  # in which the front end gets to know the room
 SECONDS_A_FRAME = 0.2
-
-PHOTOGRAPH = re.compile(r"([a-z]+\d+)-(\d+)-(\d+)\.png")
-WALL_GREY = 166
 
 
 @dataclass(frozen=True)
@@ -78,21 +73,13 @@ def generic(count: int, first_world: int) -> NDArray[np.float32]:
 
 
 def photographs(archive: Path) -> Views:
-    """ETH-80: each object before a grey wall, as the front end sees it.
-
-    The archive holds <object>-<elevation>-<azimuth>.png, 64x64 RGBA, transparent round the object.
-    """
+    """ETH-80: each object before a grey wall, as the front end sees it."""
     camera = load_rig("three60").cameras[1]
     front_end = FrontEnd([camera], model_of(blank_detector()))
-    signatures, names, directions = [], [], []
-    with tarfile.open(archive) as files:
-        for member in sorted(files.getnames()):
-            match = PHOTOGRAPH.fullmatch(Path(member).name)
-            content = files.extractfile(member) if match else None
-            if match and content is not None:
-                signatures.append(_photograph(front_end, camera, np.array(Image.open(content))))
-                names.append(match[1])
-                directions.append(_direction(int(match[2]), int(match[3])))
+    views = sorted(read_photographs(archive).items())
+    signatures = [_photograph(front_end, camera, picture) for _, picture in views]
+    names = [name for (name, _, _), _ in views]
+    directions = [_direction(polar, azimuth) for (_, polar, azimuth), _ in views]
     kept = sorted(set(names))
     objects = np.array([kept.index(name) for name in names], np.int64)
     return Views(np.array(signatures, np.float32), objects, np.array(directions))

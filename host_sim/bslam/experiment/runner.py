@@ -354,8 +354,9 @@ class Frames:
         rows = slice(self._bounds[frame], self._bounds[frame + 1])
         self._next = frame + 1
         columns: list[Any] = [column[rows] for column in self._columns]
-        if self._signature is not None:
-            columns += [None] * (SIGNATURE - len(columns)) + [self._signature[rows]]
+        if self._signature is not None or self._class is not None:
+            columns += [None] * (SIGNATURE - len(columns))
+            columns += [None if self._signature is None else self._signature[rows]]
             columns += [] if self._class is None else [self._class[rows]]
         return self._time_us[frame], self._true_id[rows], columns
 

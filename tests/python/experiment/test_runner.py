@@ -42,8 +42,8 @@ class Recorder:
     def odometry(self, kind, time_us, a, b, gyro_radps):
         self._take(kind, time_us, a, b, *(() if gyro_radps is None else (gyro_radps,)))
 
-    def sightings(self, time_us, bearing_rad, range_m, label, mappable):
-        self._take("frame", time_us, bearing_rad, range_m, label, mappable)
+    def sightings(self, time_us, bearing_rad, range_m, label, mappable, *more):
+        self._take("frame", time_us, bearing_rad, range_m, label, mappable, *more)
         return [Account("deferred", "none", None) for _ in label]
 
     def pose(self):
@@ -140,6 +140,15 @@ def test_rows_of_one_stamp_are_one_frame(log):
     assert (bearing, label, mappable) == ([0.2, 0.3], [3, -1], [True, False])
     assert range_m[0] == 2.0
     assert math.isnan(range_m[1])
+
+
+@pytest.mark.parametrize("association", ["known", "mahalanobis"])
+def test_what_the_detector_calls_a_sighting_is_told_without_looks_too(log, association):
+    classed = replace(log.sightings, beacon_class=np.array([1, 2, 3, 4, 5]))
+    _, recorder = run(replace(log, sightings=classed), RunOptions(association=association))
+    frames = [call for call in recorder.calls if call[0] == "frame"]
+    assert [call[9] for call in frames] == [[1], [2, 3], [4], [5]]
+    assert all(call[6:9] == (None, None, None) for call in frames)  # no noise, no signature
 
 
 def test_direction_only_hides_the_range(log):

@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 import measure_signature
-from measure_signature import APART_RAD, ETH80, apart, data_folder, split_views
+from bslam.errors import BslamError
+from measure_signature import APART_RAD, apart, split_views
+from training.eth80 import archive_path
 
 DIRECTIONS = [(0, 0)] + [(polar, azimuth) for polar in (30, 60, 90) for azimuth in range(0, 360, 45)]
 
 
 @pytest.fixture(scope="module")
 def photographs() -> Path:
-    path = data_folder() / ETH80
-    if not path.is_file():
-        pytest.skip(f"no {path}: BSLAM_DATA names the directory of eth80/")
-    return path
+    try:
+        return archive_path()
+    except BslamError as missing:
+        pytest.skip(str(missing))
 
 
 def test_apart_is_the_angle_between_two_directions() -> None:
