@@ -48,6 +48,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "rig": frozenset({"errors", "parsing"}),
     "modelfile": frozenset({"errors"}),
     "motion": frozenset(),
+    "maps": frozenset({"errors"}),
     "core": frozenset({"errors", "modelfile", "rig"}),
     "world": LOG | {"rig", "motion"},
     "algorithms": LOG | {"core", "motion"},
@@ -55,7 +56,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "target": frozenset({"errors", "core", "link"}),
     "recording": LOG | {"core"},
     "experiment": LOG
-    | {"moment", "rig", "modelfile", "core", "world", "link", "target", "recording", "algorithms"},
+    | {"moment", "rig", "modelfile", "core", "world", "link", "target", "recording", "algorithms", "maps"},
     "view": LOG | {"moment"},
 }
 # The command line ties the parts together and may import them all.

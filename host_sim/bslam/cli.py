@@ -19,6 +19,7 @@ from bslam.commands import (
     console,
     export,
     faults,
+    kept_maps,
     live,
     look,
     params,
@@ -44,6 +45,7 @@ COMMANDS: dict[str, ModuleType] = {
     "console": console,
     "export": export,
     "scenario": scenario,
+    "map": kept_maps,
     "faults": faults,
     "params": params,
 }

@@ -27,6 +27,7 @@ from bslam.experiment.options import (
 )
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
+from bslam.maps.blob import SUFFIX
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 from bslam.world.scenario import load_scenario
 
@@ -88,6 +89,18 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "--known-map",
         action="store_true",
         help="give the filter the true beacons: it localises and changes none (paper equation (12))",
+    )
+    group.add_argument(
+        "--map",
+        type=Path,
+        metavar=f"FILE{SUFFIX}",
+        help="start in a kept map, at a place that nobody knows (see `bslam map`)",
+    )
+    group.add_argument("--frozen", action="store_true", help="--map: nothing changes a beacon, none is added")
+    group.add_argument(
+        "--recovery",
+        action="store_true",
+        help="notice when it is lost, and find itself again; on with --map",
     )
     group.add_argument(
         "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
@@ -180,6 +193,10 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
 
     has_looks: the sightings have signatures, as all simulated ones do.
     """
+    if arguments.frozen and arguments.map is None:
+        raise BslamError("--frozen: no map; allowed: --map FILE --frozen")
+    if arguments.known_map and arguments.map is not None:
+        raise BslamError("--known-map with --map: allowed is one of them")
     association = changes.pop("association", arguments.association)
     by_sight = has_looks and not arguments.known_map
     name, rate = association or ("svm" if by_sight else "known", 0.0)
@@ -195,6 +212,9 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "target": arguments.target,
         "real": arguments.real,
         "known_map": arguments.known_map,
+        "kept_map": None if arguments.map is None else str(arguments.map),
+        "frozen": arguments.frozen,
+        "recovery": arguments.recovery or arguments.map is not None,
         "parameters": tuple(core_parameters(arguments).items()),
     }
     return RunOptions(association=name, wrong_identity_rate=rate, **(values | changes))

@@ -10,6 +10,7 @@ from typing import Any
 
 from bslam.errors import BslamError
 from bslam.experiment.batch import BatchResult
+from bslam.maps.blob import SUFFIX
 
 # Heading, and how to get the text of an entry.
 _COLUMNS = (
@@ -57,7 +58,7 @@ def _files(result: BatchResult, more: str) -> list[str]:
     """What was written, a run that failed having left nothing."""
     files = ["summary.json"]
     if not all(outcome.failed for outcome in result.outcomes):
-        files += ["NAME.estimate.tum", "NAME.truth.tum", "NAME.map.csv", "*.png"]
+        files += ["NAME.estimate.tum", "NAME.truth.tum", "NAME.map.csv", f"NAME{SUFFIX}", "*.png"]
     return files + ([more] if more else [])
 
 

@@ -118,6 +118,9 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "target": options.target,
         "real": options.real,
         "known_map": options.known_map,
+        "kept_map": options.kept_map,
+        "frozen": options.frozen or None,
+        "recovery": options.recovery or None,
     }
     return {word: value for word, value in words.items() if value is not None}
 

@@ -43,6 +43,9 @@ class RunOptions:
     target: str = "host"
     real: str = "float"  # scalar type of the core: as on the target, or the twin
     known_map: bool = False  # the log's true beacons are given to the filter, which only localises
+    kept_map: str | None = None  # file of a map to start in, at a place that nobody knows
+    frozen: bool = False  # that map stays as it is
+    recovery: bool = False  # the filter notices when it is lost; it always does in a kept map
     sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
     odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: by kind of log

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.experiment.metrics import Evaluation
 from bslam.experiment.trace import Trace
+from bslam.maps.blob import SUFFIX
 
 SCHEMA: Final = 1
 _MAP_HEADER: Final = (
@@ -67,7 +68,7 @@ def finite(content: Any) -> Any:
 
 
 def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None) -> None:
-    """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth) and NAME.map.csv.
+    """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth), NAME.map.csv and the map itself.
 
     The estimate stays in the map frame and the truth in its own: real logs are aligned by whoever compares
     them.
@@ -77,6 +78,8 @@ def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None)
         known = np.isfinite(evaluation.truth[:, 0])
         write_atomically(out / f"{name}.truth.tum", tum(trace.time_us[known], evaluation.truth[known]))
     write_atomically(out / f"{name}.map.csv", map_csv(trace))
+    if trace.kept_map is not None:
+        write_atomically(out / f"{name}{SUFFIX}", trace.kept_map)
 
 
 def tum(time_us: NDArray[np.int64], poses: NDArray[np.float64]) -> str:

@@ -5,6 +5,7 @@ Nothing is sorted or chosen anew: the inputs go in as they went in then, with th
 
 from __future__ import annotations
 
+import base64
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -67,8 +68,21 @@ def rerun(
     start = recording.start
     params, room = dict(options.parameters), start.beacons_max
     if options.target == "host":
-        slam = Slam(params, beacons_max=room, real=start.real, looks=start.looks, seeds=start.seeds)
+        slam = Slam(
+            params,
+            beacons_max=room,
+            real=start.real,
+            looks=start.looks,
+            seeds=start.seeds,
+            recovery=start.recovery,
+        )
+        if start.kept_map is not None:
+            slam.load_map(base64.b64decode(start.kept_map), frozen=start.frozen)
         return _Rerun(slam, recording, watcher).finish()
+    if start.kept_map is not None:
+        raise BslamError(
+            f"{recording.path}: it begins in a kept map; with --target {options.target}: allowed is host"
+        )
     if start.real != "float":
         raise BslamError(
             f"{recording.path}: real {start.real} with --target {options.target}: allowed is float"

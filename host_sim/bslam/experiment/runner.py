@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,6 +19,7 @@ from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
+from bslam.experiment.kept import read_blob
 from bslam.experiment.ledger import Ledger, corrupt_identities
 from bslam.experiment.local_map import LocalMap
 from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
@@ -80,6 +82,8 @@ def run_log(
     frames = frames or Frames(log.sightings, options)
     params, beacons = core_params(options, log), beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
+        if options.kept_map is not None:
+            raise BslamError(f"--map {options.kept_map} with --target {options.target}: allowed is host")
         if options.real != "float":
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
         looks = uses_looks(options)
@@ -105,6 +109,7 @@ def _run(
         return _Run(slam, log, options, frames, watcher).finish(target and target())
     params = slam.params if target is None else slam.host_params
     start = start_of(log, params, beacons_to_hold(log, options), uses_looks(options), options.real)
+    start = replace(start, recovery=options.recovery, frozen=options.frozen, kept_map=_kept_text(options))
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
@@ -121,8 +126,23 @@ def _gyro(odometry: Odometry) -> list[float | None]:
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Any:
     looks, most = uses_looks(options), SIZE_CLASSES[-1]
-    slam = Slam(params, beacons_max=min(beacons_max, most), real=options.real, looks=looks, seeds=log.seeds)
+    slam = Slam(
+        params,
+        beacons_max=min(beacons_max, most),
+        real=options.real,
+        looks=looks,
+        seeds=log.seeds,
+        recovery=options.recovery,
+    )
+    if options.kept_map is not None:
+        slam.load_map(read_blob(Path(options.kept_map)), frozen=options.frozen)
     return LocalMap(slam, most) if beacons_max > most else slam
+
+
+def _kept_text(options: RunOptions) -> str | None:
+    if options.kept_map is None:
+        return None
+    return base64.b64encode(read_blob(Path(options.kept_map))).decode()
 
 
 def uses_looks(options: RunOptions) -> bool:
@@ -134,7 +154,8 @@ def beacons_to_hold(log: Log, options: RunOptions) -> int:
     sighted = log.sightings.beacon_id[log.sightings.mappable]
     given = 0 if log.beacons is None else len(log.beacons.beacon_id)
     true_beacons = max(1, given, len(np.unique(sighted[sighted >= 0])))
-    return true_beacons if options.association == "known" else max(true_beacons, FALSE_BEACONS_ROOM)
+    is_all = options.association == "known" and options.kept_map is None
+    return true_beacons if is_all else max(true_beacons, FALSE_BEACONS_ROOM)
 
 
 class _Run:
@@ -299,6 +320,7 @@ def make_trace(
         refusals=dict(refusals),
         target=dict(target or {}),
         step_us_median=step_us_median,
+        kept_map=slam.save_map() if hasattr(slam, "save_map") else None,
     )
 
 

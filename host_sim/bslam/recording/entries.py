@@ -26,7 +26,7 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Start:
-    """The robot at the start of the recording: it stands at the origin, and its map is empty."""
+    """The robot at the start of the recording: at the origin of an empty map, or anywhere in a kept one."""
 
     name: str
     params: dict[str, int | float]  # all of them
@@ -36,6 +36,9 @@ class Start:
     robot: str | None = None  # the text of robot.toml, where the log has one
     true_beacons: tuple[tuple[int, float, float], ...] = ()  # beacon_id, x_m, y_m, where somebody knows them
     real: str = "float"  # the core's scalar type
+    recovery: bool = False  # it notices when it is lost
+    kept_map: str | None = None  # the map that it starts in, in base64; None: an empty one
+    frozen: bool = False  # that map stays as it is
     about: Json = field(default_factory=dict)  # of the target: image, build
 
 

@@ -89,6 +89,9 @@ SCHEMAS: dict[str, Json] = {
         looks=_BOOL,
         seeds=_TEXT,
         real=_TEXT,
+        recovery=_BOOL,
+        kept_map=_TEXT,
+        frozen=_BOOL,
         about=_object(),
     ),
     "bslam.Odometry": _object(
