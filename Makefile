@@ -1,6 +1,6 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
 # live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (the library for a core), images.mk (images
-# for boards, sizes), lint.mk (style), bench.mk (instruction counts), docs.mk (generated documents).
+# for boards, sizes), rtos.mk (the robot on FreeRTOS), lint.mk (style), bench.mk (instruction counts), docs.mk (generated documents).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -13,6 +13,7 @@ BSLAM := $(VENV)/bin/bslam
 include mk/config.mk
 include mk/unit.mk
 include mk/firmware.mk
+include mk/rtos.mk
 include mk/lint.mk
 include mk/bench.mk
 include mk/docs.mk

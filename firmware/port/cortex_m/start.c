@@ -12,6 +12,8 @@ int main(void);
 void systick_interrupt(void);
 void start_reset(void);
 void port_interrupt(void);
+void svc_interrupt(void);
+void pendsv_interrupt(void);
 static void fault(void);
 
 #define EXCEPTIONS 16
@@ -24,11 +26,10 @@ typedef union vector {
 } vector_t;
 
 __attribute__((section(".vectors"), used)) static const vector_t vectors[EXCEPTIONS + INTERRUPTS] = {
-    [0] = {.stack = start_stack_top},
-    [1] = {.handler = start_reset},
-    [2 ... 14] = {.handler = fault},
-    [15] = {.handler = systick_interrupt},
-    [16 ... EXCEPTIONS + INTERRUPTS - 1] = {.handler = port_interrupt},
+    [0] = {.stack = start_stack_top},      [1] = {.handler = start_reset},
+    [2 ... 10] = {.handler = fault},       [11] = {.handler = svc_interrupt},
+    [12 ... 13] = {.handler = fault},      [14] = {.handler = pendsv_interrupt},
+    [15] = {.handler = systick_interrupt}, [16 ... EXCEPTIONS + INTERRUPTS - 1] = {.handler = port_interrupt},
 };
 
 #if defined(__ARM_FP)
@@ -48,6 +49,17 @@ static void fault(void)
 
 /// A port that enables an interrupt has a handler of its own.
 __attribute__((weak)) void port_interrupt(void)
+{
+    fault();
+}
+
+/// So have these an operating system.
+__attribute__((weak)) void svc_interrupt(void)
+{
+    fault();
+}
+
+__attribute__((weak)) void pendsv_interrupt(void)
 {
     fault();
 }

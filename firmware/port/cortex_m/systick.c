@@ -1,35 +1,55 @@
 #include "port/cortex_m/systick.h"
 
-/// Counts down from RELOAD to 0, then interrupts and starts over.
-#define RELOAD 0xffffffu
 #define CONTROL (*(volatile uint32_t *)0xe000e010u)
 #define LOAD (*(volatile uint32_t *)0xe000e014u)
 #define VALUE (*(volatile uint32_t *)0xe000e018u)
 #define ENABLE_INTERRUPT_CORE_CLOCK 7u
+#define PERIOD_MAX 0x1000000u
 
 static volatile uint32_t rounds;
+static uint32_t period;  // counts down from period - 1 to 0, then interrupts and starts over
+static uint64_t before;  // ticks before the present period was set
 
 void systick_interrupt(void);
 
 void systick_interrupt(void)
 {
     rounds++;
+    systick_hook();
 }
 
-void systick_start(void)
+__attribute__((weak)) void systick_hook(void)
 {
-    LOAD = RELOAD;
+}
+
+static void start(uint32_t ticks)
+{
+    CONTROL = 0;
+    rounds = 0;
+    period = ticks;
+    LOAD = ticks - 1;
     VALUE = 0;
     CONTROL = ENABLE_INTERRUPT_CORE_CLOCK;
 }
 
+void systick_start(void)
+{
+    start(PERIOD_MAX);
+}
+
+void systick_every(uint32_t ticks)
+{
+    before = systick_ticks();
+    start(ticks);
+}
+
 uint64_t systick_ticks(void)
 {
-    uint32_t before;
+    uint32_t at;
     uint32_t value;
     do {  // again, if a round ended in between
-        before = rounds;
+        at = rounds;
         value = VALUE;
-    } while (before != rounds);
-    return (uint64_t)before << 24 | (RELOAD - value);
+    } while (at != rounds);
+    return before + (uint64_t)at * period + (period - 1 - value);
 }

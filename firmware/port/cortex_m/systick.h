@@ -10,4 +10,10 @@ void systick_start(void);
 /// Ticks of that clock since then.
 uint64_t systick_ticks(void);
 
+/// From now on systick_hook is called every so many ticks, at most 2^24: an operating system's clock.
+void systick_every(uint32_t ticks);
+
+/// Does nothing unless a program has one of its own.
+void systick_hook(void);
+
 #endif

@@ -97,17 +97,19 @@ class QemuLine:
     ns_per_instruction: int | None = NS_PER_INSTRUCTION
 
     def __init__(self, name: str, *more: str) -> None:
-        """`name` as in --target: BOARD or BOARD:FILM; `more` arguments for QEMU."""
-        board, _, film = name.partition(":")
+        """`name` as in --target: BOARD, BOARD/PROGRAM, each with :FILM; `more` arguments for QEMU."""
+        image, _, film = name.partition(":")
+        board, _, program = image.partition("/")
         machines = qemu_machines()
         if board not in machines:
             raise BslamError(f"target 'qemu:{board}' does not exist; allowed: {allowed_targets()}")
         if shutil.which(QEMU) is None:
             package = "qemu-system-arm"
             raise BslamError(f"{QEMU} is not installed: install it with: sudo apt-get install {package}")
-        self._image = BUILD_DIR / board / "robot.elf"
+        self._image = BUILD_DIR / board / f"{program or 'robot'}.elf"
         if not self._image.is_file():
-            raise BslamError(f"{self._image} is missing: build it with: make firmware TARGET={board}")
+            made_by = f"make {'rtos' if program == 'robot_rtos' else 'firmware'} TARGET={board}"
+            raise BslamError(f"{self._image} is missing: build it with: {made_by}")
         self._more = [*more, *(film_arguments(board, Path(film)) if film else [])]
         self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
         self._first = b""
