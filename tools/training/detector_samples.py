@@ -19,16 +19,16 @@ from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
-    BeaconClass("extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01, 0.18),  # round: it shows no flank
-    BeaconClass("radiator", 0.60, 0.12, 0.70, 0.70, 0.08),
-    BeaconClass("door", 2.00, 0.035, 2.00, 2.00, 0.01),
-    BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.03),
-    BeaconClass("poster", 0.84, 0.015, 1.92, 1.92, 0.05),
-    BeaconClass("sign", 0.30, 0.015, 1.75, 2.35, 0.09),
-    BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02),
+    BeaconClass("extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01, 0.18, 0.18, 0.18),  # round: it shows no flank
+    BeaconClass("radiator", 0.60, 0.12, 0.70, 0.70, 0.08, 0.0, 0.8, 1.4),
+    BeaconClass("door", 2.00, 0.035, 2.00, 2.00, 0.01, 0.0, 0.9, 0.9),
+    BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.03, 0.0, 0.9, 1.6),
+    BeaconClass("poster", 0.84, 0.015, 1.92, 1.92, 0.05, 0.0, 0.59, 0.59),
+    BeaconClass("sign", 0.30, 0.015, 1.75, 2.35, 0.09, 0.0, 0.3, 0.3),
+    BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02, 0.0, 0.8, 1.0),
 )
-"""In the order of KINDS: whole heights, middling depths, where their upper sides are, and what their looks
-make of a distance in training worlds (tools/measure_outline.py --style train)."""
+"""In the order of KINDS: whole heights, middling depths, where their upper sides are, how wide they are, and
+what their looks make of a distance in training worlds (tools/measure_outline.py --style train)."""
 
 CLUTTER = len(KINDS)
 """Label of a proposal on clutter; kinds are 0 to CLUTTER - 1, NOTHING and IGNORED below."""
@@ -177,7 +177,7 @@ def _label_boxes(
 ) -> BoxSamples:
     rows = np.flatnonzero(world.seen["frame"] == index)
     seen = world.seen[rows]
-    owner, overlap = owners(boxes, seen, teaches(seen, world.pictures.shape[2]))
+    owner, overlap = owners(boxes, seen, teaches(seen))
     label = owner.copy()
     label[owner >= 0] = seen["kind"][owner[owner >= 0]]
     is_clutter = (owner == NOTHING) & (clutter_share(world.clutter[index], boxes) > 0.4)

@@ -25,6 +25,8 @@ typedef struct bslam_beacon_class {
     float top_high_m;  ///< and at most; 0: not known
     float looks_sd;    ///< what its looks (a pale rim, a lid) make of a distance by its height, as a fraction
     float width_m;     ///< of what is as wide from every side; 0: it is not, or not known
+    float narrow_m;    ///< its front is so wide at least,
+    float wide_m;      ///< and at most; 0: not known
 } bslam_beacon_class_t;
 
 /// The detector for one kind of lens.

@@ -37,6 +37,15 @@ static const bslam_real_t HORIZON_SD_PX = BSLAM_R(0.7);
 // A round thing's width may be off by this part, and contradict its height by so many standard deviations.
 static const bslam_real_t WIDTH_SD = BSLAM_R(0.04);
 static const bslam_real_t WIDTH_SDS = 2;
+// What is cut off is seen this much narrower than it is, because it is seen obliquely: mean and deviation.
+static const bslam_real_t OBLIQUE_MEAN = BSLAM_R(0.9);
+static const bslam_real_t OBLIQUE_SD = BSLAM_R(0.12);
+// Of a side that the frame cuts off nothing is known: its variance, tangents.
+static const bslam_real_t CUT_VAR = 1;
+// How well a rough direction is known at best, since its kind may be another one; and the end that is seen,
+// as a fraction of what is seen.
+static const bslam_real_t CUT_FLOOR_RAD = BSLAM_R(0.02);
+static const bslam_real_t END_SD = BSLAM_R(0.15);
 // Seen more obliquely than this, tangent, an object is marked and not measured.
 static const bslam_real_t TURN_MAX = BSLAM_R(1.5);
 
@@ -48,9 +57,10 @@ static bool box_is_number(const bslam_box_t *box)
 
 static bslam_status_t check_size(const bslam_size_t *size)
 {
-    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m, size->top_low_m, size->top_high_m,
-                                      size->width_m};
-    bool in_range = size->top_low_m <= size->top_high_m && bslam_in_range(size->looks_sd, 0, 1);
+    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m,  size->top_low_m, size->top_high_m,
+                                      size->width_m,  size->narrow_m, size->wide_m};
+    bool in_range = size->top_low_m <= size->top_high_m && size->narrow_m <= size->wide_m &&
+                    bslam_in_range(size->looks_sd, 0, 1);
     bool are_numbers = bslam_is_number(size->looks_sd);
     for (int32_t i = 0; i < (int32_t)(sizeof lengths_m / sizeof lengths_m[0]); i++) {
         in_range = in_range && bslam_in_range(lengths_m[i], 0, SIZE_MAX_M);
@@ -203,6 +213,42 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
 }
 
+/// Whether it is cut off on one upright side, and what is left of it can tell a rough direction.
+static bool is_cut_sideways(unsigned marks)
+{
+    const bool left = (marks & BSLAM_MARK_CUT_LEFT) != 0U, right = (marks & BSLAM_MARK_CUT_RIGHT) != 0U;
+    return left != right && (marks & (BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED)) == 0U;
+}
+
+/// Rough direction of something that the frame cuts off on one side: from the end that is seen it reaches as
+/// far as its kind is wide, at the distance that its height and place tell, and beyond the frame's edge at
+/// least.
+static void measure_cut(const bslam_outline_t *found, const bslam_camera_t *camera, const bslam_size_t *size,
+                        unsigned marks, bslam_candidate_t *candidate)
+{
+    bslam_outline_t o = *found;
+    o.turn = 0;
+    o.top_var = (marks & BSLAM_MARK_CUT_TOP) != 0U ? CUT_VAR : o.top_var;
+    o.bottom_var = (marks & BSLAM_MARK_CUT_BOTTOM) != 0U ? CUT_VAR : o.bottom_var;
+    const ahead_t ahead = ahead_of(&o, camera, size, POINT_SD_PX * POINT_SD_PX * o.pixel * o.pixel);
+    if (!(ahead.inverse > 0) || !(ahead.relative_var < 1)) {
+        return;
+    }
+    const bool goes_left = (marks & BSLAM_MARK_CUT_LEFT) != 0U;
+    const bslam_real_t mean_m = (size->narrow_m + size->wide_m) / 2, band_m = size->wide_m - size->narrow_m;
+    const bslam_real_t seen = o.left - o.right;
+    const bslam_real_t expected = OBLIQUE_MEAN * mean_m * ahead.inverse;
+    const bslam_real_t half = (expected > seen ? expected : seen) / 2;
+    const bslam_real_t relative_var =
+        band_m * band_m / (12 * mean_m * mean_m) + OBLIQUE_SD * OBLIQUE_SD + ahead.relative_var;
+    const bslam_real_t end_sd = END_SD * seen;
+    const bslam_real_t middle = goes_left ? o.right + half : o.left - half;
+    candidate->bearing_rad = bslam_angle_wrap(o.facing_rad + bslam_atan2(middle, 1));
+    candidate->bearing_sd_rad =
+        bslam_sqrt(CUT_FLOOR_RAD * CUT_FLOOR_RAD + end_sd * end_sd + half * half * relative_var);
+    candidate->has_bearing = true;
+}
+
 bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
                              const bslam_box_t *rough, const bslam_size_t *size, bslam_candidate_t *candidate)
 {
@@ -230,6 +276,10 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     candidate->marks = (uint16_t)marks;
     if ((marks & sideways) == 0U) {
         measure_outline(&outline, camera, size, (marks & upright) == 0U, candidate);
+    } else if (is_cut_sideways(marks) && size->wide_m > 0) {
+        // The outline's corners are not asked: without one end the slope of its level sides is a guess.
+        measure_cut(&outline, camera, size, (marks & sideways) | (cuts_of(frame, rough) & upright),
+                    candidate);
     }
     candidate->outline = found;
     if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {

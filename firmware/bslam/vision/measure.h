@@ -12,6 +12,8 @@ typedef struct bslam_size {
     bslam_real_t top_low_m;   ///< its upper side is so high above the floor at least,
     bslam_real_t top_high_m;  ///< and at most; 0: not known
     bslam_real_t width_m;     ///< of what is as wide from every side; 0: it is not, or not known
+    bslam_real_t narrow_m;    ///< its front is so wide at least,
+    bslam_real_t wide_m;      ///< and at most; 0: not known
     bslam_real_t looks_sd;    ///< what its looks make of a distance by its height, as a fraction
 } bslam_size_t;
 
@@ -19,12 +21,13 @@ typedef struct bslam_size {
 /// margin and score stay as they are. Without a height there is no distance; without the right depth a body's
 /// flank is taken for a part of its front, and its middle is off by half of what the flank takes.
 ///
-/// Marked and not measured: what is cut off to the left or right, small (less than 5 px wide or 8 px high),
-/// or seen to be turned by a tangent of more than 1.5; and a part, whose level sides go on beyond it. What is
-/// cut off above or below has a direction and no distance; nor has one whose distance would be less certain
-/// than 15 %, or that would hang elsewhere than its kind. That something stands before an object is not
-/// noticed. A candidate without has_bearing must not be used. Signature values are 0 where none could be
-/// taken.
+/// Marked and not measured: what is small (less than 5 px wide or 8 px high), or seen to be turned by a
+/// tangent of more than 1.5; and a part, whose level sides go on beyond it. What is cut off to the left or to
+/// the right has a rough direction, from the end that is seen and how wide its kind is, if that is known;
+/// what is cut off on both sides has none. What is cut off above or below has a direction and no distance;
+/// nor has one whose distance would be less certain than 15 %, or that would hang elsewhere than its kind.
+/// That something stands before an object is not noticed. A candidate without has_bearing must not be used.
+/// Signature values are 0 where none could be taken.
 ///
 /// The standard deviations are those of the errors left, of which a large part repeats from frame to frame:
 /// they come from the object's looks, not from noise (docs/EXPERIMENTS.md). BSLAM_E_NOT_FINITE: the box or

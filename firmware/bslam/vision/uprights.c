@@ -1,5 +1,6 @@
 #include "bslam/vision/uprights.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /// What is looked for: from and to this height above the floor, at least and at most so wide as it appears,
@@ -22,6 +23,10 @@ static const upright_t uprights[] = {
 /// Sides of a kind in a frame, and boxes that come of them.
 #define SIDES_MAX 14
 #define BOXES_MAX 8
+/// Boxes of a kind that the frame's left edge cuts off, and as many by its right one. What is left of them is
+/// at least this part of the kind's least width.
+#define CUT_BOXES_MAX 2
+#define CUT_SHARE_MIN 0.3f
 /// Cells across a box and down it, at least.
 #define SIDE_MIN 2
 /// A side is one whose mean step is at least this, in quarters; a cell counts at most STEP_MAX.
@@ -240,11 +245,53 @@ static void propose_pairs(bslam_proposals_t *proposals, const bslam_view_t *view
     }
 }
 
+/// The strongest side of less step than `limit` with which something that the frame cuts off at its left or
+/// right edge could end; NULL if there is none.
+static const side_t *end_of_cut(const bslam_view_t *view, const side_t *sides, int32_t count,
+                                const upright_t *kind, bool left, float limit)
+{
+    const side_t *best = NULL;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t columns = left ? sides[i].column + 1 : view->frame->columns - sides[i].column;
+        const float width_m = (float)(columns * BSLAM_CELL_PX) / sides[i].metre_px;
+        const float step = sides[i].step + 1e-3f * (float)i;  // of equals another one
+        if (width_m > CUT_SHARE_MIN * kind->width_min_m && width_m < kind->width_max_m && step < limit &&
+            (best == NULL || sides[i].step >= best->step)) {
+            best = &sides[i];
+        }
+    }
+    return best;
+}
+
+/// Proposes what the frame cuts off on the left or the right: one of its sides is the frame's edge.
+static void propose_cut(bslam_proposals_t *proposals, const bslam_view_t *view, const side_t *sides,
+                        int32_t count, int32_t kind, bool left)
+{
+    float limit = 1e9f;
+    for (int32_t box = 0; box < CUT_BOXES_MAX; box++) {
+        const side_t *end = end_of_cut(view, sides, count, &uprights[kind], left, limit);
+        if (end == NULL) {
+            return;
+        }
+        limit = end->step + 1e-3f * (float)(end - sides);
+        side_t edge = *end;
+        edge.column = (int16_t)(left ? 0 : view->frame->columns - 1);
+        edge.u_px[0] = edge.u_px[1] = edge.u_px[2] = (float)(edge.column * BSLAM_CELL_PX) + 1.5f;
+        const bslam_proposal_t proposal =
+            left ? box_of(view, &edge, end, kind) : box_of(view, end, &edge, kind);
+        if (proposal.right - proposal.left >= SIDE_MIN && proposal.bottom - proposal.top >= SIDE_MIN) {
+            bslam_proposals_add(proposals, view, &proposal);
+        }
+    }
+}
+
 void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view)
 {
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
         side_t sides[SIDES_MAX] = {0};
         const int32_t count = find_sides(view, &uprights[kind], sides);
         propose_pairs(proposals, view, sides, count, kind);
+        propose_cut(proposals, view, sides, count, kind, true);
+        propose_cut(proposals, view, sides, count, kind, false);
     }
 }

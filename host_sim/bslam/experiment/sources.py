@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.experiment.align import Rigid
-from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
+from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
 from bslam.experiment.dlr import load_dlr
 from bslam.experiment.mrclam import best_truth, load_mrclam
 from bslam.log import SIGNATURES, Log, read_folder
@@ -97,7 +97,7 @@ class CameraSource(ScenarioSource):
 
     rig: str  # name or path of a TOML file
     store: Path  # where the rendered drives are kept
-    threshold: float = UNTOLD_THRESHOLD  # of the detector's score
+    threshold: Threshold = UNTOLD_THRESHOLD  # of the detector's score
 
     @property
     def shared(self) -> Hashable | None:  # type: ignore[override]

@@ -43,7 +43,7 @@ class FakeFrontEnd:
     calls: ClassVar[list[tuple[int, bool]]] = []
 
     def __init__(self, cameras, threshold):
-        assert len(cameras) == 3 and threshold == camera.TOLD_THRESHOLD
+        assert len(cameras) == 3 and threshold == camera.TOLD_THRESHOLD.least
 
     def see(self, rgb, camera, moved):
         assert rgb.shape == (240, 320, 3)
@@ -145,9 +145,10 @@ def test_aim_without_a_pan_unit_stays():
 
 
 def test_camera_log_leaves_out_what_the_detector_is_less_sure_of(short, tmp_path, monkeypatch):
-    looks = (candidate(), replace(candidate(), score=0.0))
+    cut = replace(candidate(range_m=None), marks=frozenset({"cut_left"}), score=-0.5)
+    looks = (candidate(), replace(candidate(), score=0.0), cut, replace(candidate(), score=-0.5))
     monkeypatch.setattr(FakeFrontEnd, "looks", looks)
     store = CameraStore(tmp_path)
     assert len(camera_log(short, 1, None, None, RIG, store).sightings.time_us) == 8
     told = camera_log(short, 1, None, None, RIG, store, camera.TOLD_THRESHOLD)
-    assert len(told.sightings.time_us) == 16
+    assert len(told.sightings.time_us) == 24

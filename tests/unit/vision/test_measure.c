@@ -141,7 +141,8 @@ static void test_measure_marks_what_is_cut_off(void **state)
     assert_int_equal(top.marks, BSLAM_MARK_CUT_TOP);
     assert_int_equal(bottom.marks, BSLAM_MARK_CUT_BOTTOM);
     assert_true(!left.has_bearing && !left.has_range && !right.has_bearing && !right.has_range);
-    // Both upright sides are there: a direction, but no distance.
+    // Its width is not known, so it may end anywhere beyond the frame. Both upright sides are there: a
+    // direction, but no distance.
     assert_true(top.has_bearing && !top.has_range && bottom.has_bearing && !bottom.has_range);
 }
 
@@ -150,6 +151,41 @@ static void test_measure_marks_what_ends_close_to_the_frames_edge(void **state)
     const unit_panel_t panel = poster(3, 0.45, 0);  // its left side is 6 px inside
     const bslam_candidate_t found = measured_in(&panel, (bslam_box_t){5, 20, 74, 100});
     assert_true((found.marks & BSLAM_MARK_CUT_LEFT) != 0 && !found.has_bearing);
+}
+
+/// Of a kind that hangs so high and is so wide.
+static const bslam_size_t HUNG_SIZE = {.height_m = BSLAM_R(0.8),
+                                       .top_low_m = BSLAM_R(1.5),
+                                       .top_high_m = BSLAM_R(1.5),
+                                       .narrow_m = BSLAM_R(0.6),
+                                       .wide_m = BSLAM_R(0.8)};
+
+static void test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is(void **state)
+{
+    // Bearing, whereto the frame ends at 30 degrees; distance; slant. A third to three quarters are seen.
+    static const double cases[][3] = {
+        {0.5, 3, 0}, {-0.5, 3, 0}, {0.47, 3, 0.4}, {-0.55, 2.5, 0}, {0.52, 4, 0}};
+    const bslam_camera_t camera = unit_pinhole();
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        const unit_panel_t panel = poster(cases[i][1], cases[i][0], cases[i][2]);
+        const bslam_candidate_t found = measured(&camera, &panel, &HUNG_SIZE);
+        const unsigned mark = cases[i][0] > 0 ? BSLAM_MARK_CUT_LEFT : BSLAM_MARK_CUT_RIGHT;
+        assert_true((found.marks & mark) != 0 && found.has_bearing && !found.has_range);
+        assert_true(found.bearing_sd_rad > BSLAM_R(0.02) && found.bearing_sd_rad < BSLAM_R(0.08));
+        assert_near(found.bearing_rad, cases[i][0], 2 * (double)found.bearing_sd_rad);
+    }
+}
+
+static void test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(0.8, 0, 0);
+    const bslam_box_t rough = {-0.5f, 20, 319.5f, 220};
+    unit_picture_draw(&picture, &camera, WALL, &panel, 1);
+    bslam_candidate_t found;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &HUNG_SIZE, &found), BSLAM_OK);
+    assert_true(!found.has_bearing && !found.has_range);
 }
 
 /// A detector's box that holds only the right half, the left half, or a slice.
@@ -308,6 +344,8 @@ int main(void)
         cmocka_unit_test(test_measure_is_less_sure_of_what_is_farther_or_fainter),
         cmocka_unit_test(test_measure_marks_what_is_cut_off),
         cmocka_unit_test(test_measure_marks_what_ends_close_to_the_frames_edge),
+        cmocka_unit_test(test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is),
+        cmocka_unit_test(test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction),
         cmocka_unit_test(test_measure_marks_a_part),
         cmocka_unit_test(test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked),
         cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
