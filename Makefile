@@ -1,6 +1,7 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
 # live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (the library for a core), images.mk (images
-# for boards, sizes), rtos.mk (the robot on FreeRTOS), lint.mk (style), bench.mk (instruction counts), docs.mk (generated documents).
+# for boards, sizes), rtos.mk (the robot on FreeRTOS), lint.mk (style), bench.mk (instruction counts), docs.mk
+# (generated documents), fuzz.mk, mcdc.mk and soak.mk (longer proofs).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -17,6 +18,9 @@ include mk/rtos.mk
 include mk/lint.mk
 include mk/bench.mk
 include mk/docs.mk
+include mk/fuzz.mk
+include mk/mcdc.mk
+include mk/soak.mk
 
 .PHONY: help
 help: ## list the targets
@@ -80,10 +84,10 @@ train: setup ## train the beacon detectors on rendered worlds, write firmware/mo
 # --- Testing ------------------------------------------------------------------------------------------------
 
 .PHONY: test pytest
-test: setup ## lint, C unit tests (float, double; sanitizers), firmware in QEMU and its sizes, pytest
-	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit check-sizes pytest \
+test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak, firmware in QEMU, pytest
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit replay soak-short check-sizes pytest \
 	    || { echo "make test: FAILED, see above" >&2; exit 1; }
-	@echo "make test: all passed (lint, C unit tests in float and double, firmware and its sizes, pytest)"
+	@echo "make test: all passed (lint, C unit tests, fuzz inputs, a short soak, firmware and its sizes, pytest)"
 
 pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet

@@ -1,7 +1,7 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
-C_TEST_FILES := $(wildcard tools/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch] \
-    tests/bench/peers/*.cpp)
+C_TEST_FILES := $(wildcard tools/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch] \
+    tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] tests/soak/*.c)
 APP_FILES := $(wildcard firmware/app/*.[ch] firmware/port/*.h firmware/port/*/*.[ch])
 CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
 CAMERA_HEADERS := $(wildcard host_sim/bslam/world/camera/*.h)

@@ -4,6 +4,7 @@
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
 #   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, QEMU, browser, linters
 #   tools/setup.sh bench   that, and what `make bench` needs: valgrind
+#   tools/setup.sh proof   that, and what `make proof` needs: clang with libFuzzer and MC/DC
 #
 # Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
 # Exit status 0: ready. 2: something is missing that could not be installed; the first line says what.
@@ -89,6 +90,11 @@ find_missing() {
     need chromium-headless-shell "trying the pages in a browser" has_browser
     [[ $part == test ]] && return
     need valgrind "counting instructions" command -v valgrind
+    [[ $part == bench ]] && return
+    need clang-19 "fuzzing and coverage" command -v clang-19
+    need llvm-19 "reading coverage" command -v llvm-cov-19
+    need libclang-rt-19-dev "fuzzing and coverage" sh -c 'echo "int main(void) { return 0; }" |
+        clang-19 -x c -fsanitize=address -fprofile-instr-generate - -o /dev/null'
 }
 
 install_missing() {
@@ -156,8 +162,8 @@ install_test_packages() {
 }
 
 case $part in
-    run | test | bench) ;;
-    *) fail "unknown part '$part'; allowed: run, test, bench" ;;
+    run | test | bench | proof) ;;
+    *) fail "unknown part '$part'; allowed: run, test, bench, proof" ;;
 esac
 install_missing
 make_venv

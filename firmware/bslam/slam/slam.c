@@ -347,7 +347,7 @@ static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bsla
     const bool differs = beacon->beacon_class != sighting->beacon_class &&
                          beacon->beacon_class != BSLAM_CLASS_NONE &&
                          sighting->beacon_class != BSLAM_CLASS_NONE;
-    taken.has_range = taken.has_range && !(beacon->kind == BSLAM_BEACON_SIZED && differs);
+    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
     return taken;
 }
 

@@ -38,7 +38,7 @@ static bslam_status_t check_counts(const bslam_additive_t *machine, int32_t feat
     const int32_t crossed = machine->crossed_count;
     if (machine->features != features || !is_in(machine->rows, 1, ROWS_MAX) ||
         !is_in(features, 1, BSLAM_ADDITIVE_FEATURES_MAX) ||
-        !(crossed == 0 || is_in(crossed, 2, BSLAM_CROSSED_MAX))) {
+        (crossed != 0 && !is_in(crossed, 2, BSLAM_CROSSED_MAX))) {
         return BSLAM_E_COUNT;
     }
     if (machine->knots == NULL || machine->bytes == NULL || machine->byte_scale == NULL ||

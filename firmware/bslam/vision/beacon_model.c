@@ -15,27 +15,28 @@ static bool are_numbers(const float *values, int32_t count)
     return true;
 }
 
-static bslam_status_t check_svm(const bslam_svm_t *svm, int32_t rows, int32_t features)
+/// A machine of one row. A quadratic one has more weights than who asks for a linear one would give it.
+static bslam_status_t check_svm(const bslam_svm_t *svm, int32_t features, bool may_be_quadratic)
 {
-    if (svm->rows != rows) {
+    if (svm->rows != 1) {
         return BSLAM_E_COUNT;
     }
-    return bslam_svm_check(svm, features);
+    return svm->quadratic && !may_be_quadratic ? BSLAM_E_PARAMETER : bslam_svm_check(svm, features);
 }
 
 static bslam_status_t check_detector(const bslam_detector_model_t *detector, int32_t class_count)
 {
     const struct {
         const bslam_svm_t *svm;
-        int32_t rows;
         int32_t features;
+        bool may_be_quadratic;
     } parts[] = {
-        {&detector->cell, 1, BSLAM_CELL_FEATURES},
-        {&detector->screen, 1, BSLAM_BLOB_FEATURES},
-        {&detector->fusion, 1, class_count + 3},
+        {&detector->cell, BSLAM_CELL_FEATURES, false},
+        {&detector->screen, BSLAM_BLOB_FEATURES, false},
+        {&detector->fusion, class_count + 3, true},
     };
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
-        const bslam_status_t status = check_svm(parts[i].svm, parts[i].rows, parts[i].features);
+        const bslam_status_t status = check_svm(parts[i].svm, parts[i].features, parts[i].may_be_quadratic);
         if (status != BSLAM_OK) {
             return status;
         }

@@ -15,6 +15,8 @@
 /// A byte in all four of a word.
 #define FOUR 0x01010101U
 #define ROWS_MAX (BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX)
+/// The sum of all weights times features stays below 2^31 with it.
+#define BIAS_MAX 1.0e9f
 
 static int32_t least(int32_t a, int32_t b)
 {
@@ -36,15 +38,22 @@ static int32_t magnitude(int32_t value)
     return value < 0 ? -value : value;
 }
 
+/// A weight of a model as a whole number: a model may have any finite one.
+static int32_t whole(float value, float limit)
+{
+    const float low = value < limit ? value : limit;
+    return (int32_t)(low > -limit ? low : -limit);
+}
+
 bslam_cell_machine_t bslam_cell_machine(const bslam_svm_t *svm)
 {
     bslam_cell_machine_t machine = {0};
     const float scale = (float)(BSLAM_CELL_VALUE_ONE << BSLAM_CELL_WEIGHT_SHIFT);
     for (int32_t i = 0; i < BSLAM_CELL_FEATURES; i++) {
         const float weight = svm->bytes != NULL ? (float)svm->bytes[i] * svm->byte_scale[0] : svm->weights[i];
-        machine.weights[i] = (int16_t)clamp((int32_t)(weight * scale), -32767, 32767);
+        machine.weights[i] = (int16_t)whole(weight * scale, 32767.0f);
     }
-    machine.bias = (int32_t)(svm->bias[0] * scale);
+    machine.bias = whole(svm->bias[0] * scale, BIAS_MAX);
     return machine;
 }
 

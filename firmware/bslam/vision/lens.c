@@ -62,7 +62,7 @@ static bool grows_up_to(const bslam_camera_t *camera, bslam_real_t r)
         return false;
     }
     const bslam_real_t lowest = camera->k2 > 0 ? BSLAM_R(-0.3) * camera->k1 / camera->k2 : 0;  // in r²
-    return !(lowest > 0 && lowest < r * r) || growth(camera, bslam_sqrt(lowest)) > 0;
+    return !(lowest > 0) || !(lowest < r * r) || growth(camera, bslam_sqrt(lowest)) > 0;
 }
 
 /// A point of the image plane in focal lengths from the axis (to the right, down), and how far it is.

@@ -6,15 +6,16 @@
 
 bslam_status_t bslam_recogniser_check(const bslam_recogniser_t *recogniser)
 {
-    const bslam_status_t status = bslam_svm_check(&recogniser->svm, BSLAM_SIGNATURE_SIZE);
-    if (status != BSLAM_OK) {
-        return status;
-    }
+    // First what says how long the tables are.
     if (recogniser->svm.rows > BSLAM_OBJECTS_MAX) {
         return BSLAM_E_COUNT;
     }
     if (recogniser->svm.quadratic || recogniser->objects == NULL) {
         return BSLAM_E_PARAMETER;
+    }
+    const bslam_status_t status = bslam_svm_check(&recogniser->svm, BSLAM_SIGNATURE_SIZE);
+    if (status != BSLAM_OK) {
+        return status;
     }
     for (int32_t i = 0; i < recogniser->svm.rows; i++) {
         if (!bslam_in_range((bslam_real_t)recogniser->objects[i].height_m, 0, 10)) {

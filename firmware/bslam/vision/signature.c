@@ -284,7 +284,7 @@ bslam_status_t bslam_signature(const bslam_frame_t *frame, const bslam_quad_t *q
     const bslam_real_t width = quad->right_px - quad->left_px;
     const bslam_real_t height =
         (quad->bottom_left_px - quad->top_left_px + quad->bottom_right_px - quad->top_right_px) / 2;
-    if (!(wall->red >= WALL_MIN && wall->green >= WALL_MIN && wall->blue >= WALL_MIN) ||
+    if (!(wall->red >= WALL_MIN) || !(wall->green >= WALL_MIN) || !(wall->blue >= WALL_MIN) ||
         !bslam_in_range(width, 1, BSLAM_IMAGE_WIDTH_MAX) ||
         !bslam_in_range(height, 1, BSLAM_IMAGE_HEIGHT_MAX)) {
         return BSLAM_E_RANGE;

@@ -123,6 +123,20 @@ static void test_cell_machine_takes_bytes_as_it_takes_floats(void **state)
     assert_int_equal(a.bias, -BSLAM_CELL_VALUE_ONE * (1 << BSLAM_CELL_WEIGHT_SHIFT) / 4);
 }
 
+static void test_cell_machine_of_any_finite_weights_is_bounded(void **state)
+{
+    float weights[BSLAM_CELL_FEATURES] = {1e12f, -1e12f};
+    const float high = 1e12f, low = -1e12f;
+    const bslam_svm_t up = {.rows = 1, .features = BSLAM_CELL_FEATURES, .weights = weights, .bias = &high};
+    const bslam_svm_t down = {.rows = 1, .features = BSLAM_CELL_FEATURES, .weights = weights, .bias = &low};
+    const bslam_cell_machine_t a = bslam_cell_machine(&up), b = bslam_cell_machine(&down);
+    assert_int_equal(a.weights[0], 32767);
+    assert_int_equal(a.weights[1], -32767);
+    assert_int_equal(a.bias, -b.bias);
+    // With it the sum over the largest features stays a whole number of 32 bits.
+    assert_true((int64_t)a.bias + INT64_C(32767) * 255 * BSLAM_CELL_FEATURES < INT32_MAX);
+}
+
 static void test_cells_step_is_the_difference_of_the_neighbours(void **state)
 {
     memset(&cells, 0, sizeof cells);
@@ -171,6 +185,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cells_decide_is_the_machine_on_the_features),
         cmocka_unit_test(test_cell_machine_takes_bytes_as_it_takes_floats),
+        cmocka_unit_test(test_cell_machine_of_any_finite_weights_is_bounded),
         cmocka_unit_test(test_cells_step_is_the_difference_of_the_neighbours),
         cmocka_unit_test(test_tone_more_light_shifts_light_and_leaves_chroma),
         cmocka_unit_test(test_tone_bin_covers_every_tone_once),

@@ -92,6 +92,8 @@ static void test_check_quadratic_machine_is_refused(void **state)
     assert_int_equal(bslam_recogniser_check(&recogniser), BSLAM_OK);
     recogniser.svm.quadratic = true;
     assert_int_equal(bslam_recogniser_check(&recogniser), BSLAM_E_PARAMETER);
+    recogniser.svm.weights = machine.weights;  // too short for a quadratic one: they are not looked at
+    assert_int_equal(bslam_recogniser_check(&recogniser), BSLAM_E_PARAMETER);
 }
 
 static void test_check_too_many_objects_are_refused(void **state)

@@ -1,0 +1,51 @@
+# Fuzzing: tests/fuzz/<target>.c, one program each, linked with the core and the application in small sizes
+# (tests/fuzz/config.h). clang's libFuzzer makes inputs up (`make fuzz`); `make test` replays those that are
+# kept in tests/fuzz/corpus/<target>.bin, compiled with the compiler of the other tests.
+
+FUZZ_TARGETS := link map model image api session
+FUZZ_HELPERS := tests/fuzz/fuzz.c tests/fuzz/picture.c
+FUZZ_APP := firmware/app/session.c firmware/app/seeing.c
+FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_APP) $(FUZZ_HELPERS)
+FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) -Itests/fuzz -DBSLAM_CONFIG_HEADER='"config.h"' -DSESSION_VISION=1 \
+    $(SANITIZE) -g -MMD -MP
+
+CLANG := clang-19
+FUZZ_COMPILE_fuzz := $(CLANG) $(FUZZ_FLAGS) -O2 -fsanitize-coverage=inline-8bit-counters,pc-table
+FUZZ_COMPILE_replay := $(CC) $(FUZZ_FLAGS) $(UNIT_WARNINGS)
+FUZZ_LINK_fuzz := $(CLANG) $(SANITIZE) -fsanitize=fuzzer
+FUZZ_LINK_replay := $(CC) $(SANITIZE)
+FUZZ_MAIN_replay := build/replay/tests/fuzz/replay.o
+
+# The rules for one way of building them: $(1) is fuzz or replay. An archive, so that a target has no more in
+# it than it calls: libFuzzer looks over all of a program after each input.
+define fuzz_rules
+build/$(1)/%.o: %.c mk/config.mk mk/fuzz.mk
+	@mkdir -p $$(@D)
+	@$$(FUZZ_COMPILE_$(1)) -c $$< -o $$@
+
+build/$(1)/library.a: $$(FUZZ_LIBRARY:%.c=build/$(1)/%.o)
+	@rm -f $$@ && ar rcs $$@ $$^
+
+$$(FUZZ_TARGETS:%=build/$(1)/%): build/$(1)/%: build/$(1)/tests/fuzz/%.o $$(FUZZ_MAIN_$(1)) \
+    build/$(1)/library.a
+	@$$(FUZZ_LINK_$(1)) $$^ -lm -o $$@
+
+-include $$(FUZZ_LIBRARY:%.c=build/$(1)/%.d) $$(FUZZ_TARGETS:%=build/$(1)/tests/fuzz/%.d)
+endef
+$(foreach way,fuzz replay,$(eval $(call fuzz_rules,$(way))))
+
+.PHONY: replay
+replay: $(FUZZ_TARGETS:%=build/replay/%) ## the inputs that fuzzing kept, once each
+	@for target in $(FUZZ_TARGETS); do printf 'replay %s: ' $$target; \
+	    build/replay/$$target tests/fuzz/corpus/$$target.bin || exit 1; done
+
+# What more inputs are made up: until the goals are met, or so long (FUZZ="--seconds 60 --targets map api").
+FUZZ :=
+
+.PHONY: fuzz-programs fuzz
+fuzz-programs:
+	@tools/setup.sh proof
+	@$(MAKE) --no-print-directory --silent $(FUZZ_TARGETS:%=build/fuzz/%)
+
+fuzz: fuzz-programs ## make inputs up for every target until the goals are met, on top of out/fuzz (20 min)
+	@$(PYTHON) tools/fuzz.py $(FUZZ)

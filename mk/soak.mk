@@ -1,0 +1,23 @@
+# Hours of running: tests/soak/soak.c, in float and in double. All of the core but vision and the link.
+
+SOAK_SOURCES := $(filter-out firmware/bslam/vision/% firmware/bslam/link/%,$(CORE_SOURCES)) tests/soak/soak.c
+
+define soak_rules
+build/soak/$(1)/%.o: %.c mk/config.mk mk/soak.mk
+	@mkdir -p $$(@D)
+	@$$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) $$(C_WARNINGS) -O2 -MMD -MP -c $$< -o $$@
+
+build/soak/$(1)/soak: $$(SOAK_SOURCES:%.c=build/soak/$(1)/%.o)
+	@$$(CC) $$^ -lm -o $$@
+
+-include $$(SOAK_SOURCES:%.c=build/soak/$(1)/%.d)
+endef
+$(foreach real,$(UNIT_REALS),$(eval $(call soak_rules,$(real))))
+SOAK_PROGRAMS := $(UNIT_REALS:%=build/soak/%/soak)
+
+.PHONY: soak soak-short
+soak: $(SOAK_PROGRAMS) ## 6 simulated hours x 20 seeds, float beside its double twin (5 min)
+	@$(PYTHON) tools/soak.py
+
+soak-short: $(SOAK_PROGRAMS)
+	@$(PYTHON) tools/soak.py --minutes 30 --seeds 4 --nees 1.1 5.8

@@ -1,0 +1,19 @@
+/// Sizes of the fuzzed build: so small that a few bytes of input fill the map, the history and the machines.
+#ifndef FUZZ_CONFIG_H
+#define FUZZ_CONFIG_H
+
+#define BSLAM_BEACONS_MAX 4
+#define BSLAM_RAYS_MAX 2
+#define BSLAM_SIGHTINGS_MAX 3
+#define BSLAM_HISTORY_MAX 3
+#define BSLAM_IMAGE_WIDTH_MAX 64
+#define BSLAM_IMAGE_HEIGHT_MAX 36
+#define BSLAM_CAMERAS_MAX 2
+#define BSLAM_PROPOSALS_MAX 8
+#define BSLAM_CANDIDATES_MAX 3
+#define BSLAM_LEARNER_SLOTS 3
+#define BSLAM_SAMPLES_PER_MACHINE 2
+#define BSLAM_RIVALS_MAX 8
+#define BSLAM_LEARNER_STEPS_MAX 100
+
+#endif

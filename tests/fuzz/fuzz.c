@@ -1,0 +1,250 @@
+#include "fuzz.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bslam/math/trig.h"
+
+_Noreturn void fuzz_fail(const char *what, const char *file, int line)
+{
+    (void)fprintf(stderr, "%s:%d: does not hold: %s\n", file, line, what);
+    abort();
+}
+
+// ---- values -----------------------------------------------------------------------------------------------
+
+uint8_t fuzz_u8(fuzz_input_t *input)
+{
+    if (input->left == 0) {
+        return 0;
+    }
+    input->left--;
+    return *input->bytes++;
+}
+
+uint16_t fuzz_u16(fuzz_input_t *input)
+{
+    const unsigned low = fuzz_u8(input);
+    return (uint16_t)(low | (unsigned)fuzz_u8(input) << 8);
+}
+
+uint32_t fuzz_u32(fuzz_input_t *input)
+{
+    const uint32_t low = fuzz_u16(input);
+    return low | (uint32_t)fuzz_u16(input) << 16;
+}
+
+static bslam_real_t any_bits(fuzz_input_t *input)
+{
+    const uint32_t bits = fuzz_u32(input);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return (bslam_real_t)value;
+}
+
+bslam_real_t fuzz_real(fuzz_input_t *input, double low, double high)
+{
+    static const float odd[] = {NAN,   INFINITY, -INFINITY, 1e-40f, -1e-40f, 1e12f, -1e12f, 2e12f,
+                                3e38f, -3e38f,   0.0f,      -0.0f,  1e-3f,   1.0f,  -1.0f};
+    const unsigned choice = fuzz_u8(input);
+    if (choice < sizeof odd / sizeof odd[0]) {
+        return (bslam_real_t)odd[choice];
+    }
+    if (choice == 15) {
+        return any_bits(input);
+    }
+    return (bslam_real_t)(low + (high - low) * fuzz_u16(input) / 65535);
+}
+
+void fuzz_signature(fuzz_input_t *input, float signature[BSLAM_SAMPLE_FEATURES])
+{
+    const unsigned place = fuzz_u8(input) % BSLAM_SAMPLE_FEATURES;
+    const unsigned value = fuzz_u8(input);
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        signature[k] = 0.1f;
+    }
+    signature[place] = value == 0 ? NAN : (float)value / 128.0f;
+}
+
+bslam_sighting_t fuzz_sighting(fuzz_input_t *input, float signature[BSLAM_SAMPLE_FEATURES])
+{
+    const unsigned flags = fuzz_u8(input);
+    bslam_sighting_t sighting = {.bearing_rad = fuzz_real(input, -3.2, 3.2),
+                                 .has_range = (flags & 1u) != 0,
+                                 .label = (int32_t)(flags >> 1 & 7u) - 1};
+    if (sighting.has_range) {
+        sighting.range_m = fuzz_real(input, 0.1, 10);
+    }
+    if ((flags & 16u) != 0) {
+        sighting.bearing_sd_rad = fuzz_real(input, 0.001, 0.1);
+        sighting.range_sd_m = fuzz_real(input, 0.01, 1);
+    }
+    if ((flags & 32u) != 0) {
+        sighting.beacon_class = fuzz_u8(input);
+    }
+    if ((flags & 64u) != 0) {
+        fuzz_signature(input, signature);
+        sighting.signature = signature;
+    }
+    if ((flags & 128u) != 0) {
+        sighting.label = (int32_t)fuzz_u32(input);
+    }
+    return sighting;
+}
+
+int64_t fuzz_time(fuzz_input_t *input, int64_t now_us)
+{
+    const unsigned choice = fuzz_u8(input);
+    if (choice < 4) {
+        static const int64_t odd[] = {INT64_MIN, -1, INT64_MAX / 2 + 1, INT64_MAX};
+        return odd[choice];
+    }
+    if (choice < 16) {
+        return now_us + (int64_t)(int32_t)fuzz_u32(input);
+    }
+    return now_us + ((int64_t)choice - 32) * 2000;
+}
+
+bslam_odometry_reading_t fuzz_reading(fuzz_input_t *input, int64_t now_us)
+{
+    const unsigned flags = fuzz_u8(input);
+    bslam_odometry_reading_t reading = {.source = (bslam_odometry_source_t)(flags & 3u),
+                                        .has_gyro = (flags & 4u) != 0};
+    reading.time_us = (flags & 8u) != 0 ? fuzz_time(input, now_us) : now_us;
+    switch (reading.source) {
+    case BSLAM_ODOMETRY_TICKS:
+        reading.left_ticks = (flags & 16u) != 0 ? fuzz_u32(input) : fuzz_u8(input);
+        reading.right_ticks = fuzz_u16(input);
+        break;
+    case BSLAM_ODOMETRY_VELOCITY:
+        reading.v_mps = fuzz_real(input, -2, 2);
+        reading.omega_radps = fuzz_real(input, -4, 4);
+        break;
+    case BSLAM_ODOMETRY_WHEELS:
+    default:
+        reading.left_m = fuzz_real(input, -0.1, 0.1);
+        reading.right_m = fuzz_real(input, -0.1, 0.1);
+        break;
+    }
+    if (reading.has_gyro) {
+        reading.gyro_radps = fuzz_real(input, -4, 4);
+    }
+    return reading;
+}
+
+// ---- what must hold ---------------------------------------------------------------------------------------
+
+/// The covariance is rounded: a number of it may be wrong by so much of the largest variance that the input
+/// has made so far, from which it came down. Below the other its square is 0 in float.
+static const double ROUNDING = 1e-6;
+static const double COVARIANCE_MIN = 1e-19;
+static double largest_variance;
+
+void fuzz_begin(void)
+{
+    largest_variance = 0;
+}
+
+static void require_finite(const bslam_ekf_t *ekf)
+{
+    for (int i = 0; i < ekf->dim; i++) {
+        fuzz_require(isfinite((double)ekf->mean[i]));
+        for (int j = 0; j <= i; j++) {
+            fuzz_require(isfinite((double)bslam_symmat_get(ekf->covariance, i, j)));
+        }
+    }
+    const double theta_rad = (double)ekf->mean[BSLAM_STATE_THETA];
+    fuzz_require(theta_rad >= -(double)BSLAM_PI && theta_rad <= (double)BSLAM_PI);
+}
+
+static bool is_positive(const bslam_ekf_t *ekf)
+{
+    const double slack = COVARIANCE_MIN + ROUNDING * largest_variance;
+    for (int i = 0; i < ekf->dim; i++) {
+        const double own = (double)bslam_symmat_get(ekf->covariance, i, i);
+        for (int j = 0; j < i; j++) {
+            const double other = (double)bslam_symmat_get(ekf->covariance, j, j);
+            const double both = fabs((double)bslam_symmat_get(ekf->covariance, i, j)) - slack;
+            if (both > 0 && both * both > 1.01 * (own + slack) * (other + slack)) {
+                return false;
+            }
+        }
+        if (own < 0) {
+            return false;
+        }
+        largest_variance = fmax(largest_variance, own);
+    }
+    return true;
+}
+
+static void require_counts(const bslam_ekf_t *ekf)
+{
+    int32_t dim = ekf->base_dim;
+    int32_t rays = 0;
+    fuzz_require(ekf->beacon_count >= 0 && ekf->beacon_count <= BSLAM_BEACONS_MAX);
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        const bslam_beacon_t *beacon = &ekf->beacons[b];
+        fuzz_require(beacon->kind == BSLAM_BEACON_KNOWN || beacon->at == dim);
+        fuzz_require(beacon->uid < ekf->next_uid && (b == 0 || beacon->uid > ekf->beacons[b - 1].uid));
+        dim += bslam_beacon_dim(beacon->kind);
+        rays += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
+    }
+    fuzz_require(dim == ekf->dim && dim <= BSLAM_STATE_MAX);
+    fuzz_require(rays == ekf->ray_count && rays <= BSLAM_RAYS_MAX);
+}
+
+void fuzz_require_sound(const bslam_slam_t *slam)
+{
+    require_counts(&slam->ekf);
+    require_finite(&slam->ekf);
+    fuzz_require(is_positive(&slam->ekf) || slam->counters.insane > 0);
+    const bslam_pose_t pose = bslam_slam_pose(slam);
+    fuzz_require(isfinite((double)pose.x_m) && isfinite((double)pose.y_m) &&
+                 isfinite((double)pose.theta_rad));
+    for (int b = 0; b < bslam_slam_beacon_count(slam); b++) {
+        bslam_beacon_view_t view;
+        fuzz_require(bslam_slam_beacon(slam, b, &view) == BSLAM_OK);
+        fuzz_require(isfinite((double)view.x_m) && isfinite((double)view.y_m));
+        fuzz_require(isfinite((double)view.covariance_m2.xx) && isfinite((double)view.covariance_m2.yy));
+    }
+    const bslam_counters_t *counters = bslam_slam_counters(slam);
+    fuzz_require(counters->matched + counters->added + counters->rejected + counters->deferred ==
+                 counters->sightings);
+}
+
+// ---- a map ------------------------------------------------------------------------------------------------
+
+void fuzz_make_map(bslam_slam_t *slam, bslam_looks_t *looks)
+{
+    bslam_params_t params;
+    int bad_id;
+    bslam_params_default(&params);
+    params.association = BSLAM_ASSOCIATION_SVM;
+    params.learn_way_m = 0;
+    params.left_speed_sd_mps = BSLAM_R(1e-3);
+    params.right_speed_sd_mps = BSLAM_R(1e-3);
+    fuzz_require(bslam_slam_init(slam, &params, &bad_id) == BSLAM_OK);
+    if (looks != NULL) {
+        fuzz_require(bslam_looks_init(looks, NULL, 0) == BSLAM_OK);
+        bslam_slam_attach_looks(slam, looks);
+    }
+    for (int view = 1; view <= 8; view++) {
+        const int64_t now_us = view * INT64_C(40000);
+        const bslam_odometry_reading_t reading = {
+            .time_us = now_us, .left_m = BSLAM_R(1e-4), .right_m = BSLAM_R(1e-4)};
+        float signatures[2][BSLAM_SAMPLE_FEATURES] = {{0}};
+        bslam_sighting_t seen[3] = {
+            {.bearing_rad = BSLAM_R(-1.0), .range_m = 2, .has_range = true, .label = -1},
+            {.bearing_rad = BSLAM_R(0.5), .range_m = 3, .has_range = true, .label = -1},
+            {.bearing_rad = BSLAM_R(2.5), .label = -1}};
+        for (int i = 0; i < 2; i++) {
+            signatures[i][9 * i] = 0.7f;
+            signatures[i][9 * i + view % 3 + 1] = 0.4f;
+            seen[i].signature = signatures[i];
+        }
+        fuzz_require(bslam_slam_odometry(slam, &reading) == BSLAM_OK);
+        fuzz_require(bslam_slam_sightings(slam, now_us, seen, 3) == BSLAM_OK);
+    }
+    fuzz_require(bslam_slam_beacon_count(slam) == 3);
+}

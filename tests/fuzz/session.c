@@ -1,0 +1,216 @@
+// The whole application behind its serial line: any bytes, or messages that the input makes up in good
+// frames. Whatever comes, the pipeline stays sound, every answer is a good frame, and no message is answered
+// twice.
+#include "app/session.h"
+
+#include <string.h>
+
+#include "fuzz.h"
+#include "port/port.h"
+
+enum { MESSAGES_MAX = 40, STORE_BYTES = 1024 };
+
+static session_t session;
+static bslam_link_parser_t answers;
+static uint8_t store[STORE_BYTES];
+static size_t stored;
+static uint32_t clock_us;
+
+// ---- a board of nothing but memory -----------------------------------------------------------------------
+
+void port_write(const uint8_t *bytes, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        (void)bslam_link_push(&answers, bytes[i]);
+    }
+}
+
+int64_t port_time_us(void)
+{
+    return clock_us;
+}
+
+uint32_t port_ticks(void)
+{
+    return clock_us;
+}
+
+uint32_t port_ticks_hz(void)
+{
+    return 1000000;
+}
+
+const uint8_t *port_build_id(void)
+{
+    static const uint8_t none[PORT_BUILD_ID_BYTES];
+    return none;
+}
+
+bool port_save(const uint8_t *bytes, size_t count)
+{
+    fuzz_require(count <= STORE_BYTES);
+    memcpy(store, bytes, count);
+    stored = count;
+    return true;
+}
+
+bool port_load(uint8_t *bytes, size_t count)
+{
+    if (stored != count) {
+        return false;
+    }
+    memcpy(bytes, store, count);
+    return true;
+}
+
+// ---- the host ---------------------------------------------------------------------------------------------
+
+static void require_good_answers(uint32_t most)
+{
+    const bslam_link_counters_t *counters = &answers.counters;
+    fuzz_require(counters->bad_crc + counters->truncated + counters->too_long + counters->bad_version == 0);
+    fuzz_require(counters->frames <= most);
+}
+
+static void take(uint8_t byte)
+{
+    const uint32_t asked = session.parser.counters.frames;
+    const uint32_t answered = answers.counters.frames;
+    session_take(&session, byte);
+    require_good_answers(answered + (session.parser.counters.frames - asked));
+}
+
+/// Payload bytes of a message that is as long as it should be, where that is a fixed number.
+static unsigned size_of(unsigned type)
+{
+    static const uint8_t sizes[0x17] = {
+        [SESSION_HELLO] = 5,         [SESSION_ODOMETRY] = 14,     [SESSION_RESUME] = 8,
+        [SESSION_KNOWN_BEACON] = 12, [SESSION_REMOVE_BEACON] = 4, [SESSION_PARAM_SET] = 6,
+        [SESSION_PARAM_GET] = 2,     [SESSION_MAP] = 1,           [SESSION_SET_POSE] = 20,
+        [SESSION_CAMERA] = 42,       [SESSION_IMAGE] = 2,         [SESSION_LOOK] = 1,
+        [SESSION_SEEN] = 1};
+    return type < sizeof sizes ? sizes[type] : 0;
+}
+
+static void put_reals(bslam_link_writer_t *writer, fuzz_input_t *input, int count, double high)
+{
+    for (; count > 0; count--) {
+        bslam_link_put_real(writer, fuzz_real(input, -high, high));
+    }
+}
+
+/// Messages whose length hangs on what they say, and those that need a number to make sense.
+static void put_payload(bslam_link_writer_t *writer, fuzz_input_t *input, unsigned type)
+{
+    const unsigned count = fuzz_u8(input) % (BSLAM_SIGHTINGS_MAX + 2);
+    switch (type) {
+    case SESSION_SIGHTINGS:
+        bslam_link_put_u8(writer, (uint8_t)count);
+        for (unsigned i = 0; i < count; i++) {
+            put_reals(writer, input, 1, 3.2);
+            bslam_link_put_real(writer, fuzz_real(input, 0.1, 10));
+            put_reals(writer, input, 2, 0);
+            bslam_link_put_i32(writer, (int32_t)fuzz_u8(input) % 8 - 1);
+            bslam_link_put_u8(writer, fuzz_u8(input));
+            bslam_link_put_u8(writer, fuzz_u8(input));
+        }
+        break;
+    case SESSION_SIGNATURES:
+    case SESSION_SEEDS:
+        bslam_link_put_u8(writer, fuzz_u8(input) % 4);
+        bslam_link_put_u8(writer, count == 0 ? fuzz_u8(input) : 1);
+        for (unsigned k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+            bslam_link_put_real(writer, k < 4 ? fuzz_real(input, -1, 1) : BSLAM_R(0.1));
+        }
+        break;
+    case SESSION_ODOMETRY:
+        bslam_link_put_u8(writer, (uint8_t)(count % 4));
+        bslam_link_put_u8(writer, fuzz_u8(input) & 1u);
+        put_reals(writer, input, 3, 0.2);
+        break;
+    case SESSION_PARAM_SET:
+        bslam_link_put_u16(writer, fuzz_u8(input));
+        put_reals(writer, input, 1, 5);
+        break;
+    case SESSION_PIXELS:
+        for (unsigned i = 32 * count; i > 0; i--) {
+            bslam_link_put_u8(writer, i % 32 == 0 ? fuzz_u8(input) : (uint8_t)i);
+        }
+        break;
+    case SESSION_CAMERA:
+        bslam_link_put_u8(writer, (uint8_t)(count % 3));
+        bslam_link_put_u8(writer, fuzz_u8(input) % 3);
+        bslam_link_put_u16(writer, (uint16_t)(4 * (fuzz_u8(input) % 18)));
+        bslam_link_put_u16(writer, (uint16_t)(4 * (fuzz_u8(input) % 10)));
+        put_reals(writer, input, 4, 60);
+        put_reals(writer, input, 5, 1);
+        break;
+    default:
+        for (unsigned i = size_of(type); i > 0; i--) {
+            bslam_link_put_u8(writer, fuzz_u8(input));
+        }
+        break;
+    }
+}
+
+/// A message as a host would send it, but for what the input has otherwise: its number, its length.
+static void send_message(fuzz_input_t *input, uint16_t *sequence, int64_t *now_us)
+{
+    uint8_t frame[BSLAM_LINK_FRAME_MAX];
+    const unsigned type = fuzz_u8(input);
+    const unsigned odd = fuzz_u8(input);
+    *sequence = (uint16_t)(*sequence + (odd < 16 ? odd - 8 : 1));
+    *now_us += odd < 32 ? 10000 * (int64_t)odd - 150000 : 40000;
+    const bslam_link_header_t header = {.type = type < 224 ? (uint8_t)(type % 0x18) : (uint8_t)type,
+                                        .sequence = *sequence,
+                                        .time_us = *now_us};
+    bslam_link_writer_t writer;
+    bslam_link_begin(&writer, frame, sizeof frame, &header);
+    put_payload(&writer, input, header.type);
+    if (odd >= 240) {
+        bslam_link_put_u8(&writer, fuzz_u8(input));
+    }
+    const size_t length = bslam_link_end(&writer);
+    for (size_t i = 0; i < length; i++) {
+        take(frame[i]);
+    }
+}
+
+static void talk(fuzz_input_t *input)
+{
+    uint16_t sequence = 0;
+    int64_t now_us = 0;
+    for (int i = 0; i < MESSAGES_MAX && input->left > 0; i++) {
+        clock_us += 1000;
+        if (fuzz_u8(input) < 16) {
+            session_take_encoders(&session, clock_us, fuzz_u16(input), fuzz_u16(input));
+        } else {
+            send_message(input, &sequence, &now_us);
+        }
+        fuzz_require_sound(&session.slam);
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    fuzz_input_t input = {data, size};
+    fuzz_begin();
+    const unsigned choice = fuzz_u8(&input);
+    memset(&answers, 0, sizeof answers);
+    clock_us = 0;
+    stored = 0;
+    session_init(&session);
+    require_good_answers(1);
+    if ((choice & 1u) != 0) {
+        talk(&input);
+    } else {
+        while (input.left > 0) {
+            take(fuzz_u8(&input));
+        }
+    }
+    if ((choice & 2u) != 0) {
+        session_init(&session);  // a restart: with what was stored
+    }
+    fuzz_require_sound(&session.slam);
+    return 0;
+}

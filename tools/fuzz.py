@@ -1,0 +1,256 @@
+"""Runs the fuzz targets in slices, keeps a ledger of what ran, prints it against the goals.
+
+Examples:
+    tools/fuzz.py                          until every goal is met, in slices of a minute
+    tools/fuzz.py --seconds 120 --targets map api
+    tools/fuzz.py --table                  what ran so far
+    tools/fuzz.py --keep                   writes the smallest inputs that reach what all reach to
+                                           tests/fuzz/corpus
+
+`make fuzz` builds the programs and calls this. The ledger (out/fuzz/ledger.csv) has a line a slice: when,
+of which commit and sources, target, executions, seconds, crashes. Exit status 0: no crash, and the goals
+met or the time over; 1: a crash, the input that caused it is named; 2: bad arguments, programs not built.
+"""
+
+import argparse
+import csv
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+PROGRAMS = ROOT / "build/fuzz"
+CORPUS = ROOT / "tests/fuzz/corpus"
+OUT = ROOT / "out/fuzz"
+TARGETS = ("link", "map", "model", "image", "api", "session")
+# What input a target makes the most of; the longer, the slower.
+LENGTHS = {"link": 48, "map": 64, "model": 48, "image": 64, "api": 96, "session": 96}
+GOAL_EACH = 1_000_000
+GOAL_ALL = 200_000_000
+# So many of these are needed for the sum; the link's parser is the fastest by far.
+FILLER = "link"
+SLICE_S = 60
+KEPT_BYTES = 300_000
+
+
+class Slice(NamedTuple):
+    """A line of the ledger."""
+
+    time: str
+    commit: str
+    sources: str
+    target: str
+    executions: int
+    seconds: int
+    crashes: int
+
+
+def source_hash() -> str:
+    """Of all that a target is made of: two slices with the same one ran the same code."""
+    digest = hashlib.sha256()
+    for folder in ("firmware/bslam", "firmware/app", "firmware/models", "tests/fuzz"):
+        for path in sorted((ROOT / folder).rglob("*.[ch]")):
+            digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def commit_name() -> str:
+    """The commit that is checked out, or "unknown"."""
+    done = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip() or "unknown"
+
+
+def read_ledger() -> list[Slice]:
+    """All slices so far."""
+    path = OUT / "ledger.csv"
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return [
+            Slice(row[0], row[1], row[2], row[3], int(row[4]), int(row[5]), int(row[6]))
+            for row in list(csv.reader(file))[1:]
+        ]
+
+
+def write_down(slice_: Slice) -> None:
+    """Adds a line to the ledger."""
+    path = OUT / "ledger.csv"
+    is_new = not path.exists()
+    with path.open("a", newline="") as file:
+        writer = csv.writer(file)
+        if is_new:
+            writer.writerow(Slice._fields)
+        writer.writerow(slice_)
+
+
+def executions(ledger: Iterable[Slice], target: str) -> int:
+    """How often a target was executed, over all slices."""
+    return sum(line.executions for line in ledger if line.target == target)
+
+
+def run_slice(target: str, seconds: int, runs: int) -> Slice:
+    """Makes inputs up for so many seconds, `runs` at most; those that reach anything new stay in out/fuzz."""
+    corpus, crashes = OUT / "corpus" / target, OUT / "crashes"
+    crashes.mkdir(parents=True, exist_ok=True)
+    unpack(target)
+    command = [
+        str(PROGRAMS / target), f"-max_total_time={seconds}", f"-runs={runs}", f"-max_len={LENGTHS[target]}",
+        "-len_control=0", "-timeout=10", "-print_final_stats=1", f"-artifact_prefix={crashes}/{target}-",
+        str(corpus),
+    ]  # fmt: skip
+    began = time.monotonic()
+    # Stack frames that are kept after their return cost half of the speed.
+    environment = os.environ | {"ASAN_OPTIONS": "detect_stack_use_after_return=0"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    found = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
+    line = Slice(
+        time.strftime("%Y-%m-%d %H:%M:%S"),
+        commit_name(),
+        source_hash(),
+        target,
+        int(found.group(1)) if found else 0,
+        round(time.monotonic() - began),
+        0 if done.returncode == 0 else 1,
+    )
+    write_down(line)
+    if done.returncode != 0:
+        print_crash(done.stderr, target)
+    return line
+
+
+def print_crash(log: str, target: str) -> None:
+    """What did not hold, and how to see it again."""
+    for line in log.splitlines():
+        if re.search(r"does not hold|ERROR: |runtime error|SUMMARY|Test unit written", line):
+            print(f"fuzz {target}: {line}", file=sys.stderr)
+    print(f"fuzz {target}: again: build/fuzz/{target} FILE", file=sys.stderr)
+
+
+def missing(ledger: list[Slice], target: str) -> int:
+    """Executions that a target still needs: its own million; the filler, what the others leave of the sum."""
+    own = executions(ledger, target)
+    need = GOAL_EACH - own
+    if target == FILLER:
+        others = sum(max(executions(ledger, other), GOAL_EACH) for other in TARGETS if other != FILLER)
+        need = max(need, GOAL_ALL - others - own)
+    return max(need, 0)
+
+
+def print_table() -> bool:
+    """What ran, against the goals; true if they are met and nothing crashed on the sources as they are."""
+    ledger = read_ledger()
+    now = source_hash()
+    heads = ("executions", "on these sources", "seconds", "crashes", "kept")
+    print(f"{'target':<10}{heads[0]:>14}{heads[1]:>18}{heads[2]:>9}{heads[3]:>9}{heads[4]:>8}  goal")
+    for target in TARGETS:
+        lines = [line for line in ledger if line.target == target]
+        present = [line for line in lines if line.sources == now]
+        corpus = len(kept_inputs(target))
+        print(
+            f"{target:<10}{executions(ledger, target):>14,}{executions(present, target):>18,}"
+            f"{sum(line.seconds for line in lines):>9,}{sum(line.crashes for line in present):>9}{corpus:>8}"
+            f"  {GOAL_EACH:,}"
+        )
+    total = sum(line.executions for line in ledger)
+    crashes = sum(line.crashes for line in ledger if line.sources == now)
+    mended = sum(line.crashes for line in ledger) - crashes
+    reached = total >= GOAL_ALL and all(executions(ledger, target) >= GOAL_EACH for target in TARGETS)
+    print(f"fuzz: {total:,} executions of {GOAL_ALL:,}, {crashes} crashes ({mended} on earlier sources)")
+    return reached and crashes == 0
+
+
+def kept_inputs(target: str) -> list[bytes]:
+    """The inputs in tests/fuzz/corpus: each behind its length, two bytes, low one first."""
+    path = CORPUS / f"{target}.bin"
+    data = path.read_bytes() if path.exists() else b""
+    inputs = []
+    while data:
+        size = int.from_bytes(data[:2], "little")
+        inputs.append(data[2 : 2 + size])
+        data = data[2 + size :]
+    return inputs
+
+
+def unpack(target: str) -> None:
+    """To files, as libFuzzer wants them."""
+    corpus = OUT / "corpus" / target
+    corpus.mkdir(parents=True, exist_ok=True)
+    for data in kept_inputs(target):
+        (corpus / hashlib.sha1(data, usedforsecurity=False).hexdigest()).write_bytes(data)
+
+
+def keep() -> None:
+    """Reduces what was found to inputs that reach all of it."""
+    count = size = 0
+    CORPUS.mkdir(parents=True, exist_ok=True)
+    for target in TARGETS:
+        unpack(target)
+        fresh = OUT / "kept" / target
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        command = [str(PROGRAMS / target), "-merge=1", "-set_cover_merge=1", str(fresh)]
+        subprocess.run([*command, str(OUT / "corpus" / target)], cwd=ROOT, capture_output=True, check=True)
+        inputs = sorted(path.read_bytes() for path in fresh.iterdir())
+        (CORPUS / f"{target}.bin").write_bytes(b"".join(len(d).to_bytes(2, "little") + d for d in inputs))
+        count += len(inputs)
+        size += sum(len(data) + 2 for data in inputs)
+    print(f"fuzz: {count} inputs kept, {size:,} bytes of at most {KEPT_BYTES:,}")
+
+
+def campaign(targets: list[str], seconds: float) -> bool:
+    """Slices until all goals are met or the time is over; false: a crash."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        ledger = read_ledger()
+        need = {target: missing(ledger, target) for target in targets}
+        # The one that ran the shortest: each gets its share of a time that is too short.
+        waiting = [target for target in targets if need[target] > 0]
+        if not waiting:
+            return True
+        spent = {t: sum(line.seconds for line in ledger if line.target == t) for t in waiting}
+        target = min(waiting, key=lambda name: (name == FILLER, spent[name]))
+        left = max(1, round(min(SLICE_S, end - time.monotonic())))
+        line = run_slice(target, left, need[target])
+        print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
+        if line.crashes:
+            return False
+    return True
+
+
+def main() -> int:
+    """Exit status as said above."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
+    parser.add_argument("--targets", nargs="+", choices=TARGETS, default=list(TARGETS), metavar="TARGET")
+    parser.add_argument("--table", action="store_true", help="print what ran, run nothing")
+    parser.add_argument("--keep", action="store_true", help="reduce what was found to tests/fuzz/corpus")
+    options = parser.parse_args()
+    absent = [target for target in options.targets if not (PROGRAMS / target).exists()]
+    if absent and not options.table:
+        print(f"fuzz: not built: {' '.join(absent)}; `make fuzz` does it", file=sys.stderr)
+        return 2
+    OUT.mkdir(parents=True, exist_ok=True)
+    if options.keep:
+        keep()
+        return 0
+    clean = options.table or campaign(options.targets, options.seconds)
+    met = print_table()
+    return 0 if clean and (met or options.seconds < float("inf")) else 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("fuzz: stopped; the ledger has all slices that ended")
