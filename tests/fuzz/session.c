@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#include "fuzz.h"
+#include "picture.h"
 #include "port/port.h"
 
 enum { MESSAGES_MAX = 40, STORE_BYTES = 1024 };
@@ -15,6 +15,8 @@ static bslam_link_parser_t answers;
 static uint8_t store[STORE_BYTES];
 static size_t stored;
 static uint32_t clock_us;
+static bslam_camera_t own_camera;
+static int own_cameras;
 
 // ---- a board of nothing but memory -----------------------------------------------------------------------
 
@@ -61,6 +63,12 @@ bool port_load(uint8_t *bytes, size_t count)
     }
     memcpy(bytes, store, count);
     return true;
+}
+
+const struct bslam_camera *port_cameras(int *count)
+{
+    *count = own_cameras;
+    return &own_camera;
 }
 
 // ---- the host ---------------------------------------------------------------------------------------------
@@ -176,13 +184,37 @@ static void send_message(fuzz_input_t *input, uint16_t *sequence, int64_t *now_u
     }
 }
 
+/// A picture of the robot's own camera: a room, changed by the input, and perhaps without its first rows.
+static void show_picture(fuzz_input_t *input)
+{
+    uint8_t rgb[FUZZ_ROW_BYTES];
+    uint16_t pixels[BSLAM_IMAGE_WIDTH_MAX] = {0};
+    const int32_t first = fuzz_u8(input) < 240 ? 0 : 3;
+    for (int32_t y = first; y < own_camera.height_px; y++) {
+        fuzz_room_row(y, rgb);
+        for (int32_t x = 0; x < own_camera.width_px; x++) {
+            pixels[x] =
+                (uint16_t)((rgb[3 * x] >> 3) << 11 | (rgb[3 * x + 1] >> 2) << 5 | rgb[3 * x + 2] >> 3);
+        }
+        pixels[fuzz_u8(input) % BSLAM_IMAGE_WIDTH_MAX] = fuzz_u16(input);
+        const port_row_t row = {.pixels = pixels,
+                                .time_us = clock_us,
+                                .is_first = y == 0,
+                                .is_last = y == own_camera.height_px - 1};
+        session_take_row(&session, &row);
+    }
+}
+
 static void talk(fuzz_input_t *input)
 {
     uint16_t sequence = 0;
     int64_t now_us = 0;
     for (int i = 0; i < MESSAGES_MAX && input->left > 0; i++) {
         clock_us += 1000;
-        if (fuzz_u8(input) < 16) {
+        const unsigned choice = fuzz_u8(input);
+        if (choice < 4 && own_cameras > 0) {
+            show_picture(input);
+        } else if (choice < 16) {
             session_take_encoders(&session, clock_us, fuzz_u16(input), fuzz_u16(input));
         } else {
             send_message(input, &sequence, &now_us);
@@ -199,6 +231,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&answers, 0, sizeof answers);
     clock_us = 0;
     stored = 0;
+    own_camera = fuzz_camera(BSLAM_LENS_PINHOLE);
+    own_cameras = (choice & 4u) != 0 ? 1 : 0;
     session_init(&session);
     require_good_answers(1);
     if ((choice & 1u) != 0) {
