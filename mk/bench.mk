@@ -3,7 +3,7 @@
 # runs other people's programs beside it, as far as they are installed.
 
 .PHONY: bench
-bench: ## a filter step's instructions (valgrind); time, memory, error beside MRPT, Eigen, GTSAM, LIBLINEAR (5 min)
+bench: ## a step's instructions (valgrind); time, memory, error beside MRPT, Eigen, GTSAM, LIBLINEAR (5 min)
 	@tools/setup.sh bench
 	@$(PYTHON) tools/bench.py
 

@@ -1,4 +1,4 @@
-# The example application on FreeRTOS, for a board with a Cortex-M4F: make rtos FREERTOS_KERNEL=PATH, where PATH
+# The application on FreeRTOS, for a board with a Cortex-M4F: make rtos FREERTOS_KERNEL=PATH, where PATH
 # is a checkout of the FreeRTOS-Kernel repository. Nothing of it is copied here.
 
 RTOS_BOARD := $(if $(filter $(TARGET),$(BOARDS)),$(TARGET),mps2_an386)
