@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "bslam/math/bytes.h"
+
 /// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
 static const uint8_t tone_log[256] = {
     0,   10,  19,  26,  32,  37,  42,  47,  51,  54,  58,  61,  64,  67,  69,  72,  74,  77,  79,  81,
@@ -28,6 +30,7 @@ static const uint8_t tone_log[256] = {
 /// A frame counts one, the first one as many as history would hold; history fades by an eighth a frame.
 #define FIRST_WEIGHT 8
 #define FADE_SHIFT 3
+#define FADE_MASK 0x1F1F1F1FU  // what the shift leaves of each byte of a word
 /// The running colours take a quarter of a new frame's.
 #define COLOUR_RATE 0.25f
 
@@ -41,53 +44,28 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
-/// Loops over this many cells at a time: constants, so that a compiler can use vector instructions.
-#define STEP BSLAM_CELL_STEP
-
-static int16_t limited(int16_t chroma)
+/// Chroma from the logarithms of two channels, within +-127.
+static int8_t chroma_of(int32_t colour, int32_t green)
 {
-    const int16_t high = chroma < 127 ? chroma : 127;
-    return high > -127 ? high : -127;
-}
-
-/// Light and chroma of STEP cells from the logarithms of their channels.
-static void fill_tones(const uint8_t *restrict red, const uint8_t *restrict green,
-                       const uint8_t *restrict blue, uint8_t *restrict light, int8_t *restrict reddish,
-                       int8_t *restrict bluish)
-{
-    for (int32_t k = 0; k < STEP; k++) {
-        const uint16_t sum = (uint16_t)(red[k] + 2 * green[k] + blue[k]);
-        light[k] = (uint8_t)(sum >> 2);
-        reddish[k] = (int8_t)limited((int16_t)(red[k] - green[k]));
-        bluish[k] = (int8_t)limited((int16_t)(blue[k] - green[k]));
-    }
-}
-
-/// Spreads of STEP cells as parts of their brightness. In float a quotient of numbers so small does not reach
-/// the next whole one.
-static void fill_spreads(const bslam_cells_t *cells, int32_t i, uint8_t *restrict spread)
-{
-    const uint8_t *red = cells->red + i, *green = cells->green + i, *range = cells->spread + i;
-    for (int32_t k = 0; k < STEP; k++) {
-        const int32_t luma = green[k] + red[k] / 2;  // as thumbnail.c weighs it for the spread
-        const int32_t part = (int32_t)((float)(128 * range[k]) / (float)(luma + 8));
-        spread[k] = (uint8_t)(part < 255 ? part : 255);
-    }
+    const int32_t chroma = clamp(colour - green, -128, 127);
+    return (int8_t)(chroma < -127 ? -127 : chroma);
 }
 
 void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
 {
     const int32_t count = frame->rows * frame->columns;
-    const bslam_cells_t *cells = frame->cells;
-    for (int32_t i = 0; i < count; i += STEP) {
-        uint8_t red[STEP], green[STEP], blue[STEP];
-        for (int32_t k = 0; k < STEP; k++) {
-            red[k] = tone_log[cells->red[i + k]];
-            green[k] = tone_log[cells->green[i + k]];
-            blue[k] = tone_log[cells->blue[i + k]];
-        }
-        fill_tones(red, green, blue, tones->light + i, tones->reddish + i, tones->bluish + i);
-        fill_spreads(cells, i, tones->spread + i);
+    const uint8_t *reds = frame->cells->red, *greens = frame->cells->green, *blues = frame->cells->blue;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t red = tone_log[reds[i]], green = tone_log[greens[i]], blue = tone_log[blues[i]];
+        tones->light[i] = (uint8_t)((red + 2 * green + blue) >> 2);
+        tones->reddish[i] = chroma_of(red, green);
+        tones->bluish[i] = chroma_of(blue, green);
+    }
+    const uint8_t *spreads = frame->cells->spread;
+    for (int32_t i = 0; i < count; i++) {
+        const uint32_t luma = greens[i] + reds[i] / 2U;  // as thumbnail.c weighs it for the spread
+        const uint32_t part = 128U * spreads[i] / (luma + 8);
+        tones->spread[i] = (uint8_t)(part < 255 ? part : 255);
     }
 }
 
@@ -178,8 +156,9 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
     for (int32_t z = 0; z < BSLAM_ZONE_COUNT; z++) {
         uint8_t *counts = background->counts[z];
         const bslam_zone_rows_t span = zone_rows(camera, frame->rows, (bslam_zone_t)z);
-        for (int32_t i = 0; i < BSLAM_TONE_BINS; i++) {
-            counts[i] = (uint8_t)(counts[i] - (counts[i] >> FADE_SHIFT));
+        for (int32_t i = 0; i < BSLAM_TONE_BINS; i += BSLAM_WORD_BYTES) {
+            const uint32_t four = bslam_word_at(counts + i);
+            bslam_word_put(counts + i, four - (four >> FADE_SHIFT & FADE_MASK));
         }
         count_tones(counts, span, frame->columns, tones, known->known ? 1 : FIRST_WEIGHT);
         const zone_sums_t sums = sum_zone(counts, span, frame, tones);

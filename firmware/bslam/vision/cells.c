@@ -165,11 +165,13 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
 static void fill_bins(const bslam_background_t *background, const int16_t *weights,
                       bslam_cell_tables_t *tables)
 {
-    memset(tables, 0, sizeof *tables);
+    const uint8_t *walls = background->counts[BSLAM_ZONE_WALL],
+                  *floors = background->counts[BSLAM_ZONE_FLOOR];
+    const uint8_t *ceilings = background->counts[BSLAM_ZONE_CEILING];
     for (int32_t bin = 0; bin < BSLAM_TONE_BINS; bin++) {
-        const int32_t wall = background->counts[BSLAM_ZONE_WALL][bin];
-        const int32_t floor = background->counts[BSLAM_ZONE_FLOOR][bin];
-        const int32_t ceiling = background->counts[BSLAM_ZONE_CEILING][bin];
+        const int32_t wall = walls[bin], floor = floors[bin], ceiling = ceilings[bin];
+        tables->sums[bin] = 0;
+        tables->frequent[bin] = 0;
         if ((wall | floor | ceiling) != 0) {
             tables->sums[bin] = weights[7] * least(wall, OFTEN) + weights[8] * least(wall, SELDOM) +
                                 weights[9] * least(floor, OFTEN) + weights[10] * least(floor, SELDOM) +

@@ -218,11 +218,18 @@ static bool radius_of(const bslam_camera_t *camera, bslam_real_t forward, bslam_
 bslam_status_t bslam_camera_project(const bslam_camera_t *camera, const bslam_direction_t *direction,
                                     bslam_real_t *u_px, bslam_real_t *v_px)
 {
+    const bslam_mounting_t mounting = bslam_camera_mounting(camera);
+    return bslam_camera_project_as(camera, &mounting, direction, u_px, v_px);
+}
+
+bslam_status_t bslam_camera_project_as(const bslam_camera_t *camera, const bslam_mounting_t *mounting,
+                                       const bslam_direction_t *direction, bslam_real_t *u_px,
+                                       bslam_real_t *v_px)
+{
     if (!bslam_is_number(direction->x) || !bslam_is_number(direction->y) || !bslam_is_number(direction->z)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bslam_mounting_t mounting = bslam_camera_mounting(camera);
-    const bslam_direction_t seen = to_camera(&mounting, direction);
+    const bslam_direction_t seen = to_camera(mounting, direction);
     const bslam_real_t sideways = bslam_sqrt(seen.y * seen.y + seen.z * seen.z);
     bslam_real_t r;
     if (!radius_of(camera, seen.x, sideways, &r) || !grows_up_to(camera, r)) {

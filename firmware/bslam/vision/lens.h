@@ -79,6 +79,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_camera_project(const bslam_camera_t *camer
                                                      const bslam_direction_t *direction, bslam_real_t *u_px,
                                                      bslam_real_t *v_px);
 
+/// As bslam_camera_project, with the camera's mounting worked out before.
+BSLAM_MUST_CHECK bslam_status_t bslam_camera_project_as(const bslam_camera_t *camera,
+                                                        const bslam_mounting_t *mounting,
+                                                        const bslam_direction_t *direction,
+                                                        bslam_real_t *u_px, bslam_real_t *v_px);
+
 /// Horizontal angle from the robot's forward axis, positive to the left, in (-pi, pi].
 bslam_real_t bslam_direction_bearing_rad(const bslam_direction_t *direction);
 

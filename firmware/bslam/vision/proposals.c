@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bytes.h"
+
 /// What cells a segmentation joins.
 typedef enum source {
     LIKELY,   ///< those whose value is above the level
@@ -44,6 +46,7 @@ _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one num
 #define SNAPS 2
 /// Boxes that overlap more than this are the same.
 #define SAME_OVERLAP BSLAM_R(0.85)
+#define SAME_SIDES BSLAM_R(0.2)  // above .15 / .85, with room for rounding
 
 static int32_t least(int32_t a, int32_t b)
 {
@@ -85,21 +88,21 @@ static void join(bslam_run_t *runs, int32_t a, int32_t b)
     into->cells = (uint16_t)(into->cells + from->cells);
 }
 
-/// Eight cells of a mask at once: none in it, or all.
-#define WORD ((int32_t)sizeof(uint64_t))
+/// Four cells of a mask at once: none in it, or all.
 #define NONE_OF_WORD 0U
-#define ALL_OF_WORD 0x0101010101010101U
+#define ALL_OF_WORD 0x01010101U
 
 /// The first cell from `column` on that is not as those of the word.
-static int32_t skip(const uint8_t *mask, int32_t column, int32_t columns, uint64_t word)
+static int32_t skip(const uint8_t *mask, int32_t column, int32_t columns, uint32_t word)
 {
-    uint64_t here = word;
-    while (column + WORD <= columns) {
-        memcpy(&here, mask + column, sizeof here);
-        if (here != word) {
-            break;
+    for (; column + BSLAM_WORD_BYTES <= columns; column += BSLAM_WORD_BYTES) {
+        uint32_t others = bslam_word_at(mask + column) ^ word;
+        if (others != 0) {
+            for (; (others & 255) == 0; others >>= 8) {
+                column++;
+            }
+            return column;
         }
-        column += WORD;
     }
     while (column < columns && mask[column] == (uint8_t)word) {
         column++;
@@ -168,10 +171,18 @@ bslam_real_t bslam_box_overlap(const bslam_box_t *a, const bslam_box_t *b)
     return both / (area_a + area_b - both);
 }
 
+/// Boxes the same to SAME_OVERLAP have each side within .15 / .85 of the box's width or height: those that
+/// have not need no division.
 static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
 {
+    const bslam_real_t off_x = SAME_SIDES * (box->right_px - box->left_px);
+    const bslam_real_t off_y = SAME_SIDES * (box->bottom_px - box->top_px);
     for (int32_t i = 0; i < proposals->count; i++) {
-        if (bslam_box_overlap(&proposals->items[i].box, box) > SAME_OVERLAP) {
+        const bslam_box_t *known = &proposals->items[i].box;
+        if (bslam_abs(known->left_px - box->left_px) <= off_x &&
+            bslam_abs(known->top_px - box->top_px) <= off_y &&
+            bslam_abs(known->right_px - box->right_px) <= off_x &&
+            bslam_box_overlap(known, box) > SAME_OVERLAP) {
             return true;
         }
     }
@@ -207,27 +218,56 @@ enum { SNAP_LINES = 5 };
 /// Cells summed at a time, a constant, so that a compiler can use vector instructions.
 enum { STEPS_AT_ONCE = 8 };
 
+#if BSLAM_HAS_BYTES
+
+#define LIMITS (EDGE_STEP_MAX * 0x01010101U)
+
+/// Sums down STEPS_AT_ONCE columns, each step limited.
+static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t all[STEPS_AT_ONCE])
+{
+    uint32_t even[2] = {0}, odd[2] = {0};
+    for (; rows > 0; rows--, steps += columns) {
+        const uint32_t first = bslam_bytes_least(bslam_word_at(steps), LIMITS);
+        const uint32_t second = bslam_bytes_least(bslam_word_at(steps + BSLAM_WORD_BYTES), LIMITS);
+        even[0] = bslam_bytes_add_even(even[0], first);
+        odd[0] = bslam_bytes_add_odd(odd[0], first);
+        even[1] = bslam_bytes_add_even(even[1], second);
+        odd[1] = bslam_bytes_add_odd(odd[1], second);
+    }
+    for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
+        const uint32_t halves = k % 2 == 0 ? even[k / 4] : odd[k / 4];
+        all[k] = (uint16_t)(k % 4 < 2 ? halves : halves >> 16);
+    }
+}
+
+static uint16_t sum_row(const uint8_t *steps, int32_t count)
+{
+    uint32_t sum = 0;
+    int32_t i = 0;
+    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
+        sum = bslam_bytes_sum(bslam_bytes_least(bslam_word_at(steps + i), LIMITS), sum);
+    }
+    for (; i < count; i++) {
+        sum += (uint32_t)least(steps[i], EDGE_STEP_MAX);
+    }
+    return (uint16_t)sum;
+}
+
+#else
+
 static uint8_t limited(uint8_t step)
 {
     return step < EDGE_STEP_MAX ? step : EDGE_STEP_MAX;
 }
 
-/// Sums of the steps across SNAP_LINES columns from `line` on; what a sum takes from beyond the frame is not
-/// read.
-static void sum_columns(const bslam_view_t *view, const bslam_proposal_t *box, int32_t line,
-                        uint16_t sums[SNAP_LINES])
+/// Sums down STEPS_AT_ONCE columns, each step limited.
+static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t all[STEPS_AT_ONCE])
 {
-    const int32_t columns = view->frame->columns;
-    const int32_t start = most(line, 0);
-    uint16_t all[STEPS_AT_ONCE] = {0};
-    for (int32_t row = box->top; row < box->bottom; row++) {
-        const uint8_t *steps = view->step_x + row * columns + start;
+    memset(all, 0, STEPS_AT_ONCE * sizeof all[0]);
+    for (; rows > 0; rows--, steps += columns) {
         for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
             all[k] = (uint16_t)(all[k] + limited(steps[k]));
         }
-    }
-    for (int32_t i = 0; i < SNAP_LINES; i++) {
-        sums[i] = line + i >= 0 && line + i < columns ? all[line + i - start] : 0;
     }
 }
 
@@ -248,6 +288,22 @@ static uint16_t sum_row(const uint8_t *steps, int32_t count)
         sum += all[k];
     }
     return (uint16_t)sum;
+}
+
+#endif
+
+/// Sums of the steps across SNAP_LINES columns from `line` on; what a sum takes from beyond the frame is not
+/// read.
+static void sum_columns(const bslam_view_t *view, const bslam_proposal_t *box, int32_t line,
+                        uint16_t sums[SNAP_LINES])
+{
+    const int32_t columns = view->frame->columns;
+    const int32_t start = most(line, 0);
+    uint16_t all[STEPS_AT_ONCE];
+    sum_down(view->step_x + box->top * columns + start, columns, box->bottom - box->top, all);
+    for (int32_t i = 0; i < SNAP_LINES; i++) {
+        sums[i] = line + i >= 0 && line + i < columns ? all[line + i - start] : 0;
+    }
 }
 
 /// Mean steps, as bslam_edge_along gives them, of SNAP_LINES lines of cells from `line` on.
@@ -395,6 +451,29 @@ static void propose_components(bslam_proposals_t *proposals, const bslam_view_t 
     }
 }
 
+#if BSLAM_HAS_BYTES
+
+static void mask_likely(uint8_t *restrict mask, const int8_t *restrict values, int32_t cells, int8_t level)
+{
+    const uint32_t limit = (uint32_t)(level + 128) * 0x01010101U;
+    for (int32_t i = 0; i < cells; i += BSLAM_WORD_BYTES) {
+        bslam_word_put(mask + i, bslam_bytes_above(bslam_word_at(values + i) ^ BSLAM_TOP_BITS, limit));
+    }
+}
+
+static void mask_smooth(uint8_t *restrict mask, const uint8_t *restrict step_x,
+                        const uint8_t *restrict step_y, int32_t cells, uint8_t level)
+{
+    const uint32_t limit = level * 0x01010101U;
+    for (int32_t i = 0; i < cells; i += BSLAM_WORD_BYTES) {
+        const uint32_t beyond = bslam_bytes_less(bslam_word_at(step_x + i), limit) |
+                                bslam_bytes_less(bslam_word_at(step_y + i), limit);
+        bslam_word_put(mask + i, bslam_bytes_above(0x01010101U, beyond));
+    }
+}
+
+#else
+
 /// Whole steps of BSLAM_CELL_STEP cells, so that a compiler can use vector instructions; the tables have
 /// room.
 static void mask_likely(uint8_t *restrict mask, const int8_t *restrict values, int32_t cells, int8_t level)
@@ -417,6 +496,8 @@ static void mask_smooth(uint8_t *restrict mask, const uint8_t *restrict step_x,
     }
 }
 
+#endif
+
 static bool is_room(const bslam_run_t *face, const bslam_frame_t *frame)
 {
     const bool leaves =
@@ -429,7 +510,9 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
 {
     const bslam_frame_t *frame = view->frame;
     uint8_t *mask = proposals->mask;
-    memset(mask, 1, (size_t)frame->rows * (size_t)frame->columns);
+    for (int32_t i = 0; i < frame->rows * frame->columns; i += BSLAM_WORD_BYTES) {
+        bslam_word_put(mask + i, ALL_OF_WORD);
+    }
     for (int32_t i = 0; i < runs; i++) {
         const bslam_run_t *run = &proposals->runs[i];
         if (is_room(&proposals->runs[root_of(proposals->runs, i)], frame)) {
@@ -447,11 +530,17 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
 static void keep_common(uint8_t *restrict out, const uint8_t *a, const uint8_t *b, const uint8_t *c,
                         int32_t columns)
 {
+#if BSLAM_HAS_BYTES
+    for (int32_t i = 0; i < columns; i += BSLAM_WORD_BYTES) {
+        bslam_word_put(out + i, bslam_word_at(a + i) & bslam_word_at(b + i) & bslam_word_at(c + i));
+    }
+#else
     for (int32_t i = 0; i < columns; i += BSLAM_CELL_STEP) {
         for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
             out[k] = a[k] & b[k] & c[k];
         }
     }
+#endif
 }
 
 /// Leaves only the cells whose eight neighbours are in the mask too: columns, then rows.

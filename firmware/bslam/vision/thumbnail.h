@@ -17,16 +17,11 @@ typedef enum bslam_pixel_format {
     BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
 } bslam_pixel_format_t;
 
-/// Pixel pairs of a row, with room for a step of cells.
-#define BSLAM_PAIRS_ROOM (BSLAM_IMAGE_WIDTH_MAX / 2 + 2 * BSLAM_CELL_STEP)
-
 /// What is summed of a row of cells until it is finished. Scratch of a frame that streams in.
 typedef struct bslam_row_sums {
-    uint32_t pairs[BSLAM_PAIRS_ROOM];        ///< of an upper row of two
-    uint32_t quads[BSLAM_PAIRS_ROOM];        ///< of 2x2 pixels
-    uint32_t upper_quads[BSLAM_PAIRS_ROOM];  ///< of a row of cells
-    int16_t darkest[BSLAM_PAIRS_ROOM];
-    int16_t brightest[BSLAM_PAIRS_ROOM];
+    uint32_t pairs[BSLAM_IMAGE_WIDTH_MAX / 2];        ///< of an upper row of two
+    uint32_t upper_quads[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of 2x2 pixels, of an upper half of a row of cells
+    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];           ///< a row that came with 8 bits a channel
 } bslam_row_sums_t;
 
 typedef struct bslam_thumbnail {

@@ -95,7 +95,7 @@ static bool bend(const bslam_view_t *view, const upright_t *kind, side_t *side)
         const bslam_direction_t there = {ahead.x * distance_m / flat, ahead.y * distance_m / flat,
                                          (bslam_real_t)height_m - camera->z_m};
         bslam_real_t u = 0, v = 0;
-        if (bslam_camera_project(camera, &there, &u, &v) != BSLAM_OK) {
+        if (bslam_camera_project_as(camera, &view->mounting, &there, &u, &v) != BSLAM_OK) {
             return false;
         }
         side->u_px[i] = (float)u;
