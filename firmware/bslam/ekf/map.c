@@ -327,8 +327,10 @@ bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
 
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf)
 {
+    const bslam_real_t *row = ekf->covariance;
     for (int i = 0; i < ekf->dim; i++) {
-        const bslam_real_t variance = bslam_symmat_get(ekf->covariance, i, i);
+        const bslam_real_t variance = row[i];
+        row += (i / 4 + 1) * 4;
         // Exactly zero is the pose before the first motion, and a ray's anchor taken from it.
         if (!bslam_is_number(ekf->mean[i]) || !bslam_in_range(variance, 0, BSLAM_R(1e30))) {
             return false;

@@ -26,10 +26,8 @@ typedef struct transition {
 static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_t forward_rate,
                             bslam_real_t turn_rate, transition_t *transition)
 {
-    *transition = (transition_t){0};
-    for (int i = 0; i < POSE_DIM; i++) {
-        transition->by[i][i] = 1;
-    }
+    static const transition_t unmoved = {{{1}, {0, 1}, {0, 0, 1}}};
+    *transition = unmoved;
     transition->by[0][BSLAM_STATE_THETA] = jacobian->x_theta;
     transition->by[1][BSLAM_STATE_THETA] = jacobian->y_theta;
     transition->by[0][BSLAM_STATE_FORWARD] = jacobian->x_forward * forward_rate;
@@ -58,7 +56,7 @@ static bslam_real_t row_times(const transition_t *transition, int i, int base, c
 static void move_covariance(const moving_t *state, const transition_t *transition)
 {
     const int base = state->base_dim;
-    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
+    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX];
     for (int j = 0; j < base; j++) {
         bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
         for (int i = 0; i < base; i++) {

@@ -42,8 +42,11 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
-    *row = (bslam_row_t){.at = (uint16_t)beacon->at, .dim = (uint16_t)bslam_beacon_dim(beacon->kind)};
+    row->at = (uint16_t)beacon->at;
+    row->dim = (uint16_t)bslam_beacon_dim(beacon->kind);
     memcpy(row->base, by_pose, 3 * sizeof row->base[0]);
+    row->base[3] = 0;
+    row->base[4] = 0;
     memcpy(row->other, by_beacon, sizeof row->other);
 }
 
@@ -292,11 +295,11 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
 
 /// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the
 /// transport.
-static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
+static void move_position(bslam_ekf_t *ekf, int at, const bslam_turning_t *turning)
 {
     bslam_real_t dx = ekf->correction[at];
     bslam_real_t dy = ekf->correction[at + 1];
-    bslam_pose_exp_translation(turn_rad, &dx, &dy);
+    bslam_turning_apply(turning, &dx, &dy);
     ekf->mean[at] += dx;
     ekf->mean[at + 1] += dy;
     ekf->shift[at] = -dy;
@@ -307,7 +310,8 @@ static void move_position(bslam_ekf_t *ekf, int at, bslam_real_t turn_rad)
 static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 {
     memset(ekf->shift, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof ekf->shift[0]);
-    move_position(ekf, BSLAM_STATE_X, turn_rad);
+    const bslam_turning_t turning = bslam_turning(turn_rad);
+    move_position(ekf, BSLAM_STATE_X, &turning);
     ekf->mean[BSLAM_STATE_THETA] =
         bslam_angle_wrap(ekf->mean[BSLAM_STATE_THETA] + ekf->correction[BSLAM_STATE_THETA]);
     for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
@@ -317,7 +321,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
         const bslam_beacon_t *beacon = &ekf->beacons[b];
         const int at = beacon->at;
         if (beacon->kind != BSLAM_BEACON_KNOWN) {
-            move_position(ekf, at, turn_rad);
+            move_position(ekf, at, &turning);
         }
         if (beacon->kind == BSLAM_BEACON_SIZED) {
             ekf->mean[at + 2] += ekf->correction[at + 2];
@@ -333,7 +337,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 /// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
 static void transport_covariance(bslam_ekf_t *ekf)
 {
-    const bslam_row_t theta_row = {.base = {0, 0, 1}};
+    static const bslam_row_t theta_row = {.base = {0, 0, 1}};
     bslam_ekf_project(ekf, &theta_row, ekf->mirror);
     const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
     for (int i = 0; i < ekf->dim; i++) {

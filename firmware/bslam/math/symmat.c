@@ -76,12 +76,27 @@ void bslam_symmat_first_columns(const bslam_real_t *restrict m, int n, const bsl
             a * bslam_symmat_get(m, i, 0) + b * bslam_symmat_get(m, i, 1) + c * bslam_symmat_get(m, i, 2);
     }
     const bslam_real_t *row = m + bslam_symmat_row(3);
-    for (int i = 3; i < n; i++) {
+    out[3] = a * row[0] + b * row[1] + c * row[2];
+    row += 4;
+    // Blocks of four rows of one filled length; what is behind n is overwritten.
+    for (int i = 4; i < n; i += 4) {
+        const bslam_real_t *second = row + i + 4, *third = second + i + 4, *fourth = third + i + 4;
         out[i] = a * row[0] + b * row[1] + c * row[2];
-        row += ((size_t)i / 4 + 1) * 4;
+        out[i + 1] = a * second[0] + b * second[1] + c * second[2];
+        out[i + 2] = a * third[0] + b * third[1] + c * third[2];
+        out[i + 3] = a * fourth[0] + b * fourth[1] + c * fourth[2];
+        row = fourth + i + 4;
     }
-    for (int i = n; i < BSLAM_SYMMAT_PADDED(n); i++) {
-        out[i] = 0;
+    // One by one: at most three are no work for memset.
+    const int padded = BSLAM_SYMMAT_PADDED(n);
+    if (n < padded) {
+        out[padded - 1] = 0;
+    }
+    if (n < padded - 1) {
+        out[padded - 2] = 0;
+    }
+    if (n < padded - 2) {
+        out[padded - 3] = 0;
     }
 }
 

@@ -28,10 +28,10 @@ bslam_pose_t bslam_pose_inverse(const bslam_pose_t *a)
     return result;
 }
 
-void bslam_pose_exp_translation(bslam_real_t turn_rad, bslam_real_t *x, bslam_real_t *y)
+bslam_turning_t bslam_turning(bslam_real_t turn_rad)
 {
-    bslam_real_t along;   // sin(t) / t
-    bslam_real_t across;  // (1 - cos(t)) / t
+    bslam_real_t along;
+    bslam_real_t across;
     if (bslam_abs(turn_rad) < BSLAM_R(0.02)) {
         const bslam_real_t square = turn_rad * turn_rad;
         along = 1 - square / 6 * (1 - square / 20 * (1 - square / 42));
@@ -44,7 +44,11 @@ void bslam_pose_exp_translation(bslam_real_t turn_rad, bslam_real_t *x, bslam_re
         // 1 - cos(t) = sin²(t) / (1 + cos(t)) keeps its digits for small t; the plain form does near pi.
         across = (c > 0 ? s * s / (1 + c) : 1 - c) / turn_rad;
     }
-    const bslam_real_t x_before = *x;
-    *x = along * x_before - across * *y;
-    *y = across * x_before + along * *y;
+    return (bslam_turning_t){along, across};
+}
+
+void bslam_pose_exp_translation(bslam_real_t turn_rad, bslam_real_t *x, bslam_real_t *y)
+{
+    const bslam_turning_t turning = bslam_turning(turn_rad);
+    bslam_turning_apply(&turning, x, y);
 }

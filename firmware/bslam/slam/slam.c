@@ -1,5 +1,7 @@
 #include "bslam/slam/slam.h"
 
+#include <string.h>
+
 #include "bslam/association/doubles.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
@@ -187,14 +189,26 @@ static bool is_noise(bslam_real_t sd, bslam_real_t low, bslam_real_t high)
     return sd == 0 || bslam_in_range(sd, low, high);
 }
 
+/// Set in the bits of every float from 2 on, of infinities and of NaN.
+#define LARGE_FLOAT 0x40000000U
+
+/// Values of signatures are small as a rule, and then no value sets that bit: two instructions each.
 static bool signature_is_finite(const float *signature)
 {
-    for (int k = 0; signature != NULL && k < BSLAM_SAMPLE_FEATURES; k++) {
-        if (!bslam_is_number((bslam_real_t)signature[k])) {
-            return false;
-        }
+    if (signature == NULL) {
+        return true;
     }
-    return true;
+    uint32_t bits = 0;
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        uint32_t value;
+        memcpy(&value, &signature[k], sizeof value);
+        bits |= value;
+    }
+    bool is_finite = true;
+    for (int k = 0; (bits & LARGE_FLOAT) != 0 && is_finite && k < BSLAM_SAMPLE_FEATURES; k++) {
+        is_finite = bslam_is_number((bslam_real_t)signature[k]);
+    }
+    return is_finite;
 }
 
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
