@@ -177,7 +177,7 @@ def _label_boxes(
 ) -> BoxSamples:
     rows = np.flatnonzero(world.seen["frame"] == index)
     seen = world.seen[rows]
-    owner, overlap = owners(boxes, seen, teaches(seen))
+    owner, overlap = owners(boxes, seen, teaches(seen, world.pictures.shape[2]))
     label = owner.copy()
     label[owner >= 0] = seen["kind"][owner[owner >= 0]]
     is_clutter = (owner == NOTHING) & (clutter_share(world.clutter[index], boxes) > 0.4)

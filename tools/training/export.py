@@ -81,7 +81,13 @@ class Header:
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
         """Add a table of kinds or objects; its name."""
         rows = "".join(
-            f"    {{{', '.join([c_string(one.name), *map(c_float, astuple(one)[1:])])}}},\n"
+            textwrap.fill(
+                ", ".join(map(c_float, astuple(one)[1:])) + "},",
+                COLUMNS,
+                initial_indent=f"    {{{c_string(one.name)}, ",
+                subsequent_indent="     ",
+            )
+            + "\n"
             for one in classes
         )
         self._body.append(f"static const bslam_beacon_class_t {name}[{len(classes)}] = {{\n{rows}}};")

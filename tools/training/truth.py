@@ -17,6 +17,9 @@ OVERLAP_MIN = 0.5
 IGNORED_SHARE = 0.5
 """A box with this share of it on a beacon that does not count is not counted either."""
 
+EDGE_PX = 1.5
+"""A box that comes this near to the frame's edge may go on outside."""
+
 Boxes = NDArray[np.floating]
 
 NOTHING = -1
@@ -34,11 +37,13 @@ def counts(seen: NDArray[np.void]) -> NDArray[np.bool_]:
     )
 
 
-def teaches(seen: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Which of them a detector learns from: also those that the frame cuts off, which still have a direction,
-    and that a robot near a wall sees most of."""
+def teaches(seen: NDArray[np.void], width_px: int) -> NDArray[np.bool_]:
+    """Which of them a detector learns from: also those that the frame cuts above or below, which still have
+    a direction, and that a robot near a wall sees most of."""
+    left, right = seen["box"][:, 0], seen["box"][:, 2]
+    upright = (left > EDGE_PX) & (right < width_px - 1 - EDGE_PX)
     whole = seen.copy()
-    whole["cut"] = False
+    whole["cut"] &= ~upright
     return counts(whole)
 
 

@@ -32,13 +32,13 @@ def test_counts_what_is_small_cut_slanted_or_hidden_does_not(change: dict[str, o
     assert counts(seen({}, change)).tolist() == [True, False]
 
 
-def test_teaches_what_the_frame_cuts_off_if_enough_of_it_is_seen() -> None:
+def test_teaches_what_is_cut_above_or_below_but_not_at_the_sides() -> None:
     above, beside = (
         {"cut": True, "box": (10.0, -0.5, 30.0, 30.0)},
         {"cut": True, "box": (-0.5, 5.0, 30.0, 30.0)},
     )
     small = {"cut": True, "box": (10.0, -0.5, 30.0, 30.0), "visible_px": 149, "own_px": 149}
-    assert teaches(seen({}, above, beside, small)).tolist() == [True, True, True, False]
+    assert teaches(seen({}, above, beside, small), 320).tolist() == [True, True, False, False]
 
 
 def test_overlaps_are_intersection_over_union() -> None:
