@@ -78,8 +78,9 @@ def build(real: str, beacons_max: int) -> Path:
 
 def build_vision() -> Path:
     """Builds the vision front end, in float as on the target, with its model where there is one yet."""
-    includes = '#include "bslam/vision/vision.h"\n'
-    text = declarations((), "vision/vision.h")
+    header = "vision/visual_gyro.h"  # it includes all the others
+    includes = f'#include "bslam/{header}"\n'
+    text = declarations((), header)
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
     text += "#define BSLAM_IMAGE_WIDTH_MAX ...\n#define BSLAM_IMAGE_HEIGHT_MAX ...\n"
     if BEACONS_HEADER.is_file():

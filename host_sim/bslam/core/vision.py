@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -71,11 +71,23 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """How far the robot turned since a camera's frame before, as bslam_turn_t describes it."""
+
+    turn_rad: float
+    variance_rad2: float
+    mismatch: float
+    parallax_rad_per_m: float
+    sideways: float
+
+
+@dataclass(frozen=True)
 class Seeing:
     """What came of a frame: candidates, surest first; "seen", or why there is none ("black" say)."""
 
     candidates: tuple[Candidate, ...]
     reason: str
+    turn: Turn | None = None  # since this camera's frame before, if the two tell
 
 
 @dataclass(frozen=True)
@@ -121,6 +133,8 @@ class FrontEnd:
             lib.bslam_vision_init(self._vision, self._model, array, len(self._cameras)),
             f"the front end refuses its model or one of its {len(self._cameras)} cameras",
         )
+        self._turns = ffi.new("bslam_turns_t *")
+        lib.bslam_turns_init(self._turns, self._vision)
 
     def see(self, rgb: Picture, camera: int = 0, moved: bool = True) -> Seeing:
         """Looks at a picture of a camera by its index: (height, width, 3) uint8, or (height, width) uint16 of
@@ -141,7 +155,14 @@ class FrontEnd:
                 lib.bslam_vision_row(self._vision, pixels + row * rgb.strides[0]), f"row {row}"
             )
         self._library.ensure(lib.bslam_vision_end(self._vision, moved), "the end of a frame")
-        return Seeing(tuple(self._candidates()), self._reason(lib.bslam_vision_reason(self._vision)))
+        reason = self._reason(lib.bslam_vision_reason(self._vision))
+        return Seeing(tuple(self._candidates()), reason, self._turn())
+
+    def _turn(self) -> Turn | None:
+        found = self._library.ffi.new("bslam_turn_t *")
+        if not self._library.lib.bslam_turns_see(self._turns, self._vision, found):
+            return None
+        return Turn(**{one.name: getattr(found, one.name) for one in fields(Turn)})
 
     def signature(self, box: tuple[float, float, float, float]) -> NDArray[np.float32] | None:
         """The signature (71,) of what a box (left, top, right, bottom, px) in the last frame holds.

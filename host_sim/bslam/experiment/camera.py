@@ -11,7 +11,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 
 import bslam.world as world_package
 from bslam.core.build import FIRMWARE_DIR
-from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd
+from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
+from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
+from bslam.experiment.compass import Compass
 from bslam.log import Log, Sightings
 from bslam.rig import Rig
 from bslam.world.arena import Arena, Beacon
@@ -77,12 +79,18 @@ SEEN = np.dtype(
 )
 
 
+TURNS = np.dtype(
+    [("frame", np.int64), ("camera", np.int64), *((one.name, np.float64) for one in fields(Turn))]
+)
+
+
 @dataclass(frozen=True)
 class CameraDrive:
     """What the front end saw on one drive."""
 
     places: NDArray[np.float64]  # (b, 3) each beacon's id, and where its front face is, x m, y m in the arena
     seen: NDArray[np.void]  # (m,) of SEEN, in order of time
+    turns: NDArray[np.void]  # (n,) of TURNS, one a frame; NaN where the frame told no turn
 
     def arena(self, arena: Arena) -> Arena:
         """With the beacons where they are seen, which for a thick one is not on the wall."""
@@ -120,6 +128,7 @@ class Glance:
     rgb: NDArray[np.uint8]  # (h, w, 3)
     candidates: tuple[Candidate, ...]  # those that have a direction
     rows: list[tuple[Any, ...]]  # of SEEN, one a candidate
+    turn: Turn | None  # since the same camera's frame before
 
 
 @dataclass(frozen=True)
@@ -133,11 +142,11 @@ class CameraStore:
         path = self.folder / f"{scenario.name}_seed{seed}_{rig.name}_{_digest(scenario, rig)}.npz"
         if path.is_file():
             with np.load(path) as file:
-                return CameraDrive(file["places"], file["seen"])
+                return CameraDrive(file["places"], file["seen"], file["turns"])
         drive = watch(scenario, seed, rig)
         self.folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=self.folder, suffix=".part", delete=False) as part:
-            np.savez_compressed(part, places=drive.places, seen=drive.seen)
+            np.savez_compressed(part, places=drive.places, seen=drive.seen, turns=drive.turns)
         os.replace(part.name, path)  # whole or not at all, whoever else writes the same
         return drive
 
@@ -172,7 +181,7 @@ def unseen_log(
     """The same before anything is seen, so without sightings, and what its cameras will see, step by step."""
     scenario = _checked(scenario, sigma_mps, noise, rig)
     scene = dress(scenario, seed)
-    log = _log_of(scenario, seed, rig, CameraDrive(_places(scene), np.empty(0, SEEN)))
+    log = _log_of(scenario, seed, rig, CameraDrive(_places(scene), np.empty(0, SEEN), np.empty(0, TURNS)))
     return log, _watch(scene, scenario, seed, rig, threshold)
 
 
@@ -197,15 +206,32 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sighting_delay_us=0,
         sighting_correlation_m=CORRELATION_M,
         sighting_scale_sd=SCALE_SD,
+        gyro_sigma_radps=VisualGyro.SD_RADPS,
     )
-    return replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
+    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
+    if len(drive.turns) == 0:
+        return log
+    eyes = Compass(log)
+    for row in drive.turns.tolist():
+        eyes.take(*_turn_of(row))
+    return replace(log, odometry=replace(log.odometry, gyro_radps=eyes.rates_radps))
 
 
 def watch(scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
     """Drive, render one frame a step, the cameras in turn, and keep what the front end sees in each."""
     scene = dress(scenario, seed)
-    rows = [row for glance in _watch(scene, scenario, seed, rig, TOLD_THRESHOLD) for row in glance.rows]
-    return CameraDrive(_places(scene), np.array(rows, dtype=SEEN))
+    rows: list[tuple[Any, ...]] = []
+    turns: list[tuple[Any, ...]] = []
+    for glance in _watch(scene, scenario, seed, rig, TOLD_THRESHOLD):
+        rows += glance.rows
+        told = (math.nan,) * len(fields(Turn)) if glance.turn is None else astuple(glance.turn)
+        turns.append((glance.step, glance.camera, *told))
+    return CameraDrive(_places(scene), np.array(rows, dtype=SEEN), np.array(turns, dtype=TURNS))
+
+
+def _turn_of(row: tuple[Any, ...]) -> tuple[int, int, Turn | None]:
+    step, camera, *told = row
+    return step, camera, None if math.isnan(told[0]) else Turn(*told)
 
 
 def _places(scene: Scene) -> NDArray[np.float64]:
@@ -228,7 +254,7 @@ def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: Thr
         seeing = front_end.see(picture.rgb, camera, step == 0 or aim.moved or before != poses[step])
         measured = [one for one in seeing.candidates if is_used(one, threshold)]
         rows = [_row(step, one, picture.identity) for one in measured]
-        yield Glance(step, camera, picture.rgb, tuple(measured), rows)
+        yield Glance(step, camera, picture.rgb, tuple(measured), rows, seeing.turn)
         surest = (one.bearing_rad for one in measured if one.score >= UNTOLD_THRESHOLD.whole)
         surest_rad = [bearing_rad for bearing_rad in surest if bearing_rad is not None]
         aim.turn(surest_rad, step * step_s, step_s)

@@ -10,7 +10,8 @@ import numpy as np
 
 from bslam.core.vision import Candidate
 from bslam.errors import BslamError
-from bslam.experiment.camera import SEEN, CameraDrive, Glance
+from bslam.experiment.camera import SEEN, TURNS, CameraDrive, Glance
+from bslam.experiment.compass import Compass
 from bslam.experiment.options import ASSOCIATIONS, RunOptions
 from bslam.experiment.runner import Frames
 from bslam.log import Log, Sightings
@@ -30,6 +31,7 @@ class Eye:
                 f"--association {options.association_name}: needs all sightings first; {allowed}"
             )
         self._options, self._glances, self._step_us = options, glances, log.robot.step_us
+        self._compass = Compass(log)
         self._seen_us = -self._step_us  # time of the last frame that was looked at
         self._frame: Frames | None = None  # the one that is to be taken
         self._glance: Glance | None = None
@@ -42,10 +44,17 @@ class Eye:
             if glance is None:
                 return False
             self._glance, self._seen_us = glance, glance.step * self._step_us
+            self._compass.take(glance.step, glance.camera, glance.turn)
             if glance.rows:
                 self._rows += glance.rows
                 self._frame = Frames(self._sightings(glance.rows), self._options)
         return self._frame is not None and self._frame.waiting_before(until_us)
+
+    def gyro_radps(self, row: int, time_us: int) -> float | None:
+        """As `runner.FrameFeed`: the frame of that time is looked at now."""
+        self.waiting_before(time_us + 1)
+        rate_radps = float(self._compass.rates_radps[row])
+        return None if math.isnan(rate_radps) else rate_radps
 
     def take(self) -> tuple[int, Sequence[int], list[Any]]:
         """As `runner.FrameFeed`."""
@@ -58,7 +67,8 @@ class Eye:
         return self._sightings(self._rows)
 
     def _sightings(self, rows: list[tuple[Any, ...]]) -> Sightings:
-        return CameraDrive(np.empty((0, 3)), np.array(rows, dtype=SEEN)).sightings(self._step_us)
+        drive = CameraDrive(np.empty((0, 3)), np.array(rows, dtype=SEEN), np.empty(0, TURNS))
+        return drive.sightings(self._step_us)
 
     def shown(self, frame: Sequence[Told]) -> Shown | None:
         """The last picture; `frame`: what became of its sightings, if they have been told."""

@@ -63,6 +63,9 @@ class FrameFeed(Protocol):
     def take(self) -> tuple[int, Sequence[int], list[Any]]:
         """Time, true identities, and the columns of the next frame, see `columns_for_filter`."""
 
+    def gyro_radps(self, row: int, time_us: int) -> float | None:
+        """What the gyro says with a row of odometry; asked before the row is fed. None: nothing."""
+
 
 def run_log(
     log: Log,
@@ -79,7 +82,7 @@ def run_log(
     beacons to hold. `record` is the file of the recording to make. `frames` are taken in place of the log's
     sightings.
     """
-    frames = frames or Frames(log.sightings, options)
+    frames = frames or Frames(log.sightings, options, log.odometry.gyro_radps)
     params, beacons = core_params(options, log), beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
         if options.kept_map is not None:
@@ -115,13 +118,6 @@ def _run(
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
         recorder.finish()
     return trace
-
-
-def _gyro(odometry: Odometry) -> list[float | None]:
-    """The gyro's rate of each row, or None."""
-    if odometry.gyro_radps is None:
-        return [None] * len(odometry.time_us)
-    return [None if math.isnan(one) else one for one in odometry.gyro_radps.tolist()]
 
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Any:
@@ -193,26 +189,32 @@ class _Run:
 
     def _run(self, odometry: Odometry) -> None:
         """Feed everything, and keep what there is to say at each of the steps' times."""
-        slam, kind, clock, times_us = self.slam, odometry.kind, self._clock, self.times_us
+        kind, times_us = odometry.kind, self.times_us
         number = np.int64 if kind == "ticks" else np.float64
         a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
-        rows = list(zip(odometry.time_us.tolist(), a, b, _gyro(odometry), strict=True))
+        rows = list(zip(range(len(a)), odometry.time_us.tolist(), a, b, strict=True))
         if len(times_us) > len(rows):  # the start stands before the first row, which already moves
             self._start_clock(times_us[0])
         else:
-            self._try(slam.odometry, kind, *rows.pop(0))
+            self._read(kind, *rows.pop(0))
         self._frames_until(times_us[1] if len(times_us) > 1 else None)
         self._keep(times_us[0])
         last_us = times_us[0]
         for row, until_us in zip(rows, [*times_us[2:], None], strict=False):
-            if row[0] - last_us > INTERRUPTION_US:
-                self._resume(row[0] - last_us)
-            last_us = row[0]
-            began = clock()
-            self._try(slam.odometry, kind, *row)
-            core_ns = clock() - began + self._frames_until(until_us)
+            time_us = row[1]
+            if time_us - last_us > INTERRUPTION_US:
+                self._resume(time_us - last_us)
+            last_us = time_us
+            core_ns = self._read(kind, *row) + self._frames_until(until_us)
             self.step_ns.append(core_ns)
-            self._keep(row[0])
+            self._keep(time_us)
+
+    def _read(self, kind: str, row: int, time_us: int, a: float, b: float) -> int:
+        """Feed a row of odometry, and what the gyro says with it; CPU time of the core, ns."""
+        gyro_radps = self.frames.gyro_radps(row, time_us)
+        began = self._clock()
+        self._try(self.slam.odometry, kind, time_us, a, b, gyro_radps)
+        return self._clock() - began
 
     def _start_clock(self, time_us: int) -> None:
         """An empty frame if none is at the start, or the core would not know how long the first row took.
@@ -353,7 +355,13 @@ def _as_written(value: Number) -> Number:
 class Frames:
     """Sightings in frames of equal time, as the filter is to see them: without what it must not know."""
 
-    def __init__(self, sightings: Sightings, options: RunOptions) -> None:
+    def __init__(
+        self,
+        sightings: Sightings,
+        options: RunOptions,
+        gyro_radps: NDArray[np.float64] | None = None,
+    ) -> None:
+        self._gyro_radps = None if gyro_radps is None else gyro_radps.tolist()
         times = sightings.time_us
         first = np.flatnonzero(np.diff(times, prepend=-1))
         self._bounds = [*first.tolist(), len(times)]
@@ -363,6 +371,12 @@ class Frames:
         self._signature = sightings.signature if uses_looks(options) else None
         self._class = None if sightings.beacon_class is None else sightings.beacon_class.tolist()
         self._next = 0
+
+    def gyro_radps(self, row: int, time_us: int) -> float | None:
+        """As `FrameFeed.gyro_radps`: what the log says."""
+        if self._gyro_radps is None or math.isnan(self._gyro_radps[row]):
+            return None
+        return self._gyro_radps[row]
 
     def waiting_before(self, until_us: int | None) -> bool:
         """As `FrameFeed.waiting_before`."""

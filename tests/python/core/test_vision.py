@@ -104,3 +104,29 @@ def test_threshold_decides_how_much_is_a_candidate(camera: Camera) -> None:
         counts.append(len(FrontEnd([camera], threshold=threshold).see(picture.rgb).candidates))
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] == 0
+
+
+def test_see_tells_how_far_the_robot_turned_in_a_rendered_world() -> None:
+    camera = load_rig("three60").cameras[1]
+    scene = make_world(21, "test")
+    renderer, front_end = Renderer(scene, camera, 21), FrontEnd([camera])
+    x_m, y_m, theta_rad = walk(scene, np.random.default_rng(21), 1, hz=5)[0]
+    errors_rad = []
+    assert front_end.see(renderer.render((x_m, y_m, theta_rad), 0.0).rgb).turn is None
+    for step in range(1, 25):  # turning on the spot, ever faster
+        turned_rad = 0.004 * step
+        theta_rad += turned_rad
+        turn = front_end.see(renderer.render((x_m, y_m, theta_rad), 0.04 * step).rgb).turn
+        if turn is not None:
+            errors_rad.append(turn.turn_rad - turned_rad)
+    assert len(errors_rad) >= 18
+    assert np.median(np.abs(errors_rad)) < 0.001
+    assert np.max(np.abs(errors_rad)) < 0.005
+
+
+def test_a_black_frame_tells_no_turn() -> None:
+    camera = load_rig("three60").cameras[1]
+    front_end = FrontEnd([camera])
+    black = np.zeros((240, 320, 3), np.uint8)
+    assert front_end.see(black).turn is None
+    assert front_end.see(black).turn is None

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing
+from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing, Turn
+from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.experiment import camera
 from bslam.experiment.camera import Aim, CameraStore, camera_log, covering_beacon
@@ -77,6 +78,23 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.03, 0.04), 0.0] * 8)
     assert log.robot.sighting_scale_sd > 0
     assert log.robot.wheel_speed_sigma_mps == 0.6
+
+
+def test_camera_log_has_the_turn_rates_that_the_frames_tell(short, tmp_path, monkeypatch):
+    drive = replace(short, steps=40)
+    true_rad = np.unwrap(simulate(drive, 1).truth.theta_rad)
+    told = iter([None, None, None, *(true_rad[3:] - true_rad[:-3]).tolist()])
+
+    def see(self, rgb, camera, moved):
+        turn_rad = next(told)
+        return Seeing((), "nothing", None if turn_rad is None else Turn(turn_rad, 1e-6, 0.0, 0.0, 0.0))
+
+    monkeypatch.setattr(FakeFrontEnd, "see", see)
+    log = camera_log(drive, 1, 0.6, None, RIG, CameraStore(tmp_path))
+    assert np.isnan(log.odometry.gyro_radps).tolist()[:3] == [True, True, False]
+    rate_radps = np.diff(true_rad) / (drive.step_us * 1e-6)
+    np.testing.assert_allclose(log.odometry.gyro_radps[10:], rate_radps[10:], atol=0.15)
+    assert log.robot.gyro_sigma_radps == VisualGyro.SD_RADPS
 
 
 def test_camera_log_drives_as_without_a_camera(short, tmp_path):

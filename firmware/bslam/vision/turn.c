@@ -1,0 +1,323 @@
+#include "bslam/vision/turn.h"
+
+#include <string.h>
+
+#include "bslam/math/trig.h"
+
+enum { BANDS = BSLAM_TURN_BANDS, COLUMNS = BSLAM_TURN_COLUMNS, SHIFT_MAX = BSLAM_TURN_SHIFT_MAX };
+
+// Edges of the bands, tangents of the elevation. All lie above the floor, whose pattern moves otherwise than
+// the walls'.
+static const bslam_real_t EDGE[BANDS + 1] = {BSLAM_R(-0.03), BSLAM_R(0.03), BSLAM_R(0.085), BSLAM_R(0.16),
+                                             BSLAM_R(0.245), BSLAM_R(0.35), BSLAM_R(0.48)};
+// A column's neighbourhood, columns to either side.
+enum { NEIGHBOURS = 8 };
+// Steps of a pattern's values in one of luma (of a half-resolution pixel, 0 to 187).
+enum { VALUE_STEPS = 2, VALUE_MAX = 127 };
+// The search for the nearest whole shift takes every second column.
+enum { SEARCH_STEP = 2 };
+// Patterns that differ by more than this part of what they are show no shift.
+static const bslam_real_t MISMATCH_MAX = BSLAM_R(0.2);
+// Refinement of the shift: steps of Gauss and Newton, with weights of Cauchy's kind.
+enum { REFINEMENTS = 3 };
+static const bslam_real_t LEAST_RESIDUAL = BSLAM_R(0.3);
+// Residuals are no noise but things that changed, alike over columns and bands: so many count as one.
+static const bslam_real_t ALIKE = 225;
+static const bslam_real_t ROUNDING_VAR = BSLAM_R(0.17);  // of a residual, from two rounded values
+// What the floor line does not tell: how far things are, and how near they may be.
+static const bslam_real_t USUAL_DISTANCE_M = 4;
+static const bslam_real_t LEAST_DISTANCE_M = BSLAM_R(0.5);
+
+static int32_t clamp(int32_t x, int32_t low, int32_t high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/// The row of the half-resolution copy where an elevation is, in the middle of the frame.
+static int16_t row_at(const bslam_camera_t *camera, bslam_real_t elevation_tangent)
+{
+    const bslam_real_t v_px = bslam_horizon_px(camera) - camera->fy_px * elevation_tangent;
+    const bslam_real_t row = (v_px + BSLAM_R(0.5)) / 2;
+    const bslam_real_t last = (bslam_real_t)(camera->height_px / 2);
+    return (int16_t)(row < 0 ? 0 : row > last ? last : row);
+}
+
+/// Bearing of a column of the frame at the horizon, from the camera's axis.
+static bslam_real_t bearing_at(const bslam_camera_t *level, bslam_real_t u_px)
+{
+    bslam_direction_t direction;
+    return bslam_camera_unproject(level, u_px, bslam_horizon_px(level), &direction) == BSLAM_OK
+               ? bslam_atan2(direction.y, direction.x)
+               : 0;
+}
+
+static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
+{
+    bslam_camera_t level = *camera;
+    level.yaw_rad = 0;
+    const int32_t columns = camera->width_px / 2;
+    const bslam_real_t last_px = (bslam_real_t)(camera->width_px - 2) + BSLAM_R(0.5);
+    grid->first_rad = bearing_at(&level, BSLAM_R(0.5));
+    grid->step_rad = (grid->first_rad - bearing_at(&level, last_px)) / (bslam_real_t)(columns - 1);
+    for (int32_t i = 0; i < columns; i++) {
+        bslam_direction_t direction = {.z = 0};
+        bslam_real_t u_px = 0, v_px = 0;
+        bslam_sin_cos(grid->first_rad - grid->step_rad * (bslam_real_t)i, &direction.y, &direction.x);
+        const bool seen = bslam_camera_project(&level, &direction, &u_px, &v_px) == BSLAM_OK;
+        const bslam_real_t at_px = seen ? (u_px - BSLAM_R(0.5)) / 2 : 0;
+        const bslam_real_t end_px = (bslam_real_t)(columns - 1) - BSLAM_R(0.004);
+        grid->at_px[i] = (uint16_t)((at_px < 0 ? 0 : at_px > end_px ? end_px : at_px) * 256);
+    }
+    for (int32_t i = 0; i <= BANDS; i++) {
+        grid->row_px[i] = row_at(camera, EDGE[i]);
+    }
+}
+
+void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision)
+{
+    memset(turns, 0, sizeof *turns);
+    for (int32_t i = 0; i < vision->camera_count; i++) {
+        make_grid(&turns->grids[i], &vision->cameras[i]);
+    }
+}
+
+/// Luma of an RGB565 pixel: twice red, green and twice blue, 0 to 187.
+static int32_t luma(uint16_t pixel)
+{
+    return ((pixel >> 10) & 62) + ((pixel >> 5) & 63) + ((pixel << 1) & 62);
+}
+
+/// The mean luma of each column of the half-resolution copy between two rows, in steps of a 16th.
+static void column_means(const uint16_t *half, int32_t columns, int32_t first_row, int32_t end_row,
+                         int32_t means[COLUMNS])
+{
+    memset(means, 0, (size_t)columns * sizeof means[0]);
+    for (int32_t row = first_row; row < end_row; row++) {
+        for (int32_t i = 0; i < columns; i++) {
+            means[i] += luma(half[row * columns + i]);
+        }
+    }
+    const int32_t rows = end_row - first_row;
+    for (int32_t i = 0; i < columns && rows > 0; i++) {
+        means[i] = means[i] * 16 / rows;
+    }
+}
+
+/// Smooths, so that a pattern can be shifted by part of a column, and takes the mean of each column's
+/// neighbourhood off; at the ends, the last column stands for what is beyond.
+static void take_neighbours_off(const int32_t *at, int32_t columns, int8_t *values)
+{
+    const int32_t last = columns - 1;
+    int32_t sum = 0;
+    for (int32_t i = -NEIGHBOURS; i <= NEIGHBOURS; i++) {
+        sum += at[clamp(i, 0, last)];
+    }
+    for (int32_t i = 0; i < columns; i++) {
+        const int32_t smooth = (at[clamp(i - 1, 0, last)] + 2 * at[i] + at[clamp(i + 1, 0, last)]) / 4;
+        const int32_t value = (smooth - sum / (2 * NEIGHBOURS + 1)) * VALUE_STEPS / 16;
+        values[i] = (int8_t)clamp(value, -VALUE_MAX, VALUE_MAX);
+        sum += at[clamp(i + NEIGHBOURS + 1, 0, last)] - at[clamp(i - NEIGHBOURS, 0, last)];
+    }
+}
+
+static void make_pattern(bslam_turn_pattern_t *pattern, const bslam_turn_grid_t *grid, const uint16_t *half,
+                         int32_t columns)
+{
+    for (int32_t band = 0; band < BANDS; band++) {
+        int32_t means[COLUMNS], at[COLUMNS];
+        column_means(half, columns, grid->row_px[band + 1], grid->row_px[band], means);
+        for (int32_t i = 0; i < columns; i++) {
+            const int32_t left = grid->at_px[i] >> 8, part = grid->at_px[i] & 255;
+            at[i] = means[left] + (means[left + 1] - means[left]) * part / 256;
+        }
+        take_neighbours_off(at, columns, pattern->values[band]);
+    }
+}
+
+/// sums[i]: of the squares of columns i - SEARCH_STEP, i - 2 SEARCH_STEP and so on.
+static void square_sums(const bslam_turn_pattern_t *pattern, int32_t columns,
+                        int32_t sums[COLUMNS + SEARCH_STEP])
+{
+    memset(sums, 0, SEARCH_STEP * sizeof sums[0]);
+    for (int32_t i = 0; i < columns; i++) {
+        int32_t squares = 0;
+        for (int32_t band = 0; band < BANDS; band++) {
+            squares += pattern->values[band][i] * pattern->values[band][i];
+        }
+        sums[i + SEARCH_STEP] = sums[i] + squares;
+    }
+}
+
+/// Two patterns, the later shifted against the earlier: its column i is the other's column i + shift.
+typedef struct bslam_pattern_pair {
+    const bslam_turn_pattern_t *before;
+    const bslam_turn_pattern_t *now;
+    int32_t columns;
+} pattern_pair_t;
+
+typedef struct bslam_pattern_match {
+    bslam_real_t shift;          // columns
+    bslam_real_t mismatch;       // part of the patterns' squares
+    bslam_real_t mean_residual;  // of a value
+} pattern_match_t;
+
+/// Sum of the products of columns first, first + SEARCH_STEP and so on with those they are shifted to.
+static int32_t product_sum(const pattern_pair_t *pair, int32_t first, int32_t end, int32_t shift)
+{
+    int32_t sum = 0;
+    for (int32_t band = 0; band < BANDS; band++) {
+        const int8_t *now = pair->now->values[band], *before = pair->before->values[band];
+        for (int32_t i = first; i < end; i += SEARCH_STEP) {
+            sum += now[i] * before[i + shift];
+        }
+    }
+    return sum;
+}
+
+/// The whole shift by which the patterns differ least.
+static pattern_match_t search(const pattern_pair_t *pair)
+{
+    int32_t now_squares[COLUMNS + SEARCH_STEP], before_squares[COLUMNS + SEARCH_STEP];
+    square_sums(pair->now, pair->columns, now_squares);
+    square_sums(pair->before, pair->columns, before_squares);
+    pattern_match_t best = {.mismatch = 2};
+    for (int32_t shift = -SHIFT_MAX; shift <= SHIFT_MAX; shift++) {
+        const int32_t first = shift < 0 ? -shift : 0;
+        const int32_t count = (pair->columns - (shift > 0 ? shift : 0) - first) / SEARCH_STEP;
+        const int32_t end = first + count * SEARCH_STEP;
+        const int32_t squares = now_squares[end] - now_squares[first] + before_squares[end + shift] -
+                                before_squares[first + shift];
+        const bslam_real_t differing = (bslam_real_t)(squares - 2 * product_sum(pair, first, end, shift));
+        const bslam_real_t mismatch = differing / (bslam_real_t)(squares + 1);
+        if (mismatch < best.mismatch) {
+            best.shift = (bslam_real_t)shift;
+            best.mismatch = mismatch;
+            best.mean_residual = bslam_sqrt(differing / (bslam_real_t)(BANDS * count));
+        }
+    }
+    return best;
+}
+
+/// Weighted sums over the columns that both frames show.
+typedef struct bslam_turn_sums {
+    bslam_real_t weight;
+    bslam_real_t residual2;  // weighted
+    bslam_real_t residual;   // absolute, not weighted
+    bslam_real_t slope2;     // weighted
+    bslam_real_t slope_residual;
+    bslam_real_t parallax;  // slope2 of each column times its parallax
+    bslam_real_t sideways;
+    int32_t count;
+} turn_sums_t;
+
+/// Sine of a column's bearing, and the same over the distance of what is there.
+typedef struct bslam_turn_column {
+    bslam_real_t sine;
+    bslam_real_t parallax;
+} turn_column_t;
+
+static void add_column(turn_sums_t *sums, const pattern_pair_t *pair, int32_t now, bslam_real_t at,
+                       bslam_real_t scale, turn_column_t column)
+{
+    const int32_t left = (int32_t)at;
+    const bslam_real_t part = at - (bslam_real_t)left;
+    bslam_real_t slope2 = 0;
+    for (int32_t band = 0; band < BANDS; band++) {
+        const int8_t *before = &pair->before->values[band][left];
+        const bslam_real_t slope = (bslam_real_t)(before[1] - before[0]);
+        const bslam_real_t residual = (bslam_real_t)(pair->now->values[band][now] - before[0]) - slope * part;
+        const bslam_real_t ratio = residual / (2 * scale);
+        const bslam_real_t weight = 1 / (1 + ratio * ratio);
+        sums->weight += weight;
+        sums->residual2 += weight * residual * residual;
+        sums->residual += bslam_abs(residual);
+        sums->slope_residual += weight * slope * residual;
+        slope2 += weight * slope * slope;
+    }
+    sums->slope2 += slope2;
+    sums->parallax += slope2 * column.parallax;
+    sums->sideways += slope2 * column.sine;
+    sums->count += BANDS;
+}
+
+/// All columns, as the patterns lie at a shift.
+static turn_sums_t add_columns(const pattern_pair_t *pair, bslam_real_t shift, bslam_real_t scale,
+                               const turn_column_t *columns)
+{
+    turn_sums_t sums = {0};
+    for (int32_t i = 0; i < pair->columns; i++) {
+        const bslam_real_t at = (bslam_real_t)i + shift;
+        if (at >= 0 && at < (bslam_real_t)(pair->columns - 1)) {
+            add_column(&sums, pair, i, at, scale, columns[i]);
+        }
+    }
+    return sums;
+}
+
+/// Where each column looks, and how near things are there, by the floor line.
+static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t count,
+                       turn_column_t columns[COLUMNS])
+{
+    bslam_real_t sine, cosine, step_sine, step_cosine;
+    bslam_sin_cos(vision->cameras[vision->camera].yaw_rad + grid->first_rad, &sine, &cosine);
+    bslam_sin_cos(grid->step_rad, &step_sine, &step_cosine);
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t cell = (grid->at_px[i] >> 8) * 2 / BSLAM_CELL_PX;
+        const bslam_real_t told_m = vision->floor_line.distance_m[cell];
+        const bslam_real_t least_m = told_m > LEAST_DISTANCE_M ? told_m : LEAST_DISTANCE_M;
+        columns[i].sine = sine;
+        columns[i].parallax = sine / (told_m > 0 ? least_m : USUAL_DISTANCE_M);
+        const bslam_real_t next = sine * step_cosine - cosine * step_sine;  // one step to the right
+        cosine = cosine * step_cosine + sine * step_sine;
+        sine = next;
+    }
+}
+
+static bool compare(const pattern_pair_t *pair, const bslam_turn_grid_t *grid, const bslam_vision_t *vision,
+                    bslam_turn_t *turn)
+{
+    pattern_match_t match = search(pair);
+    if (!(match.mismatch < MISMATCH_MAX)) {
+        return false;
+    }
+    turn_column_t columns[COLUMNS];
+    look_along(grid, vision, pair->columns, columns);
+    turn_sums_t sums = {0};
+    for (int32_t i = 0; i < REFINEMENTS; i++) {
+        sums = add_columns(pair, match.shift, match.mean_residual + LEAST_RESIDUAL, columns);
+        if (!(sums.slope2 > 0)) {
+            return false;
+        }
+        const bslam_real_t step = sums.slope_residual / sums.slope2;
+        match.shift += step < -1 ? -1 : step > 1 ? 1 : step;
+        match.mean_residual = sums.residual / (bslam_real_t)sums.count;
+    }
+    const bslam_real_t residual_var = sums.residual2 / sums.weight + ROUNDING_VAR;
+    const bslam_real_t shift_var = ALIKE * residual_var / sums.slope2;
+    turn->turn_rad =
+        -match.shift * grid->step_rad - bslam_angle_wrap(pair->now->yaw_rad - pair->before->yaw_rad);
+    turn->variance_rad2 = shift_var * grid->step_rad * grid->step_rad;
+    turn->mismatch = match.mismatch;
+    turn->parallax_rad_per_m = sums.parallax / sums.slope2;
+    turn->sideways = sums.sideways / sums.slope2;
+    return true;
+}
+
+bool bslam_turns_see(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
+{
+    const int32_t camera = vision->camera;
+    const bslam_turn_grid_t *grid = &turns->grids[camera];
+    bslam_turn_pattern_t *before = &turns->before[camera];
+    const bslam_vision_reason_t reason = bslam_vision_reason(vision);
+    turns->now.known = reason == BSLAM_VISION_SEEN || reason == BSLAM_VISION_NOTHING;
+    bool found = false;
+    if (turns->now.known) {
+        const int32_t columns = vision->cameras[camera].width_px / 2;
+        turns->now.yaw_rad = vision->cameras[camera].yaw_rad;
+        make_pattern(&turns->now, grid, vision->thumbnail.half, columns);
+        const pattern_pair_t pair = {before, &turns->now, columns};
+        found = before->known && compare(&pair, grid, vision, turn);
+    }
+    *before = turns->now;
+    return found;
+}

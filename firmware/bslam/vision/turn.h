@@ -1,0 +1,61 @@
+/// How far the robot turned between two frames of a camera, by how far the pattern of the columns went
+/// sideways. MATH "Turning seen".
+///
+///     bslam_turns_init(&turns, &vision)                   once, after bslam_vision_init
+///     bslam_turns_see(&turns, &vision, &turn)             after each bslam_vision_end
+///
+/// It needs no beacon: a skirting board's end, a door frame or a lamp will do. What it says goes to
+/// bslam_visual_gyro_t (visual_gyro.h), which makes a rate of it that odometry takes as a gyro's.
+#ifndef BSLAM_VISION_TURN_H
+#define BSLAM_VISION_TURN_H
+
+#include "bslam/vision/vision.h"
+
+enum {
+    BSLAM_TURN_BANDS = 6,       ///< of rows, from the horizon up
+    BSLAM_TURN_SHIFT_MAX = 24,  ///< columns of the half-resolution copy: what turns farther is not found
+};
+#define BSLAM_TURN_COLUMNS (BSLAM_IMAGE_WIDTH_MAX / 2)
+
+/// The turn between two frames of one camera.
+typedef struct bslam_turn {
+    bslam_real_t turn_rad;       ///< to the left, if all that is seen were infinitely far away
+    bslam_real_t variance_rad2;  ///< of its noise
+    bslam_real_t mismatch;       ///< of the two patterns: 0 they are alike, 1 they have nothing in common
+    /// A metre driven forward looks like a turn of minus so much, if things are where the floor ends; and so
+    /// much more for each 1/m by which one over their distance is larger.
+    bslam_real_t parallax_rad_per_m;
+    bslam_real_t sideways;
+} bslam_turn_t;
+
+/// What a camera saw last: the brightness of each column less that of its neighbourhood.
+typedef struct bslam_turn_pattern {
+    bool known;
+    bslam_real_t yaw_rad;  ///< of the camera then
+    int8_t values[BSLAM_TURN_BANDS][BSLAM_TURN_COLUMNS];
+} bslam_turn_pattern_t;
+
+/// Where a camera's columns are. They stand at equal angles, from the frame's left edge to its right.
+typedef struct bslam_turn_grid {
+    bslam_real_t first_rad;                ///< of the first, from the camera's axis, positive to the left
+    bslam_real_t step_rad;                 ///< to the next, to the right
+    uint16_t at_px[BSLAM_TURN_COLUMNS];    ///< in the half-resolution copy, 256ths of a pixel
+    int16_t row_px[BSLAM_TURN_BANDS + 1];  ///< its rows between the bands, the lowest first
+} bslam_turn_grid_t;
+
+typedef struct bslam_turns {
+    bslam_turn_grid_t grids[BSLAM_CAMERAS_MAX];
+    bslam_turn_pattern_t before[BSLAM_CAMERAS_MAX];
+    bslam_turn_pattern_t now;  ///< scratch
+} bslam_turns_t;
+
+/// Makes an instance ready for the cameras of a front end that is.
+void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision);
+
+/// Looks at the frame that the front end has finished last, and remembers it. True, and *turn, if it tells
+/// how far the robot has turned since the frame of the same camera before. False, *turn unchanged: there is
+/// none before, one of the two was unusable (black, say), or it shows nothing but plain walls.
+/// Work: some 4 instructions a pixel.
+bool bslam_turns_see(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn);
+
+#endif

@@ -1,0 +1,170 @@
+#include "support.h"
+
+#include <math.h>
+
+#include "picture.h"
+
+#include "bslam/vision/turn.h"
+
+// What is seen: posts before a wall, in a ring around the start.
+#define POSTS 40
+#define RING_M 4.0
+
+static bslam_vision_t vision;
+static bslam_turns_t turns;
+static unit_picture_t picture;
+
+static int start(void **state)
+{
+    memset(&vision, 0, sizeof vision);
+    vision.camera_count = 2;
+    vision.cameras[0] = vision.cameras[1] = unit_pinhole();
+    bslam_turns_init(&turns, &vision);
+    return 0;
+}
+
+/// What a camera sees from a pose of the robot; the floor line says that all is where the ring is.
+static void look(int camera, double x_m, double theta_rad)
+{
+    static const double wall[3] = {150, 150, 150};
+    unit_panel_t posts[POSTS];
+    for (int i = 0; i < POSTS; i++) {
+        const double from_rad = 2 * 3.14159265358979 * (i + 0.3 * (i % 3)) / POSTS,
+                     to_rad = from_rad + 0.03 + 0.01 * (i % 4);
+        const double ends[2][2] = {{RING_M * cos(from_rad) - x_m, RING_M * sin(from_rad)},
+                                   {RING_M * cos(to_rad) - x_m, RING_M * sin(to_rad)}};
+        const double c = cos(theta_rad), s = sin(theta_rad), grey = 110 + 20 * (i % 5);
+        posts[i] = (unit_panel_t){.x0_m = c * ends[0][0] + s * ends[0][1],
+                                  .y0_m = c * ends[0][1] - s * ends[0][0],
+                                  .x1_m = c * ends[1][0] + s * ends[1][1],
+                                  .y1_m = c * ends[1][1] - s * ends[1][0],
+                                  .low_m = 0,
+                                  .high_m = 2.5,
+                                  .red = grey,
+                                  .green = grey,
+                                  .blue = 250 - grey};
+    }
+    unit_picture_draw(&picture, &vision.cameras[camera], wall, posts, POSTS);
+    memcpy(vision.thumbnail.half, picture.half, sizeof picture.half);
+    for (int i = 0; i < BSLAM_COLUMNS_MAX; i++) {
+        vision.floor_line.distance_m[i] = real(RING_M);
+    }
+    vision.camera = camera;
+    vision.reason = BSLAM_VISION_NOTHING;
+}
+
+static bslam_turn_t turn_seen(void)
+{
+    bslam_turn_t turn;
+    assert_true(bslam_turns_see(&turns, &vision, &turn));
+    return turn;
+}
+
+static bool sees_no_turn(void)
+{
+    bslam_turn_t turn = {.turn_rad = 7};
+    const bool found = bslam_turns_see(&turns, &vision, &turn);
+    return !found && turn.turn_rad == 7;
+}
+
+static void test_see_a_turn_is_measured_to_a_part_of_a_column(void **state)
+{
+    static const double turned_rad[] = {0.0, 0.004, -0.0131, 0.05, -0.12};
+    for (int i = 0; i < COUNT_OF(turned_rad); i++) {
+        start(state);
+        look(0, 0, 0.3);
+        assert_true(sees_no_turn());  // nothing before
+        look(0, 0, 0.3 + turned_rad[i]);
+        const bslam_turn_t turn = turn_seen();
+        assert_near((double)turn.turn_rad, turned_rad[i], 0.001);
+        assert_true(turn.mismatch < BSLAM_R(0.1));
+        assert_true(turn.variance_rad2 > 0 && turn.variance_rad2 < BSLAM_R(1e-4));
+    }
+}
+
+static void test_see_through_a_fisheye(void **state)
+{
+    vision.cameras[0] = unit_equidistant();
+    bslam_turns_init(&turns, &vision);
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0, 0.1);
+    assert_near((double)turn_seen().turn_rad, 0.1, 0.002);
+}
+
+static void test_see_driving_by_is_told_as_parallax(void **state)
+{
+    vision.cameras[0].yaw_rad = BSLAM_R(1.1);
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0.08, 0.01);
+    const bslam_turn_t turn = turn_seen();
+    assert_near((double)(turn.turn_rad + turn.parallax_rad_per_m * BSLAM_R(0.08)), 0.01, 0.0015);
+    assert_near((double)turn.parallax_rad_per_m, sin(1.1) / RING_M, 0.03);
+    assert_near((double)turn.sideways, sin(1.1), 0.1);
+}
+
+static void test_see_a_camera_that_turned_on_its_own_is_no_turn_of_the_robot(void **state)
+{
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    vision.cameras[0].yaw_rad = BSLAM_R(0.08);
+    look(0, 0, 0.02);
+    assert_near((double)turn_seen().turn_rad, 0.02, 0.0007);
+}
+
+static void test_see_each_camera_has_its_own_frame_before(void **state)
+{
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(1, 0, 0.03);
+    assert_true(sees_no_turn());
+    look(0, 0, 0.05);
+    assert_near((double)turn_seen().turn_rad, 0.05, 0.0007);
+    look(1, 0, 0.04);
+    assert_near((double)turn_seen().turn_rad, 0.01, 0.0007);
+}
+
+static void test_see_a_plain_wall_tells_nothing(void **state)
+{
+    look(0, 0, 0);
+    memset(vision.thumbnail.half, 0x55, sizeof vision.thumbnail.half);
+    assert_true(sees_no_turn());
+    assert_true(sees_no_turn());
+}
+
+static void test_see_what_is_nothing_like_the_frame_before_tells_nothing(void **state)
+{
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0, 2.0);
+    assert_true(sees_no_turn());
+}
+
+static void test_see_after_an_unusable_frame_it_starts_anew(void **state)
+{
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0, 0.02);
+    vision.reason = BSLAM_VISION_BLACK;
+    assert_true(sees_no_turn());
+    look(0, 0, 0.04);
+    assert_true(sees_no_turn());
+    look(0, 0, 0.05);
+    assert_near((double)turn_seen().turn_rad, 0.01, 0.0007);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_see_a_turn_is_measured_to_a_part_of_a_column, start),
+        cmocka_unit_test_setup(test_see_through_a_fisheye, start),
+        cmocka_unit_test_setup(test_see_driving_by_is_told_as_parallax, start),
+        cmocka_unit_test_setup(test_see_a_camera_that_turned_on_its_own_is_no_turn_of_the_robot, start),
+        cmocka_unit_test_setup(test_see_each_camera_has_its_own_frame_before, start),
+        cmocka_unit_test_setup(test_see_a_plain_wall_tells_nothing, start),
+        cmocka_unit_test_setup(test_see_what_is_nothing_like_the_frame_before_tells_nothing, start),
+        cmocka_unit_test_setup(test_see_after_an_unusable_frame_it_starts_anew, start),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
