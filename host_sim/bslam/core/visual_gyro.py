@@ -9,7 +9,7 @@ from bslam.core.vision import Turn
 
 
 class VisualGyro:
-    """As bslam_visual_gyro_t: `advance` to each reading of the wheels, then `take` the frames of that time."""
+    """As bslam_visual_gyro_t: `advance` to each reading of the wheels, then `take` that time's frames."""
 
     SD_RADPS = 0.2
     """Noise of the rate, for a log's `gyro_sigma_radps` (BSLAM_VISUAL_GYRO_SD_RADPS)."""
