@@ -4,11 +4,24 @@
 TARGET ?= m4f
 
 ARM := arm-none-eabi-
+RISCV := riscv64-unknown-elf-
 TARGET_FLAGS_m0plus := -mcpu=cortex-m0plus
 TARGET_FLAGS_m4f := -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m7 := -mcpu=cortex-m7 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m33 := -mcpu=cortex-m33 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+# Single precision in hardware, as on ESP32-P4, CH32V307 or GD32VF; with a library of its own, since Debian's
+# compiler comes without.
+TARGET_FLAGS_rv32 := -march=rv32imafc -mabi=ilp32f
 TARGETS := $(patsubst TARGET_FLAGS_%,%,$(filter TARGET_FLAGS_%,$(.VARIABLES)))
+
+# Of a core $(1): the tools' prefix, the flags of every build.
+TOOLS_FOR = $(if $(filter rv%,$(1)),$(RISCV),$(ARM))
+FLAGS_FOR = $(if $(filter rv%,$(1)),--specs=picolibc.specs -msmall-data-limit=0,-mthumb) $(TARGET_FLAGS_$(1))
+
+# The tools for RISC-V take 1.4 GB, so that nothing installs them unasked: what needs them is left out of `all`
+# where they are missing, and says so where it is asked for.
+HAS_RISCV := $(shell command -v $(RISCV)gcc)
+CAN_BUILD = $(if $(filter rv%,$(1)),$(HAS_RISCV),yes)
 
 include mk/images.mk
 
@@ -16,26 +29,33 @@ ifeq ($(filter $(TARGET),$(TARGETS) $(BOARDS)),)
 $(error TARGET is $(TARGET); allowed: $(sort $(TARGETS)), and the boards $(sort $(BOARDS)))
 endif
 
-STACK_BYTES_MAX := 1024
+# A RISC-V core saves a few more registers.
+STACK_MAX_FOR = $(if $(filter rv%,$(1)),1152,1024)
 
 .PHONY: firmware
+ifeq ($(call CAN_BUILD,$(or $(BOARD_CORE_$(TARGET)),$(TARGET))),)
+firmware:
+	@echo "firmware: $(RISCV)gcc is not installed: install it with: sudo apt-get install" \
+	    "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-misc" >&2; exit 2
+else
 firmware: $(if $(filter $(TARGET),$(BOARDS)),image,library)-$(TARGET) ## build for TARGET: a core or a board
+endif
 
 # The rules for one core: $(1) is its name.
 define core_rules
 CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
-CORE_COMPILE_$(1) := $(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_$(1)) -Os -g \
+CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(call FLAGS_FOR,$(1)) -Os -g \
     -fno-math-errno -DBSLAM_PARAM_MEANINGS=0 -ffunction-sections -fdata-sections \
-    $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(STACK_BYTES_MAX)
+    $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(call STACK_MAX_FOR,$(1))
 
 .PHONY: library-$(1)
 library-$(1): build/$(1)/libbslam.a
-	@$$(PYTHON) tools/check_symbols.py --nm $$(ARM)nm $$<
-	@$$(ARM)size --totals $$< | awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
+	@$$(PYTHON) tools/check_symbols.py --nm $(call TOOLS_FOR,$(1))nm $$<
+	@$(call TOOLS_FOR,$(1))size --totals $$< | awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
 
 build/$(1)/libbslam.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
-	@$$(ARM)ar rcs $$@ $$^
+	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$^
 
 $$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk
 	@mkdir -p $$(@D)
@@ -46,7 +66,7 @@ endef
 $(foreach core,$(TARGETS),$(eval $(call core_rules,$(core))))
 
 .PHONY: firmware-all
-firmware-all: $(TARGETS:%=library-%) images ## the library for every core, the images for every board
+firmware-all: $(foreach core,$(TARGETS),$(if $(call CAN_BUILD,$(core)),library-$(core))) images ## the library for every core, the images for every board
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons

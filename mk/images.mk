@@ -6,6 +6,7 @@ BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board
 
 # What boards may use.
 PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
+RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # and the front end for pictures.
 HOST_SIZES := -DSESSION_VISION=1 \
@@ -21,13 +22,15 @@ PROGRAMS := robot selftest
 IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
     -DBSLAM_PARAM_MEANINGS=0
 
-IMAGE_LINK := -nostartfiles --specs=nano.specs --specs=nosys.specs -Wl,--gc-sections -Wl,--build-id=sha1 \
+IMAGE_LINK := -nostartfiles -Wl,--gc-sections -Wl,--build-id=sha1 \
     -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments
+
+LIBC_FOR = $(if $(filter rv%,$(1)),,--specs=nano.specs --specs=nosys.specs)
 
 # The rules for one board: $(1) is its name.
 define board_rules
-BOARD_ARM_$(1) := $(ARM)gcc -mthumb $(TARGET_FLAGS_$(BOARD_CORE_$(1)))
-BOARD_COMPILE_$(1) := $$(BOARD_ARM_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
+BOARD_CC_$(1) := $(call TOOLS_FOR,$(BOARD_CORE_$(1)))gcc $(call FLAGS_FOR,$(BOARD_CORE_$(1)))
+BOARD_COMPILE_$(1) := $$(BOARD_CC_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(CORE_SOURCES) $(APP_SOURCES) $(BOARD_SOURCES_$(1)))
 BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
@@ -38,9 +41,9 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
 build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
-    firmware/port/cortex_m/sections.ld tools/check_image.py
-	@$$(BOARD_ARM_$(1)) $$(IMAGE_LINK) -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
-	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1)
+    firmware/port/sections.ld tools/check_image.py
+	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
+	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1) --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
 
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
@@ -51,8 +54,7 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(wildcard firmware/port/*.c) \
-    firmware/port/posix/port.c
+HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk
@@ -65,7 +67,7 @@ $(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
 -include $(HOST_ROBOT_OBJECTS:.o=.d)
 
 .PHONY: images
-images: $(BOARDS:%=image-%) $(HOST_ROBOT) ## link the images of every board, and check them
+images: $(foreach board,$(BOARDS),$(if $(call CAN_BUILD,$(BOARD_CORE_$(board))),image-$(board))) $(HOST_ROBOT) ## link the images of every board, and check them
 
 .PHONY: selftest
 selftest: images ## run the self-test of every board that QEMU has

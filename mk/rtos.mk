@@ -29,14 +29,14 @@ $(RTOS_DIR)/robot_rtos.o: firmware/app/rtos/robot_rtos.c
 # The kernel's own warnings are its own business.
 $(RTOS_DIR)/%.o: $(FREERTOS_KERNEL)/%.c
 	@mkdir -p $(@D)
-	@$(BOARD_ARM_$(RTOS_BOARD)) $(C_INCLUDES) $(RTOS_INCLUDES) $(IMAGE_FLAGS) -MMD -MP -c $< -o $@
+	@$(BOARD_CC_$(RTOS_BOARD)) $(C_INCLUDES) $(RTOS_INCLUDES) $(IMAGE_FLAGS) -MMD -MP -c $< -o $@
 
 $(RTOS_DIR)/%.o: $(RTOS_PORT)/%.c
 	@mkdir -p $(@D)
-	@$(BOARD_ARM_$(RTOS_BOARD)) $(C_INCLUDES) $(RTOS_INCLUDES) $(IMAGE_FLAGS) -MMD -MP -c $< -o $@
+	@$(BOARD_CC_$(RTOS_BOARD)) $(C_INCLUDES) $(RTOS_INCLUDES) $(IMAGE_FLAGS) -MMD -MP -c $< -o $@
 
 $(RTOS_IMAGE): $(RTOS_OBJECTS) $(BOARD_OBJECTS_$(RTOS_BOARD))
-	@$(BOARD_ARM_$(RTOS_BOARD)) $(IMAGE_LINK) -T firmware/port/$(RTOS_BOARD)/memory.ld $^ -lm -o $@
+	@$(BOARD_CC_$(RTOS_BOARD)) $(IMAGE_LINK) $(call LIBC_FOR,m4f) -T firmware/port/$(RTOS_BOARD)/memory.ld $^ -lm -o $@
 	@$(PYTHON) tools/check_image.py $@ --objects build/$(RTOS_BOARD)
 
 -include $(RTOS_OBJECTS:.o=.d)

@@ -33,7 +33,8 @@ INTERRUPT_FRAME_BYTES = 26 * 4 + 4
 
 FUNCTION = re.compile(r"^([0-9a-f]+) <(.+)>:$")
 INSTRUCTION = re.compile(r"^\s*[0-9a-f]+:\t(\S+)(?:\t(.*))?$")
-GROWS_STACK = re.compile(r"(?:subw? sp(?:, sp)?, #|str .*\[sp, #-)(\d+)")
+GROWS_STACK = re.compile(r"(?:subw? sp(?:, sp)?, #|str .*\[sp, #-|addi sp,sp,-)(\d+)")
+RISCV_CALLS = ("jal", "jalr", "j", "tail", "call")
 TARGET = re.compile(r"\b([0-9a-f]+) <([^>+]+)>")
 
 
@@ -66,7 +67,11 @@ def read_functions(listing: str) -> dict[int, Function]:
 
 def _read_instruction(function: Function, name: str, operands: str) -> None:
     target = TARGET.search(operands)
-    if target and name.startswith("b"):
+    if target and name in RISCV_CALLS:
+        function.calls.add(int(target[1], 16))
+    elif name == "jalr" or (name == "jr" and operands != "ra"):
+        function.calls_pointer = True
+    elif target and name.startswith("b"):
         # A jump to another function is a call at its end; one to the function's own start is a loop.
         if name in ("bl", "blx") or int(target[1], 16) != function.address:
             function.calls.add(int(target[1], 16))

@@ -20,7 +20,7 @@ UNDEFINED_TYPES = frozenset("Uwv")
 UNWANTED_CALLS = re.compile(
     r"""
     __aeabi_(d|cd|f2d|i2d|ui2d|l2d|ul2d)    # double arithmetic by library calls; so are GCC's own names:
-    | __(?!ieee754_)\w+df[23]?$
+    | __(?!ieee754_|math_)\w+df[23]?$
     | _?(m|c|re)alloc(_r)?$ | free$ | _sbrk$
     | (v?s?n?|f)printf$ | puts$ | putchar$
     """,

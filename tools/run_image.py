@@ -9,7 +9,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from bslam.target.lines import BUILD_DIR, ICOUNT, QEMU, qemu_machines
+from bslam.target.lines import BUILD_DIR, ICOUNT, boards_here, emulator_of, how_to_start, qemu_machines
 
 TIMEOUT_S = 120.0
 
@@ -24,10 +24,11 @@ class Ended:
 
 def run_image(board: str, program: str, *more: str) -> Ended:
     """Runs build/<board>/<program>.elf to its end, with `more` arguments for QEMU."""
-    if shutil.which(QEMU) is None:
-        raise SystemExit(f"{QEMU} is not installed: install it with: sudo apt-get install qemu-system-arm")
-    command = [QEMU, "-M", qemu_machines()[board], "-display", "none", "-monitor", "none"]
-    command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
+    emulator = emulator_of(board)
+    if shutil.which(emulator) is None:
+        raise SystemExit(f"{emulator} is not installed: docs/PORTING.md says how to get it")
+    command = [emulator, "-M", qemu_machines()[board], "-display", "none", "-monitor", "none"]
+    command += [*how_to_start(board), "-icount", ICOUNT]
     command += ["-serial", "stdio", "-kernel", str(BUILD_DIR / board / f"{program}.elf"), *more]
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=TIMEOUT_S)
@@ -40,7 +41,7 @@ def run_image(board: str, program: str, *more: str) -> Ended:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", help="selftest, or another one of firmware/app")
-    parser.add_argument("--boards", nargs="+", default=sorted(qemu_machines()), help="default: all of QEMU")
+    parser.add_argument("--boards", nargs="+", default=boards_here(), help="default: all that are here")
     options = parser.parse_args(argv)
     failed = 0
     for board in options.boards:

@@ -23,7 +23,7 @@ from bslam.experiment.runner import run_log
 from bslam.log import Log, first_steps, read_folder
 from bslam.recording.recorder import FINGERPRINT_START
 from bslam.rig import load_rig
-from bslam.target.lines import qemu_machines
+from bslam.target.lines import boards_here
 from bslam.target.remote import connect
 from bslam.world.simulate import load_scenario, simulate
 
@@ -110,7 +110,7 @@ def main(argv: list[str] | None = None) -> int:
         "--rig", help="see the scenario through these cameras; signatures go to the boards, too"
     )
     parser.add_argument("--seed", type=int, default=0, help="of a scenario (default: 0)")
-    parser.add_argument("--boards", nargs="+", default=sorted(qemu_machines()), help="default: all of QEMU")
+    parser.add_argument("--boards", nargs="+", default=boards_here(), help="default: all that are here")
     parser.add_argument("--association", default="svm", help="default: svm")
     parser.add_argument("--observation", default="distance", help="default: distance")
     options = parser.parse_args(argv)

@@ -54,13 +54,46 @@ class Line(Protocol):
 
 def qemu_machines() -> dict[str, str]:
     """The boards that QEMU has, by their folder's name, and what it calls them: from their board.mk."""
+    return _of_boards("QEMU")
+
+
+def _of_boards(what: str) -> dict[str, str]:
+    """BOARD_<what>_<board> of the board.mk that have one."""
     found = {}
     for path in sorted(ROOT.glob(BOARD_FILES)):
         board = path.parent.name
-        match = re.search(rf"^BOARD_QEMU_{board} := (\S+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+        text = path.read_text(encoding="utf-8")
+        match = re.search(rf"^BOARD_{what}_{board} := (\S+)$", text, re.MULTILINE)
         if match:
             found[board] = match[1]
     return found
+
+
+def emulator_of(board: str) -> str:
+    """The program that emulates a board."""
+    return _of_boards("EMULATOR").get(board, QEMU)
+
+
+def boards_here() -> list[str]:
+    """QEMU's boards, but for those of other cores than Arm's whose emulator or image is not here: nothing
+    installs their tools unasked (docs/PORTING.md).
+    """
+    others = _of_boards("EMULATOR")
+    missing = {
+        one for one, program in others.items() if not (shutil.which(program) and _image_of(one).is_file())
+    }
+    return sorted(set(qemu_machines()) - missing)
+
+
+def _image_of(board: str, program: str = "robot") -> Path:
+    return BUILD_DIR / board / f"{program}.elf"
+
+
+def how_to_start(board: str) -> list[str]:
+    """QEMU's arguments for a program that starts at reset and may end the emulator."""
+    if emulator_of(board) != QEMU:
+        return ["-bios", "none"]
+    return ["-semihosting-config", "enable=on,target=native"]
 
 
 def film_arguments(board: str, film: Path) -> list[str]:
@@ -103,10 +136,13 @@ class QemuLine:
         machines = qemu_machines()
         if board not in machines:
             raise BslamError(f"target 'qemu:{board}' does not exist; allowed: {allowed_targets()}")
-        if shutil.which(QEMU) is None:
-            package = "qemu-system-arm"
-            raise BslamError(f"{QEMU} is not installed: install it with: sudo apt-get install {package}")
-        self._image = BUILD_DIR / board / f"{program or 'robot'}.elf"
+        self._emulator, self._start_words = emulator_of(board), how_to_start(board)
+        if shutil.which(self._emulator) is None:
+            package = "qemu-system-arm" if self._emulator == QEMU else "qemu-system-misc"
+            raise BslamError(
+                f"{self._emulator} is not installed: install it with: sudo apt-get install {package}"
+            )
+        self._image = _image_of(board, program or "robot")
         if not self._image.is_file():
             made_by = f"make {'rtos' if program == 'robot_rtos' else 'firmware'} TARGET={board}"
             raise BslamError(f"{self._image} is missing: build it with: {made_by}")
@@ -122,8 +158,18 @@ class QemuLine:
         listener.bind(path)
         listener.listen(1)
         listener.settimeout(START_TIMEOUT_S)
-        command = [QEMU, "-M", machine, "-display", "none", "-monitor", "none", "-kernel", str(self._image)]
-        command += ["-semihosting-config", "enable=on,target=native", "-icount", ICOUNT]
+        command = [
+            self._emulator,
+            "-M",
+            machine,
+            "-display",
+            "none",
+            "-monitor",
+            "none",
+            "-kernel",
+            str(self._image),
+        ]
+        command += [*self._start_words, "-icount", ICOUNT]
         command += ["-chardev", f"socket,id=line,path={path}", "-serial", "chardev:line"]
         command += ["-qmp", f"unix:{path}.qmp,server=on,wait=off", *self._more]
         process = subprocess.Popen(
@@ -134,7 +180,7 @@ class QemuLine:
         except TimeoutError:
             process.kill()
             said = process.communicate()[1].decode(errors="replace")
-            raise TargetError(f"{QEMU} did not start: {said}") from None
+            raise TargetError(f"{self._emulator} did not start: {said}") from None
         finally:
             listener.close()
         return line, process
@@ -143,7 +189,7 @@ class QemuLine:
         """A UART drops what comes before the program has enabled it: its first bytes say that it has."""
         data = self.read(START_TIMEOUT_S)
         if not data:
-            raise TargetError(f"{self._image} on {QEMU} says nothing")
+            raise TargetError(f"{self._image} on {self._emulator} says nothing")
         return data
 
     @property
@@ -172,7 +218,9 @@ class QemuLine:
     def _gone(self) -> str:
         self._process.kill()
         said = self._process.communicate()[1].decode(errors="replace").strip()
-        return f"{QEMU} with {self._image.name} ended with status {self._process.returncode}: {said}"
+        return (
+            f"{self._emulator} with {self._image.name} ended with status {self._process.returncode}: {said}"
+        )
 
     def close(self) -> None:
         self._socket.close()

@@ -1,6 +1,7 @@
 """The images in QEMU: the same bits as here on every core, the same instructions at every run."""
 
 import re
+import shutil
 import subprocess
 
 import pytest
@@ -11,7 +12,7 @@ from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import first_steps
-from bslam.target.lines import ROOT, qemu_machines
+from bslam.target.lines import ROOT, boards_here, emulator_of, qemu_machines
 from bslam.world.simulate import load_scenario, simulate
 
 STEPS = 120
@@ -29,13 +30,22 @@ def host(log):
 
 
 SMALL = ("stm32f405", "stm32f405_seeing", "microbit")
+BOARDS = [
+    pytest.param(
+        board,
+        marks=pytest.mark.skipif(
+            board not in boards_here(), reason=f"not shown here: no image or no {emulator_of(board)}"
+        ),
+    )
+    for board in sorted(qemu_machines())
+]
 WAYS = (
     (("association", "svm"),),
     (("association", "known"), ("observation", "direction")),
 )
 
 
-@pytest.mark.parametrize("board", sorted(qemu_machines()))
+@pytest.mark.parametrize("board", BOARDS)
 def test_every_state_is_that_of_the_host(log, host, board):
     ways = WAYS[1:] if board in SMALL else WAYS  # unknown identity is given room for 80 beacons
     for words in ways:
@@ -45,7 +55,7 @@ def test_every_state_is_that_of_the_host(log, host, board):
         assert len(set(there)) == len(there)
 
 
-@pytest.mark.parametrize("board", sorted(qemu_machines()))
+@pytest.mark.parametrize("board", BOARDS)
 def test_the_self_test_passes_on_the_board(board):
     ended = run_image.run_image(board, "selftest")
     assert ended.status == 0, ended.output
@@ -86,3 +96,23 @@ def test_an_image_that_does_not_fit_is_refused_by_the_linker(tmp_path):
     )
     assert done.returncode != 0
     assert re.search(r"region `RAM' overflowed by \d+ bytes", done.stderr), done.stderr
+
+
+def test_without_its_tools_risc_v_says_what_to_install(tmp_path):
+    """PATH has all that make needs and no compiler for RISC-V."""
+    for tool in ("sh", "bash", "make", "sed", "awk", "cc", "pkg-config", "mkdir", "cat"):
+        found = shutil.which(tool)
+        if found:
+            (tmp_path / tool).symlink_to(found)
+    for target in ("rv32", "riscv_virt"):
+        command = ["make", "--no-print-directory", "firmware", f"TARGET={target}"]
+        environment = {"PATH": str(tmp_path), "HOME": str(tmp_path)}
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode == 2
+        assert "apt-get install gcc-riscv64-unknown-elf" in done.stderr
+
+
+def test_only_boards_of_other_cores_may_be_missing(monkeypatch):
+    """A missing qemu-system-arm skips nothing: its boards stay in the list, and their tests fail."""
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert boards_here() == [one for one in sorted(qemu_machines()) if emulator_of(one) == "qemu-system-arm"]
