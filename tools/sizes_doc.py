@@ -197,7 +197,7 @@ for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images
 
-`robot.elf`, `-O2`, bytes; RAM without the stack. The MPS2 boards have the host's largest sizes (80 beacons); \
+`robot.elf`, `-O2`, bytes; RAM without stack. The MPS2 boards have the host's largest sizes (80 beacons); \
 stm32f405 learns looks, stm32f405_seeing has the front end for one QVGA camera, both 20 beacons; microbit 6.
 
 {table(("image", "ROM", "RAM"), image_rows())}
