@@ -153,6 +153,27 @@ def _rig(arguments: argparse.Namespace) -> str:
     return arguments.rig or load_scenario(arguments.scenario).rig or DEFAULT_RIG
 
 
+def add_algorithm_options(parser: argparse.ArgumentParser) -> Any:
+    """Algorithms of the user's own; the group, for more of the kind."""
+    group = parser.add_argument_group("algorithms")
+    group.add_argument(
+        "--with",
+        dest="own",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="an algorithm of your own; may be repeated",
+    )
+    group.add_argument(
+        "--call-limit",
+        type=positive_number,
+        default=60.0,
+        metavar="S",
+        help="an algorithm hangs if one step takes longer, in seconds (default: 60)",
+    )
+    return group
+
+
 def add_batch_options(
     parser: argparse.ArgumentParser, command: str, seeds: str = "0:1", pictures: int = 5
 ) -> None:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from bslam.commands.arguments import (
+    add_algorithm_options,
     add_batch_options,
     add_filter_options,
     add_sensor_options,
     positive_count,
-    positive_number,
     run_options,
     scenario_source,
 )
@@ -48,15 +48,7 @@ the runs, compare.png the errors over time."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("scenario", metavar="SCENARIO", help="name, path of a TOML file, or a log folder")
-    group = parser.add_argument_group("algorithms")
-    group.add_argument(
-        "--with",
-        dest="own",
-        action="append",
-        default=[],
-        metavar="MODULE:CLASS",
-        help="an algorithm of your own; may be repeated",
-    )
+    group = add_algorithm_options(parser)
     group.add_argument("--only", metavar="NAME,...", help="of those that come with bslam, only these")
     group.add_argument(
         "--map-every",
@@ -64,13 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=25,
         metavar="N",
         help="solve the exact MAP every N steps (25)",
-    )
-    group.add_argument(
-        "--call-limit",
-        type=positive_number,
-        default=60.0,
-        metavar="S",
-        help="an algorithm hangs if one step takes longer, in seconds (default: 60)",
     )
     add_sensor_options(parser)
     add_filter_options(parser)

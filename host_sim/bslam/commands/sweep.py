@@ -8,10 +8,16 @@ import itertools
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
+from bslam.commands.arguments import (
+    add_algorithm_options,
+    add_batch_options,
+    add_filter_options,
+    add_sensor_options,
+)
 from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
 from bslam.commands.report import HEADINGS, mean_row, table_of
@@ -19,6 +25,8 @@ from bslam.errors import BslamError
 from bslam.experiment.batch import Job, make_jobs
 from bslam.experiment.cluster import cluster
 from bslam.experiment.consistency import half_interval_95
+from bslam.experiment.contest import Guest, guest_jobs
+from bslam.experiment.methods import method_digest, own_method
 from bslam.experiment.options import RunOptions
 from bslam.experiment.output import write_atomically, write_summary
 from bslam.experiment.sources import Source
@@ -40,6 +48,7 @@ EXAMPLES = """examples:
   bslam sweep paper_room --sigma 0.3,0.6,1.0 --filter standard,invariant --seeds 0:10
   bslam sweep pairs --association known,known:0.05,nearest,mahalanobis --seeds 0:5
   bslam sweep gates.toml --jobs 8 --out out/gates
+  bslam sweep paper_room --with my_slam:MySlam --seeds 0:100
   bslam sweep gates.toml --cluster tcp://10.0.0.1:8786 --no-files
 
 A sweep file (TOML) holds the options by their names, with underscores, and lists where there are several:
@@ -48,14 +57,17 @@ A sweep file (TOML) holds the options by their names, with underscores, and list
   sigma = [0.3, 1.0]
   association = ["known", "mahalanobis"]
   set.gate_d2 = [9.0, 16.0]
-which is 2 x 100 x 2 x 2 x 2 runs. Finished runs are kept in DIR/sweep.sqlite: after Ctrl-C, a crash or a
-power cut the same command makes those that are missing. results.parquet has a row a run, sweep.txt the means
+which is 2 x 100 x 2 x 2 x 2 runs. with = ["my_slam:MySlam"] makes the same drives with an algorithm of your
+own, too (docs/PLUGIN.md), each run in a process of its own.
+Finished runs are kept in DIR/sweep.sqlite: after Ctrl-C, a crash or a power cut the same command makes those
+that are missing. results.parquet has a row a run, sweep.txt the means
 of each combination over its seeds. On a cluster every worker needs this version of bslam and, without
 --no-files, the same DIR."""
 _LISTS: Final = ("observation", "association", "filter", "sigma")
 _FLAGS: Final = ("velocity_states", "known_map", "files")
+_MANY: Final = ("with",)  # options that may be repeated
 _WORDS: Final = ("seeds", "motion", "noise", "sensor", "rig", "real")
-_KEYS: Final = dict.fromkeys(("scenarios", *_LISTS, *_WORDS, *_FLAGS, "set"))
+_KEYS: Final = dict.fromkeys(("scenarios", *_LISTS, *_WORDS, *_FLAGS, *_MANY, "set"))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,6 +91,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="trajectories and map of each run, about 0.7 MB (default: yes)",
     )
+    add_algorithm_options(parser)
     add_sensor_options(parser)
     add_filter_options(parser, lists=_LISTS)
     add_batch_options(parser, "sweep", pictures=0)
@@ -135,7 +148,8 @@ def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
     """Means over the seeds, one line a combination, and how sure the mean error is."""
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for entry in entries:
-        words = [f"sigma {entry['sigma_mps']}", *(str(entry[key]) for key in ("observation", "filter"))]
+        words = [f"sigma {entry['sigma_mps']}", str(entry["observation"])]
+        words.append(str(entry["method"] if "method" in entry else entry["filter"]))
         words += [str(entry["association"]), *_parameters(entry, entries)]
         groups.setdefault((str(entry["scenario"]), *words), []).append(entry)
     rows = [["means over seeds", "runs", "mean +- cm", *HEADINGS]]
@@ -147,12 +161,12 @@ def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
 
 def _parameters(entry: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Those that differ from run to run, but for what the other words say already."""
-    own = entry["parameters"]
+    own = entry.get("parameters", {})
     told = ("association", "filter", "left_speed_sd_mps", "right_speed_sd_mps")
     return [
         f"{key} {own[key]}"
         for key in sorted(own)
-        if key not in told and len({one["parameters"].get(key) for one in entries}) > 1
+        if key not in told and len({one.get("parameters", {}).get(key) for one in entries}) > 1
     ]
 
 
@@ -184,7 +198,11 @@ def jobs_and_plan(arguments: argparse.Namespace) -> tuple[list[Job], dict[str, s
         options += more_options
     jobs = make_jobs(sources, options, draw, arguments.pictures)
     if not grids[0].files:
-        jobs = [Job(one.name, one.source, one.options, one.draw, files=False) for one in jobs]
+        jobs = [replace(one, files=False) for one in jobs]
+    methods = [own_method(text) for text in grids[0].own]
+    words |= {f"with {one.where}": method_digest(one) for one in methods}
+    guests = [guest_jobs(jobs, Guest(one, grids[0].call_limit)) for one in methods]
+    jobs += itertools.chain.from_iterable(guests)
     worlds = {f"scenario {one.scenario}": repr(load_scenario(one.scenario)) for one in grids}
     return jobs, words | worlds | {"bslam": code_digest()}
 
@@ -222,6 +240,8 @@ def _words(key: str, value: Any) -> list[str]:
     option = key.replace("_", "-")
     if key in ("scenarios", "set"):
         return []
+    if key in _MANY:
+        return [f"--{option}={one}" for one in _listed(value)]
     if key in _FLAGS and isinstance(value, bool):
         return [f"--{option}" if value else f"--no-{option}"] if key != "known_map" or value else []
     return [f"--{option}={','.join(str(one) for one in _listed(value))}"]

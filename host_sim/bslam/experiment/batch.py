@@ -51,6 +51,7 @@ class Job:
     draw: Draw | None = None
     record: bool = False  # write the log as a folder NAME and the run as NAME.mcap, too
     files: bool = True  # write trajectories and map
+    maker: Maker | None = None  # who makes it; None: our own core
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,10 @@ class Outcome:
     @property
     def failed(self) -> bool:
         return self.bad_input is not None or self.crash is not None
+
+
+Maker = Callable[[Job, Path], Outcome]
+"""Makes a job in another way than by our own core; it can be sent to another process."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,7 @@ def _prepare_one(source: Source) -> None:
 def execute(job: Job, out: Path) -> Outcome:
     """One run from log to files. Never raises: a failure is an outcome, too."""
     try:
-        return _execute(job, out)
+        return _execute(job, out) if job.maker is None else job.maker(job, out)
     except BslamError as error:
         return Outcome(job.name, failed_entry(job, str(error)), bad_input=str(error))
     except TargetError as error:  # the robot at the other end went: there is nothing to look into here

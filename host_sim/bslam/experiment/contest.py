@@ -51,6 +51,27 @@ class ContestResult:
     interrupted: bool
 
 
+@dataclass(frozen=True)
+class Guest:
+    """Makes a batch's jobs by an algorithm, each in a process of its own."""
+
+    method: Method
+    call_limit_s: float
+
+    def __call__(self, job: Job, out: Path) -> Outcome:
+        """The outcome; one that is named if the algorithm raises, dies or hangs."""
+        return _watch(Bout(self.method, replace(job, maker=None)), out.absolute(), self.call_limit_s, Event())
+
+
+def guest_jobs(jobs: Sequence[Job], guest: Guest) -> list[Job]:
+    """The same drives for an algorithm; what only our core has, a filter say, makes no second run of it."""
+    drives: dict[str, Job] = {}
+    for job in jobs:
+        plain = replace(job.options, filter="standard", motion="arc", parameters=())
+        drives.setdefault(repr((job.source, plain)), job)
+    return [replace(one, name=f"{one.name}.{guest.method.name}", maker=guest) for one in drives.values()]
+
+
 def make_bouts(
     methods: Sequence[Method], sources: Sequence[Source], options: Sequence[RunOptions]
 ) -> list[Bout]:

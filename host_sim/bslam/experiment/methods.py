@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import inspect
@@ -75,6 +76,17 @@ def own_method(text: str) -> Method:
     if found is None:
         raise BslamError(f"--with {text}: there is no module {module}, here or installed; {allowed}")
     return Method(name, f"{module}:{name}")
+
+
+def method_digest(method: Method) -> str:
+    """Of the file that it stands in: results of two versions are not one."""
+    place = method.where.rpartition(":")[0]
+    if not place.endswith(".py"):
+        _look_beside_the_user()
+        spec = importlib.util.find_spec(place)
+        place = "" if spec is None or spec.origin is None else spec.origin
+    path = Path(place)
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else "unknown"
 
 
 def load_method(method: Method) -> Callable[[Setup], Algorithm]:

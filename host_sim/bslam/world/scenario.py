@@ -17,6 +17,7 @@ from bslam.errors import BslamError
 from bslam.log import (
     BEACON_ID_MAX,
     BEARING_SIGMA_RAD,
+    GYRO_SIGMA_RADPS,
     RANGE_SIGMA_FLOOR_M,
     RANGE_SIGMA_FRACTION,
     RANGE_SIGMA_SCALE_M,
@@ -180,6 +181,14 @@ class Encoders:
 
 
 @dataclass(frozen=True)
+class Gyro:
+    """Says how fast the robot turns, in the mean over each step; in a drive it is off by a constant bias."""
+
+    sigma_radps: float = setting(GYRO_SIGMA_RADPS)  # each reading, independent
+    bias_sigma_radps: float = setting(number(0.0, 100.0), 0.0)  # of the bias, which the seed draws
+
+
+@dataclass(frozen=True)
 class Sensor:
     """What sees beacons. The sd of a range r is sqrt(floor^2 + (fraction r)^2 + (r^2 / scale)^2)."""
 
@@ -217,6 +226,7 @@ class Scenario:
     wheels: Wheels
     encoders: Encoders | None
     sensor: Sensor
+    gyro: Gyro | None = None
     movers: tuple[Mover, ...] = ()
     recorded: tuple[tuple[float, float, float, float], ...] = ()
     rig: str | None = None
@@ -272,9 +282,10 @@ TABLES: dict[str, type] = {
     "driving": Driving,
     "wheels": Wheels,
     "encoders": Encoders,
+    "gyro": Gyro,
     "sensor": Sensor,
 }
-OPTIONAL = ("encoders", "areas", "beacons", "boxes", "movers", "rig")
+OPTIONAL = ("encoders", "gyro", "areas", "beacons", "boxes", "movers", "rig")
 LISTS: dict[str, type] = {
     "walls": _WallTable,
     "beacons": _BeaconTable,

@@ -25,9 +25,11 @@ from bslam.world.driving import Drive, drive
 from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
 from bslam.world.signatures import generic_looks
-from bslam.world.wheels import count_ticks, read_travel
+from bslam.world.wheels import count_ticks, read_gyro, read_travel
 
 __all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
+
+_BIAS_AS_NOISE_S = 2.0  # docs/EXPERIMENTS.md "A gyro"
 
 
 def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, noise: str | None = None) -> Log:
@@ -83,10 +85,10 @@ def with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -
 
 
 def _random_streams(seed: int) -> list[np.random.Generator]:
-    """Driving, wheels, sensing."""
+    """Driving, wheels, sensing, gyro."""
     if seed < 0:
         raise BslamError(f"seed: {seed!r} is not allowed; allowed: an integer from 0")
-    return np.random.default_rng(seed).spawn(3)
+    return np.random.default_rng(seed).spawn(4)
 
 
 def _wheel_noise_m(scenario: Scenario, seed: int) -> NDArray[np.float64]:
@@ -104,8 +106,14 @@ def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], pa
     else:
         travel_m = travel_m - np.where(path.stalled[:, np.newaxis], 0.0, noise_m)
     if scenario.encoders is None:
-        return read_travel(time_us, travel_m)
-    return count_ticks(scenario.encoders, time_us, travel_m)
+        odometry = read_travel(time_us, travel_m)
+    else:
+        odometry = count_ticks(scenario.encoders, time_us, travel_m)
+    if scenario.gyro is None:
+        return odometry
+    rate_radps = read_gyro(scenario.gyro, _random_streams(seed)[3], path.theta_rad, scenario.step_us)
+    unsaid = np.full(len(odometry.time_us) - len(rate_radps), np.nan)  # the counters' first row moves nothing
+    return replace(odometry, gyro_radps=np.concatenate([unsaid, rate_radps]))
 
 
 def _until(sightings: Sightings, end_us: int) -> Sightings:
@@ -154,8 +162,18 @@ def _describe_robot(scenario: Scenario) -> Robot:
         sensor_y_m=sensor.y_m,
         sensor_yaw_rad=sensor.yaw_rad,
         sighting_delay_us=sensor.delay_us,
+        **_gyro_noise(scenario),
         left_radius_m=None if encoders is None else encoders.left_radius_m,
         right_radius_m=None if encoders is None else encoders.right_radius_m,
         ticks_per_revolution=None if encoders is None else encoders.ticks_per_revolution,
         counter_bits=None if encoders is None else encoders.counter_bits,
     )
+
+
+def _gyro_noise(scenario: Scenario) -> dict[str, float]:
+    """What the filter is told, which has no state for the bias: noise as bad after _BIAS_AS_NOISE_S."""
+    gyro = scenario.gyro
+    if gyro is None:
+        return {}
+    steps = _BIAS_AS_NOISE_S / (scenario.step_us * 1e-6)
+    return {"gyro_sigma_radps": math.hypot(gyro.sigma_radps, gyro.bias_sigma_radps * math.sqrt(steps))}

@@ -1,4 +1,4 @@
-"""What the wheels say of the motion. Travel is (steps, 2): how far the left and the right wheel went, m."""
+"""What the wheels, and a gyro, say of the motion. Travel (steps, 2): how far left and right wheel went, m."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.log import Odometry
-from bslam.world.scenario import Encoders
+from bslam.log import Odometry, wrap_rad
+from bslam.world.scenario import Encoders, Gyro
 
 
 def read_travel(time_us: NDArray[np.int64], travel_m: NDArray[np.float64]) -> Odometry:
@@ -26,3 +26,12 @@ def count_ticks(encoders: Encoders, time_us: NDArray[np.int64], travel_m: NDArra
     left_ticks, right_ticks = np.mod(ticks, 2.0**encoders.counter_bits).T
     times_us = np.concatenate([np.zeros(1, dtype=np.int64), time_us])
     return Odometry("ticks", times_us, left_ticks.copy(), right_ticks.copy())
+
+
+def read_gyro(
+    gyro: Gyro, random: np.random.Generator, theta_rad: NDArray[np.float64], step_us: int
+) -> NDArray[np.float64]:
+    """Its rate in each step, rad/s (steps,), from the headings (steps + 1,) at their ends."""
+    rate_radps = wrap_rad(np.diff(theta_rad)) / (step_us * 1e-6)
+    bias_radps = gyro.bias_sigma_radps * random.standard_normal()
+    return rate_radps + bias_radps + gyro.sigma_radps * random.standard_normal(len(rate_radps))

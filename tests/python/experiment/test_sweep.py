@@ -15,6 +15,15 @@ from bslam.cli import main
 from bslam.errors import BslamError
 from bslam.experiment.sweep import Store, forget
 
+STILL = """
+class Still:
+    def reset(self, seed): self.seed = seed
+    def odometry(self, time_us, left_m, right_m): pass
+    def observe(self, time_us, sightings): pass
+    def pose(self): return 0.0, 0.0, 0.0
+    def map(self): return []
+"""
+
 
 def write(path: Path, *lines: str) -> Path:
     path.write_text("\n".join(lines), encoding="utf-8")
@@ -131,6 +140,27 @@ def test_sweep_goes_on_past_a_run_that_fails_and_tries_it_again(
     failed = [run for run in runs(out) if "error" in run]
     assert len(runs(out)) == 8 and len(failed) == 4 and all(run["diverged"] for run in failed)
     assert kill_sweep.kept(out) == 4
+
+
+def test_sweep_with_an_algorithm_makes_its_runs_once_and_names_what_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kill_sweep.write_sweep(tmp_path, 2)
+    monkeypatch.chdir(tmp_path)
+    module = write(tmp_path / "mine_of_sweep.py", STILL)
+    lines = ['scenarios = ["short.toml"]', 'seeds = "0:2"', 'association = "known"', "files = false"]
+    lines += ['filter = ["standard", "invariant"]', 'with = ["mine_of_sweep:Still"]']
+    sweep, out = write(tmp_path / "grid.toml", *lines), tmp_path / "out"
+    assert sweep_into(out, sweep) == 0
+    found = {run["name"]: run.get("method", run.get("filter")) for run in runs(out)}
+    assert sorted(found.values()) == ["Still", "Still", "invariant", "invariant", "standard", "standard"]
+    assert [line.count("Still") for line in (out / "sweep.txt").read_text().splitlines()] == [0, 0, 0, 1]
+    write(module, STILL.replace("return 0.0, 0.0", "return 1.0 / (self.seed - 1), 0.0"))
+    capsys.readouterr()
+    assert sweep_into(out, sweep) == 1  # a finished sweep gives way to another version's
+    said = capsys.readouterr().err
+    assert "Still failed" in said and "ZeroDivisionError" in said and "mine_of_sweep.py" in said
+    assert sum("error" in run for run in runs(out)) == 1 and len(runs(out)) == 6
 
 
 def test_sweep_on_a_dask_cluster_makes_the_same_runs(

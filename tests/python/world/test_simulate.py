@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from bslam.errors import BslamError
-from bslam.log import Log, read_folder, write_folder
+from bslam.log import Log, read_folder, wrap_rad, write_folder
 from bslam.world.arena import Arena
 from bslam.world.robot import move_on_arc
-from bslam.world.scenario import Encoders, Scenario
+from bslam.world.scenario import Encoders, Gyro, Scenario
 from bslam.world.simulate import load_scenario, scenario_names, simulate, true_drive
 
 
@@ -274,3 +274,23 @@ def test_simulate_is_quick_enough(paper_room: Scenario) -> None:
     begin_s = time.process_time()
     simulate(paper_room, 0)
     assert time.process_time() - begin_s < 0.7  # a run has two seconds for everything
+
+
+def test_gyro_says_the_true_turn_with_its_noise_and_a_bias_of_the_drive(paper_room: Scenario) -> None:
+    plain = simulate(paper_room, seed=5)
+    sure = simulate(replace(paper_room, gyro=Gyro(1e-6)), seed=5)
+    assert sure.odometry.a.tolist() == plain.odometry.a.tolist()
+    assert sure.sightings.range_m.tolist() == plain.sightings.range_m.tolist()
+    assert sure.truth is not None and sure.odometry.gyro_radps is not None
+    turned_rad = wrap_rad(np.diff(sure.truth.theta_rad))
+    assert np.abs(sure.odometry.gyro_radps * 0.04 - turned_rad).max() < 1e-6
+    off = simulate(replace(paper_room, gyro=Gyro(0.02, 0.05)), seed=5)
+    assert off.odometry.gyro_radps is not None
+    error_radps = off.odometry.gyro_radps - turned_rad / 0.04
+    assert error_radps.std() == pytest.approx(0.02, rel=0.05)
+    assert 0.001 < abs(error_radps.mean()) < 0.2
+    assert off.robot.gyro_sigma_radps == pytest.approx(math.hypot(0.02, 0.05 * math.sqrt(50)))
+    encoders = Encoders(left_radius_m=0.05, right_radius_m=0.05, ticks_per_revolution=2000, counter_bits=12)
+    ticks = simulate(replace(paper_room, gyro=Gyro(1e-6), encoders=encoders), seed=5).odometry
+    assert ticks.gyro_radps is not None and math.isnan(ticks.gyro_radps[0])
+    assert ticks.gyro_radps[1:].tolist() == sure.odometry.gyro_radps.tolist()
