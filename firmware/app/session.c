@@ -10,6 +10,8 @@
 #define FLAG_FINGERPRINT 1u
 #define FLAG_LOOKS 2u
 #define FLAG_AS_IT_IS 4u
+#define FLAG_RECOVERY 8u
+#define FLAG_GUARD 16u
 #define FLAG_GYRO 1u
 #define FLAG_MOVED 1u
 
@@ -52,6 +54,7 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
             session->params = session->slam.params;
         } else {
             session->uses_looks = (flags & FLAG_LOOKS) != 0;
+            watch_init(&session->watch, (flags & FLAG_RECOVERY) != 0, (flags & FLAG_GUARD) != 0);
             bslam_params_default(&session->params);
         }
         forget_seeds(session);
@@ -82,6 +85,7 @@ static uint8_t start_over(session_t *session, int *bad_id)
 {
     const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, bad_id);
     session->fingerprint = BSLAM_FINGERPRINT_START;
+    watch_restart(&session->watch);
     return status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
 }
 
@@ -189,7 +193,7 @@ static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
     if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
         const uint32_t began = port_ticks();
         const int64_t time_us = session->parser.header.time_us;
-        keep(session, bslam_slam_sightings(&session->slam, time_us, session->sightings, count));
+        keep(session, watch_sightings(&session->watch, &session->slam, time_us, session->sightings, count));
         session->ticks = port_ticks() - began;
         session->detail = (uint8_t)bslam_slam_bad_sighting(&session->slam);
     }
@@ -307,8 +311,8 @@ static void apply_look(session_t *session, bslam_link_reader_t *reader)
         seeing_t *seeing = &session->seeing;
         bslam_status_t status = seeing_look(seeing, moved);
         if (status == BSLAM_OK) {
-            status = bslam_slam_sightings(&session->slam, session->parser.header.time_us, seeing->sightings,
-                                          seeing->count);
+            status = watch_sightings(&session->watch, &session->slam, session->parser.header.time_us,
+                                     seeing->sightings, seeing->count);
         }
         keep(session, status);
         session->ticks += port_ticks() - began;
@@ -423,6 +427,12 @@ static void answer_counters(session_t *session, bslam_link_reader_t *reader, bsl
     bslam_link_put_u32(out, session->replayed);
 }
 
+static void answer_health(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    watch_put_health(&session->watch, &session->slam, out);
+}
+
 // ---- from a frame to its message
 // ------------------------------------------------------------------------------
 
@@ -474,6 +484,7 @@ static const exchange_t exchanges[] = {
     {SESSION_STATE, apply_nothing, answer_step},
     {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
     {SESSION_SET_POSE, apply_set_pose, answer_step},
+    {SESSION_HEALTH, apply_nothing, answer_health},
 #if SESSION_VISION
     {SESSION_CAMERA, apply_camera, answer_nothing},
     {SESSION_IMAGE, apply_image, answer_nothing},
@@ -521,6 +532,20 @@ static void answer(session_t *session, const exchange_t *exchange)
     send(session, &out);
 }
 
+/// Before anything is done with the filter. False: its memory is no longer what it was, and it has started
+/// over with an empty map.
+static bool is_good(session_t *session, int64_t time_us)
+{
+    if (watch_is_good(&session->watch, &session->slam, time_us)) {
+        return true;
+    }
+    int bad_id;
+    const uint8_t status = start_over(session, &bad_id);
+    (void)status;  // the parameters were good before
+    watch_end_step(&session->watch, &session->slam, time_us);
+    return false;
+}
+
 static void end_step(session_t *session)
 {
     if (session->takes_fingerprints) {
@@ -543,8 +568,17 @@ static void apply(session_t *session, const exchange_t *exchange)
         session->last_status = SESSION_E_TYPE;
         return;
     }
+    const int64_t time_us = session->parser.header.time_us;
+    const bool is_of_filter = exchange->type != SESSION_PIXELS;  // of which there are too many to check each
+    if (is_of_filter && exchange->type != SESSION_HELLO && !is_good(session, time_us)) {
+        keep(session, BSLAM_E_STATE);
+        return;
+    }
     bslam_link_reader_t reader = bslam_link_payload(&session->parser);
     exchange->apply(session, &reader);
+    if (is_of_filter) {
+        watch_end_step(&session->watch, &session->slam, time_us);
+    }
     if (exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS ||
         exchange->type == SESSION_LOOK) {
         end_step(session);
@@ -643,7 +677,9 @@ void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ti
                                               .left_ticks = left_ticks,
                                               .right_ticks = right_ticks};
     const uint32_t began = port_ticks();
-    const bslam_status_t status = bslam_slam_odometry(&session->slam, &reading);
+    const bool good = is_good(session, time_us);
+    const bslam_status_t status = good ? bslam_slam_odometry(&session->slam, &reading) : BSLAM_E_STATE;
+    watch_end_step(&session->watch, &session->slam, time_us);
     session->ticks = port_ticks() - began;
     if (left_ticks != session->left_ticks || right_ticks != session->right_ticks) {
         session->moves++;
@@ -677,10 +713,13 @@ static void look(session_t *session, const port_row_t *row)
     seeing_t *seeing = &session->seeing;
     const uint32_t began = port_ticks();
     bslam_status_t status = seeing_look(seeing, session->moves != session->moves_seen[row->camera]);
+    status = is_good(session, row->time_us) ? status : BSLAM_E_STATE;
     session->moves_seen[row->camera] = session->moves;
     if (status == BSLAM_OK) {
-        status = bslam_slam_sightings(&session->slam, row->time_us, seeing->sightings, seeing->count);
+        status =
+            watch_sightings(&session->watch, &session->slam, row->time_us, seeing->sightings, seeing->count);
     }
+    watch_end_step(&session->watch, &session->slam, row->time_us);
     session->ticks += port_ticks() - began;
     end_step(session);
     for (int i = 0; i < seeing->count; i++) {

@@ -8,6 +8,7 @@
 #define APP_SESSION_H
 
 #include "app/seeing.h"
+#include "app/watch.h"
 #include "bslam/bslam.h"
 #include "port/port.h"
 
@@ -35,6 +36,7 @@ typedef enum session_message {
     SESSION_STATE = 0x0f,       ///< asks where the robot stands
     SESSION_PARAM_SAVE = 0x10,  ///< keeps the parameters as set over a restart
     SESSION_SET_POSE = 0x16,    ///< the robot is told where it is
+    SESSION_HEALTH = 0x17,      ///< asks what went wrong so far, and what the robot knows of it
     SESSION_CAMERA = 0x11,      ///< what a camera is; this and the next four: only with SESSION_VISION
     SESSION_IMAGE = 0x12,       ///< starts a picture
     SESSION_PIXELS = 0x13,      ///< the next bytes of it
@@ -72,6 +74,7 @@ typedef struct session {
 #if SESSION_VISION
     seeing_t seeing;
 #endif
+    watch_t watch;
     bslam_params_t params;  ///< as set, for the next reset
     bslam_link_parser_t parser;
     uint32_t id;  ///< the host's number of this session

@@ -29,7 +29,7 @@ static const bslam_real_t DOUBT_HEADING_MAX_RAD = BSLAM_R(0.6);
 
 enum {
     EVIDENCE_SEVERAL = 8,   ///< frames that contradict, less those that agree, until the robot is lost,
-    EVIDENCE_ONE = 25,      ///< if all show the same beacon
+    EVIDENCE_ONE = 25,      ///< if all show the same beacon, or with those that say neither, once several did
     CLUE_AGE_US = 3000000,  ///< odometry carries a clue so long
     FIX_AGE_US = 1000000,
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
@@ -226,13 +226,20 @@ static bool fits_any(const bslam_recovery_t *recovery, const bslam_slam_t *slam,
     return false;
 }
 
+/// Several beacons were elsewhere: what merely stands where some beacon is dispels such a doubt no more.
+static bool is_serious(const bslam_recovery_t *recovery)
+{
+    return recovery->evidence > 0 && recovery->several;
+}
+
 static verdict_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_pose_t *mount,
                        const bslam_sighting_t *sightings, int count, const int *who)
 {
     verdict_t verdict = {0, 0, 0};
     for (int i = 0; i < count; i++) {
         if (who[i] < 0) {
-            verdict.agreeing += fits_any(recovery, slam, mount, &sightings[i]) ? 1 : 0;
+            verdict.agreeing +=
+                !is_serious(recovery) && fits_any(recovery, slam, mount, &sightings[i]) ? 1 : 0;
             continue;
         }
         const bslam_real_t distance2 = distance2_of(slam, mount, &sightings[i], who[i]);
@@ -290,6 +297,7 @@ static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, i
         recovery->doubted_us = time_us;
         recovery->doubted_uid = verdict->uid;
         recovery->several = false;
+        recovery->undecided = 0;
     }
     recovery->several =
         recovery->several || verdict->contradicting > 1 || verdict->uid != recovery->doubted_uid;
@@ -310,6 +318,12 @@ static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_
     } else if (verdict->contradicting < verdict->agreeing && recovery->evidence > 0) {
         recovery->evidence--;
         return true;
+    } else if (is_serious(recovery)) {
+        recovery->undecided++;
+        if (recovery->undecided + recovery->evidence >= EVIDENCE_ONE) {
+            get_lost(recovery, slam);
+            return false;
+        }
     }
     return recovery->evidence == 0 || !recovery->several;
 }

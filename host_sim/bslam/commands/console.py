@@ -17,7 +17,7 @@ from bslam.commands.report import table_of
 from bslam.errors import BslamError
 from bslam.experiment.options import ASSOCIATIONS
 from bslam.experiment.runner import run_log
-from bslam.link.messages import PoseReport
+from bslam.link.messages import Health, PoseReport
 from bslam.log import Log, read_folder
 from bslam.recording import RecordingWriter
 from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, Start, State
@@ -295,8 +295,19 @@ def describe(slam: Any, time_us: int) -> str:
         f"pose      x {x_m:.3f} m, y {y_m:.3f} m, heading {math.degrees(theta_rad):.1f} deg "
         f"(sd {sd_cm:.1f} cm, {sd_deg:.1f} deg)",
     ]
+    if hasattr(slam, "health"):
+        lines.append(f"health    {_health_text(slam.health())}")
     counts = ", ".join(f"{name} {count}" for name, count in slam.counters().items() if count)
     return "\n".join([*lines, f"counters  {counts or 'all 0'}", _map_text(slam.beacons())])
+
+
+def _health_text(health: Health) -> str:
+    """How the robot is doing, and the last thing that went wrong."""
+    watched = [name for name, on in (("recovery", health.recovers), ("guard", health.guards)) if on]
+    text = f"{health.state} ({' and '.join(watched) or 'nothing'} on)"
+    if health.trouble != "none":
+        text += f"; last trouble: {health.trouble} at {health.trouble_us * 1e-6:.3f} s"
+    return text
 
 
 def _map_text(beacons: Sequence[Any]) -> str:

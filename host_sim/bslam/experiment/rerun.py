@@ -88,7 +88,13 @@ def rerun(
             f"{recording.path}: real {start.real} with --target {options.target}: allowed is float"
         )
     with connect(
-        options.target, params, room, fingerprints=True, looks=start.looks, seeds=start.seeds
+        options.target,
+        params,
+        room,
+        fingerprints=True,
+        looks=start.looks,
+        seeds=start.seeds,
+        recovery=start.recovery,
     ) as remote:
         return _Rerun(remote, recording, watcher).finish(remote.target_description)
 

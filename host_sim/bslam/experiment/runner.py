@@ -91,7 +91,13 @@ def run_log(
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
         looks = uses_looks(options)
         with connect(
-            options.target, params, beacons, fingerprints=record is not None, looks=looks, seeds=log.seeds
+            options.target,
+            params,
+            beacons,
+            fingerprints=record is not None,
+            looks=looks,
+            seeds=log.seeds,
+            recovery=options.recovery,
         ) as slam:
             return _run(slam, log, options, frames, watcher, record, slam.target_description)
     factory = slam_factory or partial(_make_slam, options, log)

@@ -40,6 +40,7 @@ class Message(IntEnum):
     LOOK = 0x14
     SEEN = 0x15
     SET_POSE = 0x16
+    HEALTH = 0x17
 
 
 class Report(IntEnum):
@@ -56,6 +57,7 @@ LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE"
 NO_DETAIL = 255
 
 _HELLO = struct.Struct("<IB")
+_HEALTH = struct.Struct("<BBBq7I")
 _INFO = struct.Struct("<I3B6HI20s")
 _PAIR = struct.Struct("<ff")
 _KNOWN_BEACON = struct.Struct("<iff")
@@ -93,8 +95,20 @@ def float32(value: float) -> bytes:
         return np.float32(value).astype("<f4").tobytes()
 
 
-def hello(session: int, fingerprints: bool, looks: bool, as_it_is: bool) -> bytes:
-    return _HELLO.pack(session, int(fingerprints) | int(looks) << 1 | int(as_it_is) << 2)
+@dataclass(frozen=True)
+class Wishes:
+    """What a host asks of a session."""
+
+    fingerprints: bool = False
+    looks: bool = False
+    as_it_is: bool = False
+    recovery: bool = False  # it notices when it is lost
+    guard: bool = False  # it notices when its memory is no longer what it was
+
+
+def hello(session: int, wishes: Wishes) -> bytes:
+    flags = sum(int(one) << bit for bit, one in enumerate(astuple(wishes)))
+    return _HELLO.pack(session, flags)
 
 
 def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
@@ -352,6 +366,35 @@ def read_beacons(body: bytes) -> tuple[int, list[RawBeacon]]:
         )
     ]
     return total, part
+
+
+STATES = ("following", "doubting", "lost")
+"""`bslam_recovery_state_t`."""
+TROUBLES = ("none", "lost", "found", "corrupt", "insane")
+"""`watch_trouble_t`."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """What went wrong so far on a robot. trouble: the last one; a RESET begins `insane` anew."""
+
+    recovers: bool
+    guards: bool
+    state: str
+    trouble: str
+    trouble_us: int
+    contradicting: int
+    withheld: int
+    lost: int
+    found: int
+    corrupt: int
+    restored: int
+    insane: int
+
+
+def read_health(body: bytes) -> Health:
+    flags, state, trouble, *rest = _HEALTH.unpack(body)
+    return Health(bool(flags & 1), bool(flags & 2), STATES[state], TROUBLES[trouble], *rest)
 
 
 def read_counters(body: bytes) -> list[int]:

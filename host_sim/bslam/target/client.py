@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from bslam.link import messages
 from bslam.link.frames import Decoder, Frame, encode
-from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report
+from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report, Wishes
 from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
@@ -32,9 +32,7 @@ class Answer:
 class Client:
     """The host's side of the link. A message is applied once, however often its frame or answer is lost."""
 
-    def __init__(
-        self, line: Line, *, fingerprints: bool = False, looks: bool = False, as_it_is: bool = False
-    ) -> None:
+    def __init__(self, line: Line, wishes: Wishes | None = None) -> None:
         self._line = line
         self._decoder = Decoder()
         self._frames: deque[Frame] = deque()
@@ -45,7 +43,7 @@ class Client:
         self.reports_lost = 0
         session = secrets.randbits(32)
         line.write(b"\0")
-        answer = self.ask(Message.HELLO, messages.hello(session, fingerprints, looks, as_it_is))
+        answer = self.ask(Message.HELLO, messages.hello(session, wishes or Wishes()))
         self.info: Info = messages.read_info(answer.body)
         self._open = True
 

@@ -16,7 +16,7 @@ from bslam.core.slam import Account, Beacon, Slam, told_classes
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
-from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step
+from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step, Wishes
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
 
@@ -35,7 +35,8 @@ class Told:
 class RemoteSlam:
     """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
 
-    params, beacons_max, looks, seeds as for `Slam`; params None: the robot goes on as it is, with what it
+    params, beacons_max, looks, seeds, recovery as for `Slam`; guard: it notices when its memory is no longer
+    what it was, and starts over; params None: the robot goes on as it is, with what it
     knows. `line` is taken over. Raises BslamError for parameters that the library refuses and for an image
     that is too small or has others, TargetError if the robot does not answer.
     """
@@ -49,13 +50,16 @@ class RemoteSlam:
         fingerprints: bool = False,
         looks: bool = False,
         seeds: NDArray[np.float32] | None = None,
+        recovery: bool = False,
+        guard: bool = False,
     ) -> None:
         self._line = line
         self._raw = library("float", 1)
         as_it_is = params is None
         # What the image would refuse is refused here first, in the words of the library.
         self._values = Slam(params, beacons_max=beacons_max).params
-        self._client = Client(line, fingerprints=fingerprints, looks=looks, as_it_is=as_it_is)
+        self._client = Client(line, Wishes(fingerprints, looks, as_it_is, recovery, guard))
+        self._recovery = recovery
         self._looks = looks
         self._check_image(beacons_max)
         self._step: Step | None = None
@@ -239,7 +243,21 @@ class RemoteSlam:
         types = ["bslam_counters_t", "bslam_looks_counters_t", "bslam_learner_counters_t"]
         values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
         counts = [{name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types]
-        return counts[0] | counts[1] | counts[2] if self._looks else counts[0]
+        found = counts[0] | counts[1] | counts[2] if self._looks else counts[0]
+        if self._recovery:
+            health = self.health()
+            names = ("contradicting", "withheld", "lost", "found")
+            found |= {name: getattr(health, name) for name in names}
+        return found
+
+    @property
+    def is_lost(self) -> bool:
+        """As `Slam.is_lost`."""
+        return self.health().state == "lost"
+
+    def health(self) -> messages.Health:
+        """What went wrong so far, and what the robot knows of it."""
+        return messages.read_health(self._client.ask(Message.HEALTH).body)
 
     # ---- what only a target has ----------------------------------------------------------------------------
 
@@ -378,11 +396,20 @@ def connect(
     fingerprints: bool = False,
     looks: bool = False,
     seeds: NDArray[np.float32] | None = None,
+    recovery: bool = False,
 ) -> RemoteSlam:
     """The pipeline on the target that a word of `--target` names; close it, or use it in a `with`."""
     line = open_line(target)
     try:
-        return RemoteSlam(line, params, beacons_max, fingerprints=fingerprints, looks=looks, seeds=seeds)
+        return RemoteSlam(
+            line,
+            params,
+            beacons_max,
+            fingerprints=fingerprints,
+            looks=looks,
+            seeds=seeds,
+            recovery=recovery,
+        )
     except BaseException:
         line.close()
         raise

@@ -1,6 +1,7 @@
 """A session with the application, as a process of this computer: over a good line, and over a bad one."""
 
 import random
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,72 @@ def robot_line():
 @pytest.fixture(scope="module")
 def log():
     return first_steps(simulate(load_scenario("paper_room"), 3), STEPS)
+
+
+def drive(slam, log, first, last):
+    """Feeds a part of a drive; whether it was lost after each step, and the poses."""
+    odometry, seen = log.odometry, log.sightings
+    lost, poses = [], []
+    for row in range(first, last):
+        time_us = int(odometry.time_us[row])
+        slam.odometry("wheels", time_us, float(odometry.a[row]), float(odometry.b[row]))
+        rows = np.flatnonzero(seen.time_us == time_us)
+        columns = (seen.bearing_rad[rows].tolist(), seen.range_m[rows].tolist())
+        slam.sightings(time_us, *columns, seen.beacon_id[rows].tolist(), seen.mappable[rows].tolist())
+        lost.append(slam.is_lost)
+        poses.append(slam.pose())
+    return lost, poses
+
+
+def test_a_robot_that_recovers_is_the_host_s_and_says_how_it_is(robot_line):
+    """It drives, is told that it stands elsewhere, is lost, and finds itself again."""
+    log = first_steps(simulate(load_scenario("paper_room"), 3), 200)
+    params = {"association": 0, "velocity_states": 0}
+    here = Slam(params, beacons_max=6, recovery=True)
+    with RemoteSlam(robot_line(), params, 6, recovery=True) as there:
+        healthy = there.health()
+        assert (healthy.recovers, healthy.guards, healthy.state) == (True, False, "following")
+        assert healthy.trouble == "none"
+        assert drive(here, log, 0, 40) == drive(there, log, 0, 40)
+        here.set_pose(5.0, 3.0, 2.0, 0.02, 0.02)
+        there.set_pose(5.0, 3.0, 2.0, 0.02, 0.02)
+        mine, theirs = drive(here, log, 40, 200), drive(there, log, 40, 200)
+        assert mine == theirs
+        assert True in mine[0] and not mine[0][-1]
+        health = there.health()
+        assert (health.state, health.trouble, health.lost, health.found) == ("following", "found", 1, 1)
+        assert there.counters() == here.counters()
+
+
+def flip_a_bit(line):
+    """In the parameters of the filter, in the memory of the running robot."""
+    process = line._process.pid
+    names = subprocess.run(["nm", ROBOT], capture_output=True, text=True, check=True).stdout
+    offset = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" b session"))
+    areas = Path(f"/proc/{process}/maps").read_text().splitlines()
+    first = next(row for row in areas if row.endswith(str(ROBOT))).split("-")[0]
+    with Path(f"/proc/{process}/mem").open("r+b", buffering=0) as memory:
+        memory.seek(int(first, 16) + offset + 16)
+        byte = memory.read(1)[0]
+        memory.seek(-1, 1)
+        memory.write(bytes((byte ^ 4,)))
+
+
+@pytest.mark.parametrize("guard", [True, False])
+def test_a_bit_that_flips_in_a_robot_s_memory_is_noticed_where_it_is_guarded(robot_line, guard):
+    line = robot_line()
+    with RemoteSlam(line, {"association": 0}, 6, guard=guard) as robot:
+        robot.sightings(0, [0.1], [2.0], [7], [True])
+        robot.odometry("wheels", 40_000, 0.01, 0.01)
+        flip_a_bit(line)
+        if guard:
+            with pytest.raises(CoreError, match="BSLAM_E_STATE"):
+                robot.odometry("wheels", 80_000, 0.01, 0.01)
+            assert robot.beacons() == []
+            health = robot.health()
+            assert (health.trouble, health.trouble_us, health.corrupt) == ("corrupt", 80_000, 1)
+        robot.odometry("wheels", 120_000, 0.01, 0.01)
+        assert robot.health().corrupt == int(guard)
 
 
 def same(one, other):

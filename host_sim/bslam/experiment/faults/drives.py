@@ -119,8 +119,8 @@ def kidnap(seed: int, recovery: bool) -> Carried:
     robot.feed(0, cut)
     alarms = int(np.sum(np.diff(np.array(robot.lost, dtype=int)) == 1))
     robot.feed(to, to + 500)
-    contradicted = _first(robot.contradicted, cut)
-    lost = _first(robot.lost, contradicted)
+    lost = _first(robot.lost, cut)
+    contradicted = min(_first(robot.contradicted, cut), lost)  # it may notice what is no metre off, too
     found = next(
         (k for k in range(lost, robot.step) if not robot.lost[k] and robot.error_m[k] <= FOUND_M), None
     )
