@@ -20,7 +20,8 @@ from check_symbols import UNWANTED_CALLS
 
 CALLED_BY_POINTER = (
     (r"session_", r"(apply|answer)_"),
-    (r"bslam_slam_|associate_ticks", r"bslam_associate_"),
+    (r"learn_looks|drop_beacon", r"bslam_looks_forget"),
+    (r"bslam_slam_|associate_ticks", r"bslam_associate_|learn_looks|bslam_looks_(clear|forget)"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
     (r"read_head|kept_", r"(erase|write|read)$"),

@@ -2,8 +2,8 @@
 # Makes this machine ready: system packages, then .venv with pinned Python packages and the command `bslam`.
 #
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
-#   tools/setup.sh test    that, and what `make test` needs: CMocka, the Arm compiler, QEMU, browser, linters
-#   tools/setup.sh bench   that, and what `make bench` needs: valgrind
+#   tools/setup.sh test    that, and what `make test` needs: CMocka, Arm compiler, QEMU, browser, valgrind, linters
+#   tools/setup.sh bench   the same, for `make bench`
 #   tools/setup.sh proof   that, and what `make proof` needs: clang with libFuzzer and MC/DC
 #
 # Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
@@ -88,9 +88,8 @@ find_missing() {
     need cmake "the CMake build" command -v cmake
     need qemu-system-arm "running the firmware" command -v qemu-system-arm
     need chromium-headless-shell "trying the pages in a browser" has_browser
-    [[ $part == test ]] && return
     need valgrind "counting instructions" command -v valgrind
-    [[ $part == bench ]] && return
+    [[ $part == test || $part == bench ]] && return
     need clang-19 "fuzzing and coverage" command -v clang-19
     need llvm-19 "reading coverage" command -v llvm-cov-19
     need libclang-rt-19-dev "fuzzing and coverage" sh -c 'echo "int main(void) { return 0; }" |

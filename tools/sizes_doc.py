@@ -66,6 +66,26 @@ def flash_by_layer() -> dict[str, int]:
     return found
 
 
+def linked_bytes(with_looks: bool) -> int:
+    """Code and constants that tests/bench/link_core.c takes of build/m4f/libbslam.a and of libc."""
+    options = "-fno-math-errno -ffunction-sections -fdata-sections -nostartfiles"
+    link = "--specs=nano.specs --specs=nosys.specs -Wl,--gc-sections,--entry=main,--no-warn-rwx-segments -lm"
+    with tempfile.TemporaryDirectory() as folder:
+        image = Path(folder) / "core.elf"
+        files = [str(ROOT / "tests" / "bench" / "link_core.c"), str(BUILD_DIR / "m4f" / "libbslam.a")]
+        define = f"-DWITH_LOOKS={int(with_looks)}"
+        output_of(*COMPILER.split(), *options.split(), define, *files, *link.split(), "-o", str(image))
+        text, data = output_of("arm-none-eabi-size", str(image)).splitlines()[1].split()[:2]
+        symbols = output_of("arm-none-eabi-nm", "--portability", str(image)).splitlines()
+        own = sum(int(line.split()[3], 16) for line in symbols if line.split()[0] in ("main", "robot_step"))
+        return int(text) + int(data) - own
+
+
+def linked_rows() -> Iterator[Row]:
+    yield "identity told, or by place and class", linked_bytes(with_looks=False)
+    yield "and machines that learn looks on the robot", linked_bytes(with_looks=True)
+
+
 def image_sections(path: Path) -> tuple[int, int]:
     """Bytes of ROM and RAM of an image; the RAM without the stack."""
     sizes = defaultdict(int)
@@ -189,6 +209,11 @@ Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A li
 takes of it what is called.
 
 {table(("layer", "bytes"), flash_rows())}
+What a robot without a camera takes of it and of libc when its image is linked, bytes: odometry, sightings \
+with and without distance, all five ways of association, pose, covariance, map (tests/bench/link_core.c). \
+Learning is linked where looks are attached, names of parameters where they are asked for.
+
+{table(("linked", "bytes"), linked_rows())}
 ## RAM
 
 Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_looks_t` is \

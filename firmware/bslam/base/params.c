@@ -13,10 +13,29 @@
     {#name, MEANING(meaning), (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
 static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)};
 
-#define OFFSET(name, value, low, high, meaning) offsetof(bslam_params_t, name),
-static const size_t offsets[] = {BSLAM_PARAMS(OFFSET, OFFSET)};
+/// What checking needs: tables of their own, so that a linker drops the names where nobody asks for them.
+/// Limits, and where a field stands in the struct, which is a multiple of 4: an odd number for an integer.
+typedef struct limits {
+    bslam_real_t low, high;
+} limits_t;
+#define LIMITS_REAL(name, value, low, high, meaning) {BSLAM_R(low), BSLAM_R(high)},
+#define LIMITS_INTEGER(name, value, low, high, meaning) {(bslam_real_t)(low), (bslam_real_t)(high)},
+static const limits_t limits[] = {BSLAM_PARAMS(LIMITS_REAL, LIMITS_INTEGER)};
+#define PLACE_REAL(name, value, low, high, meaning) (uint16_t)offsetof(bslam_params_t, name),
+#define PLACE_INTEGER(name, value, low, high, meaning) (uint16_t)(offsetof(bslam_params_t, name) + 1),
+static const uint16_t places[] = {BSLAM_PARAMS(PLACE_REAL, PLACE_INTEGER)};
 
-#define PARAMS_COUNT ((int)(sizeof infos / sizeof infos[0]))
+static bool is_integer(int id)
+{
+    return places[id] % 2 != 0;
+}
+
+static size_t offset_of(int id)
+{
+    return places[id] / 2 * (size_t)2;
+}
+
+#define PARAMS_COUNT ((int)(sizeof limits / sizeof limits[0]))
 
 int bslam_params_count(void)
 {
@@ -38,7 +57,7 @@ void bslam_params_default(bslam_params_t *params)
 /// The field at a table line, as bytes of the struct.
 static const void *field(const bslam_params_t *params, int id)
 {
-    return (const unsigned char *)params + offsets[id];
+    return (const unsigned char *)params + offset_of(id);
 }
 
 bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
@@ -46,7 +65,7 @@ bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
     if (id < 0 || id >= PARAMS_COUNT) {
         return 0;
     }
-    if (infos[id].is_integer) {
+    if (is_integer(id)) {
         return (bslam_real_t) * (const int32_t *)field(params, id);
     }
     return *(const bslam_real_t *)field(params, id);
@@ -54,11 +73,11 @@ bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
 
 bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value)
 {
-    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, infos[id].low, infos[id].high)) {
+    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, limits[id].low, limits[id].high)) {
         return BSLAM_E_PARAMETER;
     }
-    void *target = (unsigned char *)params + offsets[id];
-    if (!infos[id].is_integer) {
+    void *target = (unsigned char *)params + offset_of(id);
+    if (!is_integer(id)) {
         *(bslam_real_t *)target = value;
         return BSLAM_OK;
     }
@@ -74,7 +93,7 @@ bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t val
 static int id_at(size_t offset)
 {
     int id = 0;
-    while (offsets[id] != offset) {
+    while (offset_of(id) != offset) {
         id++;
     }
     return id;
@@ -82,13 +101,13 @@ static int id_at(size_t offset)
 
 static bool is_allowed(const bslam_params_t *params, int id)
 {
-    const bslam_param_info_t *info = &infos[id];
-    if (info->is_integer) {
+    const limits_t *of = &limits[id];
+    if (is_integer(id)) {
         // As integers: a float does not hold every int32_t.
         const int32_t value = *(const int32_t *)field(params, id);
-        return value >= (int32_t)info->low && value <= (int32_t)info->high;
+        return value >= (int32_t)of->low && value <= (int32_t)of->high;
     }
-    return bslam_in_range(*(const bslam_real_t *)field(params, id), info->low, info->high);
+    return bslam_in_range(*(const bslam_real_t *)field(params, id), of->low, of->high);
 }
 
 bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)

@@ -246,8 +246,8 @@ static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state, c
         apply_speed(robot, speeds->by_velocity[k], speeds->innovation[k], correction);
     }
     if (params->filter != 0) {
-        bslam_pose_exp_translation(correction[BSLAM_STATE_THETA], &correction[BSLAM_STATE_X],
-                                   &correction[BSLAM_STATE_Y]);
+        const bslam_turning_t turning = bslam_turning(correction[BSLAM_STATE_THETA]);
+        bslam_turning_apply(&turning, &correction[BSLAM_STATE_X], &correction[BSLAM_STATE_Y]);
         const bslam_motion_jacobian_t shift = {.x_theta = -correction[BSLAM_STATE_Y],
                                                .y_theta = correction[BSLAM_STATE_X]};
         transition_t transition;

@@ -87,16 +87,9 @@ void bslam_symmat_first_columns(const bslam_real_t *restrict m, int n, const bsl
         out[i + 3] = a * fourth[0] + b * fourth[1] + c * fourth[2];
         row = fourth + i + 4;
     }
-    // One by one: at most three are no work for memset.
-    const int padded = BSLAM_SYMMAT_PADDED(n);
-    if (n < padded) {
-        out[padded - 1] = 0;
-    }
-    if (n < padded - 1) {
-        out[padded - 2] = 0;
-    }
-    if (n < padded - 2) {
-        out[padded - 3] = 0;
+    // The last block's rows behind n. At most three.
+    for (int i = n; i % 4 != 0; i++) {
+        out[i] = 0;
     }
 }
 

@@ -14,17 +14,32 @@
 #endif
 
 /// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same
+/// What whole turns leave of an angle, with its sign: C's fmod to the bit, since nothing in it rounds (a
+/// difference of two numbers of which one is at most twice the other is exact). Not fmod itself, whose code
+/// and stack are a multiple of this. NaN for what is not finite.
+static bslam_real_t remainder_of_turns(bslam_real_t angle)
+{
+    bslam_real_t left = bslam_abs(angle);
+    if (!(left - left == 0)) {
+        return angle - angle;
+    }
+    bslam_real_t turns = 2 * BSLAM_PI;
+    while (turns <= left / 2) {
+        turns *= 2;
+    }
+    for (; turns >= 2 * BSLAM_PI; turns /= 2) {
+        left -= left >= turns ? turns : 0;
+    }
+    return angle < 0 ? -left : left;
+}
+
 /// everywhere too.
 static bslam_real_t bring_near(bslam_real_t angle)
 {
     if (bslam_abs(angle) <= BSLAM_ANGLE_MAX) {
         return angle;
     }
-#if BSLAM_REAL_DOUBLE
-    return fmod(angle, 2 * BSLAM_PI);
-#else
-    return fmodf(angle, 2 * BSLAM_PI);
-#endif
+    return remainder_of_turns(angle);
 }
 
 /// The angle less the nearest multiple of pi/2, and which multiple that was.

@@ -31,14 +31,6 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
-void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
-{
-    slam->looks = looks;
-    if (looks != NULL) {
-        bslam_looks_clear(looks);
-    }
-}
-
 // ---- odometry ---------------------------------------------------------------------------------------------
 
 /// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
@@ -388,9 +380,11 @@ static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, cons
     }
 }
 
-/// Fuses all matches, then adds what is new.
-static void use_matches(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                        const bslam_sighting_t *sightings, int count)
+/// Fuses all matches, then adds what is new. Not to be inlined: association, before it, goes deepest, and
+/// would have its frame on the stack.
+__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t time_us,
+                                                  const bslam_pose_t *mount,
+                                                  const bslam_sighting_t *sightings, int count)
 {
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
@@ -428,7 +422,7 @@ static int find_uid(const bslam_ekf_t *ekf, uint32_t uid)
 static void drop_beacon(bslam_slam_t *slam, int index)
 {
     if (slam->looks != NULL) {
-        bslam_looks_forget(slam->looks, index, slam->ekf.beacon_count);
+        slam->learning->forget(slam->looks, index, slam->ekf.beacon_count);
     }
     bslam_ekf_remove(&slam->ekf, index);
 }
@@ -436,9 +430,6 @@ static void drop_beacon(bslam_slam_t *slam, int index)
 /// Machines learn from what a frame surely showed, and train for a bounded time.
 static void learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
-    if (slam->looks == NULL || slam->is_frozen || slam->params.association != BSLAM_ASSOCIATION_SVM) {
-        return;
-    }
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
@@ -458,6 +449,16 @@ static void learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sightin
         drop_beacon(slam, leaves);
     }
     (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
+}
+
+void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
+{
+    static const bslam_learning_t learning = {bslam_looks_clear, bslam_looks_forget, learn_looks};
+    slam->looks = looks;
+    slam->learning = &learning;
+    if (looks != NULL) {
+        bslam_looks_clear(looks);
+    }
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------
@@ -553,7 +554,9 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         const bslam_associate_fn associate = bslam_associate_method(&slam->params);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        learn_looks(slam, time_us, sightings, count);
+        if (slam->looks != NULL && !slam->is_frozen && slam->params.association == BSLAM_ASSOCIATION_SVM) {
+            slam->learning->learn(slam, time_us, sightings, count);
+        }
         tidy_map(slam, time_us, mount);
     } else {
         for (int i = 0; i < count; i++) {
@@ -605,7 +608,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
 void bslam_slam_forget_map(bslam_slam_t *slam)
 {
     if (slam->looks != NULL) {
-        bslam_looks_clear(slam->looks);
+        slam->learning->clear(slam->looks);
     }
     bslam_ekf_forget_map(&slam->ekf);
     slam->is_frozen = false;

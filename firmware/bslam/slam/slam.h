@@ -63,6 +63,15 @@ typedef struct bslam_account {
 } bslam_account_t;
 
 /// All members are the pipeline's own; read them through the functions below.
+/// What attached looks need of the library. Private: reached by this alone, so that a linker leaves learning
+/// out where no looks are attached.
+struct bslam_slam;
+typedef struct bslam_learning {
+    void (*clear)(bslam_looks_t *looks);
+    void (*forget)(bslam_looks_t *looks, int beacon, int count);
+    void (*learn)(struct bslam_slam *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
+} bslam_learning_t;
+
 typedef struct bslam_slam {
     bslam_params_t params;
     bslam_ekf_t ekf;
@@ -71,9 +80,10 @@ typedef struct bslam_slam {
     uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
-    bool is_lost;          ///< the pose is what odometry makes of one that is unknown
-    bool is_frozen;        ///< the map: no beacon is added, learned or taken out by itself
-    bslam_looks_t *looks;  ///< the caller's; NULL: none attached
+    bool is_lost;                      ///< the pose is what odometry makes of one that is unknown
+    bool is_frozen;                    ///< the map: no beacon is added, learned or taken out by itself
+    bslam_looks_t *looks;              ///< the caller's; NULL: none attached
+    const bslam_learning_t *learning;  ///< theirs
     bslam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;

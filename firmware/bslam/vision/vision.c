@@ -277,8 +277,9 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
 
 /// Measures the candidates; one that has no outline is of no use. Through a wide lens a thing's sides are
 /// bent, and the box around the straight ones that measuring finds is too narrow: there the detector's stays.
-/// So it does where the outline is of something else.
-static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
+/// So it does where the outline is of something else. Not to be inlined: its candidates would be on the stack
+/// while proposals are judged.
+__attribute__((noinline)) static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
 {
     const bool is_wide = vision->cameras[vision->camera].lens == BSLAM_LENS_EQUIDISTANT;
     int32_t kept = 0;

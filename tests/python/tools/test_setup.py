@@ -50,7 +50,7 @@ def test_setup_no_install_prints_the_command_and_exits_2(machine: Path) -> None:
     assert command == (
         "setup: install with: apt-get install -y --no-install-recommends"
         " gcc libc6-dev pkg-config libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi"
-        " cmake qemu-system-arm chromium-headless-shell"
+        " cmake qemu-system-arm chromium-headless-shell valgrind"
     )
 
 
@@ -106,4 +106,4 @@ def test_setup_apt_get_that_fails_is_reported_with_its_output(machine: Path) -> 
 def test_setup_unknown_part_names_the_allowed_ones(machine: Path) -> None:
     result = setup(machine, "everything")
     assert result.returncode == 2
-    assert result.stderr == "setup: unknown part 'everything'; allowed: run, test, bench\n"
+    assert result.stderr == "setup: unknown part 'everything'; allowed: run, test, bench, proof\n"
