@@ -56,7 +56,7 @@ static bslam_real_t row_times(const transition_t *transition, int i, int base, c
 static void move_covariance(const moving_t *state, const transition_t *transition)
 {
     const int base = state->base_dim;
-    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX];
+    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
     for (int j = 0; j < base; j++) {
         bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
         for (int i = 0; i < base; i++) {

@@ -14,8 +14,7 @@ static const bslam_real_t EDGE[BANDS + 1] = {BSLAM_R(-0.03), BSLAM_R(0.03), BSLA
 enum { NEIGHBOURS = 8 };
 // Steps of a pattern's values in one of luma (of a half-resolution pixel, 0 to 187).
 enum { VALUE_STEPS = 2, VALUE_MAX = 127 };
-// The search for the nearest whole shift takes every second column.
-enum { SEARCH_STEP = 2 };
+enum { SEARCH_STEP = BSLAM_TURN_SEARCH_STEP };
 // Patterns that differ by more than this part of what they are show no shift.
 static const bslam_real_t MISMATCH_MAX = BSLAM_R(0.2);
 // Refinement of the shift: steps of Gauss and Newton, with weights of Cauchy's kind.
@@ -38,8 +37,8 @@ static int16_t row_at(const bslam_camera_t *camera, bslam_real_t elevation_tange
 {
     const bslam_real_t v_px = bslam_horizon_px(camera) - camera->fy_px * elevation_tangent;
     const bslam_real_t row = (v_px + BSLAM_R(0.5)) / 2;
-    const bslam_real_t last = (bslam_real_t)(camera->height_px / 2);
-    return (int16_t)(row < 0 ? 0 : row > last ? last : row);
+    const int32_t rows = camera->height_px / 2;
+    return (int16_t)clamp((int32_t)(row < 0 ? 0 : row), 0, rows);
 }
 
 /// Bearing of a column of the frame at the horizon, from the camera's axis.
@@ -89,7 +88,7 @@ static int32_t luma(uint16_t pixel)
 
 /// The mean luma of each column of the half-resolution copy between two rows, in steps of a 16th.
 static void column_means(const uint16_t *half, int32_t columns, int32_t first_row, int32_t end_row,
-                         int32_t means[COLUMNS])
+                         int32_t *means)
 {
     memset(means, 0, (size_t)columns * sizeof means[0]);
     for (int32_t row = first_row; row < end_row; row++) {
@@ -120,23 +119,23 @@ static void take_neighbours_off(const int32_t *at, int32_t columns, int8_t *valu
     }
 }
 
-static void make_pattern(bslam_turn_pattern_t *pattern, const bslam_turn_grid_t *grid, const uint16_t *half,
+/// The pattern of a frame, into turns->now.
+static void make_pattern(bslam_turns_t *turns, const bslam_turn_grid_t *grid, const uint16_t *half,
                          int32_t columns)
 {
+    int32_t *means = turns->brightness[0], *at = turns->brightness[1];
     for (int32_t band = 0; band < BANDS; band++) {
-        int32_t means[COLUMNS], at[COLUMNS];
         column_means(half, columns, grid->row_px[band + 1], grid->row_px[band], means);
         for (int32_t i = 0; i < columns; i++) {
             const int32_t left = grid->at_px[i] >> 8, part = grid->at_px[i] & 255;
             at[i] = means[left] + (means[left + 1] - means[left]) * part / 256;
         }
-        take_neighbours_off(at, columns, pattern->values[band]);
+        take_neighbours_off(at, columns, turns->now.values[band]);
     }
 }
 
 /// sums[i]: of the squares of columns i - SEARCH_STEP, i - 2 SEARCH_STEP and so on.
-static void square_sums(const bslam_turn_pattern_t *pattern, int32_t columns,
-                        int32_t sums[COLUMNS + SEARCH_STEP])
+static void sum_squares(const bslam_turn_pattern_t *pattern, int32_t columns, int32_t *sums)
 {
     memset(sums, 0, SEARCH_STEP * sizeof sums[0]);
     for (int32_t i = 0; i < columns; i++) {
@@ -174,12 +173,12 @@ static int32_t product_sum(const pattern_pair_t *pair, int32_t first, int32_t en
     return sum;
 }
 
-/// The whole shift by which the patterns differ least.
-static pattern_match_t search(const pattern_pair_t *pair)
+/// The whole shift by which the patterns differ least. sums: room for both patterns'.
+static pattern_match_t search(const pattern_pair_t *pair, int32_t sums[2][COLUMNS + SEARCH_STEP])
 {
-    int32_t now_squares[COLUMNS + SEARCH_STEP], before_squares[COLUMNS + SEARCH_STEP];
-    square_sums(pair->now, pair->columns, now_squares);
-    square_sums(pair->before, pair->columns, before_squares);
+    const int32_t *now_squares = sums[0], *before_squares = sums[1];
+    sum_squares(pair->now, pair->columns, sums[0]);
+    sum_squares(pair->before, pair->columns, sums[1]);
     pattern_match_t best = {.mismatch = 2};
     for (int32_t shift = -SHIFT_MAX; shift <= SHIFT_MAX; shift++) {
         const int32_t first = shift < 0 ? -shift : 0;
@@ -210,14 +209,8 @@ typedef struct bslam_turn_sums {
     int32_t count;
 } turn_sums_t;
 
-/// Sine of a column's bearing, and the same over the distance of what is there.
-typedef struct bslam_turn_column {
-    bslam_real_t sine;
-    bslam_real_t parallax;
-} turn_column_t;
-
 static void add_column(turn_sums_t *sums, const pattern_pair_t *pair, int32_t now, bslam_real_t at,
-                       bslam_real_t scale, turn_column_t column)
+                       bslam_real_t scale, bslam_turn_column_t column)
 {
     const int32_t left = (int32_t)at;
     const bslam_real_t part = at - (bslam_real_t)left;
@@ -235,14 +228,14 @@ static void add_column(turn_sums_t *sums, const pattern_pair_t *pair, int32_t no
         slope2 += weight * slope * slope;
     }
     sums->slope2 += slope2;
-    sums->parallax += slope2 * column.parallax;
+    sums->parallax += slope2 * column.parallax_per_m;
     sums->sideways += slope2 * column.sine;
     sums->count += BANDS;
 }
 
 /// All columns, as the patterns lie at a shift.
 static turn_sums_t add_columns(const pattern_pair_t *pair, bslam_real_t shift, bslam_real_t scale,
-                               const turn_column_t *columns)
+                               const bslam_turn_column_t *columns)
 {
     turn_sums_t sums = {0};
     for (int32_t i = 0; i < pair->columns; i++) {
@@ -256,7 +249,7 @@ static turn_sums_t add_columns(const pattern_pair_t *pair, bslam_real_t shift, b
 
 /// Where each column looks, and how near things are there, by the floor line.
 static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t count,
-                       turn_column_t columns[COLUMNS])
+                       bslam_turn_column_t *columns)
 {
     bslam_real_t sine, cosine, step_sine, step_cosine;
     bslam_sin_cos(vision->cameras[vision->camera].yaw_rad + grid->first_rad, &sine, &cosine);
@@ -266,25 +259,26 @@ static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *visi
         const bslam_real_t told_m = vision->floor_line.distance_m[cell];
         const bslam_real_t least_m = told_m > LEAST_DISTANCE_M ? told_m : LEAST_DISTANCE_M;
         columns[i].sine = sine;
-        columns[i].parallax = sine / (told_m > 0 ? least_m : USUAL_DISTANCE_M);
+        columns[i].parallax_per_m = sine / (told_m > 0 ? least_m : USUAL_DISTANCE_M);
         const bslam_real_t next = sine * step_cosine - cosine * step_sine;  // one step to the right
         cosine = cosine * step_cosine + sine * step_sine;
         sine = next;
     }
 }
 
-static bool compare(const pattern_pair_t *pair, const bslam_turn_grid_t *grid, const bslam_vision_t *vision,
-                    bslam_turn_t *turn)
+static bool compare(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
 {
-    pattern_match_t match = search(pair);
+    const int32_t camera = vision->camera;
+    const bslam_turn_grid_t *grid = &turns->grids[camera];
+    const pattern_pair_t pair = {&turns->before[camera], &turns->now, vision->cameras[camera].width_px / 2};
+    pattern_match_t match = search(&pair, turns->square_sums);
     if (!(match.mismatch < MISMATCH_MAX)) {
         return false;
     }
-    turn_column_t columns[COLUMNS];
-    look_along(grid, vision, pair->columns, columns);
+    look_along(grid, vision, pair.columns, turns->columns);
     turn_sums_t sums = {0};
     for (int32_t i = 0; i < REFINEMENTS; i++) {
-        sums = add_columns(pair, match.shift, match.mean_residual + LEAST_RESIDUAL, columns);
+        sums = add_columns(&pair, match.shift, match.mean_residual + LEAST_RESIDUAL, turns->columns);
         if (!(sums.slope2 > 0)) {
             return false;
         }
@@ -295,7 +289,7 @@ static bool compare(const pattern_pair_t *pair, const bslam_turn_grid_t *grid, c
     const bslam_real_t residual_var = sums.residual2 / sums.weight + ROUNDING_VAR;
     const bslam_real_t shift_var = ALIKE * residual_var / sums.slope2;
     turn->turn_rad =
-        -match.shift * grid->step_rad - bslam_angle_wrap(pair->now->yaw_rad - pair->before->yaw_rad);
+        -match.shift * grid->step_rad - bslam_angle_wrap(pair.now->yaw_rad - pair.before->yaw_rad);
     turn->variance_rad2 = shift_var * grid->step_rad * grid->step_rad;
     turn->mismatch = match.mismatch;
     turn->parallax_rad_per_m = sums.parallax / sums.slope2;
@@ -305,18 +299,15 @@ static bool compare(const pattern_pair_t *pair, const bslam_turn_grid_t *grid, c
 
 bool bslam_turns_see(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
 {
-    const int32_t camera = vision->camera;
-    const bslam_turn_grid_t *grid = &turns->grids[camera];
-    bslam_turn_pattern_t *before = &turns->before[camera];
+    const bslam_camera_t *camera = &vision->cameras[vision->camera];
+    bslam_turn_pattern_t *before = &turns->before[vision->camera];
     const bslam_vision_reason_t reason = bslam_vision_reason(vision);
     turns->now.known = reason == BSLAM_VISION_SEEN || reason == BSLAM_VISION_NOTHING;
     bool found = false;
     if (turns->now.known) {
-        const int32_t columns = vision->cameras[camera].width_px / 2;
-        turns->now.yaw_rad = vision->cameras[camera].yaw_rad;
-        make_pattern(&turns->now, grid, vision->thumbnail.half, columns);
-        const pattern_pair_t pair = {before, &turns->now, columns};
-        found = before->known && compare(&pair, grid, vision, turn);
+        turns->now.yaw_rad = camera->yaw_rad;
+        make_pattern(turns, &turns->grids[vision->camera], vision->thumbnail.half, camera->width_px / 2);
+        found = before->known && compare(turns, vision, turn);
     }
     *before = turns->now;
     return found;

@@ -12,8 +12,9 @@
 #include "bslam/vision/vision.h"
 
 enum {
-    BSLAM_TURN_BANDS = 6,       ///< of rows, from the horizon up
-    BSLAM_TURN_SHIFT_MAX = 24,  ///< columns of the half-resolution copy: what turns farther is not found
+    BSLAM_TURN_BANDS = 6,        ///< of rows, from the horizon up
+    BSLAM_TURN_SHIFT_MAX = 24,   ///< columns of the half-resolution copy: what turns farther is not found
+    BSLAM_TURN_SEARCH_STEP = 2,  ///< the search for the nearest whole shift takes every second column
 };
 #define BSLAM_TURN_COLUMNS (BSLAM_IMAGE_WIDTH_MAX / 2)
 
@@ -43,10 +44,22 @@ typedef struct bslam_turn_grid {
     int16_t row_px[BSLAM_TURN_BANDS + 1];  ///< its rows between the bands, the lowest first
 } bslam_turn_grid_t;
 
+/// Sine of a column's bearing, and the same over the distance of what is there.
+typedef struct bslam_turn_column {
+    bslam_real_t sine;
+    bslam_real_t parallax_per_m;
+} bslam_turn_column_t;
+
 typedef struct bslam_turns {
     bslam_turn_grid_t grids[BSLAM_CAMERAS_MAX];
     bslam_turn_pattern_t before[BSLAM_CAMERAS_MAX];
-    bslam_turn_pattern_t now;  ///< scratch
+    // All below is scratch.
+    bslam_turn_pattern_t now;
+    union {
+        int32_t brightness[2][BSLAM_TURN_COLUMNS];
+        int32_t square_sums[2][BSLAM_TURN_COLUMNS + BSLAM_TURN_SEARCH_STEP];
+        bslam_turn_column_t columns[BSLAM_TURN_COLUMNS];
+    };
 } bslam_turns_t;
 
 /// Makes an instance ready for the cameras of a front end that is.
