@@ -68,17 +68,25 @@ def read_functions(listing: str) -> dict[int, Function]:
 
 def _read_instruction(function: Function, name: str, operands: str) -> None:
     target = TARGET.search(operands)
-    if target and name in RISCV_CALLS:
-        function.calls.add(int(target[1], 16))
-    elif name == "jalr" or (name == "jr" and operands != "ra"):
-        function.calls_pointer = True
-    elif target and name.startswith("b"):
-        # A jump to another function is a call at its end; one to the function's own start is a loop.
-        if name in ("bl", "blx") or int(target[1], 16) != function.address:
-            function.calls.add(int(target[1], 16))
-    elif name == "blx" or (name == "bx" and operands not in ("lr", function.popped.strip("{}"))):
-        function.calls_pointer = True
-    elif name == "pop":
+    jumps = name in ("jr", "jalr", "bx", "blx") or (target and (name in RISCV_CALLS or name.startswith("b")))
+    if jumps:
+        _read_jump(function, name, operands, int(target[1], 16) if target else None)
+    else:
+        _read_stack(function, name, operands)
+
+
+def _read_jump(function: Function, name: str, operands: str, target: int | None) -> None:
+    """A jump to another function is a call at its end; one to the function's own start is a loop."""
+    calls = ("bl", "blx", *RISCV_CALLS)
+    returns = {"jr": ("ra",), "bx": ("lr", function.popped.strip("{}"))}
+    if target is None:
+        function.calls_pointer = function.calls_pointer or operands not in returns.get(name, ())
+    elif name in calls or target != function.address:
+        function.calls.add(target)
+
+
+def _read_stack(function: Function, name: str, operands: str) -> None:
+    if name == "pop":
         function.popped = operands
     elif name in ("push", "vpush"):
         function.frame_bytes += _listed_registers(operands) * (8 if "d" in operands.split("-")[0] else 4)

@@ -3,7 +3,7 @@
 Takes from the renderer what each camera has before it, frame by frame (kept under build/gaps: a minute of
 rendering a drive), draws sightings of it with the front end's own errors, and runs the camera's filter on
 them, identity known. Whole beacons give direction and distance; what the frame cuts off, and what is half
-hidden, a rough direction. Prints the mean error of the position beside that of each drive:
+hidden, a rough direction. The cameras tell no turn rate here. Prints the mean error of the position beside that of each drive:
 
     .venv/bin/python tools/measure_gaps.py --seeds 0:8
 """
@@ -21,7 +21,7 @@ from tqdm import trange
 
 from bslam.commands.arguments import seeds_range
 from bslam.core.vision import SIGNATURE_SIZE
-from bslam.experiment.camera import SEEN, TOLD_THRESHOLD, CameraDrive, CameraStore, camera_log
+from bslam.experiment.camera import SEEN, TOLD_THRESHOLD, TURNS, CameraDrive, CameraStore, camera_log
 from bslam.experiment.metrics import evaluate
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
@@ -61,7 +61,7 @@ class DrawnStore(CameraStore):
     def drive(self, scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
         """Nothing that is in view is missed."""
         views, places = views_of(self.folder, scenario, seed, rig)
-        return CameraDrive(places, drawn(views, self.kinds, self.rough_rad, seed))
+        return CameraDrive(places, drawn(views, self.kinds, self.rough_rad, seed), np.empty(0, TURNS))
 
 
 def views_of(

@@ -85,6 +85,21 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     group.add_argument(
         "--real", choices=REALS, default="float", help="scalar type: float as on the target, or double"
     )
+    _add_map_options(group)
+    group.add_argument(
+        "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
+    )
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any core parameter (see `bslam params`); wins over all else; may be repeated",
+    )
+
+
+def _add_map_options(group: Any) -> None:
+    """What is known of the place before, and how the robot finds itself in it."""
     group.add_argument(
         "--known-map",
         action="store_true",
@@ -101,16 +116,6 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "--recovery",
         action="store_true",
         help="notice when it is lost, and find itself again; on with --map",
-    )
-    group.add_argument(
-        "--params", type=Path, metavar="FILE", help="TOML file of core parameters, as `calibrate` writes"
-    )
-    group.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="any core parameter (see `bslam params`); wins over all else; may be repeated",
     )
 
 
