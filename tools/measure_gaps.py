@@ -3,7 +3,8 @@
 Takes from the renderer what each camera has before it, frame by frame (kept under build/gaps: a minute of
 rendering a drive), draws sightings of it with the front end's own errors, and runs the camera's filter on
 them, identity known. Whole beacons give direction and distance; what the frame cuts off, and what is half
-hidden, a rough direction. The cameras tell no turn rate here. Prints the mean error of the position beside that of each drive:
+hidden, a rough direction. No turn rate is told. Prints the mean error of the position beside that of each
+drive:
 
     .venv/bin/python tools/measure_gaps.py --seeds 0:8
 """
