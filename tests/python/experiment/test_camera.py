@@ -11,7 +11,10 @@ from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.experiment import camera
-from bslam.experiment.camera import Aim, CameraStore, camera_log, covering_beacon
+from bslam.experiment.camera import Aim, CameraStore, camera_log, covering_beacon, unseen_log
+from bslam.experiment.eye import Eye
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
 from bslam.rig import Pan, load_rig
 from bslam.world.simulate import load_scenario, simulate
 
@@ -45,6 +48,7 @@ class FakeFrontEnd:
 
     def __init__(self, cameras, threshold):
         assert len(cameras) == 3 and threshold == camera.TOLD_THRESHOLD.least
+        self.seen_before: set[int] = set()
 
     def see(self, rgb, camera, moved):
         assert rgb.shape == (240, 320, 3)
@@ -95,6 +99,25 @@ def test_camera_log_has_the_turn_rates_that_the_frames_tell(short, tmp_path, mon
     rate_radps = np.diff(true_rad) / (drive.step_us * 1e-6)
     np.testing.assert_allclose(log.odometry.gyro_radps[10:], rate_radps[10:], atol=0.15)
     assert log.robot.gyro_sigma_radps == VisualGyro.SD_RADPS
+
+
+def test_a_run_that_looks_on_the_way_is_the_one_over_the_log(short, tmp_path, monkeypatch):
+    def see(self, rgb, camera, moved):
+        turn = Turn(0.02, 1e-6, 0.0, 0.1, 0.5) if camera in self.seen_before else None
+        self.seen_before.add(camera)
+        return Seeing((candidate(),), "seen", turn)
+
+    monkeypatch.setattr(FakeFrontEnd, "see", see)
+    drive, options = replace(short, steps=30), RunOptions(sensor="camera", association="known")
+    told = camera.TOLD_THRESHOLD
+    log = camera_log(drive, 1, 0.6, None, RIG, CameraStore(tmp_path), told)
+    unseen, glances = unseen_log(drive, 1, 0.6, None, RIG, told)
+    assert unseen.odometry.gyro_radps is None
+    live = run_log(unseen, options, frames=Eye(unseen, options, glances))
+    logged = run_log(log, options)
+    np.testing.assert_array_equal(live.pose, logged.pose)
+    without = replace(log, odometry=replace(log.odometry, gyro_radps=None))
+    assert not np.array_equal(run_log(without, options).pose, logged.pose)
 
 
 def test_camera_log_drives_as_without_a_camera(short, tmp_path):
