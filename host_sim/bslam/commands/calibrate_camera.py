@@ -19,10 +19,11 @@ from bslam.experiment.calibrate_camera import (
     find_boards,
     find_mounting,
 )
+from bslam.experiment.camera_pitch import find_pitch, load_drive
 from bslam.experiment.output import write_atomically
 from bslam.experiment.sensor_yaw import find_yaw
 from bslam.log import read_folder
-from bslam.rig import LENS_KINDS
+from bslam.rig import LENS_KINDS, Camera
 
 _ROLL_SEEN_RAD = math.radians(1.0)
 
@@ -56,6 +57,16 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         help="height of the plumb board's lowest inner corners above the floor: gives the camera's height",
     )
     group.add_argument(
+        "--drive",
+        type=Path,
+        metavar="DIR",
+        help="in place of --plumb: pictures of a drive past doors, cabinets and the like, in the order of "
+        "their names; with --height they give the pitch",
+    )
+    group.add_argument(
+        "--height", type=_metres, metavar="M", help="height of the camera above the floor, with --drive"
+    )
+    group.add_argument(
         "--log",
         type=Path,
         metavar="FOLDER",
@@ -70,7 +81,15 @@ def execute_camera(arguments: argparse.Namespace) -> int:
     folder = Path(arguments.directory)
     calibration = calibrate_lens(find_boards(folder, board), board, arguments.lens)
     mounting = yaw = None
-    if arguments.plumb is not None:
+    if (arguments.drive is None) != (arguments.height is None):
+        raise BslamError("--drive and --height: one says nothing by itself; allowed: both")
+    if arguments.drive is not None and arguments.plumb is not None:
+        raise BslamError("--drive and --plumb: both give the pitch; allowed: one")
+    if arguments.drive is not None:
+        camera = Camera(calibration.lens, z_m=arguments.height)
+        pitch = find_pitch(load_drive(arguments.drive, camera), camera)
+        mounting = Mounting(pitch, 0.0, arguments.height)
+    elif arguments.plumb is not None:
         plumb = find_boards(arguments.plumb, board)
         mounting = find_mounting(plumb, board, calibration.lens, arguments.board_height)
     elif arguments.board_height is not None:

@@ -51,6 +51,9 @@ def test_calibrate_camera_writes_a_rig_with_lens_and_mounting(pictures, tmp_path
     [
         (["--board-height", "1.0"], "--board-height: says nothing by itself; allowed: together with --plumb"),
         (["--plumb", "nowhere"], "nowhere: no such folder"),
+        (["--drive", "nowhere"], "--drive and --height: one says nothing by itself; allowed: both"),
+        (["--drive", "nowhere", "--height", "0.5"], "nowhere: no pictures; allowed: a folder with"),
+        (["--drive", "x", "--height", "0.5", "--plumb", "y"], "--drive and --plumb: both give the pitch"),
         (["--log", "nowhere"], "nowhere: no such folder; a log is a folder with"),
     ],
 )
