@@ -68,6 +68,11 @@ uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX])
     return memory.count;
 }
 
+static uint32_t slot_bytes_of(const kept_flash_t *flash)
+{
+    return flash->slot_bytes < sizeof flash->slots[0] ? flash->slot_bytes : sizeof flash->slots[0];
+}
+
 /// True if there is power for one byte more.
 static bool spend(kept_flash_t *flash)
 {
@@ -82,7 +87,7 @@ static bool spend(kept_flash_t *flash)
 static bool erase_slot(void *context, int slot)
 {
     kept_flash_t *flash = context;
-    for (size_t i = 0; i < sizeof flash->slots[slot]; i++) {
+    for (size_t i = 0; i < slot_bytes_of(flash); i++) {
         if (!spend(flash)) {
             flash->slots[slot][i] ^= (uint8_t)(0x5a + i);
             return false;
@@ -117,5 +122,5 @@ static bool read_slot(void *context, int slot, uint32_t at, void *bytes, uint32_
 
 bslam_flash_t kept_flash(kept_flash_t *flash)
 {
-    return (bslam_flash_t){erase_slot, write_slot, read_slot, flash, sizeof flash->slots[0]};
+    return (bslam_flash_t){erase_slot, write_slot, read_slot, flash, slot_bytes_of(flash)};
 }

@@ -28,6 +28,7 @@ uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX]);
 /// without having been erased fails the test.
 typedef struct kept_flash {
     uint8_t slots[BSLAM_SLOTS][KEPT_BYTES_MAX / 4];
+    uint32_t slot_bytes;  ///< of each that are used; more than there are: all
     uint32_t left;
     uint32_t used;  ///< bytes erased or written so far
 } kept_flash_t;

@@ -22,6 +22,11 @@ double unit_random(unit_random_t *random, double low, double high)
     return low + (high - low) * (double)(bits >> 11) / 9007199254740992.0;
 }
 
+uint32_t unit_every(uint32_t quick)
+{
+    return getenv("BSLAM_THOROUGH") != NULL ? 1 : quick;
+}
+
 double unit_derivative(unit_function_t function, const double *in, int in_count, int row, int column,
                        const void *context)
 {

@@ -43,6 +43,10 @@ typedef struct unit_random {
 /// The next number, uniform in [low, high).
 double unit_random(unit_random_t *random, double low, double high);
 
+/// 1 where the environment variable BSLAM_THOROUGH is set (`make proof`), else `quick`: how many cases of
+/// very many a loop goes on by.
+uint32_t unit_every(uint32_t quick);
+
 /// A function of n numbers with m results, for finite differences. context is the caller's.
 typedef void (*unit_function_t)(const double *in, double *out, const void *context);
 

@@ -112,6 +112,37 @@ static void test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new(void *
     assert_true(loads_new());
 }
 
+/// Power fails in a save, and again in the next one. Slots as small as the maps allow, to have few bytes.
+static void test_slots_saves_cut_at_any_two_bytes_leave_the_old_map(void **state)
+{
+    static kept_flash_t before;
+    static kept_flash_t between;
+    flash.slot_bytes = (new_size + 2 * BSLAM_FLASH_PIECE) / BSLAM_FLASH_PIECE * BSLAM_FLASH_PIECE;
+    save(&new_slam, BSLAM_OK);
+    save(&old_slam, BSLAM_OK);
+    before = flash;
+    const uint32_t takes = save_takes();
+    uint32_t pairs = 0;
+    for (uint32_t first = 0; first < takes; first += unit_every(61)) {
+        flash = before;
+        flash.left = first;
+        save(&new_slam, BSLAM_E_MAP);
+        between = flash;
+        for (uint32_t second = 0; second < takes; second += unit_every(67)) {
+            flash = between;
+            flash.left = second;
+            save(&new_slam, BSLAM_E_MAP);
+            assert_false(loads_new());
+            pairs++;
+        }
+        flash = between;
+        flash.left = takes;
+        save(&new_slam, BSLAM_OK);
+        assert_true(loads_new());
+    }
+    print_message("power cuts: %u pairs of %u, 0 mixed\n", pairs, takes * takes);
+}
+
 static void test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next(void **state)
 {
     save(&old_slam, BSLAM_OK);
@@ -143,6 +174,7 @@ int main(void)
         cmocka_unit_test_setup(test_slots_load_nothing_saved_says_no_map, setup),
         cmocka_unit_test_setup(test_slots_load_gives_the_map_saved_last, setup),
         cmocka_unit_test_setup(test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new, setup),
+        cmocka_unit_test_setup(test_slots_saves_cut_at_any_two_bytes_leave_the_old_map, setup),
         cmocka_unit_test_setup(test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next, setup),
         cmocka_unit_test_setup(test_slots_a_map_larger_than_a_slot_is_refused_and_the_old_stays, setup),
     };
