@@ -92,13 +92,14 @@ test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak
 pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
+# Which of its parts: PROOF="--only soak mcdc --seeds 3".
+PROOF :=
+PROOF_PROGRAMS := $(SOAK_PROGRAMS) build/unit/float/bin/store/test_slots build/unit/float/bin/store/test_guard
+
 .PHONY: proof
-proof: setup ## what takes longer: `make test`, every core, the same bits over 5000 steps, a killed sweep
-	@$(MAKE) --no-print-directory test firmware-all
-	@$(PYTHON) tools/same_bits.py --steps 5000
-	@$(PYTHON) tools/kill_sweep.py --runs 1000
-	@$(PYTHON) tools/same_bits.py --steps 5000 --rig wide180
-	@$(BSLAM) faults --out out/faults
+proof: setup fuzz-programs mcdc-programs ## every long proof beside its goal, in a table (hours); out/proof
+	@$(MAKE) --no-print-directory --silent $(PROOF_PROGRAMS)
+	@$(PYTHON) tools/prove.py $(PROOF)
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

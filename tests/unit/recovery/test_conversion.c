@@ -48,9 +48,8 @@ static void pose_of(const double *in, double *out, const void *context)
 
 static void test_pose_in_beacon_frame_covariance_is_that_of_its_derivatives(void **state)
 {
-    if (!BSLAM_REAL_DOUBLE) {
-        skip();  // finite differences of float say nothing
-    }
+    // Differences of float over 5e-5 rad are good to a hundredth; the smallest variance here is 3e-6 rad².
+    const double tolerance = BSLAM_REAL_DOUBLE ? 1e-7 : 1e-6;
     const bslam_appearance_t seen = seen_from(2, 0.8, -0.3);
     const double in[] = {(double)seen.height_rad, (double)seen.width_rad, (double)seen.bearing_rad};
     const double sd[] = {0.001, 0.001, 0.01};
@@ -64,7 +63,7 @@ static void test_pose_in_beacon_frame_covariance_is_that_of_its_derivatives(void
                 expected += unit_derivative(pose_of, in, 3, i, c, &seen) *
                             unit_derivative(pose_of, in, 3, j, c, &seen) * sd[c] * sd[c];
             }
-            assert_near(in_beacon.covariance[k], expected, 1e-7);
+            assert_near(in_beacon.covariance[k], expected, tolerance);
             k++;
         }
     }
@@ -80,8 +79,25 @@ static void test_pose_in_beacon_frame_refuses_what_cannot_be_seen(void **state)
     seen.height_rad = real(1.6);
     assert_int_equal(bslam_pose_in_beacon_frame(&seen, &in_beacon), BSLAM_E_RANGE);
     seen = seen_from(2, 0.8, 0);
-    seen.bearing_rad = real(NAN);
-    assert_int_equal(bslam_pose_in_beacon_frame(&seen, &in_beacon), BSLAM_E_NOT_FINITE);
+    seen.width_rad = real(1.6);
+    seen.height_rad = real(1.5);
+    assert_int_equal(bslam_pose_in_beacon_frame(&seen, &in_beacon), BSLAM_E_RANGE);
+}
+
+static void test_pose_in_beacon_frame_refuses_each_number_that_is_not_finite(void **state)
+{
+    bslam_appearance_t seen = seen_from(2, 0.8, 0);
+    bslam_real_t *const numbers[] = {&seen.height_m,      &seen.width_m,     &seen.height_rad,
+                                     &seen.width_rad,     &seen.bearing_rad, &seen.size_sd_rad,
+                                     &seen.bearing_sd_rad};
+    bslam_doubtful_pose_t in_beacon = {{0, 0, 0}, {0}};
+    const bslam_doubtful_pose_t before = in_beacon;
+    for (int i = 0; i < COUNT_OF(numbers); i++) {
+        seen = seen_from(2, 0.8, 0);
+        *numbers[i] = real(i % 2 == 0 ? NAN : INFINITY);
+        assert_int_equal(bslam_pose_in_beacon_frame(&seen, &in_beacon), BSLAM_E_NOT_FINITE);
+        assert_memory_equal(&in_beacon, &before, sizeof before);
+    }
 }
 
 static void test_pose_to_global_of_a_beacon_that_is_turned_and_doubtful(void **state)
@@ -105,6 +121,7 @@ int main(void)
         cmocka_unit_test(test_pose_in_beacon_frame_is_where_the_robot_stands),
         cmocka_unit_test(test_pose_in_beacon_frame_covariance_is_that_of_its_derivatives),
         cmocka_unit_test(test_pose_in_beacon_frame_refuses_what_cannot_be_seen),
+        cmocka_unit_test(test_pose_in_beacon_frame_refuses_each_number_that_is_not_finite),
         cmocka_unit_test(test_pose_to_global_of_a_beacon_that_is_turned_and_doubtful),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
