@@ -42,14 +42,16 @@ typedef struct side {
     float step;
 } side_t;
 
-/// The column of cells that a line through foot, middle and top crosses in a row of cells.
+/// The column of cells that a line through foot, middle and top crosses in a row of cells; -1 where it goes
+/// far outside, or nowhere, because two of them fall on one row.
 static int32_t column_at(const side_t *side, int32_t row)
 {
     const float v_px = (float)(row * BSLAM_CELL_PX) + 1.5f;
     const int32_t part = v_px > side->v_px[1] ? 0 : 1;
     const float share = (v_px - side->v_px[part]) / (side->v_px[part + 1] - side->v_px[part]);
     const float u_px = side->u_px[part] + share * (side->u_px[part + 1] - side->u_px[part]);
-    return (int32_t)(u_px / BSLAM_CELL_PX);
+    const bool is_near = u_px > (float)-BSLAM_FRAME_SIDE_MAX && u_px < (float)BSLAM_FRAME_SIDE_MAX;
+    return is_near ? (int32_t)(u_px / BSLAM_CELL_PX) : -1;
 }
 
 static int32_t first_row(const side_t *side)
@@ -123,7 +125,9 @@ static bool place(const bslam_view_t *view, const upright_t *kind, int32_t colum
     if (view->camera->lens == BSLAM_LENS_EQUIDISTANT && !bend(view, kind, side)) {
         return false;
     }
-    if (side->v_px[2] < -2.0f || side->v_px[0] > (float)view->frame->height_px) {
+    // In positive form: a camera on the floor gives no number.
+    if (!(side->v_px[2] >= -2.0f) || !(side->v_px[0] >= side->v_px[2]) ||
+        !(side->v_px[0] <= (float)view->frame->height_px)) {
         return false;
     }
     return end_row(side, view->frame->rows) - first_row(side) >= 2;
