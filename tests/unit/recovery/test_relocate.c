@@ -74,6 +74,44 @@ static void test_relocate_by_clues_from_along_the_way(void **state)
     assert_found(clues, 3, 1 + cos(0.2), 3 + sin(0.2), 0.7, 3);
 }
 
+/// One distance among directions is no pair with distances, and no three without.
+static void test_relocate_does_not_mix_a_distance_with_directions(void **state)
+{
+    bslam_fix_t fix;
+    for (int with = 0; with < 3; with++) {
+        const bslam_clue_t clues[] = {clue_of(0, 1, 3, 0, with == 0), clue_of(1, 1, 3, 0, with == 1),
+                                      clue_of(3, 1, 3, 0, with == 2)};
+        assert_false(bslam_relocate(clues, 3, &fix));
+    }
+    const bslam_clue_t clues[] = {clue_of(0, 1, 3, 0, true), clue_of(1, 1, 3, 0, false),
+                                  clue_of(3, 1, 3, 0, true)};
+    assert_found(clues, 3, 1, 3, 0, 3);
+}
+
+/// Where two of three beacons are in one line with the robot, or all on one circle with it, directions do not
+/// tell where it is.
+static void test_relocate_by_directions_that_do_not_tell_finds_nothing(void **state)
+{
+    static const double lines[][3][2] = {
+        {{2, 0}, {4, 0}, {1, 3}},   // the first two
+        {{1, 3}, {2, 0}, {4, 0}},   // the last two
+        {{0, 2}, {2, 2}, {2, 0}},   // on a circle with the robot, in the origin
+        {{3, 0}, {-3, 0}, {0, 2}},  // between two
+    };
+    for (int k = 0; k < COUNT_OF(lines); k++) {
+        bslam_clue_t clues[3];
+        bslam_fix_t fix = {.agreeing = 77};
+        for (int i = 0; i < 3; i++) {
+            clues[i] = clue_of(0, 0, 0, 0, false);
+            clues[i].x_m = real(lines[k][i][0]);
+            clues[i].y_m = real(lines[k][i][1]);
+            clues[i].bearing_rad = real(atan2(lines[k][i][1], lines[k][i][0]));
+        }
+        assert_false(bslam_relocate(clues, 3, &fix));
+        assert_int_equal(fix.agreeing, 77);
+    }
+}
+
 static void test_relocate_with_too_little_finds_nothing(void **state)
 {
     const bslam_clue_t one[] = {clue_of(0, 1, 3, 0, true)};
@@ -94,6 +132,8 @@ int main(void)
         cmocka_unit_test(test_relocate_by_three_directions),
         cmocka_unit_test(test_relocate_leaves_out_a_clue_that_does_not_fit),
         cmocka_unit_test(test_relocate_by_clues_from_along_the_way),
+        cmocka_unit_test(test_relocate_does_not_mix_a_distance_with_directions),
+        cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),
         cmocka_unit_test(test_relocate_with_too_little_finds_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

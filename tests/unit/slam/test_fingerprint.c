@@ -1,4 +1,4 @@
-#include "support.h"
+#include "kept_map.h"
 
 #include "bslam/slam/fingerprint.h"
 
@@ -53,10 +53,32 @@ static void test_fingerprint_a_chain_that_differed_stays_different(void **state)
     }
 }
 
+/// With looks: every machine that has been trained counts, and no other.
+static void test_fingerprint_has_the_weights_of_trained_machines(void **state)
+{
+    static bslam_looks_t looks;
+    kept_make(&slam, &looks, 3);
+    const uint64_t whole = bslam_slam_fingerprint(&slam, BSLAM_FINGERPRINT_START);
+    int trained = 0;
+    for (int m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
+        bslam_machine_t *machine = &looks.learner.machines[m];
+        const bool counts = machine->used && machine->trained;
+        trained += counts ? 1 : 0;
+        machine->weights.w[0]++;
+        assert_int_equal(bslam_slam_fingerprint(&slam, BSLAM_FINGERPRINT_START) != whole, counts);
+        machine->weights.w[0]--;
+    }
+    assert_int_equal(trained, 3);
+    looks.learner.machines[0].trained = false;
+    assert_true(bslam_slam_fingerprint(&slam, BSLAM_FINGERPRINT_START) != whole);
+    slam.looks = NULL;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_fingerprint_the_lowest_bit_of_any_state_value_changes_it, start),
+        cmocka_unit_test(test_fingerprint_has_the_weights_of_trained_machines),
         cmocka_unit_test_setup(test_fingerprint_what_is_not_the_state_does_not_count, start),
         cmocka_unit_test_setup(test_fingerprint_a_chain_that_differed_stays_different, start),
     };

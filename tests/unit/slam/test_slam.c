@@ -1221,6 +1221,44 @@ static void test_counters_a_state_that_is_not_finite_is_counted(void **state)
     assert_int_equal(bslam_slam_counters(&slam)->insane, 1);
 }
 
+static void test_set_pose_refuses_each_number_that_is_not_finite_and_changes_nothing(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    drive_circle(&slam, STEP_US, 10);
+    const bslam_slam_t before = slam;
+    for (int i = 0; i < 3; i++) {
+        bslam_pose_t pose = {1, 2, 3};
+        bslam_real_t *const numbers[] = {&pose.x_m, &pose.y_m, &pose.theta_rad};
+        *numbers[i] = real(i == 1 ? INFINITY : NAN);
+        assert_int_equal(bslam_slam_set_pose(&slam, &pose, 0, 0), BSLAM_E_NOT_FINITE);
+    }
+    const bslam_pose_t pose = {1, 2, 3};
+    assert_int_equal(bslam_slam_set_pose(&slam, &pose, BSLAM_R(30.1), 0), BSLAM_E_RANGE);
+    assert_int_equal(bslam_slam_set_pose(&slam, &pose, 0, BSLAM_R(3.3)), BSLAM_E_RANGE);
+    assert_memory_equal(&slam, &before, sizeof slam);
+}
+
+/// Of a robot that is lost a frame is accounted for, and used for nothing.
+static void test_sightings_of_a_lost_robot_are_deferred_until_it_has_a_pose(void **state)
+{
+    bslam_slam_t slam = started(unit_params());
+    drive_circle(&slam, STEP_US, 1);
+    see_one(&slam, STEP_US, unit_polar(0.2, 3, 1));
+    bslam_slam_lose_pose(&slam);
+    const uint32_t seen = slam.ekf.beacons[0].sightings;
+    drive(&slam, 2 * STEP_US, 0.01, 0.01);
+    see_one(&slam, 2 * STEP_US, unit_polar(0.2, 3, 1));
+    assert_int_equal(account(&slam, 0)->outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(account(&slam, 0)->reason, BSLAM_REASON_LOST);
+    assert_int_equal(slam.ekf.beacons[0].sightings, seen);
+    const bslam_pose_t pose = {0, 0, 0};
+    assert_int_equal(bslam_slam_set_pose(&slam, &pose, BSLAM_R(0.5), BSLAM_R(0.2)), BSLAM_OK);
+    drive(&slam, 3 * STEP_US, 0.01, 0.01);
+    see_one(&slam, 3 * STEP_US, unit_polar(0.2, 3, 1));
+    assert_int_equal(account(&slam, 0)->outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(slam.ekf.beacons[0].sightings, seen + 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1285,6 +1323,8 @@ int main(void)
         cmocka_unit_test(test_beacon_view_has_the_papers_polar_coordinates),
         cmocka_unit_test(test_init_starts_at_the_origin_with_an_empty_map),
         cmocka_unit_test(test_pose_covariance_is_the_lower_triangle_of_the_states),
+        cmocka_unit_test(test_set_pose_refuses_each_number_that_is_not_finite_and_changes_nothing),
+        cmocka_unit_test(test_sightings_of_a_lost_robot_are_deferred_until_it_has_a_pose),
         cmocka_unit_test(test_counters_a_state_that_is_not_finite_is_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

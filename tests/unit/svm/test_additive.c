@@ -147,9 +147,19 @@ static void test_additive_check_refuses(void **state)
     fill(&m, 1);
     m.crossed[1] = FEATURES;
     assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_COUNT);
+    const void **const tables[] = {(const void **)&m.view.knots, (const void **)&m.view.bytes,
+                                   (const void **)&m.view.byte_scale, (const void **)&m.view.bias,
+                                   (const void **)&m.view.crossed};
+    for (int i = 0; i < COUNT_OF(tables); i++) {
+        fill(&m, 1);
+        *tables[i] = NULL;
+        assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_PARAMETER);
+    }
+    m.view.crossed_count = 0;  // then none is needed
+    assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_OK);
     fill(&m, 1);
-    m.view.bytes = NULL;
-    assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_PARAMETER);
+    m.byte_scale[0] = INFINITY;
+    assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_NOT_FINITE);
     fill(&m, 1);
     m.knots[3] = m.knots[2];
     assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_PARAMETER);

@@ -245,6 +245,23 @@ static void test_check_names_what_is_wrong(void **state)
     assert_int_equal(bslam_camera_check(&camera), BSLAM_E_PARAMETER);
 }
 
+/// The axis meets the frame in one corner: the opposite one is 1.44 focal lengths away, the others 1.16 at
+/// most, and the radius stops growing at 1.3.
+static void test_check_refuses_a_distortion_that_folds_in_one_corner(void **state)
+{
+    static const double centres_px[][2] = {{0, 0}, {319, 0}, {0, 239}, {319, 239}, {159.5, 119.5}};
+    for (int i = 0; i < COUNT_OF(centres_px); i++) {
+        bslam_camera_t camera = pinhole();
+        camera.fx_px = 277;
+        camera.fy_px = 277;
+        camera.k1 = BSLAM_R(-0.197);
+        camera.k2 = 0;
+        camera.cx_px = real(centres_px[i][0]);
+        camera.cy_px = real(centres_px[i][1]);
+        assert_int_equal(bslam_camera_check(&camera), i < 4 ? BSLAM_E_PARAMETER : BSLAM_OK);
+    }
+}
+
 static void test_check_refuses_a_distortion_that_folds_only_between(void **state)
 {
     // The slope 1 + 3 k1 q + 5 k2 q², q = r², is -0.06 at q = 0.35 and again positive at the frame's corner,
@@ -268,6 +285,7 @@ int main(void)
         cmocka_unit_test(test_unproject_refuses_what_has_no_direction),
         cmocka_unit_test(test_nan_and_infinity_are_refused),
         cmocka_unit_test(test_check_names_what_is_wrong),
+        cmocka_unit_test(test_check_refuses_a_distortion_that_folds_in_one_corner),
         cmocka_unit_test(test_check_refuses_a_distortion_that_folds_only_between),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -295,14 +295,22 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
     bslam_camera_t camera = unit_pinhole();
     unit_picture_fill(&picture, 120, 130, 140);
     const bslam_box_t good = {100, 60, 160, 120};
-    const bslam_box_t bad = {100, 60, real(NAN), 120};
     const bslam_box_t outside = {300, 60, 330, 120};
     bslam_candidate_t candidate;
     bslam_candidate_t before;
     memset(&candidate, 0x5A, sizeof candidate);
     memcpy(&before, &candidate, sizeof before);
-    assert_int_equal(bslam_measure(&picture.frame, &camera, &bad, &POSTER_SIZE, &candidate),
-                     BSLAM_E_NOT_FINITE);
+    for (int edge = 0; edge < 4; edge++) {
+        bslam_box_t bad = good;
+        bslam_real_t *const edges[] = {&bad.left_px, &bad.top_px, &bad.right_px, &bad.bottom_px};
+        *edges[edge] = real(NAN);
+        assert_int_equal(bslam_measure(&picture.frame, &camera, &bad, &POSTER_SIZE, &candidate),
+                         BSLAM_E_NOT_FINITE);
+    }
+    bslam_camera_t lower = camera;
+    lower.height_px -= 8;  // not the frame's
+    assert_int_equal(bslam_measure(&picture.frame, &lower, &good, &POSTER_SIZE, &candidate),
+                     BSLAM_E_PARAMETER);
     assert_int_equal(bslam_measure(&picture.frame, &camera, &outside, &POSTER_SIZE, &candidate),
                      BSLAM_E_RANGE);
     const struct {

@@ -103,7 +103,8 @@ static void test_begin_other_camera_or_size_is_refused_and_nothing_changes(void 
     before = vision;
     assert_int_equal(bslam_vision_begin(&vision, -1, BSLAM_PIXELS_RGB565, WIDTH, HEIGHT), BSLAM_E_RANGE);
     assert_int_equal(bslam_vision_begin(&vision, 2, BSLAM_PIXELS_RGB565, WIDTH, HEIGHT), BSLAM_E_RANGE);
-    assert_int_equal(bslam_vision_begin(&vision, 0, BSLAM_PIXELS_RGB565, 160, 120), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_begin(&vision, 0, BSLAM_PIXELS_RGB565, 160, HEIGHT), BSLAM_E_RANGE);
+    assert_int_equal(bslam_vision_begin(&vision, 0, BSLAM_PIXELS_RGB565, WIDTH, 120), BSLAM_E_RANGE);
     assert_int_equal(bslam_vision_begin(&vision, 0, (bslam_pixel_format_t)7, WIDTH, HEIGHT), BSLAM_E_RANGE);
     assert_memory_equal(&vision, &before, sizeof vision);
 }
@@ -141,6 +142,7 @@ static void test_end_without_a_frame_or_twice_is_refused(void **state)
 static void test_point_wrong_camera_or_angle_is_refused(void **state)
 {
     before = vision;
+    assert_int_equal(bslam_vision_point(&vision, -1, 0), BSLAM_E_RANGE);
     assert_int_equal(bslam_vision_point(&vision, 2, 0), BSLAM_E_RANGE);
     assert_int_equal(bslam_vision_point(&vision, 0, BSLAM_R(3.2)), BSLAM_E_RANGE);
     assert_int_equal(bslam_vision_point(&vision, 0, real(NAN)), BSLAM_E_RANGE);
