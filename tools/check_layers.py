@@ -16,7 +16,7 @@ from pathlib import Path
 
 BASE = frozenset({"base"})
 MATH = BASE | {"math"}
-BELOW_SLAM = MATH | {"odometry", "model", "svm", "ekf", "vision", "association"}
+BELOW_SLAM = MATH | {"odometry", "model", "svm", "ekf", "smoother", "vision", "association"}
 C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "base": frozenset(),
     "math": BASE,
@@ -25,6 +25,7 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "svm": MATH,
     "link": MATH,
     "ekf": MATH | {"model"},
+    "smoother": MATH | {"model", "ekf"},
     "vision": MATH | {"model", "svm"},
     "association": MATH | {"model", "svm", "ekf"},
     "slam": BELOW_SLAM,

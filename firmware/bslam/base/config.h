@@ -51,6 +51,23 @@
 #error "BSLAM_HISTORY_MAX is 1 to 1024"
 #endif
 
+/// Nodes that the smoother keeps, one for three frames, so 250 are 30 s of 25 frames/s; 48 bytes each in
+/// float.
+#ifndef BSLAM_SMOOTHER_NODES_MAX
+#define BSLAM_SMOOTHER_NODES_MAX 250
+#endif
+#if BSLAM_SMOOTHER_NODES_MAX < 8 || BSLAM_SMOOTHER_NODES_MAX > 10000
+#error "BSLAM_SMOOTHER_NODES_MAX is 8 to 10000"
+#endif
+
+/// Beacons seen from these nodes, all together, 8 bytes each: where they are too many, the oldest nodes go.
+#ifndef BSLAM_SMOOTHER_SEEN_MAX
+#define BSLAM_SMOOTHER_SEEN_MAX (5 * BSLAM_SMOOTHER_NODES_MAX)
+#endif
+#if BSLAM_SMOOTHER_SEEN_MAX < BSLAM_BEACONS_MAX || BSLAM_SMOOTHER_SEEN_MAX > 100000
+#error "BSLAM_SMOOTHER_SEEN_MAX is BSLAM_BEACONS_MAX to 100000"
+#endif
+
 /// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: an
 /// instance takes about 117 KB for QVGA and four cameras, 107 KB for one, 46 KB for QQVGA and one.
 #ifndef BSLAM_IMAGE_WIDTH_MAX

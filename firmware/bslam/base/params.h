@@ -13,7 +13,8 @@
 /// REAL(name, default, low, high, meaning) and INTEGER(the same).
 #define BSLAM_PARAMS(REAL, INTEGER) \
     /* estimator */ \
-    INTEGER(filter, 1, 0, 1, "0 standard EKF (paper equations (4)-(11)), 1 right-invariant EKF") \
+    INTEGER(filter, 1, 0, 2, \
+            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant EKF, 2 fixed-lag smoother") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     INTEGER(velocity_states, 1, 0, 1, \
             "1: v and omega are states and the wheels measure them (speedometer noise)") \
@@ -22,6 +23,8 @@
     REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, \
          "standard deviation of v at the start (the robot stands still)") \
     REAL(velocity_walk_mps_sqrt_s, 0.15, 0.0, 100.0, "v changes by this much in a second (random walk)") \
+    REAL(path_walk_mps_sqrt_s, 0.6, 0.0, 100.0, \
+         "smoother: the same along the path where it linearises, which is to be smooth") \
     REAL(velocity_decay_s, 1e6, 1e-3, 1e6, "v decays to 0 with this time constant (1e6: not)") \
     REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, \
          "standard deviation of omega at the start (the robot stands still)") \
@@ -137,6 +140,9 @@
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none")
 // clang-format on
+
+/// Values of `filter`.
+enum { BSLAM_FILTER_STANDARD = 0, BSLAM_FILTER_INVARIANT = 1, BSLAM_FILTER_SMOOTHER = 2 };
 
 #define BSLAM_PARAMS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;
 #define BSLAM_PARAMS_FIELD_INTEGER(name, value, low, high, meaning) int32_t name;

@@ -189,6 +189,35 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_par
 /// to date.
 void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
 
+// ---- about given points -----------------------------------------------------------------------------------
+
+/// From now until bslam_ekf_correct the mean is where the models are linearised, and what is known of the
+/// state is the correction about it: a linear Kalman filter, for whoever goes through the same drive again
+/// (smoother/smoother.h). The robot's values are their own points, the map's are about[base_dim..dim).
+/// bslam_ekf_innovation and bslam_ekf_fuse serve as ever. O(n).
+void bslam_ekf_linearise(bslam_ekf_t *ekf, const bslam_real_t *about);
+
+/// How the robot's values go through a motion, MATH (14).
+typedef struct bslam_transition {
+    bslam_real_t by[3]
+                   [BSLAM_ROBOT_DIM_MAX];  ///< the new pose by the old values, the two further ones decayed
+    bslam_real_t keep[2];                  ///< what is left of these
+} bslam_transition_t;
+
+/// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the
+/// models are linearised about from then on. *transition, if not NULL, becomes what it did.
+void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+                             const bslam_real_t *next, bslam_transition_t *transition);
+
+/// The speedometers' part, where there are velocity states.
+void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion);
+
+/// The state value at `at` is its mean and this much more, up to `variance`.
+void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance);
+
+/// Brings the stored covariance up to date, the correction still waiting.
+void bslam_ekf_settle(bslam_ekf_t *ekf);
+
 // ---- map --------------------------------------------------------------------------------------------------
 
 /// Adds the beacon that a sighting shows: as a ray if it has no distance, else as a point, or a sized one
@@ -201,6 +230,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_para
 /// Adds a beacon at a position that is given and exact. BSLAM_E_MAP_FULL.
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
                                                     int *index);
+
+/// Adds a beacon of which a guess says where it is, whatever the robot's pose: as a point, each axis this
+/// doubtful. BSLAM_E_MAP_FULL. O(n).
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
+                                                    bslam_real_t sd_m, int *index);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);

@@ -156,6 +156,21 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
     return BSLAM_OK;
 }
 
+bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m, bslam_real_t sd_m,
+                                   int *index)
+{
+    static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
+    if (ekf->beacon_count == BSLAM_BEACONS_MAX) {
+        return BSLAM_E_MAP_FULL;
+    }
+    *index = append_beacon(ekf, BSLAM_BEACON_POINT);
+    const new_value_t x = {BY_NOTHING, x_m, sd_m * sd_m};
+    const new_value_t y = {BY_NOTHING, y_m, sd_m * sd_m};
+    append_value(ekf, &x);
+    append_value(ekf, &y);
+    return BSLAM_OK;
+}
+
 bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m, int *index)
 {
     if (ekf->beacon_count == BSLAM_BEACONS_MAX) {

@@ -12,21 +12,18 @@
 typedef struct moving {
     bslam_real_t *mean;
     bslam_real_t *covariance;
+    bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
+    bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
     int base_dim;
     int dim;
 } moving_t;
 
-/// The new pose's derivative by the robot's own state values: 3 x base_dim.
-typedef struct transition {
-    bslam_real_t by[POSE_DIM][BSLAM_ROBOT_DIM_MAX];
-} transition_t;
-
 /// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
 /// turn_rate times their own change.
 static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_t forward_rate,
-                            bslam_real_t turn_rate, transition_t *transition)
+                            bslam_real_t turn_rate, bslam_transition_t *transition)
 {
-    static const transition_t unmoved = {{{1}, {0, 1}, {0, 0, 1}}};
+    static const bslam_transition_t unmoved = {{{1}, {0, 1}, {0, 0, 1}}, {1, 1}};
     *transition = unmoved;
     transition->by[0][BSLAM_STATE_THETA] = jacobian->x_theta;
     transition->by[1][BSLAM_STATE_THETA] = jacobian->y_theta;
@@ -38,7 +35,8 @@ static void fill_transition(const bslam_motion_jacobian_t *jacobian, bslam_real_
 }
 
 /// Row i of F times a vector of the robot's values.
-static bslam_real_t row_times(const transition_t *transition, int i, int base, const bslam_real_t *vector)
+static bslam_real_t row_times(const bslam_transition_t *transition, int i, int base,
+                              const bslam_real_t *vector)
 {
     const bslam_real_t *by = transition->by[i];
     bslam_real_t sum = vector[i];
@@ -52,10 +50,26 @@ static bslam_real_t row_times(const transition_t *transition, int i, int base, c
     return sum;
 }
 
+/// delta <- F delta.
+static void move_correction(const moving_t *state, const bslam_transition_t *transition)
+{
+    bslam_real_t moved[POSE_DIM];
+    for (int i = 0; i < POSE_DIM; i++) {
+        moved[i] = row_times(transition, i, state->base_dim, state->correction);
+    }
+    memcpy(state->correction, moved, sizeof moved);
+}
+
 /// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows. Touches those rows only: O(n).
-static void move_covariance(const moving_t *state, const transition_t *transition)
+static void move_covariance(const moving_t *state, const bslam_transition_t *transition)
 {
     const int base = state->base_dim;
+    if (state->correction != NULL) {
+        move_correction(state, transition);
+    }
+    if (state->noted != NULL) {
+        *state->noted = *transition;
+    }
     bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
     for (int j = 0; j < base; j++) {
         bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
@@ -74,7 +88,7 @@ static void move_covariance(const moving_t *state, const transition_t *transitio
             bslam_symmat_set(state->covariance, i, j, moved[i][j]);
         }
     }
-    const transition_t f = *transition;
+    const bslam_transition_t f = *transition;
     const bool extended = base > POSE_DIM;
     for (int i = base; i < state->dim; i++) {
         bslam_real_t *row = state->covariance + bslam_symmat_row(i);
@@ -109,6 +123,9 @@ static void walk_state(const moving_t *state, int at, bslam_real_t keep, bslam_r
 {
     if (keep < 1) {
         state->mean[at] *= keep;
+        if (state->correction != NULL) {
+            state->correction[at] *= keep;
+        }
         for (int i = 0; i < state->dim; i++) {
             state->covariance[bslam_symmat_at(i, at)] *= keep;
         }
@@ -136,14 +153,17 @@ static void drive_by_velocity(const moving_t *state, const bslam_params_t *param
 {
     const bslam_real_t v_walk = params->velocity_walk_mps_sqrt_s;
     const bslam_real_t turn_walk = params->turn_rate_walk_radps_sqrt_s;
-    walk_state(state, BSLAM_STATE_FORWARD, 1 / (1 + dt_s / params->velocity_decay_s), v_walk * v_walk * dt_s);
-    walk_state(state, BSLAM_STATE_TURN, 1 / (1 + dt_s / params->turn_rate_decay_s),
-               turn_walk * turn_walk * dt_s);
+    const bslam_real_t v_keep = 1 / (1 + dt_s / params->velocity_decay_s);
+    const bslam_real_t turn_keep = 1 / (1 + dt_s / params->turn_rate_decay_s);
+    walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_walk * v_walk * dt_s);
+    walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
     bslam_motion_jacobian_t jacobian;
-    transition_t transition;
+    bslam_transition_t transition;
     step_pose(state, params, state->mean[BSLAM_STATE_FORWARD] * dt_s, state->mean[BSLAM_STATE_TURN] * dt_s,
               &jacobian);
     fill_transition(&jacobian, dt_s, dt_s, &transition);
+    transition.keep[0] = v_keep;
+    transition.keep[1] = turn_keep;
     move_covariance(state, &transition);
 }
 
@@ -160,7 +180,7 @@ static void drive_by_increment(const moving_t *state, const bslam_params_t *para
     moved->forward_m *= scales ? state->mean[BSLAM_STATE_FORWARD] : params->forward_scale;
     moved->turn_rad *= scales ? state->mean[BSLAM_STATE_TURN] : params->turn_scale;
     bslam_motion_jacobian_t jacobian;
-    transition_t transition;
+    bslam_transition_t transition;
     step_pose(state, params, moved->forward_m, moved->turn_rad, &jacobian);
     fill_transition(&jacobian, motion->forward_m, motion->turn_rad, &transition);
     move_covariance(state, &transition);
@@ -203,14 +223,13 @@ static bool read_speedometers(const bslam_real_t *mean, const bslam_params_t *pa
     return true;
 }
 
-static void measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const speeds_t *speeds)
+static void measure_speeds(bslam_ekf_t *ekf, const speeds_t *speeds)
 {
     for (int k = 0; k < 2; k++) {
         const bslam_real_t *by = speeds->by_velocity[k];
         const bslam_row_t row = {.base = {0, 0, 0, by[0], by[1]}};
         bslam_ekf_apply_scalar(ekf, &row, speeds->innovation[k], 1);
     }
-    bslam_ekf_correct(ekf, params);
 }
 
 /// One of the two into the robot's covariance and its correction.
@@ -250,7 +269,7 @@ static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state, c
         bslam_turning_apply(&turning, &correction[BSLAM_STATE_X], &correction[BSLAM_STATE_Y]);
         const bslam_motion_jacobian_t shift = {.x_theta = -correction[BSLAM_STATE_Y],
                                                .y_theta = correction[BSLAM_STATE_X]};
-        transition_t transition;
+        bslam_transition_t transition;
         fill_transition(&shift, 0, 0, &transition);
         move_covariance(state, &transition);
     }
@@ -292,11 +311,38 @@ static bool drive(const moving_t *state, const bslam_params_t *params, const bsl
 void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
                        bslam_motion_t *moved)
 {
-    const moving_t state = {ekf->mean, ekf->covariance, ekf->base_dim, ekf->dim};
+    const moving_t state = {ekf->mean, ekf->covariance, NULL, NULL, ekf->base_dim, ekf->dim};
     speeds_t speeds;
     if (drive(&state, params, motion, moved, &speeds)) {
-        measure_speeds(ekf, params, &speeds);
+        measure_speeds(ekf, &speeds);
+        bslam_ekf_correct(ekf, params);
         note_velocity(ekf->mean, moved);
+    }
+}
+
+void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+                             const bslam_real_t *next, bslam_transition_t *transition)
+{
+    bslam_ekf_settle(ekf);
+    const moving_t state = {ekf->mean, ekf->covariance, ekf->correction, transition, ekf->base_dim, ekf->dim};
+    bslam_motion_t moved = *motion;
+    if (params->velocity_states == 0) {
+        drive_by_increment(&state, params, motion, &moved);
+    } else {
+        drive_by_velocity(&state, params, motion->dt_s);
+    }
+    for (int i = 0; i < ekf->base_dim; i++) {
+        const bslam_real_t left = ekf->mean[i] - next[i];
+        ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;
+        ekf->mean[i] = next[i];
+    }
+}
+
+void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion)
+{
+    speeds_t speeds;
+    if (params->velocity_states != 0 && read_speedometers(ekf->mean, params, motion, &speeds)) {
+        measure_speeds(ekf, &speeds);
     }
 }
 
@@ -312,7 +358,7 @@ bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf)
 void bslam_robot_predict(bslam_robot_t *robot, const bslam_params_t *params, const bslam_motion_t *motion,
                          bslam_motion_t *moved)
 {
-    const moving_t state = {robot->mean, robot->covariance, robot->dim, robot->dim};
+    const moving_t state = {robot->mean, robot->covariance, NULL, NULL, robot->dim, robot->dim};
     speeds_t speeds;
     if (drive(&state, params, motion, moved, &speeds)) {
         measure_robots_speeds(robot, &state, params, &speeds);

@@ -141,7 +141,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
-    if (!sighting->has_range) {
+    if (!sighting->has_range && params->bearing_only_curvature_factor > 0) {
         innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
@@ -352,6 +352,27 @@ static void transport_covariance(bslam_ekf_t *ekf)
     terms[3] = (bslam_symmat_term_t){.row_factors = ekf->mirror, .scale = 1, .columns = ekf->shift};
     bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
     ekf->pending_count = 0;
+}
+
+void bslam_ekf_linearise(bslam_ekf_t *ekf, const bslam_real_t *about)
+{
+    memset(ekf->correction, 0, sizeof ekf->correction);
+    for (int i = ekf->base_dim; i < ekf->dim; i++) {
+        ekf->correction[i] = ekf->mean[i] - about[i];
+        ekf->mean[i] = about[i];
+    }
+    ekf->has_correction = true;
+}
+
+void bslam_ekf_settle(bslam_ekf_t *ekf)
+{
+    flush(ekf);
+}
+
+void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance)
+{
+    const bslam_row_t row = {.other = {1}, .at = (uint16_t)at, .dim = 1};
+    bslam_ekf_apply_scalar(ekf, &row, innovation, variance);
 }
 
 void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params)

@@ -14,4 +14,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use);
 
+/// The filter's state was changed from outside: what the smoother knows of the past no longer leads to it.
+void bslam_slam_restart_smoother(bslam_slam_t *slam);
+
 #endif

@@ -31,6 +31,13 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
     return BSLAM_OK;
 }
 
+void bslam_slam_restart_smoother(bslam_slam_t *slam)
+{
+    if (slam->smoother != NULL) {
+        slam->smoothing->restart(slam->smoother, &slam->params, &slam->ekf);
+    }
+}
+
 // ---- odometry ---------------------------------------------------------------------------------------------
 
 /// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
@@ -49,6 +56,9 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
     bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
+    if (slam->smoother != NULL) {
+        slam->smoothing->move(slam->smoother, &slam->ekf, &motion);
+    }
     bslam_history_take(&slam->history, &place, &moved);
     slam->way_um += whole_micrometres(moved.forward_m);
 }
@@ -121,6 +131,7 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
     predict_until(slam, 0);
     bslam_ekf_resume(&slam->ekf, &slam->params, position_sd_m * position_sd_m,
                      heading_sd_rad * heading_sd_rad);
+    bslam_slam_restart_smoother(slam);
     bslam_odometry_restart(&slam->odometry);
     bslam_history_clear(&slam->history);
     slam->has_frame = false;
@@ -137,6 +148,7 @@ bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
         return BSLAM_E_RANGE;
     }
     bslam_ekf_set_pose(&slam->ekf, pose, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
+    bslam_slam_restart_smoother(slam);
     slam->is_lost = false;
     return BSLAM_OK;
 }
@@ -145,6 +157,7 @@ void bslam_slam_lose_pose(bslam_slam_t *slam)
 {
     const bslam_pose_t pose = bslam_ekf_pose(&slam->ekf);
     bslam_ekf_set_pose(&slam->ekf, &pose, 0, 0);
+    bslam_slam_restart_smoother(slam);
     slam->is_lost = true;
 }
 
@@ -297,9 +310,21 @@ static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon)
     }
 }
 
+/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
+/// taken for something else, it has a direction only.
+static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
+{
+    bslam_sighting_t taken = *sighting;
+    const bool differs = beacon->beacon_class != sighting->beacon_class &&
+                         beacon->beacon_class != BSLAM_CLASS_NONE &&
+                         sighting->beacon_class != BSLAM_CLASS_NONE;
+    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
+    return taken;
+}
+
 /// Fuses a sighting with the beacon that association chose.
-static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beacon,
-                       bslam_innovation_t *innovation, bslam_account_t *account)
+static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
+                       bslam_beacon_t *beacon, bslam_innovation_t *innovation, bslam_account_t *account)
 {
     const bslam_real_t way_m = (bslam_real_t)(slam->way_um - beacon->way_um) / MICROMETRES_PER_M;
     const bslam_real_t factor = bslam_correlation_factor(&slam->params, way_m);
@@ -317,6 +342,10 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_beacon_t *beac
     account->test_ratio = test_ratio(&slam->params, fusion.distance2);
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
+    if (slam->smoother != NULL) {
+        const bslam_sighting_t taken = sighting_of(sighting, beacon);
+        slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
+    }
     beacon->sightings++;
     beacon->way_um = slam->way_um;
     beacon->last_seen_us = time_us;
@@ -327,7 +356,10 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
                     const bslam_sighting_t *sighting, bslam_account_t *account)
 {
     int index;
-    if (bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index) != BSLAM_OK) {
+    const bslam_status_t status =
+        slam->smoother != NULL ? slam->smoothing->add(slam->smoother, &slam->ekf, mount, sighting, &index)
+                               : bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index);
+    if (status != BSLAM_OK) {
         reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;
     }
@@ -341,20 +373,11 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->view_um = slam->way_um;
     beacon->views = 1;
     beacon->confirmed = slam->params.confirm_sightings <= 1;
+    if (slam->smoother != NULL) {
+        slam->smoothing->see(slam->smoother, sighting, index);
+    }
     fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;
-}
-
-/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
-/// taken for something else, it has a direction only.
-static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
-{
-    bslam_sighting_t taken = *sighting;
-    const bool differs = beacon->beacon_class != sighting->beacon_class &&
-                         beacon->beacon_class != BSLAM_CLASS_NONE &&
-                         sighting->beacon_class != BSLAM_CLASS_NONE;
-    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
-    return taken;
 }
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
@@ -389,8 +412,8 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
         if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH) {
-            fuse_match(slam, time_us, &slam->ekf.beacons[slam->matches[i].beacon], &slam->innovations[i],
-                       &slam->accounts[i]);
+            fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[slam->matches[i].beacon],
+                       &slam->innovations[i], &slam->accounts[i]);
         }
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
@@ -424,6 +447,9 @@ static void drop_beacon(bslam_slam_t *slam, int index)
     if (slam->looks != NULL) {
         slam->learning->forget(slam->looks, index, slam->ekf.beacon_count);
     }
+    if (slam->smoother != NULL) {
+        slam->smoothing->remove(slam->smoother, index);
+    }
     bslam_ekf_remove(&slam->ekf, index);
 }
 
@@ -449,6 +475,16 @@ static void learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sightin
         drop_beacon(slam, leaves);
     }
     (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
+}
+
+void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
+{
+    static const bslam_smoothing_t smoothing = {bslam_smoother_restart, bslam_smoother_move,
+                                                bslam_smoother_see,     bslam_smoother_add,
+                                                bslam_smoother_remove,  bslam_smoother_frame};
+    slam->smoothing = &smoothing;
+    slam->smoother = slam->params.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
+    bslam_slam_restart_smoother(slam);
 }
 
 void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
@@ -563,6 +599,9 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
             fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
         }
     }
+    if (slam->smoother != NULL) {
+        slam->smoothing->frame(slam->smoother, &slam->params, &slam->ekf);
+    }
     slam->last_frame_us = time_us;
     slam->has_frame = true;
     bslam_odometry_start(&slam->odometry, time_us);
@@ -601,6 +640,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
     const bslam_status_t status = bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index);
     if (status == BSLAM_OK) {
         slam->ekf.beacons[index].label = label;
+        bslam_slam_restart_smoother(slam);
     }
     return status;
 }
@@ -611,6 +651,7 @@ void bslam_slam_forget_map(bslam_slam_t *slam)
         slam->learning->clear(slam->looks);
     }
     bslam_ekf_forget_map(&slam->ekf);
+    bslam_slam_restart_smoother(slam);
     slam->is_frozen = false;
 }
 

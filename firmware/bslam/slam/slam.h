@@ -20,6 +20,7 @@
 #include "bslam/association/association.h"
 #include "bslam/odometry/odometry.h"
 #include "bslam/slam/history.h"
+#include "bslam/smoother/smoother.h"
 
 /// Never-decreasing counts of what happened.
 typedef struct bslam_counters {
@@ -63,6 +64,18 @@ typedef struct bslam_account {
 } bslam_account_t;
 
 /// All members are the pipeline's own; read them through the functions below.
+/// What an attached smoother needs of the library: smoother/smoother.h. Private, reached by this alone as
+/// below.
+typedef struct bslam_smoothing {
+    void (*restart)(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf);
+    void (*move)(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
+    void (*see)(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
+    bslam_status_t (*add)(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_pose_t *mount,
+                          const bslam_sighting_t *sighting, int *index);
+    void (*remove)(bslam_smoother_t *smoother, int index);
+    void (*frame)(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf);
+} bslam_smoothing_t;
+
 /// What attached looks need of the library. Private: reached by this alone, so that a linker leaves learning
 /// out where no looks are attached.
 struct bslam_slam;
@@ -80,10 +93,12 @@ typedef struct bslam_slam {
     uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
-    bool is_lost;                      ///< the pose is what odometry makes of one that is unknown
-    bool is_frozen;                    ///< the map: no beacon is added, learned or taken out by itself
-    bslam_looks_t *looks;              ///< the caller's; NULL: none attached
-    const bslam_learning_t *learning;  ///< theirs
+    bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
+    bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
+    bslam_looks_t *looks;                ///< the caller's; NULL: none attached
+    const bslam_learning_t *learning;    ///< theirs
+    bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
+    const bslam_smoothing_t *smoothing;  ///< theirs
     bslam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;
@@ -102,6 +117,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_
 /// through bslam_looks_init and stays the caller's; it serves one pipeline, and forgets what it knew of
 /// another map. NULL: looks are not used any more. bslam_slam_init detaches.
 void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks);
+
+/// From now on the filter is led through the last drive again and again (smoother/smoother.h), if the
+/// parameter `filter` says so; without a smoother it is the invariant one. *smoother stays the caller's and
+/// serves one pipeline. NULL: no more. bslam_slam_init detaches.
+void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother);
 
 /// One odometry reading, which waits until a frame shows a later moment. BSLAM_E_TIME, BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE, BSLAM_E_JUMP as bslam_odometry_read has them; BSLAM_E_SINGULAR as bslam_ekf_check_motion

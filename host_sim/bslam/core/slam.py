@@ -96,6 +96,10 @@ class Slam:
             "velocity": (self._lib.BSLAM_ODOMETRY_VELOCITY, "v_mps", "omega_radps"),
         }
         self._init(params or {})
+        self._smoother = None
+        if self._slam.params.filter == self._lib.BSLAM_FILTER_SMOOTHER:
+            self._smoother = self._ffi.new("bslam_smoother_t *")
+            self._lib.bslam_slam_attach_smoother(self._slam, self._smoother)
         self._recovery = None
         if recovery:
             self._recovery = self._ffi.new("bslam_recovery_t *")
@@ -157,9 +161,10 @@ class Slam:
 
     @property
     def state_bytes(self) -> bytes:
-        """Every byte of the C instance and its looks: for tests that a refused input changes nothing."""
+        """Every byte of the C instance, its looks and smoother: a refused input changes none of them."""
         looks = b"" if self._looks is None else bytes(self._ffi.buffer(self._looks))
-        return bytes(self._ffi.buffer(self._slam)) + looks
+        smoother = b"" if self._smoother is None else bytes(self._ffi.buffer(self._smoother))
+        return bytes(self._ffi.buffer(self._slam)) + looks + smoother
 
     def fingerprint(self, before: int) -> int:
         """Goes on with a chain of fingerprints of the state (`bslam_slam_fingerprint`)."""

@@ -34,6 +34,14 @@ CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
     "double_sd_m": 0.3,
 }
 
+# A prior on the forward speed in m/s would tell the scale, which directions do not; one on the turning rate
+# is free of it.
+SMOOTHER: Final[dict[str, int | float]] = {
+    "velocity_walk_mps_sqrt_s": 30.0,
+    "turn_rate_walk_radps_sqrt_s": 1.0,
+    "turn_rate_decay_s": 1.0,
+}
+
 REAL_LOG: Final[dict[str, int | float]] = {
     # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
     # scales.

@@ -1,0 +1,366 @@
+// The cycle: forth, up and back. MATH "The smoother".
+#include <string.h>
+
+#include "bslam/math/trig.h"
+#include "bslam/model/noise.h"
+#include "bslam/smoother/internal.h"
+
+#define ROBOT BSLAM_ROBOT_DIM_MAX
+
+/// What may come in while a cycle lasts.
+#define SLACK_NODES (BSLAM_SMOOTHER_NODES_MAX / 16 + 2)
+#define SLACK_SEEN (BSLAM_SMOOTHER_SEEN_MAX / 12)
+/// Places move no farther at once, as a share of the distance from the robot: beyond that the model is far
+/// from linear, and a beacon must not jump to the robot.
+static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
+/// How exactly the map is given to the robot alone, (1 mm)².
+static const bslam_real_t PIN_VARIANCE = BSLAM_R(1e-6);
+/// What the way back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
+static const bslam_real_t DOUBT_MIN = BSLAM_R(1e-6);
+
+// ---- along the nodes --------------------------------------------------------------------------------------
+
+static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smoother_seen_t *seen)
+{
+    bslam_sighting_t sighting = {.bearing_rad = seen->bearing * BSLAM_SMOOTHER_BEARING_RAD,
+                                 .range_m = seen->range * BSLAM_SMOOTHER_RANGE_M,
+                                 .bearing_sd_rad = seen->bearing_sd * BSLAM_SMOOTHER_SD_RAD,
+                                 .has_range = seen->ranges > 0,
+                                 .label = BSLAM_LABEL_NONE};
+    if (sighting.has_range) {
+        const bslam_real_t variance = bslam_range_variance_m2(model, &sighting, sighting.range_m);
+        sighting.range_sd_m = bslam_sqrt(variance / seen->ranges);
+    }
+    return sighting;
+}
+
+/// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
+static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+                      int first_seen)
+{
+    const bslam_params_t *model = &smoother->model;
+    const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
+    if (node->motion.dt_s > 0) {
+        bslam_ekf_measure_speeds(ekf, model, &node->motion);
+    }
+    for (int k = 0; k < node->seen; k++) {
+        const bslam_smoother_seen_t *seen = bslam_smoother_seen(smoother, first_seen + k);
+        const bslam_sighting_t sighting = sighting_of(model, seen);
+        bslam_innovation_t innovation;
+        bslam_fusion_t unused;
+        bslam_status_t status =
+            bslam_ekf_innovation(ekf, model, &mount, &sighting, seen->beacon, &innovation);
+        if (status == BSLAM_OK) {
+            status = bslam_ekf_fuse(ekf, model, &innovation, &unused);
+        }
+        smoother->left_out += status == BSLAM_OK ? 0u : 1u;
+    }
+    bslam_ekf_settle(ekf);
+}
+
+/// A filter that stands at the node before goes on to this one.
+static void pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+                      int first_seen)
+{
+    bslam_ekf_predict_about(ekf, &smoother->model, &node->motion, node->at, NULL);
+    take_node(smoother, ekf, node, first_seen);
+}
+
+// ---- forth ------------------------------------------------------------------------------------------------
+
+void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
+{
+    const bslam_smoother_node_t *node = bslam_smoother_node(smoother, 0);
+    smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
+    bslam_ekf_linearise(&smoother->base, smoother->place);
+    pass_node(smoother, &smoother->base, node, 0);
+    bslam_ekf_correct(&smoother->base, &smoother->model);
+    smoother->first_seen = (smoother->first_seen + node->seen) % BSLAM_SMOOTHER_SEEN_MAX;
+    smoother->seen_count -= node->seen;
+    smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;
+    smoother->node_count--;
+}
+
+void bslam_smoother_begin(bslam_smoother_t *smoother)
+{
+    while (smoother->node_count > BSLAM_SMOOTHER_NODES_MAX - SLACK_NODES ||
+           smoother->seen_count > BSLAM_SMOOTHER_SEEN_MAX - SLACK_SEEN) {
+        bslam_smoother_drop_oldest(smoother);
+    }
+    smoother->run = smoother->base;
+    smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
+    bslam_ekf_linearise(&smoother->run, smoother->place);
+    smoother->phase = BSLAM_SMOOTHER_FORTH;
+    smoother->at = 0;
+    smoother->at_seen = 0;
+}
+
+/// How much of its correction a beacon may take.
+static bslam_real_t share_of_step(const bslam_ekf_t *run, int at)
+{
+    const bslam_real_t dx = run->correction[at];
+    const bslam_real_t dy = run->correction[at + 1];
+    const bslam_real_t ex = run->mean[at] - run->mean[BSLAM_STATE_X];
+    const bslam_real_t ey = run->mean[at + 1] - run->mean[BSLAM_STATE_Y];
+    const bslam_real_t way_m = bslam_sqrt(dx * dx + dy * dy);
+    const bslam_real_t most_m = STEP_MAX * bslam_sqrt(ex * ex + ey * ey);
+    return way_m > most_m ? most_m / way_m : 1;
+}
+
+/// The filter of now takes its correction, or as much of it, all values alike, as no beacon refuses. The map
+/// that comes of it is linearised about from then on.
+static void end_forth(bslam_smoother_t *smoother)
+{
+    bslam_ekf_t *run = &smoother->run;
+    bslam_real_t least = 1;
+    for (int b = 0; b < run->beacon_count; b++) {
+        if (run->beacons[b].kind != BSLAM_BEACON_KNOWN) {
+            const bslam_real_t share = share_of_step(run, run->beacons[b].at);
+            least = share < least ? share : least;
+        }
+    }
+    for (int i = 0; i < run->dim; i++) {
+        run->correction[i] *= least;
+    }
+    bslam_ekf_correct(run, &smoother->model);
+    for (int i = run->base_dim; i < run->dim; i++) {
+        smoother->place[i] = run->mean[i];
+    }
+}
+
+// ---- up and back: the robot alone -------------------------------------------------------------------------
+
+/// Of a filter, what is left if the map is as it is linearised about: the robot, among known beacons.
+static void give_map(bslam_ekf_t *ekf)
+{
+    for (int i = ekf->base_dim; i < ekf->dim; i++) {
+        bslam_ekf_pin(ekf, i, 0, PIN_VARIANCE);
+    }
+    bslam_ekf_settle(ekf);
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        bslam_beacon_t *beacon = &ekf->beacons[b];
+        bslam_ekf_beacon_position(ekf, b, &beacon->known_x_m, &beacon->known_y_m);
+        beacon->kind = BSLAM_BEACON_KNOWN;
+    }
+    for (int i = ekf->base_dim; i < ekf->dim; i++) {
+        ekf->mean[i] = 0;
+        ekf->correction[i] = 0;
+    }
+    ekf->dim = ekf->base_dim;
+    ekf->ray_count = 0;
+    ekf->sized_count = 0;
+}
+
+static void begin_up(bslam_smoother_t *smoother)
+{
+    smoother->run = smoother->base;
+    bslam_ekf_linearise(&smoother->run, smoother->place);
+    give_map(&smoother->run);
+    smoother->model.velocity_walk_mps_sqrt_s = smoother->path_walk;
+    smoother->phase = BSLAM_SMOOTHER_UP;
+    smoother->at = 0;
+    smoother->at_seen = 0;
+    smoother->top = smoother->node_count;
+}
+
+static void note_mark(const bslam_ekf_t *run, bslam_smoother_mark_t *mark)
+{
+    int k = 0;
+    for (int i = 0; i < run->base_dim; i++) {
+        mark->correction[i] = run->correction[i];
+        for (int j = 0; j <= i; j++) {
+            mark->covariance[k] = bslam_symmat_get(run->covariance, i, j);
+            k++;
+        }
+    }
+}
+
+/// The robot as it was before node `first`, about the point that it had there.
+static void restore_mark(bslam_smoother_t *smoother, const bslam_smoother_mark_t *mark, int first)
+{
+    bslam_ekf_t *run = &smoother->run;
+    const bslam_real_t *mean = first > 0 ? bslam_smoother_node(smoother, first - 1)->at : smoother->base.mean;
+    int k = 0;
+    for (int i = 0; i < run->base_dim; i++) {
+        run->mean[i] = mean[i];
+        run->correction[i] = mark->correction[i];
+        for (int j = 0; j <= i; j++) {
+            bslam_symmat_set(run->covariance, i, j, mark->covariance[k]);
+            k++;
+        }
+    }
+}
+
+/// Lower triangle L with L Lᵀ = m + DOUBT_MIN I, n x n, from the symmetric matrix m.
+static void factor(const bslam_real_t *m, int n, bslam_real_t l[ROBOT][ROBOT])
+{
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j <= i; j++) {
+            bslam_real_t sum = bslam_symmat_get(m, i, j) + (i == j ? DOUBT_MIN : 0);
+            for (int k = 0; k < j; k++) {
+                sum -= l[i][k] * l[j][k];
+            }
+            if (i == j) {
+                l[i][i] = bslam_sqrt(sum > DOUBT_MIN / 4 ? sum : DOUBT_MIN / 4);
+            } else {
+                l[i][j] = sum / l[j][j];
+            }
+        }
+    }
+}
+
+/// x <- (L Lᵀ)⁻¹ x.
+static void solve(bslam_real_t l[ROBOT][ROBOT], int n, bslam_real_t x[ROBOT])
+{
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) {
+            x[i] -= l[i][k] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) {
+            x[i] -= l[k][i] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+}
+
+/// Row i of P Fᵀ.
+static void cross_row(const bslam_real_t *p, int i, int n, const bslam_transition_t *f,
+                      bslam_real_t row[ROBOT])
+{
+    for (int j = 0; j < n; j++) {
+        row[j] = 0;
+        for (int k = 0; j < 3 && k < n; k++) {
+            row[j] += bslam_symmat_get(p, i, k) * f->by[j][k] * (k < 3 ? 1 : f->keep[k - 3]);
+        }
+        if (j >= 3) {
+            row[j] = bslam_symmat_get(p, i, j) * f->keep[j - 3];
+        }
+    }
+}
+
+/// The robot goes on from a node to the next one, and what the way back needs of it is kept.
+static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *next,
+                    bslam_smoother_step_t *step)
+{
+    bslam_ekf_t *run = &smoother->run;
+    const bslam_robot_t here = bslam_ekf_robot(run);
+    const int n = run->base_dim;
+    bslam_transition_t transition;
+    bslam_real_t l[ROBOT][ROBOT];
+    memcpy(step->here, run->correction, (size_t)n * sizeof step->here[0]);
+    bslam_ekf_predict_about(run, &smoother->model, &next->motion, next->at, &transition);
+    memcpy(step->next, run->correction, (size_t)n * sizeof step->next[0]);
+    factor(run->covariance, n, l);
+    for (int i = 0; i < n; i++) {
+        cross_row(here.covariance, i, n, &transition, step->gain[i]);
+        solve(l, n, step->gain[i]);
+    }
+}
+
+/// The nodes of a part, which begins at `first`, move to where they fit best.
+static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
+{
+    const int last =
+        (first + BSLAM_SMOOTHER_PART < smoother->top ? first + BSLAM_SMOOTHER_PART : smoother->top) - 1;
+    const int n = smoother->run.base_dim;
+    restore_mark(smoother, &smoother->marks[first / BSLAM_SMOOTHER_PART], first);
+    bslam_ekf_predict_about(&smoother->run, &smoother->model, &bslam_smoother_node(smoother, first)->motion,
+                            bslam_smoother_node(smoother, first)->at, NULL);
+    for (int k = first; k <= last; k++) {
+        const bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
+        take_node(smoother, &smoother->run, node, first_seen);
+        first_seen += node->seen;
+        if (k + 1 < smoother->top) {
+            step_on(smoother, bslam_smoother_node(smoother, k + 1), &smoother->steps[k - first]);
+        }
+    }
+    // The node behind the part has moved already: about where it is now it needs no change.
+    bslam_real_t change[ROBOT] = {0};
+    for (int k = last; k >= first; k--) {
+        bslam_smoother_step_t *step = &smoother->steps[k - first];
+        bslam_real_t moved[ROBOT];
+        for (int i = 0; i < n; i++) {
+            moved[i] = k + 1 < smoother->top ? step->here[i] : smoother->run.correction[i];
+            for (int j = 0; k + 1 < smoother->top && j < n; j++) {
+                moved[i] += step->gain[i][j] * (change[j] - step->next[j]);
+            }
+        }
+        bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
+        for (int i = 0; i < n; i++) {
+            change[i] = moved[i];
+            node->at[i] += moved[i];
+        }
+        node->at[BSLAM_STATE_THETA] = bslam_angle_wrap(node->at[BSLAM_STATE_THETA]);
+    }
+}
+
+// ---- the work ---------------------------------------------------------------------------------------------
+
+/// One unit of the ways forth and up.
+static void advance(bslam_smoother_t *smoother)
+{
+    const bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->at);
+    if (smoother->phase == BSLAM_SMOOTHER_UP && smoother->at % BSLAM_SMOOTHER_PART == 0) {
+        note_mark(&smoother->run, &smoother->marks[smoother->at / BSLAM_SMOOTHER_PART]);
+    }
+    pass_node(smoother, &smoother->run, node, smoother->at_seen);
+    smoother->at++;
+    smoother->at_seen += node->seen;
+}
+
+/// The last part of those that are left on the way back.
+static void retreat(bslam_smoother_t *smoother)
+{
+    const int first = (smoother->at - 1) / BSLAM_SMOOTHER_PART * BSLAM_SMOOTHER_PART;
+    for (int k = first; k < smoother->at; k++) {
+        smoother->at_seen -= bslam_smoother_node(smoother, k)->seen;
+    }
+    go_back(smoother, first, smoother->at_seen);
+    smoother->at = first;
+}
+
+bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole)
+{
+    bool ended = false;
+    while (units > 0 && !ended) {
+        switch (smoother->phase) {
+        case BSLAM_SMOOTHER_FORTH:
+            if (smoother->at < smoother->node_count) {
+                advance(smoother);
+                break;
+            }
+            if (!is_whole) {
+                return false;
+            }
+            end_forth(smoother);
+            ended = true;
+            break;
+        case BSLAM_SMOOTHER_UP:
+            if (smoother->at < smoother->top) {
+                advance(smoother);
+                break;
+            }
+            smoother->phase = BSLAM_SMOOTHER_BACK;
+            break;
+        case BSLAM_SMOOTHER_BACK:
+        default:
+            if (smoother->at > 0) {
+                retreat(smoother);
+                units -= BSLAM_SMOOTHER_PART;
+                break;
+            }
+            bslam_smoother_begin(smoother);
+            break;
+        }
+        units--;
+    }
+    return ended;
+}
+
+void bslam_smoother_turn(bslam_smoother_t *smoother)
+{
+    begin_up(smoother);
+}

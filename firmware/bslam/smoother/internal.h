@@ -1,0 +1,36 @@
+/// What the smoother's two files share. Not for users.
+#ifndef BSLAM_SMOOTHER_INTERNAL_H
+#define BSLAM_SMOOTHER_INTERNAL_H
+
+#include "bslam/smoother/smoother.h"
+
+#define BSLAM_SMOOTHER_BEARING_RAD BSLAM_R(9.58737992e-5)  ///< of a bslam_smoother_seen_t's units
+#define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-5)
+#define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
+
+/// Node k, counted from the oldest.
+static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoother, int k)
+{
+    return &smoother->nodes[(smoother->first_node + k) % BSLAM_SMOOTHER_NODES_MAX];
+}
+
+/// Beacon seen k, counted from the oldest.
+static inline bslam_smoother_seen_t *bslam_smoother_seen(bslam_smoother_t *smoother, int k)
+{
+    return &smoother->seen[(smoother->first_seen + k) % BSLAM_SMOOTHER_SEEN_MAX];
+}
+
+/// Begins a cycle: what is too old leaves first, into the base.
+void bslam_smoother_begin(bslam_smoother_t *smoother);
+
+/// The oldest node leaves, into the base. The cycle must be begun anew.
+void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
+
+/// Does so much work; a node of one phase is a unit. `is_whole`: the newest node is as new as it can be, so
+/// that a cycle may end. True if it did: then smoother->run is the filter at the newest node.
+bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole);
+
+/// After that: the map that came of it is what the models are linearised about, and the robot goes up.
+void bslam_smoother_turn(bslam_smoother_t *smoother);
+
+#endif

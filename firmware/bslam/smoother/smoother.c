@@ -1,0 +1,280 @@
+#include "bslam/smoother/smoother.h"
+
+#include <string.h>
+
+#include "bslam/math/trig.h"
+#include "bslam/model/noise.h"
+#include "bslam/smoother/internal.h"
+
+/// A block lasts no longer, nor does a node's motion where nothing is seen.
+static const bslam_real_t BLOCK_MAX_S = BSLAM_R(0.2);
+/// How a bearing changes besides by the turn that the filter has, rad/s: by the way, and by an error of that.
+static const bslam_real_t SLOPE_SD_RADPS = BSLAM_R(0.5);
+/// A beacon in direction only is first thought to be so far away.
+static const bslam_real_t FIRST_RANGE_M = BSLAM_R(4.0);
+static const bslam_real_t FIRST_SD_M = BSLAM_R(2.5);
+static const bslam_real_t UNITS_MAX = BSLAM_R(65535.0);
+static const bslam_real_t HUBER_D = BSLAM_R(3.0);
+
+static void clear_block(bslam_smoother_t *smoother)
+{
+    memset(smoother->lines, 0, sizeof smoother->lines);
+    smoother->frames = 0;
+    smoother->middle_s = 0;
+    smoother->block_s = 0;
+}
+
+void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf)
+{
+    smoother->model = *params;
+    smoother->model.filter = BSLAM_FILTER_STANDARD;
+    smoother->free_walk = params->velocity_walk_mps_sqrt_s;
+    smoother->path_walk = params->path_walk_mps_sqrt_s;
+    smoother->model.bearing_only_variance_factor = 1;
+    smoother->model.bearing_only_curvature_factor = 0;
+    smoother->model.gate_d2 = 0;
+    smoother->model.huber_d = HUBER_D;
+    smoother->base = *ekf;
+    memcpy(smoother->place, ekf->mean, sizeof smoother->place);
+    smoother->first_node = 0;
+    smoother->node_count = 0;
+    smoother->first_seen = 0;
+    smoother->seen_count = 0;
+    smoother->to_middle = (bslam_motion_t){0};
+    smoother->from_middle = (bslam_motion_t){0};
+    clear_block(smoother);
+    bslam_smoother_begin(smoother);
+}
+
+// ---- nodes ------------------------------------------------------------------------------------------------
+
+static void add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
+{
+    sum->dt_s += motion->dt_s;
+    sum->forward_m += motion->forward_m;
+    sum->turn_rad += motion->turn_rad;
+    sum->forward_var_m2 += motion->forward_var_m2;
+    sum->turn_var_rad2 += motion->turn_var_rad2;
+    sum->forward_turn_cov_mrad += motion->forward_turn_cov_mrad;
+}
+
+/// The nearest whole number, 65535 at most.
+static int32_t units(bslam_real_t value)
+{
+    return (int32_t)(value < UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5)) : UNITS_MAX);
+}
+
+/// The line through a beacon's bearings, at the block's middle. Its slope is about that of the turn.
+static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
+{
+    const bslam_smoother_line_t *line = &smoother->lines[beacon];
+    const bslam_real_t slope = smoother->model.velocity_states != 0 ? -smoother->middle[BSLAM_STATE_TURN] : 0;
+    const bslam_real_t t = smoother->middle_s;
+    const bslam_real_t s0 = line->weight;
+    const bslam_real_t s1 = line->weight_t - t * s0;
+    const bslam_real_t s2 = line->weight_tt - t * (line->weight_t + s1);
+    const bslam_real_t y = line->weight_y - slope * s1;
+    const bslam_real_t ty = line->weight_ty - t * line->weight_y - slope * s2;
+    const bslam_real_t sloped = s2 + 1 / (SLOPE_SD_RADPS * SLOPE_SD_RADPS);
+    const bslam_real_t determinant = s0 * sloped - s1 * s1;
+    const bslam_real_t bearing_rad = line->first_rad + (sloped * y - s1 * ty) / determinant;
+    const bslam_real_t range_m = line->ranges > 0 ? line->range_m / (bslam_real_t)line->ranges : 0;
+    const bool in_reach = range_m < UNITS_MAX * BSLAM_SMOOTHER_RANGE_M;
+    const bslam_smoother_seen_t seen = {
+        // Half a turn to the left is half a turn to the right.
+        .bearing = (int16_t)(uint16_t)units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
+        .bearing_sd = (uint16_t)units(bslam_sqrt(sloped / determinant) / BSLAM_SMOOTHER_SD_RAD + 1),
+        .range = (uint16_t)(in_reach ? units(range_m / BSLAM_SMOOTHER_RANGE_M) : 0),
+        .beacon = (uint8_t)beacon,
+        .ranges = (uint8_t)(in_reach ? line->ranges : 0),
+    };
+    return seen;
+}
+
+static int lines_of_block(const bslam_smoother_t *smoother)
+{
+    int count = 0;
+    for (int b = 0; b < smoother->base.beacon_count; b++) {
+        count += smoother->lines[b].count > 0 ? 1 : 0;
+    }
+    return count;
+}
+
+static void make_room(bslam_smoother_t *smoother, int seen)
+{
+    bool dropped = false;
+    while (smoother->node_count == BSLAM_SMOOTHER_NODES_MAX ||
+           smoother->seen_count + seen > BSLAM_SMOOTHER_SEEN_MAX) {
+        bslam_smoother_drop_oldest(smoother);
+        dropped = true;
+    }
+    if (dropped) {
+        bslam_smoother_begin(smoother);
+    }
+}
+
+/// The open block becomes a node.
+static void close_block(bslam_smoother_t *smoother)
+{
+    const int seen = lines_of_block(smoother);
+    make_room(smoother, seen);
+    bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->node_count);
+    memcpy(node->at, smoother->middle, sizeof node->at);
+    node->motion = smoother->to_middle;
+    node->seen = (int16_t)seen;
+    for (int b = 0; b < smoother->base.beacon_count; b++) {
+        if (smoother->lines[b].count > 0) {
+            *bslam_smoother_seen(smoother, smoother->seen_count) = fit(smoother, b);
+            smoother->seen_count++;
+        }
+    }
+    smoother->node_count++;
+    smoother->to_middle = (bslam_motion_t){0};
+    clear_block(smoother);
+}
+
+/// The middle of the block is now, as far as one knows.
+static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
+{
+    add_motion(&smoother->to_middle, &smoother->from_middle);
+    smoother->from_middle = (bslam_motion_t){0};
+    smoother->middle_s = smoother->block_s;
+    memcpy(smoother->middle, ekf->mean, (size_t)ekf->base_dim * sizeof smoother->middle[0]);
+}
+
+void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion)
+{
+    if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BLOCK_MAX_S) {
+        close_block(smoother);
+    }
+    add_motion(&smoother->from_middle, motion);
+    if (smoother->frames > 0) {
+        smoother->block_s += motion->dt_s;
+    } else if (smoother->from_middle.dt_s >= BLOCK_MAX_S) {
+        set_middle(smoother, ekf);
+        close_block(smoother);
+    }
+}
+
+// ---- sightings and beacons --------------------------------------------------------------------------------
+
+void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index)
+{
+    bslam_smoother_line_t *line = &smoother->lines[index];
+    const bslam_real_t sd_rad =
+        sighting->bearing_sd_rad > 0 ? sighting->bearing_sd_rad : smoother->model.bearing_sd_rad;
+    const bslam_real_t weight = 1 / (sd_rad * sd_rad);
+    const bslam_real_t t = smoother->block_s;
+    if (line->count == 0) {
+        line->first_rad = sighting->bearing_rad;
+    }
+    const bslam_real_t y = bslam_angle_wrap(sighting->bearing_rad - line->first_rad);
+    line->weight += weight;
+    line->weight_t += weight * t;
+    line->weight_tt += weight * t * t;
+    line->weight_y += weight * y;
+    line->weight_ty += weight * y * t;
+    line->count++;
+    if (sighting->has_range) {
+        line->range_m += sighting->range_m;
+        line->ranges++;
+    }
+}
+
+bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_pose_t *mount,
+                                  const bslam_sighting_t *sighting, int *index)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_real_t range_m = sighting->has_range ? sighting->range_m : FIRST_RANGE_M;
+    const bslam_sighted_point_t point = bslam_locate_point(&pose, mount, range_m, sighting->bearing_rad);
+    bslam_status_t status = bslam_ekf_add_guess(ekf, point.x_m, point.y_m, FIRST_SD_M, index);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    const int at = smoother->base.dim;
+    smoother->place[at] = point.x_m;
+    smoother->place[at + 1] = point.y_m;
+    int same;
+    status = bslam_ekf_add_guess(&smoother->base, point.x_m, point.y_m, FIRST_SD_M, &same);
+    if (status == BSLAM_OK && smoother->phase == BSLAM_SMOOTHER_FORTH) {
+        smoother->run.correction[at] = 0;
+        smoother->run.correction[at + 1] = 0;
+        status = bslam_ekf_add_guess(&smoother->run, point.x_m, point.y_m, FIRST_SD_M, &same);
+    }
+    return status;
+}
+
+/// What was seen of a beacon is forgotten, and those behind it move up.
+static void forget_seen(bslam_smoother_t *smoother, int index)
+{
+    int from = 0;
+    int to = 0;
+    for (int n = 0; n < smoother->node_count; n++) {
+        bslam_smoother_node_t *node = bslam_smoother_node(smoother, n);
+        const int end = from + node->seen;
+        for (; from < end; from++) {
+            bslam_smoother_seen_t seen = *bslam_smoother_seen(smoother, from);
+            if (seen.beacon == index) {
+                node->seen--;
+                continue;
+            }
+            seen.beacon = (uint8_t)(seen.beacon > index ? seen.beacon - 1 : seen.beacon);
+            *bslam_smoother_seen(smoother, to) = seen;
+            to++;
+        }
+    }
+    smoother->seen_count = to;
+}
+
+void bslam_smoother_remove(bslam_smoother_t *smoother, int index)
+{
+    const bslam_beacon_t *beacon = &smoother->base.beacons[index];
+    const int dim = bslam_beacon_dim(beacon->kind);
+    const int at = beacon->at;
+    if (dim > 0) {
+        memmove(&smoother->place[at], &smoother->place[at + dim],
+                (size_t)(smoother->base.dim - at - dim) * sizeof smoother->place[0]);
+    }
+    memmove(&smoother->lines[index], &smoother->lines[index + 1],
+            (size_t)(smoother->base.beacon_count - index - 1) * sizeof smoother->lines[0]);
+    memset(&smoother->lines[smoother->base.beacon_count - 1], 0, sizeof smoother->lines[0]);
+    forget_seen(smoother, index);
+    bslam_ekf_remove(&smoother->base, index);
+    bslam_smoother_begin(smoother);
+}
+
+// ---- the end of a frame -----------------------------------------------------------------------------------
+
+/// The filter becomes what a cycle has made of it, and goes on to now.
+static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
+{
+    const bslam_ekf_t *run = &smoother->run;
+    memcpy(ekf->mean, run->mean, sizeof ekf->mean);
+    memcpy(ekf->covariance, run->covariance, sizeof ekf->covariance);
+    if (smoother->from_middle.dt_s > 0) {
+        bslam_motion_t moved;
+        bslam_ekf_predict(ekf, params, &smoother->from_middle, &moved);
+    }
+    smoother->cycles++;
+}
+
+void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
+{
+    smoother->frames++;
+    if (smoother->frames <= BSLAM_SMOOTHER_FRAMES / 2 + 1) {
+        set_middle(smoother, ekf);
+    }
+    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES;
+    if (is_whole) {
+        close_block(smoother);
+    }
+    if (bslam_smoother_work(smoother, 2 + smoother->node_count / 8, is_whole)) {
+        if (bslam_ekf_is_sane(&smoother->run)) {
+            take_over(smoother, params, ekf);
+            bslam_smoother_turn(smoother);
+        } else {
+            smoother->insane++;
+            bslam_smoother_restart(smoother, params, ekf);
+        }
+    }
+}

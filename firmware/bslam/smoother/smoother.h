@@ -1,0 +1,133 @@
+/// A fixed-lag smoother: the filter, led through the last drive again and again, about better points each
+/// time. MATH "The smoother".
+///
+/// A filter linearises each sighting once, at what it holds true then. In direction only that is wrong: a
+/// beacon's distance is not known for half a minute, and a wrong one enters every Jacobian. So the last
+/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames) are kept with what was read and seen
+/// there, and the filter as it was before them, the *base*. A cycle is
+///
+///     forth   from the base through all nodes, linear about their poses and the beacons' places: ends as the
+///             filter of now, which takes the place of the one that has been carried on frame by frame
+///     up      from the base again, in the map that came of it: the robot alone
+///     back    through the nodes in reverse: the poses that fit all readings best are the next ones to
+///             linearise at. They lie on a path as smooth as robots drive, for the jitter of one that rests
+///             on noisy wheels alone would look like parallax
+///
+/// and then as many nodes as came in meanwhile leave at the old end, into the base. Work is bounded a frame.
+/// All of it is the filter's own code (ekf/ekf.h) with its models, gate and Huber's rule.
+///
+/// The caller owns the struct; it serves one pipeline (slam/slam.h, bslam_slam_attach_smoother).
+#ifndef BSLAM_SMOOTHER_SMOOTHER_H
+#define BSLAM_SMOOTHER_SMOOTHER_H
+
+#include "bslam/ekf/ekf.h"
+
+/// Frames of a node.
+#define BSLAM_SMOOTHER_FRAMES 3
+/// Nodes of one of the parts in which the way back is gone.
+#define BSLAM_SMOOTHER_PART 20
+#define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
+
+/// What was seen of a beacon around a node, brought to its moment, in 8 bytes.
+typedef struct bslam_smoother_seen {
+    int16_t bearing;      ///< in 1/65536 of a turn: 0.1 mrad
+    uint16_t bearing_sd;  ///< in 10 urad, 0.65 rad at most
+    uint16_t range;       ///< in 5 mm, 327 m at most
+    uint8_t beacon;       ///< its place in the map
+    uint8_t ranges;       ///< distances that `range` is the mean of; 0: none, or too far
+} bslam_smoother_seen_t;
+
+typedef struct bslam_smoother_node {
+    bslam_real_t at[BSLAM_ROBOT_DIM_MAX];  ///< the robot's values: where its models are linearised
+    bslam_motion_t motion;                 ///< odometry since the node before, or since the base
+    int16_t seen;                          ///< beacons
+} bslam_smoother_node_t;
+
+/// Sums over the sightings of a beacon in the open block, for a line of bearing over time.
+typedef struct bslam_smoother_line {
+    bslam_real_t first_rad;
+    bslam_real_t weight;  ///< sums of w, w t, w t², w y, w y t
+    bslam_real_t weight_t;
+    bslam_real_t weight_tt;
+    bslam_real_t weight_y;
+    bslam_real_t weight_ty;
+    bslam_real_t range_m;  ///< sum
+    int32_t ranges;
+    int32_t count;
+} bslam_smoother_line_t;
+
+/// What the way back needs of a node.
+typedef struct bslam_smoother_step {
+    bslam_real_t gain[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX];
+    bslam_real_t here[BSLAM_ROBOT_DIM_MAX];  ///< correction by all that was read until the node
+    bslam_real_t next[BSLAM_ROBOT_DIM_MAX];  ///< what that makes of the next node's
+} bslam_smoother_step_t;
+
+/// The robot on the way up, where a part begins.
+typedef struct bslam_smoother_mark {
+    bslam_real_t correction[BSLAM_ROBOT_DIM_MAX];
+    bslam_real_t covariance[BSLAM_ROBOT_DIM_MAX * (BSLAM_ROBOT_DIM_MAX + 1) / 2];
+} bslam_smoother_mark_t;
+
+typedef enum bslam_smoother_phase {
+    BSLAM_SMOOTHER_FORTH = 0,
+    BSLAM_SMOOTHER_UP = 1,
+    BSLAM_SMOOTHER_BACK = 2
+} bslam_smoother_phase_t;
+
+/// All members are the smoother's own.
+typedef struct bslam_smoother {
+    bslam_params_t model;                    ///< the pipeline's, without gate and with Huber's rule
+    bslam_real_t free_walk;                  ///< of v: what the estimate rests on
+    bslam_real_t path_walk;                  ///< of v: where the models are linearised
+    bslam_ekf_t base;                        ///< before the first node
+    bslam_ekf_t run;                         ///< the present phase's
+    bslam_real_t place[BSLAM_STATE_PADDED];  ///< the map's values that the models are linearised about
+    bslam_smoother_node_t nodes[BSLAM_SMOOTHER_NODES_MAX];
+    bslam_smoother_seen_t seen[BSLAM_SMOOTHER_SEEN_MAX];
+    int32_t first_node;  ///< rings: where the oldest stands, and how many
+    int32_t node_count;
+    int32_t first_seen;
+    int32_t seen_count;
+    bslam_smoother_phase_t phase;
+    int32_t at;       ///< the next node of the phase
+    int32_t at_seen;  ///< its first beacon, counted from the oldest
+    int32_t top;      ///< nodes that go up and back
+    bslam_smoother_mark_t marks[BSLAM_SMOOTHER_PARTS];
+    bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
+    // The open block.
+    bslam_smoother_line_t lines[BSLAM_BEACONS_MAX];
+    bslam_motion_t to_middle;    ///< from the newest node to the block's middle
+    bslam_motion_t from_middle;  ///< and on to now
+    bslam_real_t middle[BSLAM_ROBOT_DIM_MAX];
+    bslam_real_t middle_s;  ///< since the block's first frame
+    bslam_real_t block_s;
+    int32_t frames;
+    uint32_t cycles;    ///< that took the filter's place
+    uint32_t insane;    ///< that did not, because they came out not finite
+    uint32_t left_out;  ///< sightings that a phase could not use, each time it met them
+} bslam_smoother_t;
+
+/// Starts anew from what the filter knows now: it becomes the base, and all nodes are forgotten.
+void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf);
+
+/// The filter has gone through this motion (as odometry reported it, before any scale). O(1).
+void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
+
+/// A sighting of the present frame was taken for beacon `index` of the filter. O(1).
+void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
+
+/// In place of bslam_ekf_add, for the filter and the base: a guess of the place, a few metres doubtful. The
+/// sighting is to be seen then, too (bslam_smoother_see). BSLAM_E_MAP_FULL. O(n).
+BSLAM_MUST_CHECK bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf,
+                                                   const bslam_pose_t *mount,
+                                                   const bslam_sighting_t *sighting, int *index);
+
+/// Beacon `index` of the filter is about to be taken out. O(n² + what is kept).
+void bslam_smoother_remove(bslam_smoother_t *smoother, int index);
+
+/// The present frame is over: at the end of a block makes a node. Does a bounded piece of work; where a cycle
+/// ends, the filter is replaced by what came of it.
+void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf);
+
+#endif
