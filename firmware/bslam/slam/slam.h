@@ -63,7 +63,6 @@ typedef struct bslam_account {
     bslam_real_t weight;      ///< 1 for full weight, 0 for not used
 } bslam_account_t;
 
-/// All members are the pipeline's own; read them through the functions below.
 /// What an attached smoother needs of the library: smoother/smoother.h. Private, reached by this alone as
 /// below.
 typedef struct bslam_smoothing {
@@ -85,6 +84,7 @@ typedef struct bslam_learning {
     void (*learn)(struct bslam_slam *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
 } bslam_learning_t;
 
+/// All members are the pipeline's own; read them through the functions below.
 typedef struct bslam_slam {
     bslam_params_t params;
     bslam_ekf_t ekf;
