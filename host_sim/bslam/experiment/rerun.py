@@ -122,7 +122,7 @@ class _Rerun:
         elif isinstance(entry, Frame):
             self._take_frame(entry)
         elif isinstance(entry, Call):
-            self._answer(entry, self._try(entry.name, *entry.arguments)[1])
+            self._answer(entry, self._try(entry.name, *entry.arguments, **entry.words)[1])
         elif isinstance(entry, State):
             self._compare(entry)
         elif isinstance(entry, Gap):
@@ -153,10 +153,10 @@ class _Rerun:
         self._chain()
         self._answer(frame, refused)
 
-    def _try(self, name: str, *inputs: Any) -> tuple[Any, str | None]:
+    def _try(self, name: str, *inputs: Any, **words: bool) -> tuple[Any, str | None]:
         """The answer of the core; None, and why, where it refuses the input."""
         try:
-            return getattr(self.slam, name)(*inputs), None
+            return getattr(self.slam, name)(*inputs, **words), None
         except CoreError as refusal:
             self.refusals[refusal.status] += 1
             return None, refusal.status

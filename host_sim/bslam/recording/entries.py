@@ -22,6 +22,8 @@ from bslam.log import ODOMETRY_COLUMNS
 Json = dict[str, Any]
 Pose = tuple[float, float, float]
 """x_m, y_m, theta_rad."""
+Argument = int | float | bytes
+"""Of a call; bytes, which a kept map is, stand in the file as base64."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,9 @@ class Call:
     """Another input: the name of a method of `Slam` and its arguments."""
 
     name: str
-    arguments: tuple[int | float, ...]
+    arguments: tuple[Argument, ...]
     refused: str | None = None
+    words: dict[str, bool] = field(default_factory=dict)  # arguments by name
 
 
 @dataclass(frozen=True)
@@ -189,8 +192,14 @@ def _column(rows: list[Json], name: str) -> list[Any]:
     return [row[name] for row in rows]
 
 
+def _call_to(one: Call) -> Json:
+    arguments = [base64.b64encode(a).decode() if isinstance(a, bytes) else a for a in one.arguments]
+    return {"name": one.name, "arguments": arguments, "refused": one.refused, "words": one.words}
+
+
 def _call_from(content: Json) -> Call:
-    return Call(content["name"], tuple(content["arguments"]), content["refused"])
+    arguments = tuple(base64.b64decode(a) if isinstance(a, str) else a for a in content["arguments"])
+    return Call(content["name"], arguments, content["refused"], content.get("words", {}))
 
 
 def _state_to(one: State) -> Json:
@@ -261,7 +270,7 @@ FORMATS: dict[type, Format] = {
     Start: Format("/start", "bslam.Start", _start_to, _start_from),
     Reading: Format("/odometry", "bslam.Odometry", _reading_to, _reading_from),
     Frame: Format("/sightings", "bslam.Sightings", _frame_to, _frame_from),
-    Call: Format("/call", "bslam.Call", asdict, _call_from),
+    Call: Format("/call", "bslam.Call", _call_to, _call_from),
     State: Format("/state", "bslam.State", _state_to, _state_from),
     Map: Format("/map", "bslam.Map", _map_to, _map_from),
     Counters: Format("/counters", "bslam.Counters", lambda one: one.counts, Counters),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.core.errors import CoreError
 from bslam.core.slam import Account
-from bslam.recording.entries import Call, Counters, Frame, Map, Pose, Reading, State, TruePose
+from bslam.recording.entries import Argument, Call, Counters, Frame, Map, Pose, Reading, State, TruePose
 from bslam.recording.writer import RecordingWriter
 
 FINGERPRINT_START = 0xCBF29CE484222325
@@ -70,6 +70,14 @@ class Recorder:
         """As `Slam.set_pose`."""
         self._call("set_pose", *arguments)
 
+    def load_map(self, blob: bytes, *, frozen: bool = False) -> None:
+        """As `Slam.load_map`."""
+        self._call("load_map", blob, frozen=frozen)
+
+    def lose_pose(self) -> None:
+        """As `Slam.lose_pose`."""
+        self._call("lose_pose")
+
     def add_known_beacon(self, *arguments: float) -> None:
         """As `Slam.add_known_beacon`."""
         self._call("add_known_beacon", *arguments)
@@ -82,15 +90,15 @@ class Recorder:
         """Note the map and the counters at the end."""
         self._note_map()
 
-    def _call(self, name: str, *arguments: int | float) -> None:
-        _, refusal = self._attempt(name, *arguments)
-        self._writer.put(Call(name, arguments, _status(refusal)))
+    def _call(self, name: str, *arguments: Argument, **words: bool) -> None:
+        _, refusal = self._attempt(name, *arguments, **words)
+        self._writer.put(Call(name, arguments, _status(refusal), words))
         if refusal is not None:
             raise refusal
 
-    def _attempt(self, name: str, *inputs: Any) -> tuple[Any, CoreError | None]:
+    def _attempt(self, name: str, *inputs: Any, **words: bool) -> tuple[Any, CoreError | None]:
         try:
-            return getattr(self._slam, name)(*inputs), None
+            return getattr(self._slam, name)(*inputs, **words), None
         except CoreError as error:
             return None, error
 

@@ -104,7 +104,9 @@ SCHEMAS: dict[str, Json] = {
     "bslam.Sightings": _object(
         time_us=_WHOLE, refused=_TEXT, signed=_BOOL, noisy=_BOOL, sightings=_list(_SIGHTING)
     ),
-    "bslam.Call": _object(name=_TEXT, arguments=_list(_NUMBER), refused=_TEXT),
+    "bslam.Call": _object(
+        name=_TEXT, arguments=_list({"type": ["number", "string"]}), refused=_TEXT, words=_object()
+    ),
     "bslam.State": _object(**_POSE_2D, covariance=_list(_NUMBER), fingerprint=_TEXT),
     "bslam.Map": _object(beacons=_list(_BEACON)),
     "bslam.Counters": _object(),
