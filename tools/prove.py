@@ -29,7 +29,7 @@ LAST_LINE = r"([^\n]+)\n?\Z"
 
 
 class Proof(NamedTuple):
-    """A row: `figure` finds in the command's output what was reached; its exit status says if it is enough."""
+    """A row: `figure` finds in the output what was reached; the exit status says if it is enough."""
 
     name: str
     title: str
