@@ -98,6 +98,7 @@ def about() -> str:
     """Machine, date, compilers and versions."""
     found = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
     lines = [f"{found[1] if found else platform.processor()}, {platform.system()} {platform.machine()}"]
+    lines.append(f"bslam {_first_line('git', '-C', str(ROOT), 'describe', '--always', '--dirty')}")
     lines += [_first_line("cc", "--version"), _first_line("valgrind", "--version")]
     packages = ("libmrpt-slam-dev", "libeigen3-dev", "liblinear-dev")
     lines += [f"{one} {version}" for one in packages if (version := _debian_version(one))]
@@ -110,7 +111,7 @@ def about() -> str:
 
 
 def _first_line(*command: str) -> str:
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\n")[0]
+    return subprocess.run(command, capture_output=True, text=True).stdout.split("\n")[0] or "unknown"
 
 
 def _debian_version(package: str) -> str:

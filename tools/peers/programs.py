@@ -41,9 +41,9 @@ class Run:
     kept_bytes: int
 
 
-def run(program: Path, words: Sequence[str], drive: str) -> Run:
-    """One run. Raises SystemExit with what the program said, if it failed."""
-    done = subprocess.run([program, *words], input=drive, capture_output=True, text=True)
+def run(program: Path, words: Sequence[str], drive: str, limit_s: float | None = None) -> Run:
+    """One run. Raises SystemExit with what the program said, if it failed; TimeoutExpired after limit_s."""
+    done = subprocess.run([program, *words], input=drive, capture_output=True, text=True, timeout=limit_s)
     if done.returncode != 0:
         raise SystemExit(f"bench: {program.name} {' '.join(words)} failed:\n{done.stderr}")
     steps, took_ns, error_m, landmarks, kept_bytes = done.stdout.split()
