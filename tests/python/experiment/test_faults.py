@@ -11,7 +11,14 @@ from bslam.commands.faults import all_faults
 
 FAULTS = all_faults(1, cut_every=61)
 # A drive of 200 s each, some with two or three runs: one of each kind here, the rest in `make proof`.
-SLOW = {"no kidnapping", "look-alike beacons", "restart in a kept map", "40 % outlier sightings", "bump"}
+SLOW = {
+    "no kidnapping",
+    "look-alike beacons",
+    "restart in a kept map",
+    "restart by directions alone",
+    "40 % outlier sightings",
+    "bump",
+}
 QUICK = [one for one in FAULTS if one.name not in SLOW]
 
 
