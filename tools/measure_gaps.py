@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +22,12 @@ from tqdm import trange
 
 from bslam.commands.arguments import seeds_range
 from bslam.core.vision import SIGNATURE_SIZE
+from bslam.core.visual_gyro import VisualGyro
 from bslam.experiment.camera import SEEN, TOLD_THRESHOLD, TURNS, CameraDrive, CameraStore, camera_log
 from bslam.experiment.metrics import evaluate
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
+from bslam.log import Log
 from bslam.rig import Rig, load_rig
 from bslam.world.camera import Renderer, dress
 from bslam.world.scenario import Scenario
@@ -119,9 +121,24 @@ def drawn(views: NDArray[np.void], kinds: tuple[str, ...], rough_rad: float, see
     return seen
 
 
-def error_cm(store: DrawnStore, scenario: Scenario, seed: int, sigma_mps: float, rig: Rig) -> float:
+def with_gyro(log: Log, seed: int) -> Log:
+    """With the turn rate that the cameras tell (bslam.core.visual_gyro), drawn from the truth."""
+    assert log.truth is not None
+    ends_us = log.odometry.time_us
+    starts_us = np.concatenate([log.truth.time_us[:1], ends_us[:-1]])
+    theta_rad = np.unwrap(log.truth.theta_rad)
+    turned_rad = [np.interp(time_us, log.truth.time_us, theta_rad) for time_us in (starts_us, ends_us)]
+    noise = np.random.default_rng([seed, 6]).normal(0.0, VisualGyro.SD_RADPS, len(ends_us))
+    rates = (turned_rad[1] - turned_rad[0]) / np.maximum(1e-6 * (ends_us - starts_us), 1e-6) + noise
+    return replace(log, odometry=replace(log.odometry, gyro_radps=rates))
+
+
+def error_cm(
+    store: DrawnStore, scenario: Scenario, seed: int, sigma_mps: float, rig: Rig, gyro: bool
+) -> float:
     """Mean error of the position over a drive."""
     log = camera_log(scenario, seed, sigma_mps, None, rig, store, TOLD_THRESHOLD)
+    log = with_gyro(log, seed) if gyro else log
     options = RunOptions(sensor="camera", sigma_mps=sigma_mps, seed=seed, observation="distance")
     evaluation = evaluate(log, run_log(log, options), options, align=False)
     assert evaluation is not None
@@ -140,6 +157,7 @@ def main() -> int:
     parser.add_argument(
         "--rough-deg", type=float, default=2.3, help="sd of a rough direction (default: 2.3, as measured)"
     )
+    parser.add_argument("--gyro", action="store_true", help="the cameras tell the turn rate, too")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "gaps", help="where views are kept")
     arguments = parser.parse_args()
     scenario, rig = load_scenario(arguments.scenario), load_rig(arguments.rig)
@@ -147,7 +165,9 @@ def main() -> int:
     for name, kinds in SETS.items():
         store = DrawnStore(arguments.folder, kinds, math.radians(arguments.rough_deg))
         for sigma_mps in arguments.sigma:
-            errors = [error_cm(store, scenario, seed, sigma_mps, rig) for seed in arguments.seeds]
+            errors = [
+                error_cm(store, scenario, seed, sigma_mps, rig, arguments.gyro) for seed in arguments.seeds
+            ]
             each = " ".join(f"{error:.0f}" for error in errors)
             print(f"{name:16} sigma {sigma_mps:g}: {np.mean(errors):5.1f} ({each})", flush=True)
     return 0
