@@ -64,9 +64,10 @@ static void test_fingerprint_has_the_weights_of_trained_machines(void **state)
         bslam_machine_t *machine = &looks.learner.machines[m];
         const bool counts = machine->used && machine->trained;
         trained += counts ? 1 : 0;
-        machine->weights.w[0]++;
+        const bslam_stored_weight_t kept = machine->weights.w[0];
+        machine->weights.w[0] = (bslam_stored_weight_t)(kept + 1);
         assert_int_equal(bslam_slam_fingerprint(&slam, BSLAM_FINGERPRINT_START) != whole, counts);
-        machine->weights.w[0]--;
+        machine->weights.w[0] = kept;
     }
     assert_int_equal(trained, 3);
     looks.learner.machines[0].trained = false;
