@@ -18,7 +18,7 @@ TARGETS := $(patsubst TARGET_FLAGS_%,%,$(filter TARGET_FLAGS_%,$(.VARIABLES)))
 TOOLS_FOR = $(if $(filter rv%,$(1)),$(RISCV),$(ARM))
 FLAGS_FOR = $(if $(filter rv%,$(1)),--specs=picolibc.specs -msmall-data-limit=0,-mthumb) $(TARGET_FLAGS_$(1))
 
-# The tools for RISC-V take 1.4 GB, so that nothing installs them unasked: what needs them is left out of `all`
+# The tools for RISC-V take 1.4 GB, so nothing installs them unasked: what needs them is left out of `all`
 # where they are missing, and says so where it is asked for.
 HAS_RISCV := $(shell command -v $(RISCV)gcc)
 CAN_BUILD = $(if $(filter rv%,$(1)),$(HAS_RISCV),yes)
@@ -51,7 +51,8 @@ CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(cal
 .PHONY: library-$(1)
 library-$(1): build/$(1)/libbslam.a
 	@$$(PYTHON) tools/check_symbols.py --nm $(call TOOLS_FOR,$(1))nm $$<
-	@$(call TOOLS_FOR,$(1))size --totals $$< | awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
+	@$(call TOOLS_FOR,$(1))size --totals $$< | \
+	    awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
 
 build/$(1)/libbslam.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
@@ -66,7 +67,8 @@ endef
 $(foreach core,$(TARGETS),$(eval $(call core_rules,$(core))))
 
 .PHONY: firmware-all
-firmware-all: $(foreach core,$(TARGETS),$(if $(call CAN_BUILD,$(core)),library-$(core))) images ## the library for every core, the images for every board
+TARGET_LIBRARIES := $(foreach core,$(TARGETS),$(if $(call CAN_BUILD,$(core)),library-$(core)))
+firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the images for every board
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons

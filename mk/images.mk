@@ -42,7 +42,8 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 
 build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
     firmware/port/sections.ld tools/check_image.py
-	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
+	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
+	    -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
 	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1) --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
 
 .PHONY: image-$(1)
@@ -54,7 +55,8 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c $(patsubst %,firmware/port/%.c,absent film posix/port)
+HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c \
+    $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk
@@ -67,7 +69,8 @@ $(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
 -include $(HOST_ROBOT_OBJECTS:.o=.d)
 
 .PHONY: images
-images: $(foreach board,$(BOARDS),$(if $(call CAN_BUILD,$(BOARD_CORE_$(board))),image-$(board))) $(HOST_ROBOT) ## link the images of every board, and check them
+BUILT_BOARDS := $(foreach board,$(BOARDS),$(if $(call CAN_BUILD,$(BOARD_CORE_$(board))),image-$(board)))
+images: $(BUILT_BOARDS) $(HOST_ROBOT) ## link the images of every board, and check them
 
 .PHONY: selftest
 selftest: images ## run the self-test of every board that QEMU has

@@ -61,9 +61,33 @@ static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bsla
     return d2;
 }
 
+/// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
+static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
+    bslam_real_t x;
+    bslam_real_t y;
+    bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
+    if (sighting->has_range) {
+        const bslam_sighted_point_t seen =
+            bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
+        const bslam_real_t limit = frame->params->nearest_threshold_m;
+        const bslam_real_t dx = (seen.x_m - x) / limit;
+        const bslam_real_t dy = (seen.y_m - y) / limit;
+        return dx * dx + dy * dy;
+    }
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);
+    const bslam_real_t direction = bslam_atan2(y - sensor.pose.y_m, x - sensor.pose.x_m);
+    const bslam_real_t difference =
+        bslam_angle_wrap(direction - sensor.pose.theta_rad - bslam_angle_wrap(sighting->bearing_rad)) /
+        frame->params->nearest_threshold_rad;
+    return difference * difference;
+}
+
 /// The beacon that a label tells. Until it is confirmed any sighting may be the false one, the first as well
 /// as those that contradict it: each of these starts a rival of the same label, and the first that is
-/// confirmed stays. So the nearest, and if the gate has that one out a new one.
+/// confirmed stays. So the nearest, and a new one if the gate has that one out and it is not even near.
 static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                         bslam_match_t *match)
 {
@@ -87,7 +111,8 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
     }
     const bslam_real_t gate_d2 = frame->params->gate_d2;
     const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
-    if (rivals == 0 || (is_out && sighting->has_range && rivals < RIVALS_MAX)) {
+    const bool may_rival = is_out && sighting->has_range && rivals < RIVALS_MAX;
+    if (rivals == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
         match->verdict = BSLAM_VERDICT_NEW;
         match->beacon = -1;
     }
@@ -156,30 +181,6 @@ static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2
         }
     }
     keep_one_to_one(frame, matches);
-}
-
-/// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
-static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
-                               int beacon)
-{
-    const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
-    bslam_real_t x;
-    bslam_real_t y;
-    bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
-    if (sighting->has_range) {
-        const bslam_sighted_point_t seen =
-            bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
-        const bslam_real_t limit = frame->params->nearest_threshold_m;
-        const bslam_real_t dx = (seen.x_m - x) / limit;
-        const bslam_real_t dy = (seen.y_m - y) / limit;
-        return dx * dx + dy * dy;
-    }
-    const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);
-    const bslam_real_t direction = bslam_atan2(y - sensor.pose.y_m, x - sensor.pose.x_m);
-    const bslam_real_t difference =
-        bslam_angle_wrap(direction - sensor.pose.theta_rad - bslam_angle_wrap(sighting->bearing_rad)) /
-        frame->params->nearest_threshold_rad;
-    return difference * difference;
 }
 
 void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches)

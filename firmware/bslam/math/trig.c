@@ -13,7 +13,6 @@
 #define HALF_PI_LOW 7.5497899548918821e-8f
 #endif
 
-/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same
 /// What whole turns leave of an angle, with its sign: C's fmod to the bit, since nothing in it rounds (a
 /// difference of two numbers of which one is at most twice the other is exact). Not fmod itself, whose code
 /// and stack are a multiple of this. NaN for what is not finite.
@@ -27,12 +26,14 @@ static bslam_real_t remainder_of_turns(bslam_real_t angle)
     while (turns <= left / 2) {
         turns *= 2;
     }
-    for (; turns >= 2 * BSLAM_PI; turns /= 2) {
+    while (turns >= 2 * BSLAM_PI) {
         left -= left >= turns ? turns : 0;
+        turns /= 2;
     }
     return angle < 0 ? -left : left;
 }
 
+/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same
 /// everywhere too.
 static bslam_real_t bring_near(bslam_real_t angle)
 {

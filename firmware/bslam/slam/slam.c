@@ -307,6 +307,7 @@ static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon)
         beacon->view_um = slam->way_um;
         beacon->views++;
         beacon->confirmed = beacon->views >= slam->params.confirm_sightings;
+        slam->confirmed_now = slam->confirmed_now || beacon->confirmed;
     }
 }
 
@@ -352,6 +353,18 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     count_view(slam, beacon);
 }
 
+/// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
+/// that one does it.
+static void note_rivals(bslam_slam_t *slam, int index)
+{
+    bslam_beacon_t *beacons = slam->ekf.beacons;
+    for (int b = 0; b < index && slam->params.association == BSLAM_ASSOCIATION_KNOWN; b++) {
+        const uint32_t rivals = beacons[b].label == beacons[index].label ? 1 : 0;
+        beacons[b].gated += rivals;
+        beacons[index].gated += rivals;
+    }
+}
+
 static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
                     const bslam_sighting_t *sighting, bslam_account_t *account)
 {
@@ -373,6 +386,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->view_um = slam->way_um;
     beacon->views = 1;
     beacon->confirmed = slam->params.confirm_sightings <= 1;
+    note_rivals(slam, index);
     if (slam->smoother != NULL) {
         slam->smoothing->see(slam->smoother, sighting, index);
     }
@@ -499,33 +513,32 @@ void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
-/// Whether another beacon has its label: a confirmed one, or any.
-static bool has_rival(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, bool confirmed)
-{
-    for (int b = 0; b < ekf->beacon_count; b++) {
-        const bslam_beacon_t *other = &ekf->beacons[b];
-        if (other != beacon && other->label == beacon->label && (other->confirmed || !confirmed)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
-/// reason against it: it leaves if sightings contradicted it, or once another of its label is confirmed.
-static bool is_unconfirmed(const bslam_slam_t *slam, const bslam_beacon_t *beacon, int64_t time_us)
+/// reason against it: it leaves if sightings contradicted it.
+static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
 {
-    const bslam_params_t *params = &slam->params;
-    const bool is_told = params->association == BSLAM_ASSOCIATION_KNOWN;
-    if (beacon->confirmed) {
+    const int64_t window_us = params->confirm_window_us;
+    if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
-    if (is_told && has_rival(&slam->ekf, beacon, true)) {
-        return true;
+    return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
+}
+
+/// The first that is confirmed of several with one told label stays, the others leave.
+static void drop_rivals(bslam_slam_t *slam)
+{
+    const bool is_told = slam->params.association == BSLAM_ASSOCIATION_KNOWN;
+    for (int b = slam->ekf.beacon_count - 1; b >= 0 && is_told; b--) {
+        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
+        for (int i = 0; i < slam->ekf.beacon_count && !beacon->confirmed; i++) {
+            if (slam->ekf.beacons[i].confirmed && slam->ekf.beacons[i].label == beacon->label) {
+                drop_beacon(slam, b);
+                slam->counters.removed++;
+                break;
+            }
+        }
     }
-    const bool is_late =
-        params->confirm_window_us > 0 && time_us - beacon->first_seen_us > params->confirm_window_us;
-    return is_late && (!is_told || beacon->gated > 0 || has_rival(&slam->ekf, beacon, false));
+    slam->confirmed_now = false;
 }
 
 /// Rays whose distance is known become points; provisional beacons whose time is up leave.
@@ -533,12 +546,15 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
 {
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (is_unconfirmed(slam, beacon, time_us)) {
+        if (is_unconfirmed(&slam->params, beacon, time_us)) {
             drop_beacon(slam, b);
             slam->counters.removed++;
         } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
             slam->counters.settled++;
         }
+    }
+    if (slam->confirmed_now) {
+        drop_rivals(slam);
     }
 }
 
