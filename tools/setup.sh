@@ -2,7 +2,7 @@
 # Makes this machine ready: system packages, then .venv with pinned Python packages and the command `bslam`.
 #
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
-#   tools/setup.sh test    that, and what `make test` needs: CMocka, Arm compiler, QEMU, browser, valgrind, lint
+#   tools/setup.sh test    that, and what `make test` needs: CMocka, Arm compiler, QEMU, browser, valgrind
 #   tools/setup.sh bench   the same, for `make bench`
 #   tools/setup.sh proof   that, and what `make proof` needs: clang with libFuzzer and MC/DC
 #
