@@ -58,7 +58,8 @@ def test_one_run_leaves_its_files_and_an_entry(made, tmp_path):
     assert result.ok
     assert drawn == ["a"]
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"a", "a.mcap", "a.estimate.tum", "a.truth.tum", "a.map.csv", "summary.json"}
+    tables = {"a.estimate.tum", "a.truth.tum", "a.map.csv"}
+    assert names == {"a", "a.mcap", "a.bslam", *tables, "summary.json"}
     (entry,) = summary(tmp_path)["runs"]
     assert (entry["name"], entry["scenario"], entry["truth"], entry["diverged"]) == (
         "a",
