@@ -45,7 +45,7 @@ def runs(out):
         (["run", "paper_room", "--observation", "x"], ["--observation", "'x'", "distance, direction"]),
         (["run", "paper_room", "--association", "look"], ["--association", "'look'", "known", "nearest"]),
         (["run", "paper_room", "--association", "known:7"], ["--association", "'7'", "0 to 1"]),
-        (["run", "paper_room", "--filter", "particle"], ["--filter", "'particle'", "standard, invariant, smoother"]),
+        (["run", "paper_room", "--filter", "x"], ["--filter", "'x'", "standard, invariant, smoother"]),
         (["run", "paper_room", "--motion", "x"], ["--motion", "'x'", "euler"]),
         (["run", "paper_room", "--noise", "x"], ["--noise", "'x'", "speedometer"]),
         (["run", "paper_room", "--sensor", "lidar"], ["--sensor", "'lidar'", "simulated"]),
