@@ -1,11 +1,15 @@
 """The front end through its Python binding: what it refuses, what it says of pictures that show nothing, and
 that it finds beacons in a rendered world."""
 
+import re
+
 import numpy as np
 import pytest
 
 from bslam.core import CoreError
+from bslam.core.build import LIBRARY_DIR
 from bslam.core.vision import FrontEnd
+from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, make_world, walk
@@ -130,3 +134,9 @@ def test_a_black_frame_tells_no_turn() -> None:
     black = np.zeros((240, 320, 3), np.uint8)
     assert front_end.see(black).turn is None
     assert front_end.see(black).turn is None
+
+
+def test_the_gyro_s_noise_is_the_header_s() -> None:
+    header = (LIBRARY_DIR / "vision" / "visual_gyro.h").read_text(encoding="utf-8")
+    (value,) = re.findall(r"#define BSLAM_VISUAL_GYRO_SD_RADPS ([0-9.]+)f", header)
+    assert float(value) == VisualGyro.SD_RADPS
