@@ -133,37 +133,58 @@ static void read_signature(bslam_link_reader_t *reader, float signature[BSLAM_SA
     }
 }
 
+/// Whether so many signatures are what is left of a payload: asked before the first is taken.
+static bool holds_signatures(session_t *session, const bslam_link_reader_t *reader, int count)
+{
+    const size_t bytes = (size_t)count * BSLAM_SAMPLE_FEATURES * sizeof(float);
+    if (!reader->failed && reader->left == bytes) {
+        return true;
+    }
+    session->last_status = SESSION_E_LENGTH;
+    return false;
+}
+
 static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
 {
     const int first = bslam_link_get_u8(reader);
     const int count = bslam_link_get_u8(reader);
     if (first + count > BSLAM_SIGHTINGS_MAX) {
         keep(session, BSLAM_E_COUNT);
-        return;
-    }
-    for (int i = first; i < first + count; i++) {
-        read_signature(reader, session->signatures[i]);
-    }
-    if (is_whole(session, reader)) {
+    } else if (holds_signatures(session, reader, count)) {
+        for (int i = first; i < first + count; i++) {
+            read_signature(reader, session->signatures[i]);
+        }
         keep(session, BSLAM_OK);
     }
 }
 
+/// Encodes signatures into samples, all into the same one where `step` is 0.
+static bslam_status_t read_seeds(bslam_link_reader_t reader, int count, bslam_sample_t *samples, int step)
+{
+    bslam_status_t status = BSLAM_OK;
+    for (int i = 0; i < count && status == BSLAM_OK; i++) {
+        float signature[BSLAM_SAMPLE_FEATURES];
+        read_signature(&reader, signature);
+        status = bslam_sample_encode(signature, &samples[i * step]);
+    }
+    return status;
+}
+
+/// Machines that run already learn from the seeds: none is written unless all are good.
 static void apply_seeds(session_t *session, bslam_link_reader_t *reader)
 {
     const int first = bslam_link_get_u8(reader);
     const int count = bslam_link_get_u8(reader);
-    bslam_status_t status = first + count > BSLAM_SEEDS_MAX ? BSLAM_E_COUNT : BSLAM_OK;
-    for (int i = first; i < first + count && status == BSLAM_OK; i++) {
-        float signature[BSLAM_SAMPLE_FEATURES];
-        read_signature(reader, signature);
-        status = bslam_sample_encode(signature, &session->seeds[i]);
-    }
-    if (status != BSLAM_OK) {
+    if (first + count > BSLAM_SEEDS_MAX) {
+        keep(session, BSLAM_E_COUNT);
+    } else if (holds_signatures(session, reader, count)) {
+        bslam_sample_t tried;
+        bslam_status_t status = read_seeds(*reader, count, &tried, 0);
+        if (status == BSLAM_OK) {
+            status = read_seeds(*reader, count, &session->seeds[first], 1);
+            session->seed_count = first + count;
+        }
         keep(session, status);
-    } else if (is_whole(session, reader)) {
-        session->seed_count = first + count;
-        keep(session, BSLAM_OK);
     }
 }
 

@@ -217,7 +217,13 @@ def test_a_replayed_message_is_not_applied_again(robot_line):
 
 @pytest.mark.parametrize(
     ("kind", "payload", "refusal"),
-    [(0x33, b"", "TYPE"), (Message.ODOMETRY, b"\0\0", "LENGTH"), (Message.PARAM_SET, b"\0" * 7, "LENGTH")],
+    [
+        (0x33, b"", "TYPE"),
+        (Message.ODOMETRY, b"\0\0", "LENGTH"),
+        (Message.PARAM_SET, b"\0" * 7, "LENGTH"),
+        (Message.SIGNATURES, b"\0\1" + b"\0" * 4, "LENGTH"),
+        (Message.SEEDS, b"\0\2" + b"\0" * 4 * 71, "LENGTH"),
+    ],
 )
 def test_a_message_that_is_none_is_refused(kind, payload, refusal, robot_line):
     line = robot_line()
