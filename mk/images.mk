@@ -14,7 +14,7 @@ HOST_SIZES := -DSESSION_VISION=1 \
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := $(patsubst %,firmware/app/%.c,session records stored seeing text watch)
+APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records stored seeing text watch)
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 

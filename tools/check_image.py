@@ -20,11 +20,11 @@ from check_symbols import UNWANTED_CALLS
 
 CALLED_BY_POINTER = (
     (r"session_", r"(apply|answer)_"),
-    (r"learn_looks|drop_beacon", r"bslam_looks_forget|bslam_smoother_remove"),
+    (r"bslam_slam_learn_looks|bslam_slam_drop_beacon", r"bslam_looks_forget|bslam_smoother_remove"),
     (r"predict_step|fuse_match|add_new|use_matches", r"bslam_smoother_(move|see|add)"),
     (
         r"bslam_slam_|associate_ticks",
-        r"bslam_associate_|learn_looks|bslam_looks_(clear|forget)|bslam_smoother_\w+",
+        r"bslam_associate_|bslam_slam_learn_looks|bslam_looks_(clear|forget)|bslam_smoother_\w+",
     ),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),

@@ -1,538 +1,17 @@
 #include "app/session.h"
 
-#include "app/records.h"
+#include "app/exchange.h"
 #include "app/stored.h"
 #include "port/port.h"
 
-#define NO_DETAIL 255
-#define BEACON_BYTES 43
-#define BEACONS_A_FRAME ((BSLAM_LINK_PAYLOAD_MAX - 16) / BEACON_BYTES)
-#define FLAG_FINGERPRINT 1u
-#define FLAG_LOOKS 2u
-#define FLAG_AS_IT_IS 4u
-#define FLAG_RECOVERY 8u
-#define FLAG_GUARD 16u
-#define FLAG_GYRO 1u
-#define FLAG_MOVED 1u
-
-// ---- messages applied: the payload in, a status out
-// ---------------------------------------------------------
-
-/// A payload that is read and is as long as it should be.
-static bool is_whole(session_t *session, const bslam_link_reader_t *reader)
-{
-    if (bslam_link_is_read(reader)) {
-        return true;
-    }
-    session->last_status = SESSION_E_LENGTH;
-    return false;
-}
-
-static void keep(session_t *session, bslam_status_t status)
-{
-    session->last_status = (uint8_t)status;
-}
-
-static void forget_seeds(session_t *session)
-{
-#if SESSION_LOOKS
-    session->seed_count = 0;
-#else
-    (void)session;
-#endif
-}
-
-static void apply_hello(session_t *session, bslam_link_reader_t *reader)
-{
-    const uint32_t id = bslam_link_get_u32(reader);
-    const uint8_t flags = bslam_link_get_u8(reader);
-    if (is_whole(session, reader)) {
-        session->id = id;
-        session->open = true;
-        session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
-        if ((flags & FLAG_AS_IT_IS) != 0) {
-            session->params = session->slam.params;
-        } else {
-            session->uses_looks = (flags & FLAG_LOOKS) != 0;
-            watch_init(&session->watch, (flags & FLAG_RECOVERY) != 0, (flags & FLAG_GUARD) != 0);
-            bslam_params_default(&session->params);
-        }
-        forget_seeds(session);
-        keep(session, BSLAM_OK);
-    }
-}
-
-/// Where the host wishes it, and where identity is told by looks.
-static uint8_t attach_looks(session_t *session)
-{
-    session->uses_looks |= session->params.association == BSLAM_ASSOCIATION_SVM;
-    if (!session->uses_looks) {
-        return BSLAM_OK;
-    }
-#if SESSION_LOOKS
-    const bslam_status_t status = bslam_looks_init(&session->looks, session->seeds, session->seed_count);
-    if (status == BSLAM_OK) {
-        bslam_slam_attach_looks(&session->slam, &session->looks);
-    }
-    return (uint8_t)status;
-#else
-    return SESSION_E_LOOKS;
-#endif
-}
-
-/// The status of the library or the link, and which parameter it is about.
-static uint8_t start_over(session_t *session, int *bad_id)
-{
-    const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, bad_id);
-    session->fingerprint = BSLAM_FINGERPRINT_START;
-    watch_restart(&session->watch);
-    return status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
-}
-
-static void apply_reset(session_t *session, bslam_link_reader_t *reader)
-{
-    if (is_whole(session, reader)) {
-        int bad_id = NO_DETAIL;
-        session->last_status = start_over(session, &bad_id);
-        session->detail = (uint8_t)bad_id;
-    }
-}
-
-static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
-{
-    bslam_odometry_reading_t reading = {.time_us = session->parser.header.time_us};
-    reading.source = (bslam_odometry_source_t)bslam_link_get_u8(reader);
-    reading.has_gyro = (bslam_link_get_u8(reader) & FLAG_GYRO) != 0;
-    if (reading.source == BSLAM_ODOMETRY_TICKS) {
-        reading.left_ticks = bslam_link_get_u32(reader);
-        reading.right_ticks = bslam_link_get_u32(reader);
-    } else {
-        const bslam_real_t a = bslam_link_get_real(reader);
-        const bslam_real_t b = bslam_link_get_real(reader);
-        const bool is_wheels = reading.source == BSLAM_ODOMETRY_WHEELS;
-        reading.left_m = is_wheels ? a : 0;
-        reading.right_m = is_wheels ? b : 0;
-        reading.v_mps = is_wheels ? 0 : a;
-        reading.omega_radps = is_wheels ? 0 : b;
-    }
-    reading.gyro_radps = bslam_link_get_real(reader);
-    if (is_whole(session, reader)) {
-        const uint32_t began = port_ticks();
-        keep(session, bslam_slam_odometry(&session->slam, &reading));
-        session->ticks = port_ticks() - began;
-        session->moves++;
-    }
-}
-
-#if SESSION_LOOKS
-
-static void read_signature(bslam_link_reader_t *reader, float signature[BSLAM_SAMPLE_FEATURES])
-{
-    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
-        signature[k] = (float)bslam_link_get_real(reader);
-    }
-}
-
-/// Whether so many signatures are what is left of a payload: asked before the first is taken.
-static bool holds_signatures(session_t *session, const bslam_link_reader_t *reader, int count)
-{
-    const size_t bytes = (size_t)count * BSLAM_SAMPLE_FEATURES * sizeof(float);
-    if (!reader->failed && reader->left == bytes) {
-        return true;
-    }
-    session->last_status = SESSION_E_LENGTH;
-    return false;
-}
-
-static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
-{
-    const int first = bslam_link_get_u8(reader);
-    const int count = bslam_link_get_u8(reader);
-    if (first + count > BSLAM_SIGHTINGS_MAX) {
-        keep(session, BSLAM_E_COUNT);
-    } else if (holds_signatures(session, reader, count)) {
-        for (int i = first; i < first + count; i++) {
-            read_signature(reader, session->signatures[i]);
-        }
-        keep(session, BSLAM_OK);
-    }
-}
-
-/// Encodes signatures into samples, all into the same one where `step` is 0.
-static bslam_status_t read_seeds(bslam_link_reader_t reader, int count, bslam_sample_t *samples, int step)
-{
-    bslam_status_t status = BSLAM_OK;
-    for (int i = 0; i < count && status == BSLAM_OK; i++) {
-        float signature[BSLAM_SAMPLE_FEATURES];
-        read_signature(&reader, signature);
-        status = bslam_sample_encode(signature, &samples[i * step]);
-    }
-    return status;
-}
-
-/// Machines that run already learn from the seeds: none is written unless all are good.
-static void apply_seeds(session_t *session, bslam_link_reader_t *reader)
-{
-    const int first = bslam_link_get_u8(reader);
-    const int count = bslam_link_get_u8(reader);
-    if (first + count > BSLAM_SEEDS_MAX) {
-        keep(session, BSLAM_E_COUNT);
-    } else if (holds_signatures(session, reader, count)) {
-        bslam_sample_t tried;
-        bslam_status_t status = read_seeds(*reader, count, &tried, 0);
-        if (status == BSLAM_OK) {
-            status = read_seeds(*reader, count, &session->seeds[first], 1);
-            session->seed_count = first + count;
-        }
-        keep(session, status);
-    }
-}
-
-static const float *signature_of(const session_t *session, int sighting)
-{
-    return session->signatures[sighting];
-}
-
-#else
-
-static const float *signature_of(const session_t *session, int sighting)
-{
-    (void)session;
-    (void)sighting;
-    return NULL;
-}
-
-#endif
-
-static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
-{
-    const int count = bslam_link_get_u8(reader);
-    for (int i = 0; i < count && i < BSLAM_SIGHTINGS_MAX; i++) {
-        record_get_sighting(reader, signature_of(session, i), &session->sightings[i]);
-    }
-    // Of too many, which the library refuses, there is no room to read all.
-    if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
-        const uint32_t began = port_ticks();
-        const int64_t time_us = session->parser.header.time_us;
-        keep(session, watch_sightings(&session->watch, &session->slam, time_us, session->sightings, count));
-        session->ticks = port_ticks() - began;
-        session->detail = (uint8_t)bslam_slam_bad_sighting(&session->slam);
-    }
-}
-
-static void apply_resume(session_t *session, bslam_link_reader_t *reader)
-{
-    const bslam_real_t position_sd_m = bslam_link_get_real(reader);
-    const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
-    if (is_whole(session, reader)) {
-        keep(session, bslam_slam_resume_odometry(&session->slam, position_sd_m, heading_sd_rad));
-    }
-}
-
-static void apply_set_pose(session_t *session, bslam_link_reader_t *reader)
-{
-    bslam_pose_t pose;
-    pose.x_m = bslam_link_get_real(reader);
-    pose.y_m = bslam_link_get_real(reader);
-    pose.theta_rad = bslam_link_get_real(reader);
-    const bslam_real_t position_sd_m = bslam_link_get_real(reader);
-    const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
-    if (is_whole(session, reader)) {
-        keep(session, bslam_slam_set_pose(&session->slam, &pose, position_sd_m, heading_sd_rad));
-    }
-}
-
-static void apply_known_beacon(session_t *session, bslam_link_reader_t *reader)
-{
-    const int32_t label = bslam_link_get_i32(reader);
-    const bslam_real_t x_m = bslam_link_get_real(reader);
-    const bslam_real_t y_m = bslam_link_get_real(reader);
-    if (is_whole(session, reader)) {
-        keep(session, bslam_slam_add_known_beacon(&session->slam, label, x_m, y_m));
-    }
-}
-
-static void apply_remove_beacon(session_t *session, bslam_link_reader_t *reader)
-{
-    const uint32_t uid = bslam_link_get_u32(reader);
-    if (is_whole(session, reader)) {
-        keep(session, bslam_slam_remove_beacon(&session->slam, uid));
-    }
-}
-
-static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
-{
-    const int id = bslam_link_get_u16(reader);
-    const bslam_real_t value = bslam_link_get_real(reader);
-    if (is_whole(session, reader)) {
-        keep(session, bslam_params_set(&session->params, id, value));
-    }
-}
-
-static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
-{
-    if (is_whole(session, reader)) {
-        session->last_status =
-            stored_params_save(&session->params) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
-    }
-}
-
-/// A question changes nothing: it is read when it is answered.
-static void apply_nothing(session_t *session, bslam_link_reader_t *reader)
-{
-    (void)reader;
-    keep(session, BSLAM_OK);
-}
-
-#if SESSION_VISION
-
-static void apply_camera(session_t *session, bslam_link_reader_t *reader)
-{
-    const int index = bslam_link_get_u8(reader);
-    bslam_camera_t camera = {.lens = (bslam_lens_kind_t)bslam_link_get_u8(reader)};
-    camera.width_px = bslam_link_get_u16(reader);
-    camera.height_px = bslam_link_get_u16(reader);
-    bslam_real_t *const values[] = {&camera.fx_px,   &camera.fy_px,     &camera.cx_px,
-                                    &camera.cy_px,   &camera.k1,        &camera.k2,
-                                    &camera.yaw_rad, &camera.pitch_rad, &camera.z_m};
-    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
-        *values[i] = bslam_link_get_real(reader);
-    }
-    if (is_whole(session, reader)) {
-        keep(session, seeing_set_camera(&session->seeing, index, &camera));
-    }
-}
-
-static void apply_image(session_t *session, bslam_link_reader_t *reader)
-{
-    const int camera = bslam_link_get_u8(reader);
-    const bslam_pixel_format_t format = (bslam_pixel_format_t)bslam_link_get_u8(reader);
-    if (is_whole(session, reader)) {
-        session->ticks = 0;
-        keep(session, seeing_begin(&session->seeing, camera, format));
-    }
-}
-
-static void apply_pixels(session_t *session, bslam_link_reader_t *reader)
-{
-    const uint32_t began = port_ticks();
-    bslam_status_t status = BSLAM_OK;
-    while (reader->left > 0 && status == BSLAM_OK) {
-        status = seeing_take(&session->seeing, bslam_link_get_u8(reader));
-    }
-    keep(session, status);
-    session->ticks += port_ticks() - began;
-}
-
-static void apply_look(session_t *session, bslam_link_reader_t *reader)
-{
-    const bool moved = (bslam_link_get_u8(reader) & FLAG_MOVED) != 0;
-    if (is_whole(session, reader)) {
-        const uint32_t began = port_ticks();
-        seeing_t *seeing = &session->seeing;
-        bslam_status_t status = seeing_look(seeing, moved);
-        if (status == BSLAM_OK) {
-            status = watch_sightings(&session->watch, &session->slam, session->parser.header.time_us,
-                                     seeing->sightings, seeing->count);
-        }
-        keep(session, status);
-        session->ticks += port_ticks() - began;
-    }
-}
-
-#endif
-
-// ---- answers: from the state as it stands, so that one that was lost can be given again
-// -----------------------
-
-static void put_step(session_t *session, bslam_link_writer_t *out)
-{
-    record_put_step(out, &session->slam, session->fingerprint, session->ticks);
-}
-
-static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    bslam_link_put_u32(out, session->id);
-    bslam_link_put_u8(out, BSLAM_VERSION_MAJOR);
-    bslam_link_put_u8(out, BSLAM_VERSION_MINOR);
-    bslam_link_put_u8(out, BSLAM_VERSION_PATCH);
-    bslam_link_put_u16(out, BSLAM_BEACONS_MAX);
-    bslam_link_put_u16(out, BSLAM_RAYS_MAX);
-    bslam_link_put_u16(out, BSLAM_SIGHTINGS_MAX);
-    bslam_link_put_u16(out, BSLAM_HISTORY_MAX);
-    bslam_link_put_u16(out, (uint16_t)bslam_params_count());
-    bslam_link_put_u16(out, stored_names_crc());
-    bslam_link_put_u32(out, port_ticks_hz());
-    const uint8_t *build_id = port_build_id();
-    for (int i = 0; i < PORT_BUILD_ID_BYTES; i++) {
-        bslam_link_put_u8(out, build_id[i]);
-    }
-}
-
-static void answer_step(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    put_step(session, out);
-}
-
-static void answer_sightings(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    put_step(session, out);
-    record_put_accounts(out, &session->slam);
-}
-
-static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)session;
-    (void)reader;
-    (void)out;
-}
-
-static void answer_param(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    const int id = bslam_link_get_u16(reader);
-    bslam_link_put_real(out, bslam_params_get(&session->params, id));
-}
-
-static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    bslam_pose_t pose = {0, 0, 0};
-    const bslam_status_t status = bslam_slam_pose_at(&session->slam, session->parser.header.time_us, &pose);
-    bslam_link_put_u8(out, (uint8_t)status);
-    bslam_link_put_real(out, pose.x_m);
-    bslam_link_put_real(out, pose.y_m);
-    bslam_link_put_real(out, pose.theta_rad);
-}
-
-static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    const int total = bslam_slam_beacon_count(&session->slam);
-    const int first = bslam_link_get_u8(reader);
-    const int rest = first < total ? total - first : 0;
-    const int count = rest < BEACONS_A_FRAME ? rest : BEACONS_A_FRAME;
-    bslam_link_put_u8(out, (uint8_t)total);
-    bslam_link_put_u8(out, (uint8_t)count);
-    for (int i = 0; i < count; i++) {
-        bslam_beacon_view_t view;
-        if (bslam_slam_beacon(&session->slam, first + i, &view) == BSLAM_OK) {
-            record_put_beacon(out, &view);
-        }
-    }
-}
-
-_Static_assert(2 + sizeof(bslam_counters_t) + sizeof(bslam_looks_counters_t) +
-                       sizeof(bslam_learner_counters_t) + sizeof(bslam_link_counters_t) + 8 <=
-                   BSLAM_LINK_PAYLOAD_MAX,
-               "the counters are one answer");
-
-static void answer_counters(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    record_put_counters(out, &session->slam.counters, sizeof session->slam.counters);
-#if SESSION_LOOKS
-    const bslam_looks_counters_t *looks = &session->looks.counters;
-    const bslam_learner_counters_t *learner = &session->looks.learner.counters;
-#else
-    static const bslam_looks_counters_t no_looks;
-    static const bslam_learner_counters_t no_learner;
-    const bslam_looks_counters_t *looks = &no_looks;
-    const bslam_learner_counters_t *learner = &no_learner;
-#endif
-    record_put_counters(out, looks, sizeof *looks);
-    record_put_counters(out, learner, sizeof *learner);
-    record_put_counters(out, &session->parser.counters, sizeof session->parser.counters);
-    bslam_link_put_u32(out, session->repeated);
-    bslam_link_put_u32(out, session->replayed);
-}
-
-static void answer_health(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    (void)reader;
-    watch_put_health(&session->watch, &session->slam, out);
-}
-
-// ---- from a frame to its message
-// ------------------------------------------------------------------------------
-
-#if SESSION_VISION
-
-static void answer_look(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    answer_sightings(session, reader, out);
-    bslam_link_put_u8(out, (uint8_t)bslam_vision_reason(&session->seeing.vision));
-    bslam_link_put_u8(out, (uint8_t)session->seeing.count);
-}
-
-/// One a message: a frame of default size has no room for two.
-static void answer_seen(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
-{
-    const int index = bslam_link_get_u8(reader);
-    const bool there = index < session->seeing.count;
-    bslam_link_put_u8(out, there ? 1 : 0);
-    if (there) {
-        record_put_sighting(out, &session->seeing.sightings[index], true);
-    }
-}
-
-#endif
-
-typedef struct exchange {
-    uint8_t type;
-    void (*apply)(session_t *session, bslam_link_reader_t *reader);
-    void (*answer)(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out);
-} exchange_t;
-
-static const exchange_t exchanges[] = {
-    {SESSION_HELLO, apply_hello, answer_hello},
-    {SESSION_RESET, apply_reset, answer_nothing},
-    {SESSION_ODOMETRY, apply_odometry, answer_step},
-    {SESSION_SIGHTINGS, apply_sightings, answer_sightings},
-    {SESSION_RESUME, apply_resume, answer_step},
-    {SESSION_KNOWN_BEACON, apply_known_beacon, answer_nothing},
-    {SESSION_REMOVE_BEACON, apply_remove_beacon, answer_nothing},
-    {SESSION_PARAM_SET, apply_param_set, answer_nothing},
-    {SESSION_PARAM_GET, apply_nothing, answer_param},
-    {SESSION_POSE_AT, apply_nothing, answer_pose_at},
-    {SESSION_MAP, apply_nothing, answer_map},
-    {SESSION_COUNTERS, apply_nothing, answer_counters},
-#if SESSION_LOOKS
-    {SESSION_SIGNATURES, apply_signatures, answer_nothing},
-    {SESSION_SEEDS, apply_seeds, answer_nothing},
-#endif
-    {SESSION_STATE, apply_nothing, answer_step},
-    {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
-    {SESSION_SET_POSE, apply_set_pose, answer_step},
-    {SESSION_HEALTH, apply_nothing, answer_health},
-#if SESSION_VISION
-    {SESSION_CAMERA, apply_camera, answer_nothing},
-    {SESSION_IMAGE, apply_image, answer_nothing},
-    {SESSION_PIXELS, apply_pixels, answer_nothing},
-    {SESSION_LOOK, apply_look, answer_look},
-    {SESSION_SEEN, apply_nothing, answer_seen},
-#endif
-};
-
-static const exchange_t *find_exchange(uint8_t type)
-{
-    for (size_t i = 0; i < sizeof exchanges / sizeof exchanges[0]; i++) {
-        if (exchanges[i].type == type) {
-            return &exchanges[i];
-        }
-    }
-    return NULL;
-}
-
-static void send(session_t *session, bslam_link_writer_t *out)
+void session_send(session_t *session, bslam_link_writer_t *out)
 {
     const size_t length = bslam_link_end(out);
     port_write(session->out, length);
 }
 
-static void begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
-                  int64_t time_us)
+void session_begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
+                   int64_t time_us)
 {
     const bslam_link_header_t header = {.type = type, .sequence = sequence, .time_us = time_us};
     bslam_link_begin(out, session->out, sizeof session->out, &header);
@@ -543,31 +22,29 @@ static void answer(session_t *session, const exchange_t *exchange)
 {
     const bslam_link_header_t *asked = &session->parser.header;
     bslam_link_writer_t out;
-    begin(session, &out, asked->type | SESSION_ANSWER, asked->sequence, asked->time_us);
+    session_begin(session, &out, asked->type | SESSION_ANSWER, asked->sequence, asked->time_us);
     bslam_link_put_u8(&out, session->last_status);
     bslam_link_put_u8(&out, session->detail);
     if (exchange != NULL && session->last_status < SESSION_E_NO_SESSION) {
         bslam_link_reader_t reader = bslam_link_payload(&session->parser);
         exchange->answer(session, &reader, &out);
     }
-    send(session, &out);
+    session_send(session, &out);
 }
 
-/// Before anything is done with the filter. False: its memory is no longer what it was, and it has started
-/// over with an empty map.
-static bool is_good(session_t *session, int64_t time_us)
+bool session_is_good(session_t *session, int64_t time_us)
 {
     if (watch_is_good(&session->watch, &session->slam, time_us)) {
         return true;
     }
     int bad_id;
-    const uint8_t status = start_over(session, &bad_id);
+    const uint8_t status = session_start_over(session, &bad_id);
     (void)status;  // the parameters were good before
     watch_end_step(&session->watch, &session->slam, time_us);
     return false;
 }
 
-static void end_step(session_t *session)
+void session_end_step(session_t *session)
 {
     if (session->takes_fingerprints) {
         session->fingerprint = bslam_slam_fingerprint(&session->slam, session->fingerprint);
@@ -591,8 +68,8 @@ static void apply(session_t *session, const exchange_t *exchange)
     }
     const int64_t time_us = session->parser.header.time_us;
     const bool is_of_filter = exchange->type != SESSION_PIXELS;  // of which there are too many to check each
-    if (is_of_filter && exchange->type != SESSION_HELLO && !is_good(session, time_us)) {
-        keep(session, BSLAM_E_STATE);
+    if (is_of_filter && exchange->type != SESSION_HELLO && !session_is_good(session, time_us)) {
+        session->last_status = BSLAM_E_STATE;
         return;
     }
     bslam_link_reader_t reader = bslam_link_payload(&session->parser);
@@ -602,7 +79,7 @@ static void apply(session_t *session, const exchange_t *exchange)
     }
     if (exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS ||
         exchange->type == SESSION_LOOK) {
-        end_step(session);
+        session_end_step(session);
     }
 }
 
@@ -614,7 +91,7 @@ static int16_t ahead(const session_t *session)
 
 static void take_message(session_t *session)
 {
-    const exchange_t *exchange = find_exchange(session->parser.header.type);
+    const exchange_t *exchange = exchange_find(session->parser.header.type);
     const bool starts = session->parser.header.type == SESSION_HELLO;
     if (session->open && !starts && ahead(session) < 0) {
         session->replayed++;
@@ -658,7 +135,7 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
 {
     int bad_id = NO_DETAIL;
     if (stored_params_load(&session->params)) {
-        const uint8_t status = start_over(session, &bad_id);
+        const uint8_t status = session_start_over(session, &bad_id);
         if (status == BSLAM_OK) {
             return status;
         }
@@ -667,7 +144,7 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
     if (has_eyes) {
         session->params.association = SESSION_LOOKS ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
     }
-    return start_over(session, &bad_id);
+    return session_start_over(session, &bad_id);
 }
 
 void session_init(session_t *session)
@@ -679,99 +156,7 @@ void session_init(session_t *session)
     // A delimiter first: whatever the line had before the start is no part of this frame.
     const uint8_t delimiter = 0;
     port_write(&delimiter, 1);
-    begin(session, &out, SESSION_READY, 0, port_time_us());
+    session_begin(session, &out, SESSION_READY, 0, port_time_us());
     bslam_link_put_u8(&out, status);
-    send(session, &out);
+    session_send(session, &out);
 }
-
-/// A report of the robot's own, whose frame stands in session->out.
-static void begin_report(session_t *session, bslam_link_writer_t *out, uint8_t type, int64_t time_us)
-{
-    session->report_sequence++;
-    begin(session, out, type, session->report_sequence, time_us);
-}
-
-void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks)
-{
-    const bslam_odometry_reading_t reading = {.time_us = time_us,
-                                              .source = BSLAM_ODOMETRY_TICKS,
-                                              .left_ticks = left_ticks,
-                                              .right_ticks = right_ticks};
-    const uint32_t began = port_ticks();
-    const bool good = is_good(session, time_us);
-    const bslam_status_t status = good ? bslam_slam_odometry(&session->slam, &reading) : BSLAM_E_STATE;
-    watch_end_step(&session->watch, &session->slam, time_us);
-    session->ticks = port_ticks() - began;
-    if (left_ticks != session->left_ticks || right_ticks != session->right_ticks) {
-        session->moves++;
-    }
-    session->left_ticks = left_ticks;
-    session->right_ticks = right_ticks;
-    end_step(session);
-    bslam_link_writer_t out;
-    begin_report(session, &out, SESSION_POSE, time_us);
-    bslam_link_put_u8(&out, (uint8_t)status);
-    bslam_link_put_u32(&out, left_ticks);
-    bslam_link_put_u32(&out, right_ticks);
-    put_step(session, &out);
-    send(session, &out);
-}
-
-#if SESSION_VISION
-
-static void report_sighting(session_t *session, int64_t time_us, int number)
-{
-    bslam_link_writer_t out;
-    begin_report(session, &out, SESSION_SIGHTED, time_us);
-    bslam_link_put_u8(&out, (uint8_t)number);
-    record_put_sighting(&out, &session->seeing.sightings[number], session->uses_looks);
-    send(session, &out);
-}
-
-/// Looks at the picture whose last row has come.
-static void look(session_t *session, const port_row_t *row)
-{
-    seeing_t *seeing = &session->seeing;
-    const uint32_t began = port_ticks();
-    bslam_status_t status = seeing_look(seeing, session->moves != session->moves_seen[row->camera]);
-    status = is_good(session, row->time_us) ? status : BSLAM_E_STATE;
-    session->moves_seen[row->camera] = session->moves;
-    if (status == BSLAM_OK) {
-        status =
-            watch_sightings(&session->watch, &session->slam, row->time_us, seeing->sightings, seeing->count);
-    }
-    watch_end_step(&session->watch, &session->slam, row->time_us);
-    session->ticks += port_ticks() - began;
-    end_step(session);
-    for (int i = 0; i < seeing->count; i++) {
-        report_sighting(session, row->time_us, i);
-    }
-    bslam_link_writer_t out;
-    begin_report(session, &out, SESSION_LOOKED, row->time_us);
-    bslam_link_put_u8(&out, (uint8_t)status);
-    bslam_link_put_u8(&out, (uint8_t)row->camera);
-    bslam_link_put_u8(&out, (uint8_t)bslam_vision_reason(&seeing->vision));
-    bslam_link_put_u8(&out, (uint8_t)seeing->count);
-    put_step(session, &out);
-    record_put_accounts(&out, &session->slam);
-    send(session, &out);
-}
-
-void session_take_row(session_t *session, const port_row_t *row)
-{
-    const uint32_t began = port_ticks();
-    bslam_status_t status = BSLAM_OK;
-    if (row->is_first) {
-        session->ticks = 0;
-        status = seeing_begin_rows(&session->seeing, row->camera);
-    }
-    if (status == BSLAM_OK) {
-        status = seeing_take_row(&session->seeing, row->pixels);
-    }
-    session->ticks += port_ticks() - began;
-    if (row->is_last && status == BSLAM_OK) {
-        look(session, row);
-    }
-}
-
-#endif

@@ -1,8 +1,29 @@
-/// The two halves of bslam_slam_sightings, for what looks at a frame before it is used. Not for users.
+/// What the files of this directory call of each other: motion.c, check.c, frame.c, slam.c. Not for users.
 #ifndef BSLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_INTERNAL_H
 
 #include "bslam/slam/slam.h"
+
+// ---- motion.c: odometry waits in the history until a frame shows what comes after it ----------------------
+
+/// The filter goes on to the moment until_us before the newest odometry.
+void bslam_slam_predict_until(bslam_slam_t *slam, int64_t until_us);
+
+/// How long before the newest odometry a moment is; 0 while no clock has started.
+int64_t bslam_slam_behind_us(const bslam_slam_t *slam, int64_t time_us);
+
+/// The robot of a moment that the filter has not passed, as it goes there from where it is known.
+bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, bslam_pose_t *pose);
+
+// ---- check.c ----------------------------------------------------------------------------------------------
+
+/// Checks a frame, and says how long before the newest odometry it was taken. The statuses of
+/// bslam_slam_sightings; bad_sighting is noted, nothing else changes.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us,
+                                                       const bslam_sighting_t *sightings, int count,
+                                                       int64_t *behind_us);
+
+// ---- frame.c: the two halves of bslam_slam_sightings, for what looks at a frame before it is used ---------
 
 /// Checks a frame and takes the filter to its moment; *mount is where its sensor is on the robot. The
 /// statuses of bslam_slam_sightings; after BSLAM_OK bslam_slam_close_frame must follow with the same frame.
@@ -13,6 +34,18 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_
 /// Works the frame off, or, if it is not to be used or the robot is lost, accounts for its sightings only.
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use);
+
+/// Machines learn from what a frame surely showed, and train for a bounded time.
+void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                            int count);
+
+// ---- slam.c -----------------------------------------------------------------------------------------------
+
+/// Where a beacon is in the map, or -1.
+int bslam_slam_find_beacon(const bslam_slam_t *slam, uint32_t uid);
+
+/// Takes a beacon out of the map, and what is known of its looks with it.
+void bslam_slam_drop_beacon(bslam_slam_t *slam, int index);
 
 /// The filter's state was changed from outside: what the smoother knows of the past no longer leads to it.
 void bslam_slam_restart_smoother(bslam_slam_t *slam);

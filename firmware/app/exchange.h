@@ -1,0 +1,43 @@
+/// What the files of a session call of each other: session.c has the protocol, exchange.c the messages,
+/// sensors.c the robot's own encoders and cameras.
+#ifndef APP_EXCHANGE_H
+#define APP_EXCHANGE_H
+
+#include "app/session.h"
+
+#define NO_DETAIL 255  // of a status that is about no parameter and no sighting
+
+// ---- exchange.c -------------------------------------------------------------------------------------------
+
+/// A message that the host may send: how it is applied, and how it is answered.
+typedef struct exchange {
+    uint8_t type;
+    void (*apply)(session_t *session, bslam_link_reader_t *reader);
+    void (*answer)(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out);
+} exchange_t;
+
+/// NULL: there is no such message.
+const exchange_t *exchange_find(uint8_t type);
+
+/// Starts over with the parameters as they were set and an empty map. The status of the library or the link,
+/// and which parameter it is about.
+uint8_t session_start_over(session_t *session, int *bad_id);
+
+/// Where the robot stands after a step.
+void session_put_step(session_t *session, bslam_link_writer_t *out);
+
+// ---- session.c --------------------------------------------------------------------------------------------
+
+/// A message of the robot's: begin, put, send. Its frame stands in session->out.
+void session_begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
+                   int64_t time_us);
+void session_send(session_t *session, bslam_link_writer_t *out);
+
+/// Before anything is done with the filter. False: its memory is no longer what it was, and it has started
+/// over with an empty map.
+bool session_is_good(session_t *session, int64_t time_us);
+
+/// After whatever may have changed the filter: its fingerprint, if the host takes any.
+void session_end_step(session_t *session);
+
+#endif

@@ -1,0 +1,95 @@
+#include "app/exchange.h"
+#include "app/records.h"
+#include "port/port.h"
+
+/// A report of the robot's own, whose frame stands in session->out.
+static void begin_report(session_t *session, bslam_link_writer_t *out, uint8_t type, int64_t time_us)
+{
+    session->report_sequence++;
+    session_begin(session, out, type, session->report_sequence, time_us);
+}
+
+void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks)
+{
+    const bslam_odometry_reading_t reading = {.time_us = time_us,
+                                              .source = BSLAM_ODOMETRY_TICKS,
+                                              .left_ticks = left_ticks,
+                                              .right_ticks = right_ticks};
+    const uint32_t began = port_ticks();
+    const bool good = session_is_good(session, time_us);
+    const bslam_status_t status = good ? bslam_slam_odometry(&session->slam, &reading) : BSLAM_E_STATE;
+    watch_end_step(&session->watch, &session->slam, time_us);
+    session->ticks = port_ticks() - began;
+    if (left_ticks != session->left_ticks || right_ticks != session->right_ticks) {
+        session->moves++;
+    }
+    session->left_ticks = left_ticks;
+    session->right_ticks = right_ticks;
+    session_end_step(session);
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_POSE, time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u32(&out, left_ticks);
+    bslam_link_put_u32(&out, right_ticks);
+    session_put_step(session, &out);
+    session_send(session, &out);
+}
+
+#if SESSION_VISION
+
+static void report_sighting(session_t *session, int64_t time_us, int number)
+{
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_SIGHTED, time_us);
+    bslam_link_put_u8(&out, (uint8_t)number);
+    record_put_sighting(&out, &session->seeing.sightings[number], session->uses_looks);
+    session_send(session, &out);
+}
+
+/// Looks at the picture whose last row has come.
+static void look(session_t *session, const port_row_t *row)
+{
+    seeing_t *seeing = &session->seeing;
+    const uint32_t began = port_ticks();
+    bslam_status_t status = seeing_look(seeing, session->moves != session->moves_seen[row->camera]);
+    status = session_is_good(session, row->time_us) ? status : BSLAM_E_STATE;
+    session->moves_seen[row->camera] = session->moves;
+    if (status == BSLAM_OK) {
+        status =
+            watch_sightings(&session->watch, &session->slam, row->time_us, seeing->sightings, seeing->count);
+    }
+    watch_end_step(&session->watch, &session->slam, row->time_us);
+    session->ticks += port_ticks() - began;
+    session_end_step(session);
+    for (int i = 0; i < seeing->count; i++) {
+        report_sighting(session, row->time_us, i);
+    }
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_LOOKED, row->time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u8(&out, (uint8_t)row->camera);
+    bslam_link_put_u8(&out, (uint8_t)bslam_vision_reason(&seeing->vision));
+    bslam_link_put_u8(&out, (uint8_t)seeing->count);
+    session_put_step(session, &out);
+    record_put_accounts(&out, &session->slam);
+    session_send(session, &out);
+}
+
+void session_take_row(session_t *session, const port_row_t *row)
+{
+    const uint32_t began = port_ticks();
+    bslam_status_t status = BSLAM_OK;
+    if (row->is_first) {
+        session->ticks = 0;
+        status = seeing_begin_rows(&session->seeing, row->camera);
+    }
+    if (status == BSLAM_OK) {
+        status = seeing_take_row(&session->seeing, row->pixels);
+    }
+    session->ticks += port_ticks() - began;
+    if (row->is_last && status == BSLAM_OK) {
+        look(session, row);
+    }
+}
+
+#endif

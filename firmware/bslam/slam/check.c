@@ -1,0 +1,75 @@
+#include <string.h>
+
+#include "bslam/math/trig.h"
+#include "bslam/slam/internal.h"
+
+static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
+static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
+static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
+
+/// A standard deviation, or 0 where the detector gives none.
+static bool is_noise(bslam_real_t sd, bslam_real_t low, bslam_real_t high)
+{
+    return sd == 0 || bslam_in_range(sd, low, high);
+}
+
+/// Set in the bits of every float from 2 on, of infinities and of NaN.
+#define LARGE_FLOAT 0x40000000U
+
+/// Values of signatures are small as a rule, and then no value sets that bit: two instructions each.
+static bool signature_is_finite(const float *signature)
+{
+    if (signature == NULL) {
+        return true;
+    }
+    uint32_t bits = 0;
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        uint32_t value;
+        memcpy(&value, &signature[k], sizeof value);
+        bits |= value;
+    }
+    bool is_finite = true;
+    for (int k = 0; (bits & LARGE_FLOAT) != 0 && is_finite && k < BSLAM_SAMPLE_FEATURES; k++) {
+        is_finite = bslam_is_number((bslam_real_t)signature[k]);
+    }
+    return is_finite;
+}
+
+static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
+{
+    if (!signature_is_finite(sighting->signature) || !bslam_is_number(sighting->bearing_rad) ||
+        !bslam_is_number(sighting->bearing_sd_rad) ||
+        (sighting->has_range &&
+         (!bslam_is_number(sighting->range_m) || !bslam_is_number(sighting->range_sd_m)))) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI) &&
+                            is_noise(sighting->bearing_sd_rad, BEARING_SD_MIN_RAD, BSLAM_PI);
+    const bool range_ok =
+        !sighting->has_range || (bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M) &&
+                                 is_noise(sighting->range_sd_m, RANGE_MIN_M, RANGE_MAX_M));
+    return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
+}
+
+bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                      int count, int64_t *behind_us)
+{
+    slam->bad_sighting = -1;
+    if (count < 0 || count > BSLAM_SIGHTINGS_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    if (time_us < 0 || time_us > INT64_MAX / 2 || (slam->has_frame && time_us <= slam->last_frame_us)) {
+        return BSLAM_E_TIME;
+    }
+    for (int i = 0; i < count; i++) {
+        const bslam_status_t status = check_sighting(&sightings[i]);
+        if (status != BSLAM_OK) {
+            slam->bad_sighting = i;
+            return status;
+        }
+    }
+    *behind_us = bslam_slam_behind_us(slam, time_us - slam->params.sighting_delay_us);
+    const bool in_reach =
+        *behind_us <= slam->history.filter.behind_us && *behind_us >= -slam->params.ahead_max_us;
+    return in_reach ? BSLAM_OK : BSLAM_E_TIME;
+}

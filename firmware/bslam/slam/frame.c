@@ -1,0 +1,343 @@
+#include "bslam/association/doubles.h"
+#include "bslam/model/noise.h"
+#include "bslam/model/pose.h"
+#include "bslam/slam/internal.h"
+
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+
+/// Where the sensor of a frame is on the robot, which has come as far as odometry has: of a frame that is
+/// ahead of it, where it will be.
+static bslam_pose_t mount_of_frame(const bslam_slam_t *slam, int64_t behind_us)
+{
+    const bslam_params_t *p = &slam->params;
+    const bslam_pose_t mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
+    if (behind_us >= 0) {
+        return mount;
+    }
+    const bslam_motion_t last = bslam_history_newest(&slam->history);
+    const bslam_pose_t ahead = bslam_history_look_ahead(p, &last, -behind_us);
+    return bslam_pose_compose(&ahead, &mount);
+}
+
+static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
+                         const bslam_beacon_t *beacon)
+{
+    account->outcome = outcome;
+    account->reason = reason;
+    account->has_beacon = beacon != NULL;
+    account->beacon_uid = beacon != NULL ? beacon->uid : 0;
+    account->test_ratio = -1;
+    account->weight = 0;
+}
+
+static bslam_real_t test_ratio(const bslam_params_t *params, bslam_real_t distance2)
+{
+    return params->gate_d2 > 0 && distance2 >= 0 ? distance2 / params->gate_d2 : -1;
+}
+
+static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon_t *beacon,
+                   bslam_account_t *account)
+{
+    fill_account(account, BSLAM_OUTCOME_REJECTED, reason, beacon);
+    slam->counters.gated += reason == BSLAM_REASON_GATE ? 1u : 0u;
+    slam->counters.map_full += reason == BSLAM_REASON_MAP_FULL ? 1u : 0u;
+    slam->counters.duplicates += reason == BSLAM_REASON_DUPLICATE ? 1u : 0u;
+    slam->counters.unidentified += reason == BSLAM_REASON_NO_IDENTITY ? 1u : 0u;
+    slam->counters.unmappable += reason == BSLAM_REASON_CLASS ? 1u : 0u;
+    slam->counters.frozen += reason == BSLAM_REASON_FROZEN ? 1u : 0u;
+}
+
+/// A sighting counts towards a beacon's confirmation if the robot has gone far enough since the last that
+/// did.
+static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon)
+{
+    const uint32_t least_um = (uint32_t)(slam->params.confirm_way_m * MICROMETRES_PER_M);
+    if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
+        beacon->view_um = slam->way_um;
+        beacon->views++;
+        beacon->confirmed = beacon->views >= slam->params.confirm_sightings;
+        slam->confirmed_now = slam->confirmed_now || beacon->confirmed;
+    }
+}
+
+/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
+/// taken for something else, it has a direction only.
+static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
+{
+    bslam_sighting_t taken = *sighting;
+    const bool differs = beacon->beacon_class != sighting->beacon_class &&
+                         beacon->beacon_class != BSLAM_CLASS_NONE &&
+                         sighting->beacon_class != BSLAM_CLASS_NONE;
+    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
+    return taken;
+}
+
+/// Fuses a sighting with the beacon that association chose.
+static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
+                       bslam_beacon_t *beacon, bslam_innovation_t *innovation, bslam_account_t *account)
+{
+    const bslam_real_t way_m = (bslam_real_t)(slam->way_um - beacon->way_um) / MICROMETRES_PER_M;
+    const bslam_real_t factor = bslam_correlation_factor(&slam->params, way_m);
+    innovation->range_var_m2 *= factor;
+    innovation->bearing_var_rad2 *= factor;
+    bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
+    const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->params, innovation, &fusion);
+    if (status != BSLAM_OK) {
+        reject(slam, status == BSLAM_E_RANGE ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon, account);
+        beacon->gated += status == BSLAM_E_RANGE ? 1u : 0u;
+        account->test_ratio = test_ratio(&slam->params, fusion.distance2);
+        return;
+    }
+    fill_account(account, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE, beacon);
+    account->test_ratio = test_ratio(&slam->params, fusion.distance2);
+    account->weight = fusion.weight;
+    slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
+    if (slam->smoother != NULL) {
+        const bslam_sighting_t taken = sighting_of(sighting, beacon);
+        slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
+    }
+    beacon->sightings++;
+    beacon->way_um = slam->way_um;
+    beacon->last_seen_us = time_us;
+    count_view(slam, beacon);
+}
+
+/// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
+/// that one does it.
+static void note_rivals(bslam_slam_t *slam, int index)
+{
+    bslam_beacon_t *beacons = slam->ekf.beacons;
+    for (int b = 0; b < index && slam->params.association == BSLAM_ASSOCIATION_KNOWN; b++) {
+        const uint32_t rivals = beacons[b].label == beacons[index].label ? 1 : 0;
+        beacons[b].gated += rivals;
+        beacons[index].gated += rivals;
+    }
+}
+
+static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                    const bslam_sighting_t *sighting, bslam_account_t *account)
+{
+    int index;
+    const bslam_status_t status =
+        slam->smoother != NULL ? slam->smoothing->add(slam->smoother, &slam->ekf, mount, sighting, &index)
+                               : bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index);
+    if (status != BSLAM_OK) {
+        reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
+        return;
+    }
+    bslam_beacon_t *beacon = &slam->ekf.beacons[index];
+    beacon->label = sighting->label;
+    beacon->beacon_class = sighting->beacon_class;
+    beacon->first_seen_us = time_us;
+    beacon->last_seen_us = time_us;
+    beacon->sightings = 1;
+    beacon->way_um = slam->way_um;
+    beacon->view_um = slam->way_um;
+    beacon->views = 1;
+    beacon->confirmed = slam->params.confirm_sightings <= 1;
+    note_rivals(slam, index);
+    if (slam->smoother != NULL) {
+        slam->smoothing->see(slam->smoother, sighting, index);
+    }
+    fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
+    account->weight = 1;
+}
+
+/// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
+/// them before the first is fused, so that the order within a frame does not matter.
+static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sightings,
+                             int count)
+{
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->matches[i];
+        if (match->verdict == BSLAM_VERDICT_REJECT) {
+            reject(slam, match->reason, NULL, &slam->accounts[i]);
+        } else if (match->verdict == BSLAM_VERDICT_DEFER) {
+            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
+        } else if (match->verdict == BSLAM_VERDICT_MATCH) {
+            const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
+            const bslam_sighting_t taken = sighting_of(&sightings[i], beacon);
+            if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon,
+                                     &slam->innovations[i]) != BSLAM_OK) {
+                reject(slam, BSLAM_REASON_SINGULAR, beacon, &slam->accounts[i]);
+                match->verdict = BSLAM_VERDICT_REJECT;
+            }
+        }
+    }
+}
+
+/// Fuses all matches, then adds what is new. Not to be inlined: association, before it, goes deepest, and
+/// would have its frame on the stack.
+__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t time_us,
+                                                  const bslam_pose_t *mount,
+                                                  const bslam_sighting_t *sightings, int count)
+{
+    take_innovations(slam, mount, sightings, count);
+    for (int i = 0; i < count; i++) {
+        if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH) {
+            fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[slam->matches[i].beacon],
+                       &slam->innovations[i], &slam->accounts[i]);
+        }
+    }
+    bslam_ekf_correct(&slam->ekf, &slam->params);
+    for (int i = 0; i < count; i++) {
+        if (slam->matches[i].verdict != BSLAM_VERDICT_NEW) {
+            continue;
+        }
+        if (slam->is_frozen) {
+            reject(slam, BSLAM_REASON_FROZEN, NULL, &slam->accounts[i]);
+        } else {
+            add_new(slam, time_us, mount, &sightings[i], &slam->accounts[i]);
+        }
+    }
+}
+
+// ---- looks ------------------------------------------------------------------------------------------------
+
+void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+{
+    for (int i = 0; i < count; i++) {
+        const bslam_account_t *account = &slam->accounts[i];
+        const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
+        if (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED) {
+            continue;
+        }
+        const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
+        if (is_new || slam->matches[i].sure) {
+            bslam_looks_teach(slam->looks, &slam->params, index, slam->ekf.beacon_count, slam->way_um,
+                              &sightings[i]);
+        } else {
+            slam->looks->counters.unsure++;
+        }
+    }
+    const int leaves = bslam_doubles_settle(slam->looks, &slam->ekf, &slam->params, time_us);
+    if (leaves != BSLAM_NO_DOUBLE) {
+        bslam_slam_drop_beacon(slam, leaves);
+    }
+    (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
+}
+
+// ---- tidying ----------------------------------------------------------------------------------------------
+
+/// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
+/// reason against it: it leaves if sightings contradicted it.
+static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
+{
+    const int64_t window_us = params->confirm_window_us;
+    if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
+        return false;
+    }
+    return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
+}
+
+/// The first that is confirmed of several with one told label stays, the others leave.
+static void drop_rivals(bslam_slam_t *slam)
+{
+    const bool is_told = slam->params.association == BSLAM_ASSOCIATION_KNOWN;
+    for (int b = slam->ekf.beacon_count - 1; b >= 0 && is_told; b--) {
+        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
+        for (int i = 0; i < slam->ekf.beacon_count && !beacon->confirmed; i++) {
+            if (slam->ekf.beacons[i].confirmed && slam->ekf.beacons[i].label == beacon->label) {
+                bslam_slam_drop_beacon(slam, b);
+                slam->counters.removed++;
+                break;
+            }
+        }
+    }
+    slam->confirmed_now = false;
+}
+
+/// Rays whose distance is known become points; provisional beacons whose time is up leave.
+static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
+{
+    for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
+        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
+        if (is_unconfirmed(&slam->params, beacon, time_us)) {
+            bslam_slam_drop_beacon(slam, b);
+            slam->counters.removed++;
+        } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
+            slam->counters.settled++;
+        }
+    }
+    if (slam->confirmed_now) {
+        drop_rivals(slam);
+    }
+}
+
+static void count_accounts(bslam_slam_t *slam, int count)
+{
+    bslam_counters_t *counters = &slam->counters;
+    counters->frames++;
+    counters->sightings += (uint32_t)count;
+    for (int i = 0; i < count; i++) {
+        switch (slam->accounts[i].outcome) {
+        case BSLAM_OUTCOME_MATCHED:
+            counters->matched++;
+            break;
+        case BSLAM_OUTCOME_NEW:
+            counters->added++;
+            break;
+        case BSLAM_OUTCOME_DEFERRED:
+            counters->deferred++;
+            break;
+        case BSLAM_OUTCOME_REJECTED:
+        default:
+            counters->rejected++;
+            break;
+        }
+    }
+    counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
+}
+
+bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                     int count, bslam_pose_t *mount)
+{
+    int64_t behind_us;
+    const bslam_status_t status = bslam_slam_check_frame(slam, time_us, sightings, count, &behind_us);
+    if (status != BSLAM_OK) {
+        slam->counters.frames_refused++;
+        return status;
+    }
+    bslam_slam_predict_until(slam, behind_us > 0 ? behind_us : 0);
+    *mount = mount_of_frame(slam, behind_us);
+    return BSLAM_OK;
+}
+
+void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
+                            const bslam_pose_t *mount, bool use)
+{
+    if (use && !slam->is_lost) {
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks,
+                                              mount,      sightings,     count};
+        const bslam_associate_fn associate = bslam_associate_method(&slam->params);
+        associate(&frame, slam->matches);
+        use_matches(slam, time_us, mount, sightings, count);
+        if (slam->looks != NULL && !slam->is_frozen && slam->params.association == BSLAM_ASSOCIATION_SVM) {
+            slam->learning->learn(slam, time_us, sightings, count);
+        }
+        tidy_map(slam, time_us, mount);
+    } else {
+        for (int i = 0; i < count; i++) {
+            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
+        }
+    }
+    if (slam->smoother != NULL) {
+        slam->smoothing->frame(slam->smoother, &slam->params, &slam->ekf);
+    }
+    slam->last_frame_us = time_us;
+    slam->has_frame = true;
+    bslam_odometry_start(&slam->odometry, time_us);
+    slam->account_count = count;
+    count_accounts(slam, count);
+}
+
+bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                    int count)
+{
+    bslam_pose_t mount;
+    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &mount);
+    if (status == BSLAM_OK) {
+        bslam_slam_close_frame(slam, time_us, sightings, count, &mount, true);
+    }
+    return status;
+}
