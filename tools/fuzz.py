@@ -7,9 +7,11 @@ Examples:
     tools/fuzz.py --keep                   writes the smallest inputs that reach what all reach to
                                            tests/fuzz/corpus
 
-`make fuzz` builds the programs and calls this. The ledger (out/fuzz/ledger.csv) has a line a slice: when,
-of which commit and sources, target, executions, seconds, crashes. Exit status 0: no crash, and the goals
-met or the time over; 1: a crash, the input that caused it is named; 2: bad arguments, programs not built.
+`make fuzz` builds the programs and calls this. The ledger (tests/fuzz/ledger.csv) has a line a slice: when,
+of which commit and sources, target, libFuzzer's seed, executions, seconds, crashes. It is kept with the
+sources: the goals are met by all slices together, and by no crash on the sources as they are. Exit status 0:
+no crash, and the goals met or the time over; 1: a crash, the input that caused it is named; 2: bad
+arguments, programs not built.
 """
 
 import argparse
@@ -28,6 +30,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = ROOT / "build/fuzz"
 CORPUS = ROOT / "tests/fuzz/corpus"
+LEDGER = ROOT / "tests/fuzz/ledger.csv"
 OUT = ROOT / "out/fuzz"
 TARGETS = ("link", "map", "model", "image", "api", "session")
 # What input a target makes the most of; the longer, the slower.
@@ -47,6 +50,7 @@ class Slice(NamedTuple):
     commit: str
     sources: str
     target: str
+    seed: int  # 0: drawn by libFuzzer, and not written down
     executions: int
     seconds: int
     crashes: int
@@ -71,22 +75,20 @@ def commit_name() -> str:
 
 def read_ledger() -> list[Slice]:
     """All slices so far."""
-    path = OUT / "ledger.csv"
-    if not path.exists():
+    if not LEDGER.exists():
         return []
-    with path.open(newline="") as file:
+    with LEDGER.open(newline="") as file:
         return [
-            Slice(row[0], row[1], row[2], row[3], int(row[4]), int(row[5]), int(row[6]))
+            Slice(*row[:4], *(int(number) for number in row[4:]))  # type: ignore[arg-type]
             for row in list(csv.reader(file))[1:]
         ]
 
 
 def write_down(slice_: Slice) -> None:
     """Adds a line to the ledger."""
-    path = OUT / "ledger.csv"
-    is_new = not path.exists()
-    with path.open("a", newline="") as file:
-        writer = csv.writer(file)
+    is_new = not LEDGER.exists()
+    with LEDGER.open("a", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
         if is_new:
             writer.writerow(Slice._fields)
         writer.writerow(slice_)
@@ -97,7 +99,7 @@ def executions(ledger: Iterable[Slice], target: str) -> int:
     return sum(line.executions for line in ledger if line.target == target)
 
 
-def run_slice(target: str, seconds: int, runs: int) -> Slice:
+def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
     """Makes inputs up for so many seconds, `runs` at most; those that reach anything new stay in out/fuzz."""
     corpus, crashes = OUT / "corpus" / target, OUT / "crashes"
     crashes.mkdir(parents=True, exist_ok=True)
@@ -105,18 +107,20 @@ def run_slice(target: str, seconds: int, runs: int) -> Slice:
     command = [
         str(PROGRAMS / target), f"-max_total_time={seconds}", f"-runs={runs}", f"-max_len={LENGTHS[target]}",
         "-len_control=0", "-timeout=10", "-print_final_stats=1", f"-artifact_prefix={crashes}/{target}-",
-        str(corpus),
+        f"-seed={seed}", str(corpus),
     ]  # fmt: skip
     began = time.monotonic()
+    commit, sources = commit_name(), source_hash()
     # Stack frames that are kept after their return cost half of the speed.
     environment = os.environ | {"ASAN_OPTIONS": "detect_stack_use_after_return=0"}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     found = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
     line = Slice(
         time.strftime("%Y-%m-%d %H:%M:%S"),
-        commit_name(),
-        source_hash(),
+        commit,
+        sources,
         target,
+        seed,
         int(found.group(1)) if found else 0,
         round(time.monotonic() - began),
         0 if done.returncode == 0 else 1,
@@ -219,7 +223,7 @@ def campaign(targets: list[str], seconds: float) -> bool:
         spent = {t: sum(line.seconds for line in ledger if line.target == t) for t in waiting}
         target = min(waiting, key=lambda name: (name == FILLER, spent[name]))
         left = max(1, round(min(SLICE_S, end - time.monotonic())))
-        line = run_slice(target, left, need[target])
+        line = run_slice(target, len(ledger) + 1, left, need[target])
         print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
         if line.crashes:
             return False
@@ -253,4 +257,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main())
     except KeyboardInterrupt:
-        sys.exit("fuzz: stopped; the ledger has all slices that ended")
+        sys.exit("fuzz: stopped; tests/fuzz/ledger.csv has all slices that ended")
