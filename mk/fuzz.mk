@@ -10,7 +10,9 @@ FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) -Itests/fuzz -DBSLAM_CONFIG_HEADER='"c
     $(SANITIZE) -g -MMD -MP
 
 CLANG := clang-19
-FUZZ_COMPILE_fuzz := $(CLANG) $(FUZZ_FLAGS) -O2 -fsanitize-coverage=inline-8bit-counters,pc-table
+# Stack frames that are kept after their return cost half of the speed.
+FUZZ_COMPILE_fuzz := $(CLANG) $(FUZZ_FLAGS) -O2 -fsanitize-address-use-after-return=never \
+    -fsanitize-coverage=inline-8bit-counters,pc-table
 FUZZ_COMPILE_replay := $(CC) $(FUZZ_FLAGS) $(UNIT_WARNINGS)
 FUZZ_LINK_fuzz := $(CLANG) $(SANITIZE) -fsanitize=fuzzer
 FUZZ_LINK_replay := $(CC) $(SANITIZE)
