@@ -1,7 +1,7 @@
 """Runs the fuzz targets in slices, keeps a ledger of what ran, prints it against the goals.
 
 Examples:
-    tools/fuzz.py                          until every goal is met, in slices of a minute
+    tools/fuzz.py                          until every goal is met, in slices of five minutes
     tools/fuzz.py --seconds 120 --targets map api
     tools/fuzz.py --table                  what ran so far
     tools/fuzz.py --keep                   writes the smallest inputs that reach what all reach to
@@ -38,7 +38,7 @@ GOAL_EACH = 1_000_000
 GOAL_ALL = 200_000_000
 # So many of these are needed for the sum; the link's parser is the fastest by far.
 FILLER = "link"
-SLICE_S = 60
+SLICE_S = 300
 KEPT_BYTES = 300_000
 
 
