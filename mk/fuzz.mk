@@ -6,8 +6,8 @@ FUZZ_TARGETS := link map model image api session
 FUZZ_HELPERS := tests/fuzz/fuzz.c tests/fuzz/picture.c
 FUZZ_APP := $(APP_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_APP) $(FUZZ_HELPERS)
-FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) -Itests/fuzz -DBSLAM_CONFIG_HEADER='"config.h"' -DSESSION_VISION=1 \
-    $(SANITIZE) -g -MMD -MP
+FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"config.h"' -DSESSION_VISION=1
+FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) $(FUZZ_DEFINES) $(SANITIZE) -g -MMD -MP
 
 CLANG := clang-19
 # Stack frames that are kept after their return cost half of the speed.

@@ -1,12 +1,13 @@
-"""Measures the modified condition/decision coverage (MC/DC) of firmware/bslam by the C unit tests.
+"""Measures the modified condition/decision coverage (MC/DC) of firmware/bslam by the C tests.
 
 Examples:
     tools/mcdc.py                          a table by file, and the total against the goal
     tools/mcdc.py --list vision/lens.c     which conditions of a file no test has shown to matter
 
-`make mcdc` builds what this runs. A condition is covered if two runs of its decision differ in it alone, of
-what was evaluated, and in the outcome (clang's masking MC/DC). Decisions of one condition are no matter of
-MC/DC. Inline functions of headers count once, covered if one of their copies is. tests/unit/mcdc.toml lists
+`make mcdc` builds what this runs: the C unit tests, and the inputs that fuzzing kept, whose core has smaller
+sizes. A condition is covered if two runs of its decision with the same core differ in it alone, of what was
+evaluated, and in the outcome (clang's masking MC/DC). Decisions of one condition are no matter of MC/DC.
+Inline functions of headers count once, covered if one of their copies is. tests/unit/mcdc.toml lists
 conditions that cannot be covered, each with its reason; one that is covered after all, or is not there, is
 an error. Exit status 0: the goal is reached; 1: not, or a test failed, or an exclusion does not fit; 2: not
 built.
@@ -25,6 +26,7 @@ from typing import Any, NamedTuple
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/mcdc"
 CORE = ROOT / "firmware/bslam"
+CORPUS = ROOT / "tests/fuzz/corpus"
 EXCLUSIONS = ROOT / "tests/unit/mcdc.toml"
 GOAL_PERCENT = 95.0
 
@@ -47,22 +49,22 @@ class Exclusion(NamedTuple):
     reason: str
 
 
-def run_tests() -> Path:
-    """Runs every test program; the merged profile."""
-    raw = BUILD / "raw"
+def run_tests(account: Path) -> Path:
+    """Runs every program of an account; the merged profile."""
+    raw = account / "raw"
     raw.mkdir(exist_ok=True)
     for old in raw.glob("*.profraw"):
         old.unlink()
-    programs = sorted(path for path in (BUILD / "bin").glob("*/test_*") if path.suffix == "")
-    if not programs:
-        sys.exit("mcdc: nothing built; `make mcdc` does it")
+    programs = sorted(path for path in (account / "bin").rglob("*") if path.is_file())
     for program in programs:
         environment = os.environ | {"LLVM_PROFILE_FILE": str(raw / f"{program.name}.profraw")}
-        done = subprocess.run([str(program)], env=environment, capture_output=True, text=True, check=False)
+        inputs = [str(CORPUS / f"{program.name}.bin")] if account.name == "replay" else []
+        command = [str(program), *inputs]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             print(done.stdout + done.stderr, file=sys.stderr)
             sys.exit(f"mcdc: {program.name} failed")
-    profile = BUILD / "all.profdata"
+    profile = account / "all.profdata"
     subprocess.run(
         ["llvm-profdata-19", "merge", "-o", str(profile), *map(str, sorted(raw.glob("*.profraw")))],
         check=True,
@@ -79,33 +81,37 @@ def source_text(path: Path, record: list[Any]) -> str:
     return re.sub(r"\s+", " ", " ".join(lines))
 
 
-def read_decisions(profile: Path) -> list[Decision]:
-    """All decisions of the core, copies of inline functions taken together."""
+def read_records(account: Path) -> list[tuple[Path, list[Any]]]:
+    """What an account says of each decision of the core, a copy of an inline function by itself."""
     command = [
         "llvm-cov-19",
         "export",
-        str(BUILD / "libbslam.so"),
-        f"-instr-profile={profile}",
+        str(account / "libbslam.so"),
+        f"-instr-profile={run_tests(account)}",
         "-skip-functions",
     ]
     exported = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
-    decisions = []
-    for file in exported["data"][0]["files"]:
-        path = Path(file["filename"])
-        path = path if path.is_absolute() else ROOT / path
-        found: dict[tuple[int, int], tuple[list[Any], tuple[bool, ...]]] = {}
-        for record in file["mcdc_records"]:
-            place = (record[0], record[1])
+    return [
+        (ROOT / file["filename"], record)
+        for file in exported["data"][0]["files"]
+        for record in file["mcdc_records"]
+    ]
+
+
+def read_decisions(accounts: list[Path]) -> list[Decision]:
+    """All decisions of the core: a condition is covered if it is in any account."""
+    found: dict[tuple[Path, int, int], tuple[list[Any], tuple[bool, ...]]] = {}
+    for account in accounts:
+        for path, record in read_records(account):
+            place = (path, record[0], record[1])
             covered = tuple(record[-1])
             if place in found:
                 covered = tuple(a or b for a, b in zip(covered, found[place][1], strict=True))
             found[place] = (record, covered)
-        name = path.relative_to(CORE).as_posix()
-        decisions += [
-            Decision(name, place[0], source_text(path, record), covered)
-            for place, (record, covered) in sorted(found.items())
-        ]
-    return decisions
+    return [
+        Decision(path.relative_to(CORE).as_posix(), line, source_text(path, record), covered)
+        for (path, line, _), (record, covered) in sorted(found.items())
+    ]
 
 
 def read_exclusions() -> list[Exclusion]:
@@ -206,10 +212,11 @@ def main() -> int:
         "--list", metavar="FILE", nargs="*", default=None, help="what is open in these files (or all)"
     )
     options = parser.parse_args()
-    if not (BUILD / "libbslam.so").exists():
+    accounts = [BUILD / "unit", BUILD / "replay"]
+    if not all((account / "libbslam.so").exists() for account in accounts):
         print("mcdc: nothing built; `make mcdc` does it", file=sys.stderr)
         return 2
-    decisions = read_decisions(run_tests())
+    decisions = read_decisions(accounts)
     excluded, wrong = apply_exclusions(decisions, read_exclusions())
     if options.list is not None:
         for file in options.list or sorted({decision.file for decision in decisions}):
