@@ -1,12 +1,13 @@
 # Modified condition/decision coverage of the core: each condition of a decision has been shown to change its
-# outcome by itself. clang instruments the core, as one shared library, so that every program that runs it adds
-# to one account: the C unit tests to that of build/mcdc/unit, the inputs that fuzzing kept to that of
+# outcome by itself. clang instruments the core, as one shared library, so that every program that runs it
+# adds to one account: the C unit tests to that of build/mcdc/unit, the inputs that fuzzing kept to that of
 # build/mcdc/replay, where the core has the small sizes of tests/fuzz/config.h. tools/mcdc.py prints them.
 
 MCDC_COVERAGE := -fprofile-instr-generate -fcoverage-mapping -fcoverage-mcdc
 MCDC_FLAGS_unit := $(UNIT_FLAGS_float)
 MCDC_FLAGS_replay := $(FUZZ_DEFINES)
-MCDC_PROGRAMS := $(UNIT_SOURCES:tests/unit/%.c=build/mcdc/unit/bin/%) $(FUZZ_TARGETS:%=build/mcdc/replay/bin/%)
+MCDC_PROGRAMS := $(UNIT_SOURCES:tests/unit/%.c=build/mcdc/unit/bin/%) \
+    $(FUZZ_TARGETS:%=build/mcdc/replay/bin/%)
 # What stands between a program and the core.
 MCDC_HELPERS_unit := $(UNIT_HELPERS:%.c=build/mcdc/unit/%.o)
 MCDC_HELPERS_replay := build/mcdc/replay/tests/fuzz/replay.o build/mcdc/replay/library.a
