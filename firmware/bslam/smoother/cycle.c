@@ -121,6 +121,10 @@ static void end_forth(bslam_smoother_t *smoother)
     }
     for (int i = 0; i < run->dim; i++) {
         run->correction[i] *= least;
+        if (!bslam_is_number(run->correction[i])) {
+            run->mean[i] = run->correction[i];  // no angle to wrap: what is not sane is not taken
+            return;
+        }
     }
     bslam_ekf_correct(run, &smoother->model);
     for (int i = run->base_dim; i < run->dim; i++) {
