@@ -1,4 +1,4 @@
-// Nodes, refusals, and drives that tell little: through the pipeline, at whatever sizes the build has.
+// Nodes, refusals, and drives that tell little: through the pipeline.
 #include <math.h>
 
 #include "support.h"
