@@ -190,9 +190,6 @@ def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig
     first = rig.cameras[0]
     if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
         raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
-    if scenario.movers:
-        reason = "what moves about is not drawn"
-        raise BslamError(f"scenario {scenario.name}, movers: {reason}; allowed: none, or --sensor simulated")
     return with_noise(scenario, sigma_mps, noise)
 
 
@@ -249,7 +246,8 @@ def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: Thr
         camera = step % len(rig.cameras)
         if rig.pan is not None:
             front_end.point(camera, math.remainder(rig.cameras[camera].yaw_rad + aim.angle_rad, math.tau))
-        picture = renderers[camera].render((x_m, y_m, theta_rad), step * step_s, aim.angle_rad)
+        pose, others_m = (x_m, y_m, theta_rad), path.others_m[step]
+        picture = renderers[camera].render(pose, step * step_s, aim.angle_rad, others_m)
         before = poses[max(step - len(rig.cameras), 0)]  # when this camera took its last picture
         seeing = front_end.see(picture.rgb, camera, step == 0 or aim.moved or before != poses[step])
         measured = [one for one in seeing.candidates if is_used(one, threshold)]

@@ -70,7 +70,8 @@ def _drive_shots(scenario: Scenario, seed: int, rig: Rig, frames: int, every_s: 
     for index, pose in enumerate(poses[: frames * between]):
         camera = index % len(rig.cameras)
         time_s = index * stride * scenario.step_us * 1e-6
-        picture = renderers[camera].render((pose[0], pose[1], pose[2]), time_s)
+        others_m = path.others_m[index * stride]
+        picture = renderers[camera].render((pose[0], pose[1], pose[2]), time_s, movers_m=others_m)
         moved = last.get(camera) != pose
         last[camera] = pose
         shown = index % between == between - 1

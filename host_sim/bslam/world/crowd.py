@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.world.arena import Point
 
+LOOKS = ("person", "box")
 _DISTANCE_M = 0.1  # nobody walks nearer to the robot than this
 
 
@@ -23,6 +24,7 @@ class Mover:
     radius_m: float
     pause_s: float  # at both ends
     hides: bool
+    looks: str  # before a camera: one of LOOKS
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ from bslam.parsing.settings import (
 )
 from bslam.rig import load_rig
 from bslam.world.arena import Arena, Beacon, Box, Point, Wall
-from bslam.world.crowd import Mover
+from bslam.world.crowd import LOOKS, Mover
 from bslam.world.kinds import KINDS
 from bslam.world.planner import grid_size
 
@@ -251,6 +251,12 @@ class _MoverTable:
     radius_m: float = setting(number(0.01, 10.0), 0.25)
     pause_s: float = setting(NOT_NEGATIVE, 0.0)  # at both ends of the path
     hides: bool = setting(_TRUE_OR_FALSE, True)
+    looks: str | None = setting(one_of(*LOOKS), None)  # before a camera; left out: who hides is a person
+
+    def mover(self) -> Mover:
+        """What it stands for."""
+        looks = self.looks or ("person" if self.hides else "box")
+        return Mover(self.path, self.speed_mps, self.radius_m, self.pause_s, self.hides, looks)
 
 
 @dataclass(frozen=True)
@@ -336,7 +342,7 @@ def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
             ),
             boxes=tuple(Box(one.at, one.size_m, one.turn_rad, one.hides) for one in lists["boxes"]),
         ),
-        movers=tuple(Mover(**vars(one)) for one in lists["movers"]),
+        movers=tuple(one.mover() for one in lists["movers"]),
         recorded=_read_recorded(tables["driving"].recorded, path, top["steps"] * top["step_us"]),
         areas=tuple(lists["areas"]),
         **top,
@@ -453,6 +459,8 @@ def _check_inside(scenario: Scenario, require: Callable[[bool, str, object, str]
         require(not in_box, "[start], keys x_m, y_m", place, allowed_start)
     for index, mover in enumerate(scenario.movers):
         check(f"movers[{index}], key path", *mover.path)
+        upright = mover.hides or mover.looks != "person"
+        require(upright, f"movers[{index}], key looks", mover.looks, "'box' where hides = false")
     check("[driving], key waypoints", *scenario.driving.waypoints)
 
 

@@ -16,7 +16,7 @@ from bslam.experiment.eye import Eye
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.rig import Pan, load_rig
-from bslam.world.simulate import load_scenario, simulate
+from bslam.world.simulate import load_scenario, simulate, true_drive
 
 RIG = load_rig("three60")
 
@@ -68,6 +68,23 @@ def test_camera_log_takes_the_cameras_in_turn_one_frame_a_step(short, tmp_path):
     camera_log(short, 1, None, None, RIG, CameraStore(tmp_path))
     assert [index for index, _ in FakeFrontEnd.calls] == [0, 1, 2, 0, 1, 2, 0, 1]
     assert FakeFrontEnd.calls[0] == (0, True)
+
+
+def test_cameras_see_people_where_they_are_at_that_step(short, monkeypatch):
+    hall = replace(load_scenario("busy_hall"), steps=60)
+    path, places = true_drive(hall, 1), []
+
+    def render(self, pose, time_s, pan_rad, movers_m):
+        places.append(movers_m)
+        return rendered(self, pose, time_s, pan_rad, movers_m)
+
+    rendered = camera.Renderer.render
+    monkeypatch.setattr(camera.Renderer, "render", render)
+    _, glances = unseen_log(hall, 1, None, None, RIG, camera.TOLD_THRESHOLD)
+    for _ in zip(glances, range(50), strict=False):
+        continue
+    np.testing.assert_array_equal(places, path.others_m[: len(places)])
+    assert np.ptp(np.array(places), axis=0).max() > 0.5  # somebody walks
 
 
 def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(short, tmp_path, monkeypatch):

@@ -52,6 +52,8 @@ def test_check_and_show_say_what_there_is(room, capsys):
         ('kind = "sign"', 'kind = "clock"', ["beacons[9], key kind", "'clock'", "'sign'"]),
         ("path = [[1.2, 1.5], [14.5, 1.5]]", "path = [[1.2, 1.5]]", ["movers[0], key path", "two points"]),
         ("path = [[1.2, 1.5],", "path = [[1.2, 99],", ["movers[0], key path", "99", "within the walls"]),
+        ("pause_s = 4.0", "looks = 'dog'", ["movers[0], key looks", "dog", "person", "box"]),
+        ("radius_m = 0.4,", "looks = 'person',", ["movers[5], key looks", "hides = false"]),
         ("keep_off_m = 0.5", "waypoints = [[1.0, 77.0]]", ["[driving], key waypoints", "77.0", "within"]),
         ("step_us = 40_000", 'step_us = 40_000\nrig = "six"', ["key rig", "'six'", "three60"]),
     ],
@@ -76,9 +78,3 @@ def test_nothing_named_is_bad_input(capsys):
 def test_rig_of_the_scenario_is_the_one_of_the_camera(room):
     room.write_text(room.read_text().replace("step_us = 40_000", 'step_us = 40_000\nrig = "wide180"', 1))
     assert load_scenario(room).rig == "wide180"
-
-
-def test_people_before_a_camera_are_refused(room, capsys):
-    words = ["run", "mine.toml", "--sensor", "camera", "--jobs", "1"]
-    assert main(words) == 2
-    assert "movers: what moves about is not drawn" in capsys.readouterr().err.splitlines()[-1]

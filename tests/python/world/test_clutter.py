@@ -54,6 +54,7 @@ def mover(**changes: object) -> Mover:
         "radius_m": 0.25,
         "pause_s": 1.0,
         "hides": True,
+        "looks": "person",
     }
     return Mover(**(settings | changes))  # type: ignore[arg-type]
 

@@ -115,6 +115,7 @@ class Furnisher:
         self._beacons: list[BeaconLook] = []
         self._bodies: list[Body] = []
         self._obstacles: list[Obstacle] = []
+        self._movers: list[int] = []
         self._lamps: list[tuple[float, float, float, float, float]] = []
         self._taken: list[Footprint] = []
         self.faces = [face for wall in walls for face in faces_of(wall)]
@@ -179,6 +180,15 @@ class Furnisher:
 
     def add_clutter(self, piece: Piece, x_m: float, y_m: float) -> None:
         """A thing that stands on the floor and always shows the same side."""
+        self._stand_up(piece, x_m, y_m)
+        self._obstacles.append(Obstacle(x_m, y_m, 0.5 * piece.width_m))
+
+    def add_mover(self, piece: Piece, x_m: float, y_m: float) -> None:
+        """The same, but it moves about from there (`Renderer.render`): nothing keeps clear of the place."""
+        self._movers.append(self._builder.surface_count)
+        self._stand_up(piece, x_m, y_m)
+
+    def _stand_up(self, piece: Piece, x_m: float, y_m: float) -> None:
         self._builder.rectangle(
             np.array([x_m - 0.5 * piece.width_m, y_m, piece.height_m]),
             np.array([piece.width_m, 0.0, 0.0]),
@@ -187,7 +197,6 @@ class Furnisher:
             CLUTTER,
             flags=raw.CUT_OUT | raw.BILLBOARD,
         )
-        self._obstacles.append(Obstacle(x_m, y_m, 0.5 * piece.width_m))
 
     def draw_place(self, width_m: float, depth_m: float) -> tuple[WallFace, float] | None:
         """A free place on some wall's inner face, or None if none was found."""
@@ -232,8 +241,9 @@ class Furnisher:
             beacons=tuple(self._beacons),
             bodies=tuple(self._bodies),
             obstacles=tuple(self._obstacles),
+            movers=tuple(self._movers),
             lighting=_draw_lighting(artist),
-            tables=self._builder.tables(np.array(self._lamps), walls, ambient),
+            tables=self._builder.tables(raw.Light(np.array(self._lamps), walls, ambient)),
         )
 
     # --- The shell ------------------------------------------------------------------------------------------

@@ -86,45 +86,58 @@ class LensTables:
         lib.render_tiles(self.c, _pointer(self._tiles))
 
 
+class Light:
+    """Where light comes from: lamps (k, 5), walls (w, 4), ambient (lamps', sky's) as render_bake has them."""
+
+    def __init__(self, lamps: Floats, walls: Floats, ambient: tuple[float, float]) -> None:
+        self._lamps = np.ascontiguousarray(lamps, dtype=np.float32).reshape(-1, 5)
+        self._walls = np.ascontiguousarray(walls, dtype=np.float32).reshape(-1, 4)
+        self._ambient = list(ambient)
+
+    def bake(self, surfaces: NDArray[Any], maps: NDArray[np.float32]) -> None:
+        """Writes the light maps of surfaces (n,) SURFACE: (n, nodes, nodes, 2) float32."""
+        assert surfaces.dtype == SURFACE and maps.dtype == np.float32
+        assert maps.shape == (len(surfaces), LIGHT_NODES, LIGHT_NODES, 2)
+        lib.render_bake(
+            _pointer(surfaces, "render_surface_t *"),
+            len(surfaces),
+            _pointer(self._lamps),
+            len(self._lamps),
+            _pointer(self._walls),
+            len(self._walls),
+            self._ambient,
+            _pointer(maps),
+        )
+
+
 class SceneTables:
     """A scene's surfaces (n,) SURFACE, textures (m,) TEXTURE and their texels, and light maps."""
 
     def __init__(
-        self,
-        surfaces: NDArray[Any],
-        textures: NDArray[Any],
-        texels: NDArray[np.uint32],
-        light: NDArray[np.float32],
+        self, surfaces: NDArray[Any], textures: NDArray[Any], texels: NDArray[np.uint32], light: Light
     ) -> None:
         assert surfaces.dtype == SURFACE and textures.dtype == TEXTURE and len(surfaces) <= SURFACES_MAX
-        assert light.shape == (len(surfaces), LIGHT_NODES, LIGHT_NODES, 2) and light.dtype == np.float32
         assert texels.dtype == np.uint32
-        self._keep = (surfaces, textures, texels, light)
+        self._surfaces, self._textures, self._texels, self._light = surfaces, textures, texels, light
+        self._maps = np.zeros((len(surfaces), LIGHT_NODES, LIGHT_NODES, 2), dtype=np.float32)
+        light.bake(surfaces, self._maps)
         self.surface_count = len(surfaces)
         self.c = ffi.new("render_scene_t *")
         self.c.surfaces = _pointer(surfaces, "render_surface_t *")
         self.c.surface_count = len(surfaces)
         self.c.textures = _pointer(textures, "render_texture_t *")
         self.c.texels = _pointer(texels, "uint32_t *")
-        self.c.light = _pointer(light)
+        self.c.light = _pointer(self._maps)
 
+    def copy(self) -> SceneTables:
+        """One whose surfaces can be moved without moving these; textures are shared."""
+        return SceneTables(self._surfaces.copy(), self._textures, self._texels, self._light)
 
-def bake(surfaces: NDArray[Any], lamps: Floats, walls: Floats, ambient: tuple[float, float]) -> NDArray[Any]:
-    """Light maps (surfaces, nodes, nodes, 2) float32; lamps (k, 5), walls (w, 4) as render_bake has them."""
-    lamps32 = np.ascontiguousarray(lamps, dtype=np.float32).reshape(-1, 5)
-    walls32 = np.ascontiguousarray(walls, dtype=np.float32).reshape(-1, 4)
-    light = np.zeros((len(surfaces), LIGHT_NODES, LIGHT_NODES, 2), dtype=np.float32)
-    lib.render_bake(
-        _pointer(surfaces, "render_surface_t *"),
-        len(surfaces),
-        _pointer(lamps32),
-        len(lamps32),
-        _pointer(walls32),
-        len(walls32),
-        list(ambient),
-        _pointer(light),
-    )
-    return light
+    def move(self, surface: int, x_m: float, y_m: float) -> None:
+        """Puts the middle of an upright surface there, and in the light there."""
+        one = self._surfaces[surface : surface + 1]
+        one["corner_m"][0, :2] = (x_m, y_m) - 0.5 * one["right_m"][0, :2]
+        self._light.bake(one, self._maps[surface : surface + 1])
 
 
 class Caster:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,8 @@ class Renderer:
     def __init__(self, scene: Scene, camera: Camera, seed: int | Sequence[int]) -> None:
         random = np.random.default_rng(np.random.SeedSequence(seed))
         self._scene, self._camera = scene, camera
-        self._caster = raw.Caster(scene.tables, lens.rays(camera), int(random.integers(1, 2**63)))
+        self._tables = scene.tables.copy() if scene.movers else scene.tables
+        self._caster = raw.Caster(self._tables, lens.rays(camera), int(random.integers(1, 2**63)))
         self._target = random.uniform(*_TARGET_BRIGHTNESS)
         self._lag_s = random.uniform(*_EXPOSURE_LAG_S)
         self._shutter_s = random.uniform(*_SHUTTER_S)
@@ -84,14 +86,21 @@ class Renderer:
         self._exposure: float | None = None
         self._last: tuple[float, float] | None = None  # time s and direction rad of the picture before
 
-    def render(self, pose: Pose, time_s: float, pan_rad: float = 0.0) -> Frame:
+    def render(
+        self, pose: Pose, time_s: float, pan_rad: float = 0.0, movers_m: Floats | None = None
+    ) -> Frame:
         """The picture from a robot's pose (x m, y m, theta rad) in the arena's frame.
 
-        Times should rise from call to call; pan_rad turns the camera beyond its mounting. BslamError unless
-        all are finite.
+        Times should rise from call to call; pan_rad turns the camera beyond its mounting; movers_m (n, 2):
+        where the scene's movers are, if not where they were. BslamError unless all are finite.
         """
-        if not all(math.isfinite(one) for one in (*pose, time_s, pan_rad)):
-            raise BslamError(f"pose {pose!r}, time {time_s!r}, pan {pan_rad!r}: allowed: finite numbers")
+        movers = [] if movers_m is None else movers_m.tolist()
+        if not all(math.isfinite(one) for one in (*pose, time_s, pan_rad, *chain(*movers))):
+            raise BslamError(
+                f"pose {pose!r}, time {time_s!r}, pan {pan_rad!r}, movers {movers!r}: allowed: finite numbers"
+            )
+        for surface, place in zip(self._scene.movers, movers, strict=movers_m is not None):
+            self._tables.move(surface, *place)
         eye, yaw_rad = self._eye(pose, pan_rad)
         lamp, sky = self._scene.lighting.at(time_s)
         identity, depth_m = self._caster.trace(eye, (math.cos(yaw_rad), math.sin(yaw_rad)), lamp, sky)

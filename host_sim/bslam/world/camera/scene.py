@@ -121,6 +121,7 @@ class Scene:
     bodies: tuple[Body, ...]  # of the beacons, in their order
     areas: tuple[tuple[float, float, float, float], ...]  # rooms: low x, low y, high x, high y
     obstacles: tuple[Obstacle, ...]
+    movers: tuple[int, ...]  # the surfaces of what moves about, one each
     lighting: Lighting
     tables: raw.SceneTables
 
@@ -175,15 +176,10 @@ class SceneBuilder:
             (tuple(corner_m), tuple(right_m), tuple(down_m), *tiles, *glow, texture, flags, identity)
         )
 
-    def tables(self, lamps: Floats, walls: Floats, ambient: tuple[float, float]) -> raw.SceneTables:
-        """All that was collected, with light maps."""
-        surfaces = self._array()
-        return raw.SceneTables(
-            surfaces,
-            np.array(self._textures, dtype=raw.TEXTURE),
-            np.concatenate(self._texels),
-            raw.bake(surfaces, lamps, walls, ambient),
-        )
+    def tables(self, light: raw.Light) -> raw.SceneTables:
+        """All that was collected, in that light."""
+        textures = np.array(self._textures, dtype=raw.TEXTURE)
+        return raw.SceneTables(self._array(), textures, np.concatenate(self._texels), light)
 
     def body(self, first: int, turns: bool) -> Body:
         """The surfaces from `first` on."""

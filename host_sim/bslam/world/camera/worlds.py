@@ -11,8 +11,9 @@ import numpy as np
 from bslam.errors import BslamError
 from bslam.world.arena import Beacon, Box, Point, Wall
 from bslam.world.camera.furnish import Area, Furnisher, WallFace
-from bslam.world.camera.looks import BEACONS, Artist, Look, clutter, style_of
+from bslam.world.camera.looks import BEACONS, Artist, Look, clutter, person, style_of, trolley
 from bslam.world.camera.scene import IDENTITY_MAX, Scene
+from bslam.world.crowd import Mover
 from bslam.world.kinds import KINDS, Kind, KindDeck
 from bslam.world.scenario import Scenario
 
@@ -27,6 +28,7 @@ _GAP_SHARE = 0.9  # of the way to the neighbour that two beacons may take togeth
 _AT_WALL_M = 0.15  # clutter of a dressed scenario stands so near to a wall, out of the robot's way
 _HIGH_BOX_M, _LOW_BOX_M = 1.3, 0.3  # a box that hides what is behind, and one that does not
 _TEXTURES = 2  # the stream that a scenario's own textures come from
+_MOVERS = 3  # and the one for what moves about: with and without it, all else looks the same
 _DRESSED_DEPTH_M = 0.25  # a scenario's robot comes as near to the walls as 0.3 m
 
 
@@ -57,7 +59,8 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
 
     A beacon's foot is where the scenario has it; what stands out from the wall is seen its depth farther in
     (`Scene.beacons`, `Scene.arena`). Clutter stands at the walls, where no robot drives; a scenario's box is
-    a piece of clutter as wide as its longer side. BslamError: a beacon that hangs on no wall, or has too
+    a piece of clutter as wide as its longer side; people and what else moves stand where their paths begin,
+    until they are rendered elsewhere. BslamError: a beacon that hangs on no wall, or has too
     little of it for its kind; an id beyond 32767; a bad seed or style.
     """
     artist = _artist(seed, style, 1)
@@ -89,6 +92,7 @@ def dress(scenario: Scenario, seed: int, style: str = "test") -> Scene:
         if foot is not None:
             furnisher.add_clutter(piece, *foot)
     _stand_boxes(furnisher, artist, arena.boxes)
+    _add_movers(furnisher, _artist(seed, style, _MOVERS), scenario.movers)
     return furnisher.finish(seed)
 
 
@@ -113,9 +117,23 @@ def _textured(name: str, texture: int, artist: Artist) -> Look:
 
 def _stand_boxes(furnisher: Furnisher, artist: Artist, boxes: Sequence[Box]) -> None:
     for box in boxes:
-        height_m = _HIGH_BOX_M if box.hides else _LOW_BOX_M
-        piece = replace(clutter(artist), width_m=max(box.size_m), height_m=height_m)
+        piece = replace(clutter(artist), width_m=max(box.size_m), height_m=_box_height(box.hides))
         furnisher.add_clutter(piece, *box.at)
+
+
+def _box_height(hides: bool) -> float:
+    return _HIGH_BOX_M if hides else _LOW_BOX_M
+
+
+def _add_movers(furnisher: Furnisher, artist: Artist, movers: Sequence[Mover]) -> None:
+    """Where their paths begin, each as wide as it is round."""
+    for mover in movers:
+        width_m = 2.0 * mover.radius_m
+        if mover.looks == "person":
+            piece = person(artist, width_m)
+        else:
+            piece = trolley(artist, width_m, _box_height(mover.hides))
+        furnisher.add_mover(piece, *mover.path[0])
 
 
 def _own_looks(beacon: Beacon) -> int:

@@ -3,6 +3,7 @@
 from bslam.world.camera.looks.fittings import door, extinguisher, radiator, window
 from bslam.world.camera.looks.furniture import cabinet, clutter, wall_thing
 from bslam.world.camera.looks.look import Look
+from bslam.world.camera.looks.people import person, trolley
 from bslam.world.camera.looks.piece import Piece
 from bslam.world.camera.looks.prints import poster, sign
 from bslam.world.camera.looks.style import STYLES, Artist, style_of
@@ -29,7 +30,9 @@ __all__ = [
     "clutter",
     "floor",
     "lamp",
+    "person",
     "style_of",
+    "trolley",
     "wall",
     "wall_style",
     "wall_thing",

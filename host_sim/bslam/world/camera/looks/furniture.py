@@ -153,6 +153,11 @@ def clutter(artist: Artist) -> Piece:
     """Something that stands on the floor."""
     paint, width_m, height_m = _CLUTTER[artist.pick(artist.style.clutter)]
     scale = artist.between(0.85, 1.15)
+    return Piece(cut_out(artist, paint, width_m, height_m), scale * width_m, scale * height_m)
+
+
+def cut_out(artist: Artist, paint: Callable[[Canvas, Artist], None], width_m: float, height_m: float) -> Look:
+    """What a painter leaves on an empty canvas, cut out of it."""
     canvas = Canvas(64, 128, (0.0, 0.0, 0.0), width_m / height_m)
     canvas.rgb -= 1.0
     ground = canvas.ground()
@@ -162,7 +167,7 @@ def clutter(artist: Artist) -> Piece:
     canvas.keep(outline)
     # Seen from afar a cut-out mixes with the colour around it: let that be its own.
     canvas.rgb[~outline] = canvas.rgb[outline].mean(axis=0)
-    return Piece(Look(canvas.picture(), (0.5, 0.5, 0.5), cut_out=True), scale * width_m, scale * height_m)
+    return Look(canvas.picture(), (0.5, 0.5, 0.5), cut_out=True)
 
 
 def _chair(canvas: Canvas, artist: Artist) -> None:
