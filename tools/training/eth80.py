@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from bslam.core.learner import flash_seeds
 from bslam.core.vision import FrontEnd
 from bslam.errors import BslamError
 from bslam.experiment.datasets import data_root
@@ -76,7 +77,8 @@ class PhotographedSource(ScenarioSource):
         names = dict(zip(there.beacon_id.tolist(), objects, strict=False))
         log = _only(log, np.array(list(names)))
         signatures = _signatures(self.scenario, self.seed, log, names)
-        return replace(log, sightings=replace(log.sightings, signature=signatures))
+        seen = replace(log.sightings, signature=signatures)
+        return replace(log, sightings=seen, seeds=flash_seeds())
 
 
 def _only(log: Log, beacon_id: NDArray[np.int64]) -> Log:

@@ -8,16 +8,15 @@ objects, and so are the generic seeds that come with the library.
 from __future__ import annotations
 
 import hashlib
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.vision import SIGNATURE_SIZE, BeaconModel, Candidate, FrontEnd
+from bslam.core.learner import flash_seeds
+from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.errors import BslamError
 from bslam.experiment.pictures import Box, Scaled, camera_for, load_picture
 from bslam.rig import Camera
@@ -26,9 +25,6 @@ from training.truth import areas, intersections, overlaps
 
 NONE = -1
 """The label of what is none of the objects."""
-
-SEEDS = Path(__file__).resolve().parents[2] / "firmware/models/seeds.h"
-SEED_STEPS = 127  # of 1, as firmware/bslam/svm/sample.h stores them
 
 SAME_OVERLAP = 0.5  # intersection over union from which a candidate is of a box
 TOUCH = 0.1  # share of a candidate on a box above which it is no example of something else
@@ -97,7 +93,7 @@ def collect(folder: Folder, camera: Camera | None = None, model: BeaconModel | N
             found.update(names[owner] for owner in owners)
         else:
             useless[picture.path.name] = seeing.reason
-    for index, seed in enumerate(generic_signatures()):
+    for index, seed in enumerate(flash_seeds()):
         collected.add(seed, NONE, index % len(frames))
     drawn = Counter(label.name for picture in folder.pictures for label in picture.labels)
     _check(folder, collected, drawn)
@@ -147,13 +143,6 @@ def _add_candidates(collected: _Collected, view: _View, candidates: Sequence[Can
             label = NONE if owner == NONE else view.objects[owner]
             collected.add(candidate.signature, label, view.picture)
     return {owner for owner in owners if owner is not None and owner != NONE}
-
-
-def generic_signatures() -> NDArray[np.float32]:
-    """Signatures (n, 71) of beacons that are nobody's: those that machines on the robot start from."""
-    rows = re.findall(r"\{\{(.*?)\}\}", SEEDS.read_text(encoding="utf-8"), re.DOTALL)
-    stored = np.array([[int(q) for q in re.findall(r"Q\((-?\d+)\)", row)] for row in rows])
-    return (stored[:, :SIGNATURE_SIZE] / SEED_STEPS).astype(np.float32)
 
 
 def folder_sha256(folder: Folder) -> str:

@@ -58,6 +58,7 @@ typedef struct bslam_sighting_frame {
     const bslam_pose_t *mount;   ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
+    int64_t time_us;
 } bslam_sighting_frame_t;
 
 /// Decides for every sighting of the frame: matches[0..count). A beacon is matched at most once in a frame.

@@ -40,6 +40,14 @@ static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_
                : bslam_looks_class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
 }
 
+/// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
+/// its sighting is this one or was missed.
+static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, int beacon)
+{
+    const int64_t ago_us = frame->time_us - frame->ekf->beacons[beacon].last_seen_us;
+    return ago_us > 0 && ago_us <= frame->params->again_us ? frame->params->again_odds : 0;
+}
+
 /// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
 static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, int beacon,
                   const bslam_sample_t *sample, candidate_t *found)
@@ -59,7 +67,8 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
         found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
     }
     found->score = weight.log_density - log_new(frame->params, sighting) +
-                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
+                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
+                   again_odds(frame, beacon);
     return true;
 }
 

@@ -107,6 +107,9 @@
     REAL(defer_score, 4.0, 0.0, 1e3, "svm: a best score between 0 and minus this is left undecided") \
     REAL(rival_lead, 2.0, 0.0, 1e3, \
          "svm: of two sightings that want a beacon, one must score higher by this, or both wait") \
+    REAL(again_odds, 4.2, 0.0, 100.0, \
+         "svm: log odds that a beacon seen just now is seen again (4.2: missed 15 times in 1000)") \
+    INTEGER(again_us, 200000, 0, 1000000000, "svm: just now is so long ago") \
     REAL(looks_weight, 1.0, 0.0, 100.0, "svm: what looks count against position (0: nothing)") \
     REAL(looks_samples, 3.0, 0.0, 1e3, "svm: looks count half when a machine keeps so many samples") \
     REAL(looks_slope, 4.0, 0.0, 1e3, "svm: log odds of a decision value") \

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.build import FIRMWARE_DIR
 from bslam.core.raw import Library, library
 from bslam.errors import BslamError
 
@@ -14,6 +16,9 @@ Floats = NDArray[np.float32]
 
 SIGNATURE_SIZE = 71
 """Values of a signature."""
+
+_SEEDS = FIRMWARE_DIR / "models" / "seeds.h"
+_SEED_STEPS = 127  # of 1, as firmware/bslam/svm/sample.h stores them
 
 
 class Learner:
@@ -148,3 +153,10 @@ def encode(raw: Library, signatures: Floats) -> Any:
 def _floats(ffi: Any, values: Floats) -> Any:
     """The numbers of a C-contiguous array, good as long as it is."""
     return ffi.from_buffer("float[]", values)
+
+
+def flash_seeds() -> Floats:
+    """Signatures (n, 71) of beacons that are nobody's: those in flash, which machines start from."""
+    rows = re.findall(r"\{\{(.*?)\}\}", _SEEDS.read_text(encoding="utf-8"), re.DOTALL)
+    stored = np.array([[int(q) for q in re.findall(r"Q\((-?\d+)\)", row)] for row in rows])
+    return (stored[:, :SIGNATURE_SIZE] / _SEED_STEPS).astype(np.float32)

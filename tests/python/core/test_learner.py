@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
 from bslam.core import CoreError
-from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution
+from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution, flash_seeds
 from bslam.errors import BslamError
 
 REALS = pytest.mark.parametrize("real", ["float", "double"])
@@ -109,3 +109,9 @@ def test_solver_more_samples_than_it_holds_are_refused() -> None:
     samples = np.zeros((OWN + RIVALS + 1, SIGNATURE_SIZE), np.float32)
     with pytest.raises(BslamError, match=r"113 signatures.*allowed: up to 112"):
         Solution(samples, np.zeros(len(samples), np.bool_), cost=COST, tolerance=0.1)
+
+
+def test_seeds_of_the_flash_are_those_of_the_header():
+    seeds = flash_seeds()
+    assert seeds.shape == (64, SIGNATURE_SIZE) and np.abs(seeds).max() <= 1.0
+    assert len(np.unique(seeds, axis=0)) == 64

@@ -210,12 +210,6 @@ def test_one_object_alone_is_told_from_the_generic_seeds(rows, tmp_path):
     assert counts[1].sum() >= 64 and counts[1, 1] >= 0.9 * counts[1].sum()
 
 
-def test_generic_signatures_are_those_of_the_front_end():
-    seeds = samples.generic_signatures()
-    assert seeds.shape == (64, SIGNATURE) and np.abs(seeds).max() <= 1.0
-    assert len(np.unique(seeds, axis=0)) == 64
-
-
 # --- what is refused ----------------------------------------------------------------------------------------
 
 

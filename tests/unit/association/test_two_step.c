@@ -62,14 +62,20 @@ typedef struct decision {
     bslam_match_t matches[8];
 } decision_t;
 
-static decision_t decide(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_sighting_t *seen,
-                         int count)
+static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                            const bslam_sighting_t *seen, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, params, &looks, &on_axle, seen, count};
+    const bslam_sighting_frame_t frame = {ekf, params, &looks, &on_axle, seen, count, time_us};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     bslam_associate_svm(&frame, decision.matches);
     return decision;
+}
+
+static decision_t decide(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_sighting_t *seen,
+                         int count)
+{
+    return decide_at(0, ekf, params, seen, count);
 }
 
 static int setup(void **state)
@@ -100,6 +106,41 @@ static void test_score_is_equation_47_without_looks(void **state)
     const decision_t d = decide(&ekf, &params, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
     assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01), 1e-4);
+}
+
+static void test_score_adds_the_odds_of_being_seen_again(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_odds = BSLAM_R(4.2);
+    params.again_us = 200000;
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
+    ekf.beacons[0].last_seen_us = 1000000;
+    const int64_t times_us[] = {1000000, 1000001, 1200000, 1200001};
+    const double odds[] = {0, 4.2, 4.2, 0};
+    for (int i = 0; i < 4; i++) {
+        const decision_t d = decide_at(times_us[i], &ekf, &params, &seen, 1);
+        assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01) + odds[i], 1e-4);
+    }
+}
+
+/// From afar position says little, and a beacon that waits each time is never learned.
+static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_odds = BSLAM_R(4.2);
+    params.again_us = 200000;
+    const double far_away[1][2] = {{20, 0}};
+    bslam_ekf_t ekf = unit_map_of(&params, far_away, 1);
+    ekf.beacons[0].last_seen_us = 1000000;
+    float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
+    give_machine(0, 3.0, 1);
+    bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
+    seen.range_sd_m = 4;
+    const decision_t after_long = decide_at(9000000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&after_long.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    const decision_t again = decide_at(1040000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&again.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_score_adds_what_looks_say_as_samples_come(void **state)
@@ -365,6 +406,8 @@ int main(void)
         cmocka_unit_test_setup(test_a_class_counts_as_its_log_odds_say, setup),
         cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
+        cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),
+        cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
         cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
         cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
