@@ -41,6 +41,27 @@ def motion_covariance(
     return covariance
 
 
+def measured_motion(
+    p: Mapping[str, int | float], dt_s: Any, left_m: Any, right_m: Any, gyro_radps: Any
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(way m, turn rad) (..., 2) of steps by wheels and gyro, scaled, and its covariance, MATH (5), (6).
+
+    gyro_radps: NaN where there is none.
+    """
+    dt_s, left_m, right_m, rate = (
+        np.asarray(one, dtype=np.float64) for one in (dt_s, left_m, right_m, gyro_radps)
+    )
+    read = np.stack([0.5 * (left_m + right_m), (right_m - left_m) / p["wheelbase_m"]], axis=-1)
+    covariance = motion_covariance(p, dt_s, left_m, right_m)
+    told = np.isfinite(rate)
+    total = covariance[..., 1, 1] + (p["gyro_sd_radps"] * dt_s) ** 2
+    gain = np.where(told[..., np.newaxis], covariance[..., 1] / total[..., np.newaxis], 0.0)
+    off_rad = np.where(told, rate, 0.0) * dt_s - read[..., 1]
+    read = read + gain * off_rad[..., np.newaxis]
+    covariance = covariance - gain[..., :, np.newaxis] * covariance[..., np.newaxis, 1, :]
+    return read * np.array([p["forward_scale"], p["turn_scale"]]), covariance
+
+
 def range_sd_m(p: Mapping[str, int | float], range_m: Any) -> Any:
     """Standard deviation of a distance, MATH (13)."""
     fraction, per_m = p["range_sd_fraction"], p["range_sd_per_m"]

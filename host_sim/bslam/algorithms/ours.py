@@ -35,13 +35,20 @@ class Bslam:
         """See `Algorithm`. Nothing inside is random."""
         self._slam = self._new()
         self._accounts: Sequence[Account] | None = None
+        self._gyro_radps: float | None = None  # of the step to come
+
+    def gyro(self, time_us: int, rate_radps: float) -> None:
+        """See `Gyroscopic`."""
+        self._gyro_radps = rate_radps
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
         try:
-            self._slam.odometry("wheels", time_us, left_m, right_m)
+            self._slam.odometry("wheels", time_us, left_m, right_m, self._gyro_radps)
         except CoreError:
             return  # the core has counted it
+        finally:
+            self._gyro_radps = None
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""

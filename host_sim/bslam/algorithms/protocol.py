@@ -96,6 +96,8 @@ class Algorithm(Protocol):
     image's sightings (None: it refused the image), and `uids() -> Iterable[int]` of the beacons in its map,
     provisional ones included.
 
+    Of robots with a gyro, a class that has `gyro(time_us, rate_radps)` is told what it says (`Gyroscopic`).
+
     An exception ends the run and is reported with the algorithm's name; so do a pose or map that is not
     finite, and a call that takes longer than --call-limit.
     """
@@ -120,3 +122,13 @@ class Algorithm(Protocol):
 
     def map(self) -> Sequence[Landmark]:
         """The beacons known by now; asked for at the end of the drive."""
+
+
+class Gyroscopic(Algorithm, Protocol):
+    """An algorithm that takes a gyro. `robot.gyro_sigma_radps` is its noise."""
+
+    def gyro(self, time_us: int, rate_radps: float) -> None:
+        """How fast the robot turned on the way that the next `odometry`, of the same stamp, tells of.
+
+        The mean over that time, to the left positive. Not called for a step without a reading.
+        """

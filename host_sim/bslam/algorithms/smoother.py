@@ -1,7 +1,7 @@
 """The whole drive at once: the poses and beacons that fit all readings best, by Gauss and Newton.
 
 Every pose is an unknown, and so is every beacon; the first pose is the origin. Minimised are the squares of
-  odometry     (way, turn) between two poses against the reading, weighted with MATH (5)
+  odometry     (way, turn) between two poses against the reading, a gyro's among it, MATH (5), (6)
   arc          what is left of the move beside that arc: 0, to a hundredth of a millimetre
   speeds       (v, omega) of a step against that of the step before, MATH (15), with velocity states
   sightings    direction and distance, MATH (11), (13); the sd of a distance is that of the predicted one
@@ -11,6 +11,7 @@ Poses couple with their neighbours only: their normal equations are a band, beac
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded, solve
 
-from bslam.algorithms.noise import motion_covariance, range_sd_m
+from bslam.algorithms.noise import measured_motion, range_sd_m
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Smoother:
 
     def __init__(self, parameters: Mapping[str, int | float]) -> None:
         self._p = parameters
-        self._steps: list[tuple[float, float, float]] = []  # dt_s, left_m, right_m
+        self._steps: list[tuple[float, float, float, float]] = []  # dt_s, left_m, right_m, gyro_radps
         self._seen: list[tuple[int, int, float, float]] = []  # pose, beacon, bearing_rad, range_m
         self._priors: list[tuple[int, float, float]] = []  # beacon, x_m, y_m
         self._new_poses: list[tuple[float, float, float]] = []
@@ -77,9 +78,16 @@ class Smoother:
             self._new_beacons = []
         return self._beacons
 
-    def add_step(self, dt_s: float, left_m: float, right_m: float, pose: tuple[float, float, float]) -> None:
-        """A reading of odometry, and the pose that it leads to from the last one."""
-        self._steps.append((dt_s, left_m, right_m))
+    def add_step(
+        self,
+        dt_s: float,
+        left_m: float,
+        right_m: float,
+        pose: tuple[float, float, float],
+        gyro_radps: float = math.nan,
+    ) -> None:
+        """A reading of odometry, and the pose that it leads to from the last one. NaN: no gyro."""
+        self._steps.append((dt_s, left_m, right_m, gyro_radps))
         self._new_poses.append(pose)
 
     def add_sighting(self, pose: int, beacon: int, bearing_rad: float, range_m: float) -> None:
@@ -173,13 +181,14 @@ class _Problem:
     def __init__(
         self,
         parameters: Mapping[str, int | float],
-        steps: list[tuple[float, float, float]],
+        steps: list[tuple[float, float, float, float]],
         seen: list[tuple[int, int, float, float]],
         priors: list[tuple[int, float, float]],
     ) -> None:
         self._p = parameters
-        self._dt_s, left_m, right_m = np.array(steps, dtype=np.float64).reshape(-1, 3).T
-        self._measured, self._odometry_weight = _odometry(parameters, self._dt_s, left_m, right_m)
+        self._dt_s, left_m, right_m, gyro_radps = np.array(steps, dtype=np.float64).reshape(-1, 4).T
+        self._measured, covariance = measured_motion(parameters, self._dt_s, left_m, right_m, gyro_radps)
+        self._odometry_weight = np.linalg.inv(np.linalg.cholesky(covariance))
         self._with_speeds = bool(parameters["velocity_states"]) and len(steps) > 0
         if self._with_speeds:
             self._keep, self._speed_weight = _speed_model(parameters, self._dt_s)
@@ -360,15 +369,6 @@ def _mount(p: Mapping[str, int | float], theta_rad: Array) -> tuple[Array, Array
     x_m, y_m = p["mount_x_m"], p["mount_y_m"]
     eye = np.column_stack([c * x_m - s * y_m, s * x_m + c * y_m])
     return eye, np.column_stack([-eye[:, 1], eye[:, 0]])
-
-
-def _odometry(
-    p: Mapping[str, int | float], dt_s: Array, left_m: Array, right_m: Array
-) -> tuple[Array, Array]:
-    """Measured (way, turn) (n, 2), and the inverse Cholesky factor of its covariance, MATH (5), (n, 2, 2)."""
-    way_m, turn_rad = 0.5 * (left_m + right_m), (right_m - left_m) / p["wheelbase_m"]
-    weight = np.linalg.inv(np.linalg.cholesky(motion_covariance(p, dt_s, left_m, right_m)))
-    return np.column_stack([p["forward_scale"] * way_m, p["turn_scale"] * turn_rad]), weight
 
 
 def _speed_model(p: Mapping[str, int | float], dt_s: Array) -> tuple[Array, Array]:

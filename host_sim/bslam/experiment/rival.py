@@ -18,7 +18,7 @@ from bslam.experiment.ledger import Ledger
 from bslam.experiment.options import RunOptions, core_params
 from bslam.experiment.runner import MAPPABLE, Frames, beacons_to_hold
 from bslam.experiment.trace import MapBeacon, SightingCounts, Trace
-from bslam.experiment.truth import step_times_us, wheel_travel
+from bslam.experiment.truth import gyro_rates, step_times_us, wheel_travel
 from bslam.log import Log
 
 STANDS_FOR_M = 1.0
@@ -80,9 +80,14 @@ class _Drive:
         algorithm, clock, times_us = self._algorithm, time.thread_time_ns, self._times_us
         self._observe_start(times_us)
         self._keep(0)
-        travel = zip(*(one.tolist() for one in wheel_travel(self._log)), strict=True)
-        for step, (left_m, right_m) in enumerate(travel, start=1):
+        travel = zip(
+            *(one.tolist() for one in (*wheel_travel(self._log), gyro_rates(self._log))), strict=True
+        )
+        feel = getattr(algorithm, "gyro", None)
+        for step, (left_m, right_m, rate_radps) in enumerate(travel, start=1):
             began = clock()
+            if feel is not None and not math.isnan(rate_radps):
+                feel(times_us[step], rate_radps)
             algorithm.odometry(times_us[step], left_m, right_m)
             self._observe_until(times_us[step + 1] if step + 1 < len(times_us) else None)
             self._keep(step)

@@ -108,6 +108,13 @@ def wheel_travel(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return way_m - half_m, way_m + half_m
 
 
+def gyro_rates(log: Log) -> NDArray[np.float64]:
+    """Mean turn rate of each step by the gyro, rad/s, (n,); NaN where none tells."""
+    steps = len(step_times_us(log)) - 1
+    rates = log.odometry.gyro_radps
+    return np.full(steps, np.nan) if rates is None else rates[len(rates) - steps :]
+
+
 def _travel_of_ticks(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     robot = log.robot
     assert robot.left_radius_m and robot.right_radius_m and robot.ticks_per_revolution and robot.counter_bits

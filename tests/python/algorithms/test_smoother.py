@@ -1,6 +1,7 @@
 """The exact MAP: its derivatives by differences, its optimum by GTSAM's on the same graph."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ def parameters(**changes):
     return Slam.defaults() | MOUNT | changes
 
 
-def drive(p, steps, seed=4, has_range=True):
+def drive(p, steps, seed=4, has_range=True, has_gyro=False):
     """A smoother fed with a noisy curve through three beacons, every one seen at every third step."""
     rng = np.random.default_rng(seed)
     smoother = Smoother(p)
@@ -30,7 +31,10 @@ def drive(p, steps, seed=4, has_range=True):
         true = move_on_arc(true, *wheels, p["wheelbase_m"])
         left_m, right_m = (wheels + 0.3 * STEP_S * rng.standard_normal(2)).tolist()
         guess = move_on_arc(smoother.last_pose, left_m, right_m, p["wheelbase_m"])
-        smoother.add_step(STEP_S, left_m, right_m, guess)
+        turn_radps = (wheels[1] - wheels[0]) / p["wheelbase_m"] / STEP_S
+        told = has_gyro and step % 2 == 0
+        gyro_radps = turn_radps + p["gyro_sd_radps"] * rng.standard_normal() if told else math.nan
+        smoother.add_step(STEP_S, left_m, right_m, guess, gyro_radps)
         if step % 3 == 0:
             look(smoother, p, true, step, rng, has_range)
     return smoother
@@ -75,12 +79,15 @@ def test_gradient_and_step_are_those_of_finite_differences(velocity_states, has_
 
 
 @pytest.mark.parametrize("velocity_states", [0, 1])
-def test_optimum_is_that_of_gtsam_on_the_same_graph(velocity_states):
+@pytest.mark.parametrize(("has_range", "has_gyro"), [(True, False), (False, False), (True, True)])
+def test_optimum_is_that_of_gtsam_on_the_same_graph(velocity_states, has_range, has_gyro):
     gtsam = pytest.importorskip("gtsam")
     p = parameters(velocity_states=velocity_states)
-    smoother, start = drive(p, 60), drive(p, 60)
+    smoother, start = (drive(p, 60, has_range=has_range, has_gyro=has_gyro) for _ in range(2))
     smoother.solve()
-    graph, values = gtsam_graph(gtsam, p, smoother, start)
+    # Plain Gauss-Newton from odometry diverges without distances: GTSAM then sets out beside the optimum.
+    begin = start if has_range else beside(smoother)
+    graph, values = gtsam_graph(gtsam, p, smoother, begin)
     best, last = values, math.inf
     for _ in range(20):  # not its optimizers, which stop when the narrow arcs make the cost rise once
         change = graph.linearize(best).optimize()
@@ -96,6 +103,15 @@ def test_optimum_is_that_of_gtsam_on_the_same_graph(velocity_states):
     assert np.abs(smoother.beacons - beacons).max() < 2e-5
 
 
+def beside(solved):
+    """Poses half a centimetre and beacons 5 cm off."""
+    rng = np.random.default_rng(9)
+    poses = solved.poses + 0.005 * rng.standard_normal(solved.poses.shape)
+    return SimpleNamespace(
+        poses=poses, beacons=solved.beacons + 0.05 * rng.standard_normal(solved.beacons.shape)
+    )
+
+
 def gtsam_graph(gtsam, p, solved, start):
     """The same terms by GTSAM's own poses, logarithm and bearing-range factor; distances weighted alike."""
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
@@ -108,7 +124,7 @@ def gtsam_graph(gtsam, p, solved, start):
 
     for number, place in enumerate(start.beacons):
         values.insert(1000 + number, place)
-    for k, (dt_s, left_m, right_m) in enumerate(solved._steps):
+    for k, (dt_s, left_m, right_m, gyro_radps) in enumerate(solved._steps):
         values.insert(k + 1, gtsam.Pose2(*start.poses[k + 1]))
         read = np.array([0.5 * (left_m + right_m), 0.0, (right_m - left_m) / p["wheelbase_m"]])
         covariance = np.zeros((3, 3))
@@ -117,6 +133,12 @@ def gtsam_graph(gtsam, p, solved, start):
         add([k, k + 1], lambda a, b, read=read: twist(gtsam, a, b) - read, covariance)
         if p["velocity_states"]:
             add_speeds(gtsam, p, add, k, dt_s)
+        if math.isfinite(gyro_radps):
+            turned, sd_rad = gyro_radps * dt_s, p["gyro_sd_radps"] * dt_s
+            add([k, k + 1], lambda a, b, t=turned: twist(gtsam, a, b)[[2]] - t, [[sd_rad**2]])
+    for beacon, *place in solved._priors:
+        spread = gtsam.noiseModel.Isotropic.Sigma(2, 2.5)
+        graph.add(gtsam.PriorFactorPoint2(1000 + beacon, np.array(place), spread))
     mount = gtsam.Pose2(*MOUNT.values())
     for pose, beacon, bearing_rad, range_m in solved._seen:
         eye = gtsam.Pose2(*solved.poses[pose]).compose(mount)
@@ -124,9 +146,11 @@ def gtsam_graph(gtsam, p, solved, start):
 
         def sight(at, place, bearing_rad=bearing_rad, range_m=range_m):
             eye = at.compose(mount)
-            return np.array([eye.bearing(place).theta() - bearing_rad, eye.range(place) - range_m])
+            error = np.array([eye.bearing(place).theta() - bearing_rad, eye.range(place) - range_m])
+            return error[np.isfinite(error)]
 
-        add([pose, 1000 + beacon], sight, np.diag(np.square(sd)))
+        kept = 1 if math.isnan(range_m) else 2
+        add([pose, 1000 + beacon], sight, np.diag(np.square(sd[:kept])))
     return graph, values
 
 

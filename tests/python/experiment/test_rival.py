@@ -72,6 +72,49 @@ def test_our_core_as_an_algorithm_is_our_core_to_the_bit(made, observation, real
     assert len(places) == 3
 
 
+def test_gyro_is_told_to_who_takes_it_before_the_wheels_of_its_step(made):
+    log = with_gyro(made.circle_log(4, seed=3), [0.3, math.nan, 0.1, -0.2])
+    listening = type("Listening", (Scribe,), {"gyro": lambda self, *told: self.calls.append(("gyro", *told))})
+    scribe, _ = told(log, RunOptions(), listening)
+    calls = [call for call in scribe.calls if call[0] in ("gyro", "odometry")]
+    assert [call[0] for call in calls] == ["gyro", "odometry", "odometry", *["gyro", "odometry"] * 2]
+    rates = [call[1:] for call in calls if call[0] == "gyro"]
+    assert rates == [(made.step_us * k, rate) for k, rate in ((1, 0.3), (3, 0.1), (4, -0.2))]
+    deaf, _ = told(log, RunOptions())
+    assert {call[0] for call in deaf.calls} == {"reset", "observe", "odometry"}
+
+
+def test_our_core_as_an_algorithm_hears_the_gyro_to_the_bit(made):
+    rates = np.random.default_rng(0).normal(0.3, 0.1, 150)
+    rates[40:60] = np.nan
+    log = with_gyro(made.circle_log(150, seed=3), rates)
+    own = run_log(log, RunOptions())
+    assert run_algorithm(log, RunOptions(), Bslam, ignore).pose.tolist() == own.pose.tolist()
+    assert own.pose.tolist() != run_log(with_gyro(log, None), RunOptions()).pose.tolist()
+
+
+@pytest.mark.parametrize("name", ["map", "isam2"])
+def test_the_bound_and_its_neighbour_hear_the_gyro(made, name):
+    """With one that is next to exact, the heading is its sum."""
+    if name == "isam2":
+        pytest.importorskip("gtsam")
+    quiet = made.circle_log(60, seed=3)
+    turn_rad = np.unwrap(quiet.truth.theta_rad)
+    rates = np.diff(turn_rad) / (made.step_us * 1e-6)
+    log = with_gyro(quiet, rates, sigma_radps=1e-5)
+    (method,) = (one for one in shipped_methods(10) if one.name == name)
+    trace = run_algorithm(log, RunOptions(), load_method(method), ignore)
+    np.testing.assert_allclose(np.unwrap(trace.pose[:, 2])[::10], turn_rad[::10], atol=1e-4)
+    deaf = run_algorithm(quiet, RunOptions(), load_method(method), ignore)
+    assert np.abs(np.unwrap(deaf.pose[:, 2])[::10] - turn_rad[::10]).max() > 1e-3
+
+
+def with_gyro(log, rates_radps, sigma_radps=0.02):
+    rates = None if rates_radps is None else np.asarray(rates_radps, dtype=np.float64)
+    robot = replace(log.robot, gyro_sigma_radps=sigma_radps)
+    return replace(log, odometry=replace(log.odometry, gyro_radps=rates), robot=robot)
+
+
 def test_our_core_as_an_algorithm_makes_the_same_mistakes():
     log = first_steps(simulate(load_scenario("pairs"), seed=2), 400)
     classes = (1 + log.sightings.beacon_id % 2).astype(np.int64)
