@@ -1,6 +1,6 @@
 /// What the parts of a step cost on this board, in ticks of port_ticks: one line each, "name size ticks", the
 /// mean of several calls. tools/costs.py runs it and knows what a tick is.
-#include "app/text.h"
+#include "app/measure.h"
 #include "bslam/bslam.h"
 #include "bslam/math/trig.h"
 #include "port/port.h"
@@ -16,45 +16,10 @@ static bslam_looks_t looks;
 static bslam_params_t params;
 static int64_t time_us;
 static float signatures[BSLAM_BEACONS_MAX][BSLAM_SAMPLE_FEATURES];
-static uint32_t random_state;
-
-// ---- the report -------------------------------------------------------------------------------------------
-
-static void report(const char *name, int size, uint32_t ticks)
-{
-    text_put(name);
-    text_put(" ");
-    text_put_number((uint32_t)size);
-    text_put(" ");
-    text_put_number(ticks);
-    text_put("\n");
-}
-
-/// What should not happen ends the program.
-static void need(bool good)
-{
-    if (!good) {
-        text_put("failed\n");
-        port_exit(1);
-    }
-}
+static uint32_t random_state = 1;
 
 // ---- the world: beacons on a grid, the robot at rest at the origin
 // ------------------------------------------
-
-static uint32_t next_random(void)
-{
-    random_state ^= random_state << 13;
-    random_state ^= random_state >> 17;
-    random_state ^= random_state << 5;
-    return random_state;
-}
-
-/// Uniform in -1 to 1.
-static float random_unit(void)
-{
-    return (float)(int32_t)next_random() * (1.0f / 2147483648.0f);
-}
 
 static bslam_sighting_t see(int beacon)
 {
@@ -71,7 +36,7 @@ static void stand_still(void)
 {
     time_us += STEP_US;
     const bslam_odometry_reading_t reading = {.time_us = time_us, .source = BSLAM_ODOMETRY_WHEELS};
-    need(bslam_slam_odometry(&slam, &reading) == BSLAM_OK);
+    measure_need(bslam_slam_odometry(&slam, &reading) == BSLAM_OK);
 }
 
 static void look_at(int first, int count)
@@ -80,7 +45,7 @@ static void look_at(int first, int count)
     for (int i = 0; i < count; i++) {
         seen[i] = see(first + i);
     }
-    need(bslam_slam_sightings(&slam, time_us, seen, count) == BSLAM_OK);
+    measure_need(bslam_slam_sightings(&slam, time_us, seen, count) == BSLAM_OK);
 }
 
 /// A map of so many beacons, each seen once.
@@ -88,17 +53,17 @@ static void start(int beacons, int association)
 {
     int bad_id = 0;
     params.association = association;
-    need(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK);
+    measure_need(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK);
     time_us = 0;
     params.association = 0;
     for (int b = 0; b < beacons; b++) {
         const bslam_sighting_t sighting = see(b);
         slam.params.association = 0;
-        need(bslam_slam_sightings(&slam, time_us, &sighting, 1) == BSLAM_OK);
+        measure_need(bslam_slam_sightings(&slam, time_us, &sighting, 1) == BSLAM_OK);
         time_us++;
     }
     slam.params.association = association;
-    need(bslam_slam_beacon_count(&slam) == beacons);
+    measure_need(bslam_slam_beacon_count(&slam) == beacons);
 }
 
 // ---- what is measured -------------------------------------------------------------------------------------
@@ -128,8 +93,8 @@ static uint32_t augment_ticks(int beacons)
         look_at(beacons, 1);
         ticks += port_ticks() - began;
         bslam_beacon_view_t view;
-        need(bslam_slam_beacon(&slam, beacons, &view) == BSLAM_OK);
-        need(bslam_slam_remove_beacon(&slam, view.uid) == BSLAM_OK);
+        measure_need(bslam_slam_beacon(&slam, beacons, &view) == BSLAM_OK);
+        measure_need(bslam_slam_remove_beacon(&slam, view.uid) == BSLAM_OK);
     }
     return ticks / STEPS;
 }
@@ -160,15 +125,15 @@ static uint32_t train_ticks(int machines)
     uint64_t ticks = 0;
     for (int b = 0; b < machines; b++) {
         int32_t machine;
-        need(bslam_learner_add(learner, &machine) == BSLAM_OK);
+        measure_need(bslam_learner_add(learner, &machine) == BSLAM_OK);
     }
     for (int view = 0; view < VIEWS * machines; view++) {
         float signature[BSLAM_SAMPLE_FEATURES];
         const int machine = view % machines;
         for (int i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
-            signature[i] = 0.5f * signatures[machine][i] + 0.5f * random_unit();
+            signature[i] = 0.5f * signatures[machine][i] + 0.5f * measure_random(&random_state);
         }
-        need(bslam_learner_show(learner, machine, signature) == BSLAM_OK);
+        measure_need(bslam_learner_show(learner, machine, signature) == BSLAM_OK);
         bool left = true;
         while (left) {
             const uint32_t began = port_ticks();
@@ -176,7 +141,7 @@ static uint32_t train_ticks(int machines)
             ticks += port_ticks() - began;
         }
     }
-    need(learner->counters.updates > 0);
+    measure_need(learner->counters.updates > 0);
     return (uint32_t)(ticks / learner->counters.updates);
 }
 
@@ -187,28 +152,28 @@ static void measure_filter(int beacons, int velocity_states)
     params.confirm_window_us = 0;
     start(beacons, 0);
     (void)step_ticks(beacons, SEEN);  // until the covariance has no zeros left
-    report(velocity_states != 0 ? "predict_velocity" : "predict", beacons, step_ticks(beacons, 0));
-    report(velocity_states != 0 ? "step_velocity" : "step", beacons, step_ticks(beacons, SEEN));
+    measure_report(velocity_states != 0 ? "predict_velocity" : "predict", beacons, step_ticks(beacons, 0));
+    measure_report(velocity_states != 0 ? "step_velocity" : "step", beacons, step_ticks(beacons, SEEN));
     if (velocity_states == 0) {
-        report("augment", beacons, augment_ticks(beacons));
-        report("associate_mahalanobis", beacons, associate_ticks(beacons, bslam_associate_mahalanobis));
+        measure_report("augment", beacons, augment_ticks(beacons));
+        measure_report("associate_mahalanobis", beacons,
+                       associate_ticks(beacons, bslam_associate_mahalanobis));
     }
 }
 
 static void measure_learning(int beacons)
 {
-    need(bslam_looks_init(&looks, NULL, 0) == BSLAM_OK);
-    report("train", beacons, train_ticks(beacons));
+    measure_need(bslam_looks_init(&looks, NULL, 0) == BSLAM_OK);
+    measure_report("train", beacons, train_ticks(beacons));
 }
 
 int main(void)
 {
     static const int sizes[] = {6, 20, 50};
     port_init();
-    random_state = 1;
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
         for (int i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
-            signatures[b][i] = random_unit();
+            signatures[b][i] = measure_random(&random_state);
         }
     }
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
