@@ -7,6 +7,10 @@
 
 #define ROBOT BSLAM_ROBOT_DIM_MAX
 
+/// What a node costs on the ways up and back, where it costs the state's dimension on the way forth: about
+/// in proportion to a Cortex-M4F's instructions, so that all frames cost alike.
+enum { UP_COST = 8, BACK_COST = 12 };
+
 /// What may come in while a cycle lasts.
 #define SLACK_NODES (BSLAM_SMOOTHER_NODES_MAX / 16 + 2)
 #define SLACK_SEEN (BSLAM_SMOOTHER_SEEN_MAX / 12)
@@ -93,6 +97,7 @@ void bslam_smoother_begin(bslam_smoother_t *smoother)
     smoother->phase = BSLAM_SMOOTHER_FORTH;
     smoother->at = 0;
     smoother->at_seen = 0;
+    smoother->work = 0;
 }
 
 /// How much of its correction a beacon may take.
@@ -328,22 +333,23 @@ static void retreat(bslam_smoother_t *smoother)
 
 bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole)
 {
-    bool ended = false;
-    while (units > 0 && !ended) {
+    smoother->work += units * (smoother->base.dim + UP_COST + BACK_COST) / 3;
+    while (smoother->work > 0) {
         switch (smoother->phase) {
         case BSLAM_SMOOTHER_FORTH:
             if (smoother->at < smoother->node_count) {
+                smoother->work -= smoother->base.dim;
                 advance(smoother);
                 break;
             }
-            if (!is_whole) {
-                return false;
+            smoother->work = 0;
+            if (is_whole) {
+                end_forth(smoother);
             }
-            end_forth(smoother);
-            ended = true;
-            break;
+            return is_whole;
         case BSLAM_SMOOTHER_UP:
             if (smoother->at < smoother->top) {
+                smoother->work -= UP_COST;
                 advance(smoother);
                 break;
             }
@@ -352,16 +358,15 @@ bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole)
         case BSLAM_SMOOTHER_BACK:
         default:
             if (smoother->at > 0) {
+                smoother->work -= BACK_COST * BSLAM_SMOOTHER_PART;
                 retreat(smoother);
-                units -= BSLAM_SMOOTHER_PART;
                 break;
             }
             bslam_smoother_begin(smoother);
             break;
         }
-        units--;
     }
-    return ended;
+    return false;
 }
 
 void bslam_smoother_turn(bslam_smoother_t *smoother)

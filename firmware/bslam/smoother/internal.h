@@ -26,8 +26,8 @@ void bslam_smoother_begin(bslam_smoother_t *smoother);
 /// The oldest node leaves, into the base. The cycle must be begun anew.
 void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
 
-/// Does so much work; a node of one phase is a unit. `is_whole`: the newest node is as new as it can be, so
-/// that a cycle may end. True if it did: then smoother->run is the filter at the newest node.
+/// Does so much work; a node of one phase, in the mean, is a unit. `is_whole`: the newest node is as new as
+/// it can be, so that a cycle may end. True if it did: then smoother->run is the filter at the newest node.
 bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole);
 
 /// After that: the map that came of it is what the models are linearised about, and the robot goes up.

@@ -93,6 +93,7 @@ typedef struct bslam_smoother {
     int32_t at;       ///< the next node of the phase
     int32_t at_seen;  ///< its first beacon, counted from the oldest
     int32_t top;      ///< nodes that go up and back
+    int32_t work;     ///< what the frame may still do; below 0: what the next ones do less
     bslam_smoother_mark_t marks[BSLAM_SMOOTHER_PARTS];
     bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
     // The open block.
