@@ -268,7 +268,7 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
     if (is_whole) {
         close_block(smoother);
     }
-    if (bslam_smoother_work(smoother, 2 + smoother->node_count / 8, is_whole)) {
+    if (bslam_smoother_work(smoother, 2 + smoother->node_count / 6, is_whole)) {
         if (bslam_ekf_is_sane(&smoother->run)) {
             take_over(smoother, params, ekf);
             bslam_smoother_turn(smoother);
