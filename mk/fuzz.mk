@@ -2,8 +2,8 @@
 # (tests/fuzz/config.h). clang's libFuzzer makes inputs up (`make fuzz`); `make test` replays those that are
 # kept in tests/fuzz/corpus/<target>.bin, compiled with the compiler of the other tests.
 
-FUZZ_TARGETS := link map model image api session
-FUZZ_HELPERS := tests/fuzz/fuzz.c tests/fuzz/picture.c
+FUZZ_TARGETS := link map model image api drive session
+FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c
 FUZZ_APP := $(APP_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_APP) $(FUZZ_HELPERS)
 FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"config.h"' -DSESSION_VISION=1
