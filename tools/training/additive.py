@@ -16,6 +16,7 @@ from training.together import minimise
 
 KNOTS = 9  # as BSLAM_KNOTS
 GRID_KNOTS = (0, 3, 5, 8)
+SHARE_ONE = 1 << 15  # as BSLAM_SHARE_ONE
 KNOT_SHARES = np.linspace(0.01, 0.99, KNOTS)
 KNOT_GAP = 1e-3
 DEVIATION_MIN = 0.1
@@ -34,10 +35,11 @@ def place_knots(x: Features) -> NDArray[np.float32]:
 
 
 def locate(x: NDArray[np.floating], knots: NDArray[np.float32]) -> Places:
-    """The lower knot of values (n,) and the share of the way to the next."""
+    """The lower knot of values (n,) and the share of the way to the next, in whole steps as in C."""
     knot = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(knots) - 2)
     share = (x - knots[knot]) / (knots[knot + 1] - knots[knot])
-    return knot, np.clip(share, 0.0, 1.0).astype(np.float32)
+    steps = np.floor(np.clip(share, 0.0, 1.0).astype(np.float32) * SHARE_ONE + 0.5)
+    return knot, (steps / SHARE_ONE).astype(np.float32)
 
 
 def tents(places: Places, count: int) -> NDArray[np.float32]:

@@ -62,7 +62,9 @@ void bslam_looks_clear(bslam_looks_t *looks)
 void bslam_looks_forget(bslam_looks_t *looks, int index, int count)
 {
     release(looks, index, count);
-    memmove(&looks->of[index], &looks->of[index + 1], (size_t)(count - 1 - index) * sizeof looks->of[0]);
+    for (int b = index; b < count - 1; b++) {
+        looks->of[b] = looks->of[b + 1];
+    }
     looks->of[count - 1] = BLANK;
 }
 

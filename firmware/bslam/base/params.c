@@ -49,9 +49,10 @@ const bslam_param_info_t *bslam_params_info(int id)
 
 void bslam_params_default(bslam_params_t *params)
 {
-#define DEFAULT_REAL(name, value, low, high, meaning) params->name = BSLAM_R(value);
-#define DEFAULT_INTEGER(name, value, low, high, meaning) params->name = (value);
-    BSLAM_PARAMS(DEFAULT_REAL, DEFAULT_INTEGER)
+#define DEFAULT_INTEGER(name, value, low, high, meaning) .name = (value),
+#define DEFAULT_REAL(name, value, low, high, meaning) .name = BSLAM_R(value),
+    static const bslam_params_t defaults = {BSLAM_PARAMS(DEFAULT_REAL, DEFAULT_INTEGER)};
+    *params = defaults;
 }
 
 /// The field at a table line, as bytes of the struct.

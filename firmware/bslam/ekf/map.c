@@ -189,9 +189,10 @@ bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_rea
 static void remove_values(bslam_ekf_t *ekf, int first, int count)
 {
     bslam_symmat_remove(ekf->covariance, ekf->dim, first, count);
-    memmove(&ekf->mean[first], &ekf->mean[first + count],
-            (size_t)(ekf->dim - first - count) * sizeof ekf->mean[0]);
     ekf->dim -= count;
+    for (int i = first; i < ekf->dim; i++) {
+        ekf->mean[i] = ekf->mean[i + count];
+    }
     memset(&ekf->mean[ekf->dim], 0, (size_t)count * sizeof ekf->mean[0]);
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (ekf->beacons[b].at > first) {
@@ -209,8 +210,9 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index)
         remove_values(ekf, beacon->at, bslam_beacon_dim(beacon->kind));
     }
     ekf->beacon_count--;
-    memmove(&ekf->beacons[index], &ekf->beacons[index + 1],
-            (size_t)(ekf->beacon_count - index) * sizeof ekf->beacons[0]);
+    for (int b = index; b < ekf->beacon_count; b++) {
+        ekf->beacons[b] = ekf->beacons[b + 1];
+    }
 }
 
 void bslam_ekf_forget_map(bslam_ekf_t *ekf)

@@ -50,29 +50,55 @@ static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3]
     memcpy(row->other, by_beacon, sizeof row->other);
 }
 
-/// The state index of the k-th value of a sighting's row, the robot's pose first.
-static int row_index(const bslam_row_t *row, int k)
+enum { SEEN_DIM_MAX = POSE_DIM + BSLAM_RAY_DIM };
+
+/// Covariance of the i-th value that row a looks at with all that row b does: the robot's pose and a beacon
+/// each.
+static void fill_line(const bslam_ekf_t *ekf, const bslam_row_t *a, int i, const bslam_row_t *b,
+                      bslam_real_t line[SEEN_DIM_MAX])
 {
-    return k < POSE_DIM ? k : row->at + k - POSE_DIM;
+    const int at = i < POSE_DIM ? i : a->at + i - POSE_DIM;
+    for (int j = 0; j < POSE_DIM; j++) {
+        line[j] = bslam_symmat_get(ekf->covariance, at, j);
+    }
+    for (int j = 0; j < b->dim; j++) {
+        line[POSE_DIM + j] = bslam_symmat_get(ekf->covariance, b->at + j, at);
+    }
 }
 
-static bslam_real_t row_value(const bslam_row_t *row, int k)
-{
-    return k < POSE_DIM ? row->base[k] : row->other[k - POSE_DIM];
-}
-
-/// a P bᵀ for two rows of one sighting, from the covariance as it is stored.
-static bslam_real_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
+/// row · line.
+static bslam_real_t weigh(const bslam_row_t *row, const bslam_real_t *line)
 {
     bslam_real_t sum = 0;
-    for (int i = 0; i < POSE_DIM + a->dim; i++) {
-        bslam_real_t inner = 0;
-        for (int j = 0; j < POSE_DIM + b->dim; j++) {
-            inner += bslam_symmat_get(ekf->covariance, row_index(a, i), row_index(b, j)) * row_value(b, j);
-        }
-        sum += row_value(a, i) * inner;
+    for (int k = 0; k < POSE_DIM; k++) {
+        sum += line[k] * row->base[k];
+    }
+    for (int k = 0; k < row->dim; k++) {
+        sum += line[POSE_DIM + k] * row->other[k];
     }
     return sum;
+}
+
+/// Of two rows a P bᵀ; and a P aᵀ and b P bᵀ, if they look at the same beacon. From the covariance as it is
+/// stored.
+typedef struct forms {
+    bslam_real_t ab, aa, bb;
+} forms_t;
+
+static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
+{
+    forms_t sums = {0, 0, 0};
+    bslam_real_t line[SEEN_DIM_MAX] = {0};
+    for (int i = 0; i < POSE_DIM + a->dim; i++) {
+        fill_line(ekf, a, i, b, line);
+        const bslam_real_t of_a = i < POSE_DIM ? a->base[i] : a->other[i - POSE_DIM];
+        const bslam_real_t of_b = i < POSE_DIM ? b->base[i] : b->other[i - POSE_DIM];
+        const bslam_real_t by_b = weigh(b, line);
+        sums.ab += of_a * by_b;
+        sums.aa += of_a * weigh(a, line);
+        sums.bb += of_b * by_b;
+    }
+    return sums;
 }
 
 // ---- innovation -------------------------------------------------------------------------------------------
@@ -84,8 +110,8 @@ static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beaco
 {
     bslam_row_t stretch;
     fill_row(beacon, seen->stretch_by_pose, seen->stretch_by_beacon, &stretch);
-    const bslam_real_t cross = quadratic(ekf, &stretch, bearing);
-    return quadratic(ekf, &stretch, &stretch) * quadratic(ekf, bearing, bearing) + cross * cross;
+    const forms_t p = quadratic(ekf, &stretch, bearing);
+    return p.aa * p.bb + p.ab * p.ab;
 }
 
 static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
@@ -156,19 +182,22 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
 bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
                                    bslam_real_t *distance2)
 {
-    bslam_sym2_t s = {.xx = 1, .xy = 0, .yy = 0};
-    s.yy = quadratic(ekf, &innovation->bearing_row, &innovation->bearing_row) + innovation->bearing_var_rad2;
+    const bslam_row_t *bearing = &innovation->bearing_row;
+    bslam_sym2_t s = {.xx = 1, .xy = 0};
     if (!innovation->has_range) {
+        s.yy = quadratic(ekf, bearing, bearing).bb + innovation->bearing_var_rad2;
         return bslam_sym2_mahalanobis(&s, 0, innovation->bearing_rad, distance2);
     }
-    s.xx = quadratic(ekf, &innovation->range_row, &innovation->range_row) + innovation->range_var_m2;
-    s.xy = quadratic(ekf, &innovation->range_row, &innovation->bearing_row);
+    const forms_t p = quadratic(ekf, &innovation->range_row, bearing);
+    s.xx = p.aa + innovation->range_var_m2;
+    s.xy = p.ab;
+    s.yy = p.bb + innovation->bearing_var_rad2;
     return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
 }
 
 bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
-    return quadratic(ekf, a, b);
+    return quadratic(ekf, a, b).ab;
 }
 
 // ---- gain and down-date -----------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 #include "bslam/math/symmat.h"
 
-#include <string.h>
-
 /// factors · (a, b, c, d), of which the first `count` exist. The compiler knows the count: no test is left.
 static inline bslam_real_t weigh(const bslam_real_t *factors, const int count, const bslam_real_t *a,
                                  const bslam_real_t *b, const bslam_real_t *c, const bslam_real_t *d)
@@ -192,8 +190,9 @@ void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count)
     for (int i = first + count; i < n; i++) {
         const bslam_real_t *from = m + bslam_symmat_row(i);
         bslam_real_t *to = m + bslam_symmat_row(i - count);
-        memmove(to, from, (size_t)first * sizeof *m);
-        memmove(to + first, from + first + count, (size_t)(i - first - count + 1) * sizeof *m);
+        for (int j = 0; j <= i - count; j++) {
+            to[j] = from[j < first ? j : j + count];
+        }
     }
 }
 

@@ -33,47 +33,47 @@ static void move_sample(bslam_passage_t *passage, bslam_sample_t *sample)
 
 #if BSLAM_SAMPLE_FLOAT
 /// The unit and the 16-bit weights that come nearest, for samples in units of 1/127.
-static float weights_to_words(const bslam_weights_t *weights, int16_t words[BSLAM_SAMPLE_USED])
+static float weights_to_words(const bslam_weights_t *weights, int16_t words[BSLAM_SAMPLE_SIZE])
 {
     float largest = 0.0f;
-    for (int k = 0; k < BSLAM_SAMPLE_USED; k++) {
+    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         const float size = weights->w[k] < 0.0f ? -weights->w[k] : weights->w[k];
         largest = size > largest ? size : largest;
     }
     const float per_unit = largest > 0.0f ? 32767.0f / largest : 0.0f;
-    for (int k = 0; k < BSLAM_SAMPLE_USED; k++) {
+    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         const float w = weights->w[k] * per_unit;
         words[k] = (int16_t)(w + (w < 0.0f ? -0.5f : 0.5f));
     }
     return weights->unit * largest / (32767.0f * 127.0f);
 }
 
-static void words_to_weights(float unit, const int16_t words[BSLAM_SAMPLE_USED], bslam_weights_t *weights)
+static void words_to_weights(float unit, const int16_t words[BSLAM_SAMPLE_SIZE], bslam_weights_t *weights)
 {
     *weights = (bslam_weights_t){.unit = 1.0f};
-    for (int k = 0; k < BSLAM_SAMPLE_USED; k++) {
+    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         weights->w[k] = unit * 127.0f * (float)words[k];
     }
 }
 #else
-static float weights_to_words(const bslam_weights_t *weights, int16_t words[BSLAM_SAMPLE_USED])
+static float weights_to_words(const bslam_weights_t *weights, int16_t words[BSLAM_SAMPLE_SIZE])
 {
-    memcpy(words, weights->w, BSLAM_SAMPLE_USED * sizeof words[0]);
+    memcpy(words, weights->w, BSLAM_SAMPLE_SIZE * sizeof words[0]);
     return weights->unit;
 }
 
-static void words_to_weights(float unit, const int16_t words[BSLAM_SAMPLE_USED], bslam_weights_t *weights)
+static void words_to_weights(float unit, const int16_t words[BSLAM_SAMPLE_SIZE], bslam_weights_t *weights)
 {
     *weights = (bslam_weights_t){.unit = unit};
-    memcpy(weights->w, words, BSLAM_SAMPLE_USED * sizeof words[0]);
+    memcpy(weights->w, words, BSLAM_SAMPLE_SIZE * sizeof words[0]);
 }
 #endif
 
 static void move_weights(bslam_passage_t *passage, bslam_weights_t *weights)
 {
-    int16_t words[BSLAM_SAMPLE_USED];
+    int16_t words[BSLAM_SAMPLE_SIZE];
     const float unit = bslam_passage_float(passage, weights_to_words(weights, words));
-    for (int k = 0; k < BSLAM_SAMPLE_USED; k++) {
+    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         words[k] = (int16_t)(uint16_t)bslam_passage_whole(passage, (uint16_t)words[k], 2);
     }
     bslam_passage_require(passage, unit >= 0.0f, BSLAM_MAP_CONTENT);

@@ -76,57 +76,68 @@ bslam_status_t bslam_additive_check(const bslam_additive_t *machine, int32_t fea
     return BSLAM_OK;
 }
 
-static float share_between(float x, float low, float high)
+static uint16_t share_between(float x, float low, float high)
 {
     const float share = (x - low) / (high - low);
-    return share < 0.0f ? 0.0f : share > 1.0f ? 1.0f : share;
+    const float within = share < 0.0f ? 0.0f : share > 1.0f ? 1.0f : share;
+    return (uint16_t)(within * (float)BSLAM_SHARE_ONE + 0.5f);
 }
 
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place)
 {
-    for (int32_t i = 0; i < machine->features; i++) {
-        const float *knots = machine->knots + i * BSLAM_KNOTS;
+    const float *knots = machine->knots;
+    for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
         int32_t k = 0;
         while (k < BSLAM_KNOTS - 2 && x[i] >= knots[k + 1]) {
             k++;
         }
-        place->knot[i] = (uint8_t)k;
-        place->share[i] = share_between(x[i], knots[k], knots[k + 1]);
+        place->curves[i].at = (uint16_t)(i * BSLAM_KNOTS + k);
+        place->curves[i].share = share_between(x[i], knots[k], knots[k + 1]);
     }
     for (int32_t c = 0; c < machine->crossed_count; c++) {
         const int32_t i = machine->crossed[c];
-        const float *knots = machine->knots + i * BSLAM_KNOTS;
+        const float *of_feature = machine->knots + i * BSLAM_KNOTS;
         int32_t k = 0;
-        while (k < BSLAM_GRID_KNOTS - 2 && x[i] >= knots[grid_knots[k + 1]]) {
+        while (k < BSLAM_GRID_KNOTS - 2 && x[i] >= of_feature[grid_knots[k + 1]]) {
             k++;
         }
-        place->grid_knot[c] = (uint8_t)k;
-        place->grid_share[c] = share_between(x[i], knots[grid_knots[k]], knots[grid_knots[k + 1]]);
+        place->grids[c].at = (uint16_t)k;
+        place->grids[c].share = share_between(x[i], of_feature[grid_knots[k]], of_feature[grid_knots[k + 1]]);
     }
 }
 
-/// Between two values, in steps of a byte.
-static float between(const int8_t *bytes, float share)
+/// Of a row's curves, in steps of a byte, times BSLAM_SHARE_ONE: three times 96 * 127 * 32768 fits.
+static int32_t sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes)
 {
-    return (float)bytes[0] + share * (float)(bytes[1] - bytes[0]);
+    int32_t lower = 0, more = 0;
+    for (const bslam_between_knots_t *end = place + features; place != end; place++) {
+        const int8_t *weights = bytes + place->at;
+        lower += weights[0];
+        more += place->share * (weights[1] - weights[0]);
+    }
+    return lower * BSLAM_SHARE_ONE + more;
 }
 
-/// The sum of the grids of all pairs, in steps of a byte.
-static float sum_grids(const bslam_additive_t *machine, const bslam_additive_place_t *place,
-                       const int8_t *bytes)
+/// Of a row's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
+static int64_t sum_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes)
 {
-    float sum = 0;
-    for (int32_t a = 0; a < machine->crossed_count; a++) {
-        const int8_t *row = bytes + place->grid_knot[a] * BSLAM_GRID_KNOTS;
-        const float share = place->grid_share[a];
-        for (int32_t b = a + 1; b < machine->crossed_count; b++) {
-            const int8_t *corner = row + place->grid_knot[b];
-            const float low = between(corner, place->grid_share[b]);
-            const float high = between(corner + BSLAM_GRID_KNOTS, place->grid_share[b]);
-            sum += low + share * (high - low);
-            row += BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
+    int64_t sum = 0;
+    const bslam_between_knots_t *end = place->grids + crossed_count;
+    for (const bslam_between_knots_t *a = place->grids; a != end; a++) {
+        // Of all grids of this feature: along its lower knots and its upper ones.
+        const int8_t *grid = bytes + a->at * BSLAM_GRID_KNOTS;
+        int32_t low = 0, low_more = 0, high = 0, high_more = 0;
+        for (const bslam_between_knots_t *b = a + 1; b != end; b++) {
+            const int8_t *corner = grid + b->at;
+            low += corner[0];
+            low_more += b->share * (corner[1] - corner[0]);
+            high += corner[BSLAM_GRID_KNOTS];
+            high_more += b->share * (corner[BSLAM_GRID_KNOTS + 1] - corner[BSLAM_GRID_KNOTS]);
+            grid += BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
         }
-        bytes += (machine->crossed_count - 1 - a) * BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
+        sum += (int64_t)(low * BSLAM_SHARE_ONE + low_more) * (BSLAM_SHARE_ONE - a->share) +
+               (int64_t)(high * BSLAM_SHARE_ONE + high_more) * a->share;
+        bytes += (end - a - 1) * BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
     }
     return sum;
 }
@@ -137,11 +148,10 @@ void bslam_additive_decide(const bslam_additive_t *machine, const bslam_additive
     const int32_t weights = BSLAM_ADDITIVE_WEIGHTS(machine->features, machine->crossed_count);
     for (int32_t row = first; row < end; row++) {
         const int8_t *bytes = machine->bytes + row * weights;
-        float sum = 0;
-        for (int32_t i = 0; i < machine->features; i++) {
-            sum += between(bytes + i * BSLAM_KNOTS + place->knot[i], place->share[i]);
-        }
-        sum += sum_grids(machine, place, bytes + machine->features * BSLAM_KNOTS);
-        values[row - first] = machine->bias[row] + machine->byte_scale[row] * sum;
+        const int64_t sum = (int64_t)sum_curves(place->curves, machine->features, bytes) * BSLAM_SHARE_ONE +
+                            sum_grids(place, machine->crossed_count, bytes + machine->features * BSLAM_KNOTS);
+        values[row - first] =
+            machine->bias[row] +
+            machine->byte_scale[row] * ((float)(int32_t)(sum / BSLAM_SHARE_ONE) * (1.0f / BSLAM_SHARE_ONE));
     }
 }

@@ -36,12 +36,19 @@ typedef struct bslam_additive {
     const float *bias;        ///< rows values
 } bslam_additive_t;
 
+/// A place between two knots: where the lower one's weight stands, and the share of the way to the upper one.
+typedef struct bslam_between_knots {
+    uint16_t at;     ///< among the weights of a row; of a grid, the knot's number
+    uint16_t share;  ///< 0 to BSLAM_SHARE_ONE
+} bslam_between_knots_t;
+
+/// A whole way between knots. Shares are whole numbers, so that sums are exact and in integers.
+enum { BSLAM_SHARE_BITS = 15, BSLAM_SHARE_ONE = 1 << BSLAM_SHARE_BITS };
+
 /// Where a sample lies between knots: worked out once for all rows.
 typedef struct bslam_additive_place {
-    uint8_t knot[BSLAM_ADDITIVE_FEATURES_MAX];  ///< the lower of the two
-    float share[BSLAM_ADDITIVE_FEATURES_MAX];   ///< of the way to the upper one, 0 to 1
-    uint8_t grid_knot[BSLAM_CROSSED_MAX];
-    float grid_share[BSLAM_CROSSED_MAX];
+    bslam_between_knots_t curves[BSLAM_ADDITIVE_FEATURES_MAX];
+    bslam_between_knots_t grids[BSLAM_CROSSED_MAX];
 } bslam_additive_place_t;
 
 /// Looks a machine over, once, before its first use. BSLAM_E_COUNT: a count is out of range, there are not as

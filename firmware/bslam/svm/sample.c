@@ -8,7 +8,7 @@
 #if BSLAM_SAMPLE_FLOAT
 typedef float sum_t;
 #else
-typedef int32_t sum_t;  // 80 * 127 * 32767 fits
+typedef int32_t sum_t;  // 72 * 127 * 32767 fits
 #endif
 
 static bool is_number(float x)
@@ -37,9 +37,6 @@ bslam_status_t bslam_sample_encode(const float features[BSLAM_SAMPLE_FEATURES], 
         sample->q[i] = store(features[i]);
     }
     sample->q[BSLAM_SAMPLE_FEATURES] = store(1.0f);
-    for (int32_t i = BSLAM_SAMPLE_USED; i < BSLAM_SAMPLE_SIZE; i++) {
-        sample->q[i] = 0;
-    }
     return BSLAM_OK;
 }
 

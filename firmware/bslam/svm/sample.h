@@ -14,10 +14,8 @@
 
 /// Features of a sample: the values of a signature (vision/signature.h).
 #define BSLAM_SAMPLE_FEATURES 71
-/// Features and the constant.
-#define BSLAM_SAMPLE_USED (BSLAM_SAMPLE_FEATURES + 1)
-/// Stored values: zeros fill them up to a multiple of 16, so that a compiler's vectors leave no remainder.
-#define BSLAM_SAMPLE_SIZE 80
+/// Features and the constant: 72, a multiple of 8, as loops over a sample take it.
+#define BSLAM_SAMPLE_SIZE (BSLAM_SAMPLE_FEATURES + 1)
 
 #if BSLAM_SAMPLE_FLOAT
 typedef float bslam_stored_t;
@@ -48,8 +46,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_sample_encode(const float features[BSLAM_S
 static inline void bslam_sample_unpack(const bslam_sample_t *restrict sample,
                                        float q[restrict BSLAM_SAMPLE_SIZE])
 {
-    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i += 4) {
         q[i] = (float)sample->q[i];
+        q[i + 1] = (float)sample->q[i + 1];
+        q[i + 2] = (float)sample->q[i + 2];
+        q[i + 3] = (float)sample->q[i + 3];
     }
 }
 

@@ -7,30 +7,39 @@ static const float FIRST_SHRINK = 0.1f;
 // Of the tolerance: a smaller gradient is not worth the work of a move.
 static const float NEGLIGIBLE = 0.1f;
 
-/// In eight sums side by side: the same bits with a vector unit and without.
+/// In eight sums side by side: the same bits with a vector unit and without. Each by its name, so that a core
+/// without one keeps them in registers.
 static float dot(const float *restrict a, const float *restrict b)
 {
-    float sums[8] = {0};
-    for (int32_t i = 0; i < BSLAM_SAMPLE_USED; i += 8) {
-        for (int32_t k = 0; k < 8; k++) {
-            sums[k] += a[i + k] * b[i + k];
-        }
+    float s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0, s5 = 0, s6 = 0, s7 = 0;
+    for (const float *end = a + BSLAM_SAMPLE_SIZE; a != end; a += 8, b += 8) {
+        s0 += a[0] * b[0];
+        s1 += a[1] * b[1];
+        s2 += a[2] * b[2];
+        s3 += a[3] * b[3];
+        s4 += a[4] * b[4];
+        s5 += a[5] * b[5];
+        s6 += a[6] * b[6];
+        s7 += a[7] * b[7];
     }
-    for (int32_t k = 0; k < 4; k++) {
-        sums[k] += sums[k + 4];
-    }
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    return ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7));
 }
 
 /// w += factor x. Both are kept in terms of q, so the unit enters twice.
 static void add_scaled(float *restrict weights, float factor, const float *restrict q)
 {
     const float by = factor * (BSLAM_SAMPLE_UNIT * BSLAM_SAMPLE_UNIT);
-    for (int32_t i = 0; i < BSLAM_SAMPLE_USED; i += 8) {
-        for (int32_t k = 0; k < 8; k++) {
-            weights[i + k] += by * q[i + k];
-        }
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i += 4) {
+        weights[i] += by * q[i];
+        weights[i + 1] += by * q[i + 1];
+        weights[i + 2] += by * q[i + 2];
+        weights[i + 3] += by * q[i + 3];
     }
+}
+
+static float sign_of(const bslam_solver_row_t *row)
+{
+    return row->positive ? 1.0f : -1.0f;
 }
 
 static void begin_pass(bslam_solver_t *solver)
@@ -62,11 +71,11 @@ void bslam_solver_add(bslam_solver_t *solver, const bslam_samples_t *samples, in
     row->alpha = alpha;
     row->diagonal = 0.0f;
     row->sample = (uint16_t)sample;
-    row->sign = positive ? 1.0f : -1.0f;
+    row->positive = positive;
     if (alpha > 0.0f) {
         float q[BSLAM_SAMPLE_SIZE];
         bslam_sample_unpack(bslam_sample_at(samples, sample), q);
-        add_scaled(solver->weights, row->sign * alpha, q);
+        add_scaled(solver->weights, sign_of(row) * alpha, q);
     }
     solver->order[solver->count] = (uint16_t)solver->count;
     solver->count++;
@@ -113,7 +122,7 @@ static void move(bslam_solver_t *solver, bslam_solver_row_t *row, float gradient
     }
     const float best = row->alpha - gradient / row->diagonal;
     const float alpha = best > 0.0f ? best : 0.0f;
-    add_scaled(solver->weights, row->sign * (alpha - row->alpha), q);
+    add_scaled(solver->weights, sign_of(row) * (alpha - row->alpha), q);
     row->alpha = alpha;
 }
 
@@ -124,7 +133,7 @@ static void step(bslam_solver_t *solver, const bslam_samples_t *samples)
     float q[BSLAM_SAMPLE_SIZE];
     bslam_sample_unpack(bslam_sample_at(samples, row->sample), q);
     const float gradient =
-        row->sign * dot(solver->weights, q) - 1.0f + row->alpha * solver->half_inverse_cost;
+        sign_of(row) * dot(solver->weights, q) - 1.0f + row->alpha * solver->half_inverse_cost;
     const bool stays_at_0 = row->alpha <= 0.0f && gradient >= 0.0f;
     if (stays_at_0 && gradient > solver->shrink_above) {
         solver->active--;

@@ -32,8 +32,8 @@ static inline const bslam_sample_t *bslam_sample_at(const bslam_samples_t *sampl
 typedef struct bslam_solver_row {
     float alpha;     ///< dual variable, >= 0
     float diagonal;  ///< x . x + 1 / 2C; 0 until it is needed
-    float sign;      ///< y: 1, or -1 for a rival
     uint16_t sample;
+    bool positive;  ///< y is 1, not -1 as a rival's
 } bslam_solver_row_t;
 
 typedef struct bslam_solver {

@@ -46,7 +46,7 @@ static void keep_alphas(bslam_learner_t *learner, bool with_zeros)
     for (int32_t i = 0; i < solver->count; i++) {
         const bslam_solver_row_t *row = &solver->rows[i];
         const uint16_t alpha = pack_alpha(row->alpha);
-        if (row->sign > 0.0f) {
+        if (row->positive) {
             machine->own_alpha[row->sample - learner->training.machine * BSLAM_PER_MACHINE] = alpha;
         } else if (alpha > 0 || with_zeros) {
             machine->rival[machine->rivals] = row->sample;

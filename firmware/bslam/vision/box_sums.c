@@ -88,15 +88,6 @@ static bslam_zone_sums_t zone_of(const bslam_sums_t *sums)
     return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
 }
 
-static void merge(bslam_sums_t *into, const bslam_sums_t *from)
-{
-    int32_t *a = &into->cells;
-    const int32_t *b = &from->cells;
-    for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
-        a[i] += b[i];
-    }
-}
-
 /// The box's zones: rows and columns that they begin at, and one past the last.
 typedef struct grid {
     int32_t left[ZONES + 1], top[ZONES + 1];
@@ -115,6 +106,18 @@ static grid_t grid_of(const bslam_proposal_t *p)
         grid.top[i] = p->top + i * (p->bottom - p->top) / ZONES;
     }
     return grid;
+}
+
+/// Stride of each row of zones; 0 if it is not the same in all of them.
+static void fill_strides(const grid_t *grid, const bslam_proposal_t *p, int32_t strides[ZONES])
+{
+    // The narrowest and the widest zone of a row; where they differ it is by one column.
+    const int32_t narrow = (p->right - p->left) / ZONES, wide = (p->right - p->left + ZONES - 1) / ZONES;
+    for (int32_t row = 0; row < ZONES; row++) {
+        const int32_t height = grid->top[row + 1] - grid->top[row];
+        const int32_t stride = stride_of(narrow * height);
+        strides[row] = stride == stride_of(wide * height) ? stride : 0;
+    }
 }
 
 #if BSLAM_HAS_BYTES
@@ -182,8 +185,14 @@ static void sum_tones(const bslam_view_t *view, const rows_t *rows, bslam_sums_t
 typedef struct texture_sums {
     uint32_t spread, step_x, step_y;
     uint32_t value, likely;
-    uint32_t wall, floor;  ///< pairs of halves
+    uint32_t wall, floor;
 } texture_sums_t;
+
+/// The two halves of a word together.
+static uint32_t halves_sum(uint32_t halves)
+{
+    return (halves & 0xFFFFU) + (halves >> 16);
+}
 
 static inline void add_texture(const bslam_view_t *view, int32_t i, uint32_t mask, texture_sums_t *sums)
 {
@@ -195,17 +204,30 @@ static inline void add_texture(const bslam_view_t *view, int32_t i, uint32_t mas
     sums->likely = bslam_bytes_sum(bslam_bytes_above(value, SIGNED_ZERO), sums->likely);
 }
 
-/// Two cells.
-static inline void add_frequent(const bslam_view_t *view, int32_t i, texture_sums_t *sums)
+/// Two cells, to a half of walls and of floors each.
+static inline void add_frequent(const bslam_view_t *view, int32_t i, uint32_t *walls, uint32_t *floors)
 {
     const uint32_t both = bslam_word_at(view->frequent + i);
-    sums->wall = bslam_bytes_add_even(sums->wall, both);
-    sums->floor = bslam_bytes_add_odd(sums->floor, both);
+    *walls = bslam_bytes_add_even(*walls, both);
+    *floors = bslam_bytes_add_odd(*floors, both);
 }
 
-static void sum_texture(const bslam_view_t *view, const rows_t *rows, bslam_sums_t *sums)
+static void merge_tones(bslam_sums_t *into, const bslam_sums_t *from)
 {
-    texture_sums_t all = {0};
+    into->cells += from->cells;
+    into->light += from->light;
+    into->reddish += from->reddish;
+    into->bluish += from->bluish;
+    into->light_sq += from->light_sq;
+    into->reddish_sq += from->reddish_sq;
+    into->bluish_sq += from->bluish_sq;
+}
+
+/// Adds the texture and the values of an area's cells.
+static void add_texture_of(const bslam_view_t *view, const rows_t *rows, texture_sums_t *sums)
+{
+    texture_sums_t all = *sums;
+    uint32_t walls = 0, floors = 0;  // in halves, which a third of a frame does not fill
     const int32_t width = rows->right - rows->left, last = width & ~(BSLAM_WORD_BYTES - 1);
     const uint32_t mask = mask_of(width - last);
     for (int32_t row = rows->first; row < rows->end; row += rows->stride) {
@@ -213,8 +235,8 @@ static void sum_texture(const bslam_view_t *view, const rows_t *rows, bslam_sums
         const int32_t end = i + width;
         for (; i + BSLAM_WORD_BYTES <= end; i += BSLAM_WORD_BYTES) {
             add_texture(view, i, ALL_BYTES, &all);
-            add_frequent(view, i, &all);
-            add_frequent(view, i + 2, &all);
+            add_frequent(view, i, &walls, &floors);
+            add_frequent(view, i + 2, &walls, &floors);
         }
         if (mask != 0) {
             add_texture(view, i, mask, &all);
@@ -224,39 +246,73 @@ static void sum_texture(const bslam_view_t *view, const rows_t *rows, bslam_sums
             all.floor += view->frequent[i] >> 8;
         }
     }
-    sums->spread = (int32_t)all.spread;
-    sums->step_x = (int32_t)all.step_x;
-    sums->step_y = (int32_t)all.step_y;
-    sums->value = (int32_t)all.value - 128 * sums->cells;
-    sums->likely = (int32_t)all.likely;
-    sums->wall = (int32_t)((all.wall & 0xFFFFU) + (all.wall >> 16));
-    sums->floor = (int32_t)((all.floor & 0xFFFFU) + (all.floor >> 16));
+    all.wall += halves_sum(walls);
+    all.floor += halves_sum(floors);
+    *sums = all;
 }
 
-static bslam_sums_t sum_inside(const bslam_view_t *view, area_t area)
+static void take_texture(const texture_sums_t *all, bslam_sums_t *sums)
 {
-    bslam_sums_t sums;
-    const rows_t rows = rows_of(view, area);
-    sum_tones(view, &rows, &sums);
-    sum_texture(view, &rows, &sums);
-    return sums;
+    sums->spread = (int32_t)all->spread;
+    sums->step_x = (int32_t)all->step_x;
+    sums->step_y = (int32_t)all->step_y;
+    sums->value = (int32_t)all->value - 128 * sums->cells;
+    sums->likely = (int32_t)all->likely;
+    sums->wall = (int32_t)all->wall;
+    sums->floor = (int32_t)all->floor;
+}
+
+/// A row of zones: the texture, which nothing asks of single zones, across them where they have the same
+/// stride.
+static void sum_zones(const bslam_view_t *view, const grid_t *grid, int32_t r, int32_t stride,
+                      bslam_sums_t zones[ZONES], texture_sums_t *texture)
+{
+    rows_t rows = {0};
+    for (int32_t c = 0; c < ZONES; c++) {
+        rows = rows_of(view, zone_area(grid, r, c));
+        sum_tones(view, &rows, &zones[c]);
+        if (stride == 0) {
+            add_texture_of(view, &rows, texture);
+        }
+    }
+    if (stride != 0) {
+        rows.left = grid->left[0];
+        add_texture_of(view, &rows, texture);
+    }
 }
 
 void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
                    bslam_zone_sums_t zones[ZONES * ZONES], bslam_sums_t *inside)
 {
     const grid_t grid = grid_of(box);
-    memset(inside, 0, sizeof *inside);
-    for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const bslam_sums_t sums = sum_inside(view, zone_area(&grid, z / ZONES, z % ZONES));
-        zones[z] = zone_of(&sums);
-        merge(inside, &sums);
+    int32_t strides[ZONES];
+    fill_strides(&grid, box, strides);
+    bslam_sums_t sums = {0};
+    texture_sums_t texture = {0};
+    for (int32_t r = 0; r < ZONES; r++) {
+        bslam_sums_t row[ZONES];
+        sum_zones(view, &grid, r, strides[r], row, &texture);
+        for (int32_t c = 0; c < ZONES; c++) {
+            zones[ZONES * r + c] = zone_of(&row[c]);
+            merge_tones(&sums, &row[c]);
+        }
     }
+    take_texture(&texture, &sums);
+    *inside = sums;
 }
 
 #else
 
 // --- By columns
+
+static void merge(bslam_sums_t *into, const bslam_sums_t *from)
+{
+    int32_t *a = &into->cells;
+    const int32_t *b = &from->cells;
+    for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
+        a[i] += b[i];
+    }
+}
 
 static bslam_sums_t sum_inside(const bslam_view_t *view, area_t area)
 {
@@ -346,18 +402,6 @@ static void add_row(lanes_t *restrict lanes, const bslam_view_t *view, int32_t i
     add_bytes(lanes->spread, view->tones->spread + i);
     add_bytes(lanes->step_x, view->step_x + i);
     add_bytes(lanes->step_y, view->step_y + i);
-}
-
-/// Stride of each row of zones; 0 if it is not the same in all of them.
-static void fill_strides(const grid_t *grid, const bslam_proposal_t *p, int32_t strides[ZONES])
-{
-    // The narrowest and the widest zone of a row; where they differ it is by one column.
-    const int32_t narrow = (p->right - p->left) / ZONES, wide = (p->right - p->left + ZONES - 1) / ZONES;
-    for (int32_t row = 0; row < ZONES; row++) {
-        const int32_t height = grid->top[row + 1] - grid->top[row];
-        const int32_t stride = stride_of(narrow * height);
-        strides[row] = stride == stride_of(wide * height) ? stride : 0;
-    }
 }
 
 /// Adds what was summed of a row of zones down the columns from `first` on, and forgets it.
