@@ -40,7 +40,7 @@ EXAMPLES = """examples:
 
 SCENARIO is a name, the path of a TOML file, or a log folder. --with names a class by module (found from
 the working directory, or installed) or by file; docs/PLUGIN.md says what it must offer. Without --only all
-that are installed run: bslam, dead_reckoning, map (the exact causal MAP, the bound), isam2 (GTSAM).
+that are installed run: bslam, dead_reckoning, map (the exact causal MAP, the bound), isam2 (GTSAM), mrpt.
 The table's ratio is to the map at the steps at which that is solved. compare.json has the table, summary.json
 the runs, compare.png the errors over time."""
 
@@ -79,6 +79,8 @@ def compare(
     """The algorithms, the drives' options, what came of it, and a line for each algorithm."""
     methods = _methods(arguments)
     sources, options = _drives(arguments)
+    for method in methods:
+        method.prepare()
     for source in {source.shared: source for source in sources if source.shared is not None}.values():
         source.prepare()
     bouts = make_bouts(methods, sources, options)
@@ -89,7 +91,10 @@ def compare(
 def _methods(arguments: argparse.Namespace) -> list[Method]:
     """Those that come with bslam, all or as --only says, and then the user's. Raises BslamError."""
     shipped = shipped_methods(arguments.map_every)
-    chosen = _installed(shipped) if arguments.only is None else _named(shipped, arguments.only)
+    if arguments.only is None:
+        chosen = _possible(shipped, arguments.observation)
+    else:
+        chosen = _named(shipped, arguments.only)
     for text in arguments.own:
         own = own_method(text)
         if any(other.name == own.name for other in chosen):
@@ -98,11 +103,21 @@ def _methods(arguments: argparse.Namespace) -> list[Method]:
     return chosen
 
 
-def _installed(shipped: Sequence[Method]) -> list[Method]:
-    for one in shipped:
-        if not one.is_here:
-            print(f"left out: {one.name} ({_how_to_get(one)})", file=sys.stderr)
-    return [one for one in shipped if one.is_here]
+def _possible(shipped: Sequence[Method], observation: str) -> list[Method]:
+    """Those that are installed and can do with what is seen."""
+    reasons = {one.name: _why_not(one, observation) for one in shipped}
+    for name, reason in reasons.items():
+        if reason:
+            print(f"left out: {name} ({reason})", file=sys.stderr)
+    return [one for one in shipped if not reasons[one.name]]
+
+
+def _why_not(method: Method, observation: str) -> str:
+    if not method.is_here:
+        return f"not installed: {method.install}"
+    if method.only_with not in (None, observation):
+        return f"only with --observation {method.only_with}"
+    return ""
 
 
 def _named(shipped: Sequence[Method], only: str) -> list[Method]:
@@ -112,13 +127,9 @@ def _named(shipped: Sequence[Method], only: str) -> list[Method]:
         if name not in by_name:
             raise BslamError(f"--only {name}: there is no such algorithm; allowed: {', '.join(by_name)}")
         if not by_name[name].is_here:
-            raise BslamError(f"--only {name}: is not installed; allowed: {_how_to_get(by_name[name])}")
+            raise BslamError(f"--only {name}: is not installed; allowed: {by_name[name].install}")
         chosen.append(by_name[name])
     return chosen
-
-
-def _how_to_get(method: Method) -> str:
-    return f"needs {' and '.join(method.needs)}: pip install 'bslam[{method.name}]'"
 
 
 def _drives(arguments: argparse.Namespace) -> tuple[list[Source], list[RunOptions]]:

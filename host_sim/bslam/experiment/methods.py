@@ -29,12 +29,22 @@ class Method:
     meaning: str = "your own"
     settings: tuple[tuple[str, Any], ...] = ()  # keyword arguments of the constructor
     needs: tuple[str, ...] = ()  # packages beyond bslam's own
+    files: tuple[str, ...] = ()  # and files that other packages bring
+    install: str = ""  # the command that brings both
+    only_with: str | None = None  # the one observation that it can do with; None: any
     shipped: bool = False
 
     @property
     def is_here(self) -> bool:
         """Everything it needs is installed."""
-        return all(importlib.util.find_spec(package) is not None for package in self.needs)
+        return all(importlib.util.find_spec(package) is not None for package in self.needs) and all(
+            Path(file).is_file() for file in self.files
+        )
+
+    def prepare(self) -> None:
+        """Have made what takes longer than a call may. Raises BslamError if that cannot be."""
+        if self.files:
+            importlib.import_module(self.where.partition(":")[0]).prepare()
 
 
 def shipped_methods(map_every: int) -> list[Method]:
@@ -51,7 +61,21 @@ def shipped_methods(map_every: int) -> list[Method]:
             shipped=True,
         ),
         Method(
-            "isam2", f"{folder}.isam2:Isam2", "GTSAM's incremental smoother", needs=("gtsam",), shipped=True
+            "isam2",
+            f"{folder}.isam2:Isam2",
+            "GTSAM's incremental smoother",
+            needs=("gtsam",),
+            install="pip install 'bslam[isam2]'",
+            shipped=True,
+        ),
+        Method(
+            "mrpt",
+            f"{folder}.mrpt:MrptEkf",
+            "MRPT's EKF-SLAM",
+            files=("/usr/include/mrpt/slam/include/mrpt/slam/CRangeBearingKFSLAM2D.h",),
+            install="apt-get install libmrpt-slam-dev",
+            only_with="distance",
+            shipped=True,
         ),
     ]
 

@@ -1,10 +1,12 @@
 """`bslam compare` as a user meets it: strangers' code in processes of its own."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from bslam.cli import main
+from bslam.experiment.methods import shipped_methods
 from bslam.log import write_folder
 
 STRANGERS = """
@@ -101,3 +103,20 @@ def test_bad_words_exit_2_and_the_last_line_says_what_is_allowed(scene, capsys, 
     last = capsys.readouterr().err.strip().splitlines()[-1]
     for part in [*parts, "allowed"]:
         assert part.strip("'") in last
+
+
+def test_who_is_not_installed_or_cannot_do_it_is_left_out(scene, monkeypatch, capsys):
+    """MRPT: directions alone are not for it; where it is not installed the command that brings it is said."""
+    words = ["compare", "drive", "--association", "known", "--jobs", "1"]
+    _, ours, *_, mrpt = shipped_methods(25)
+    missing = replace(mrpt, files=("/nowhere/at/all.h",))
+    monkeypatch.setattr("bslam.commands.compare.shipped_methods", lambda _every: [ours, missing])
+    assert main([*words, "--out", "here"]) == 0
+    assert "left out: mrpt (not installed: apt-get install libmrpt-slam-dev)" in capsys.readouterr().err
+    assert main([*words, "--only", "mrpt"]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert "mrpt" in last and "allowed: apt-get install libmrpt-slam-dev" in last
+    here = replace(mrpt, files=())
+    monkeypatch.setattr("bslam.commands.compare.shipped_methods", lambda _every: [ours, here])
+    assert main([*words, "--observation", "direction", "--out", "there"]) == 0
+    assert "left out: mrpt (only with --observation distance)" in capsys.readouterr().err
