@@ -50,7 +50,7 @@ VIEW = np.dtype(
 EDGE_PX = 1.5
 VISIBLE_PX_MIN, SLANT_RAD_MAX = 150, math.radians(60.0)
 WHOLE_MIN, HIDDEN_MIN = 0.9, 0.5  # parts seen of what counts as whole, and as half hidden
-BEARING_SD_RAD, RANGE_SD = math.radians(0.2), 0.03
+BEARING_SD_RAD, RANGE_SD, SCALE_SD = math.radians(0.2), 0.03, 0.05
 SETS = {"whole": (), "and cut off": ("cut",), "and half hidden": ("cut", "hidden")}
 
 
@@ -114,7 +114,8 @@ def drawn(views: NDArray[np.void], kinds: tuple[str, ...], rough_rad: float, see
     seen["bearing_rad"] = chosen["bearing_rad"] + sd_rad * noise[0]
     seen["bearing_sd_rad"] = sd_rad
     seen["range_m"] = np.where(is_rough, np.nan, chosen["range_m"] * (1 + RANGE_SD * noise[1]))
-    seen["range_noise_sd_m"] = np.where(is_rough, 0.0, RANGE_SD * chosen["range_m"])
+    seen["range_sd_m"] = np.where(is_rough, 0.0, RANGE_SD * chosen["range_m"])
+    seen["range_scale_sd"] = SCALE_SD
     seen["signature"] = np.zeros((len(chosen), SIGNATURE_SIZE), np.float32)
     seen["score"] = 1.0
     seen["is_cut"] = chosen["is_cut"]

@@ -72,20 +72,6 @@ bslam_status_t seeing_take_row(seeing_t *seeing, const void *pixels)
     return bslam_vision_row(&seeing->vision, pixels);
 }
 
-static bslam_sighting_t as_sighting(const bslam_candidate_t *candidate)
-{
-    const bool has_range = candidate->has_range;
-    const bslam_sighting_t sighting = {.bearing_rad = candidate->bearing_rad,
-                                       .range_m = has_range ? candidate->range_m : 0,
-                                       .bearing_sd_rad = candidate->bearing_sd_rad,
-                                       .range_sd_m = has_range ? candidate->range_sd_m : 0,
-                                       .has_range = has_range,
-                                       .beacon_class = BSLAM_CLASS_NONE,
-                                       .label = BSLAM_LABEL_NONE,
-                                       .signature = candidate->signature};
-    return sighting;
-}
-
 bslam_status_t seeing_look(seeing_t *seeing, bool robot_moved)
 {
     clear(seeing);
@@ -94,7 +80,7 @@ bslam_status_t seeing_look(seeing_t *seeing, bool robot_moved)
     const bslam_candidate_t *found = bslam_vision_candidates(&seeing->vision, &count);
     for (int i = 0; status == BSLAM_OK && i < count; i++) {
         if (found[i].has_bearing) {
-            seeing->sightings[seeing->count++] = as_sighting(&found[i]);
+            seeing->sightings[seeing->count++] = bslam_sighting_of(&found[i]);
         }
     }
     return status;

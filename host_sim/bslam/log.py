@@ -36,7 +36,7 @@ ODOMETRY_COLUMNS = {
 }
 GYRO = "gyro_radps"
 """Column of odometry that a robot without a gyro leaves out."""
-SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m")
+SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m", "range_scale_sd")
 """Columns of sightings that a detector may leave out."""
 CLASS = "beacon_class"
 """Column of sightings that a detector may leave out: the kind of beacon."""
@@ -85,6 +85,9 @@ class Sightings:
         None  # (m,) noise as the detector gives it; 0, None: it does not
     )
     range_sd_m: NDArray[np.float64] | None = None  # (m,)
+    range_scale_sd: NDArray[np.float64] | None = (
+        None  # (m,) by what part all distances of the thing err alike; 0, None: as robot.toml
+    )
     signature: NDArray[np.float32] | None = None  # (m, SIGNATURE_SIZE) how each looks; None: nobody knows
     beacon_class: NDArray[np.int64] | None = (
         None  # (m,) the detector's kind of beacon, 1 to 254; 0, None: it has none
@@ -339,6 +342,7 @@ _COLUMNS = {
         "0 or radians from 1e-5 to pi", lambda v: (v == 0) | ((v >= 1e-5) & (v <= math.pi))
     ),
     "range_sd_m": Column("0 or a number from 0.001 to 1e4", lambda v: (v == 0) | ((v >= 1e-3) & (v <= 1e4))),
+    "range_scale_sd": Column("a number from 0 to 1", lambda v: (v >= 0) & (v <= 1)),
     CLASS: Column("an integer from 0 to 254", lambda values: is_count(values) & (values <= 254)),
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,

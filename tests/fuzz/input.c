@@ -76,6 +76,7 @@ bslam_sighting_t fuzz_sighting(fuzz_input_t *input, float signature[BSLAM_SAMPLE
     if ((flags & 16u) != 0) {
         sighting.bearing_sd_rad = fuzz_real(input, 0.001, 0.1);
         sighting.range_sd_m = fuzz_real(input, 0.01, 1);
+        sighting.range_scale_sd = (flags & 32u) != 0 ? sighting.range_sd_m / 8 : 0;
     }
     if ((flags & 32u) != 0) {
         sighting.beacon_class = fuzz_u8(input);

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from bslam.errors import BslamError
 from bslam.log import (
+    SIGHTING_NOISE,
     SIGNATURE_SIZE,
     Beacons,
     Log,
@@ -124,7 +125,8 @@ def test_write_then_read_without_truth_map_and_ranges_gives_the_same_log(tmp_pat
 
 def test_write_then_read_keeps_the_noise_that_the_detector_gives(tmp_path: Path) -> None:
     log = a_log()
-    noise = {"bearing_sd_rad": np.array([0.01, 0.0, 0.02]), "range_sd_m": np.array([0.1, 0.0, 1.0 / 3.0])}
+    values = ([0.01, 0.0, 0.02], [0.1, 0.0, 1.0 / 3.0], [0.07, 0.0, 1.0])
+    noise = {name: np.array(column) for name, column in zip(SIGHTING_NOISE, values, strict=True)}
     log = replace(log, sightings=replace(log.sightings, **noise))
     write_folder(log, tmp_path)
     assert_same_log(log, read_folder(tmp_path))

@@ -221,7 +221,7 @@ void bslam_ekf_settle(bslam_ekf_t *ekf);
 // ---- map --------------------------------------------------------------------------------------------------
 
 /// Adds the beacon that a sighting shows: as a ray if it has no distance, else as a point, or a sized one
-/// where params->range_scale_sd is set and there is room for its third value. *index is its place.
+/// where it or params->range_scale_sd is set and there is room for its third value. *index is its place.
 /// BSLAM_E_MAP_FULL: no room for it. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params,
                                               const bslam_pose_t *mount, const bslam_sighting_t *sighting,

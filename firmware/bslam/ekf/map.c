@@ -62,8 +62,8 @@ static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t range_var =
-        bslam_scaled_range_variance_m2(params, sighting, sighting->range_m, bslam_unknown_scale_var(params));
+    const bslam_real_t range_var = bslam_scaled_range_variance_m2(params, sighting, sighting->range_m,
+                                                                  bslam_unknown_scale_var(params, sighting));
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
@@ -88,7 +88,7 @@ static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const b
 {
     static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
     const bslam_sighted_point_t point = append_point(ekf, params, mount, sighting);
-    const bslam_real_t scale_var = bslam_unknown_scale_var(params);
+    const bslam_real_t scale_var = bslam_unknown_scale_var(params, sighting);
     const bslam_real_t by_range = -scale_var * sighting->range_m;
     const new_value_t scale = {BY_NOTHING, 1, scale_var};
     const int at = ekf->dim;
@@ -145,7 +145,7 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
         *index = append_beacon(ekf, BSLAM_BEACON_RAY);
         append_ray(ekf, params, mount, sighting);
         ekf->ray_count++;
-    } else if (params->range_scale_sd > 0 && room > 0) {
+    } else if (bslam_unknown_scale_var(params, sighting) > 0 && room > 0) {
         *index = append_beacon(ekf, BSLAM_BEACON_SIZED);
         append_sized(ekf, params, mount, sighting);
         ekf->sized_count++;

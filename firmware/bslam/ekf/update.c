@@ -147,7 +147,7 @@ static bslam_real_t range_variance_m2(const bslam_params_t *params, const bslam_
 {
     const bool has_scale = beacon->kind == BSLAM_BEACON_SIZED || beacon->known_scale > 0;
     return bslam_scaled_range_variance_m2(params, sighting, range_m,
-                                          has_scale ? 0 : bslam_unknown_scale_var(params));
+                                          has_scale ? 0 : bslam_unknown_scale_var(params, sighting));
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,

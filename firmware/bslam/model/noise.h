@@ -22,7 +22,8 @@ static inline bslam_real_t bslam_range_variance_m2(const bslam_params_t *params,
 }
 
 /// The same of a beacon whose scale, by which all of its distances are too long, is known to this variance:
-/// 0 where the scale is a state value, range_scale_sd² where nobody knows it. MATH "A beacon's own scale".
+/// 0 where the scale is a state value, bslam_unknown_scale_var where nobody knows it. MATH "A beacon's own
+/// scale".
 static inline bslam_real_t bslam_scaled_range_variance_m2(const bslam_params_t *params,
                                                           const bslam_sighting_t *sighting,
                                                           bslam_real_t range_m, bslam_real_t scale_var)
@@ -30,10 +31,12 @@ static inline bslam_real_t bslam_scaled_range_variance_m2(const bslam_params_t *
     return bslam_range_variance_m2(params, sighting, range_m) + scale_var * range_m * range_m;
 }
 
-/// Variance of the scale of a beacon of which nothing is known.
-static inline bslam_real_t bslam_unknown_scale_var(const bslam_params_t *params)
+/// Variance of the scale of a beacon of which only this sighting is known.
+static inline bslam_real_t bslam_unknown_scale_var(const bslam_params_t *params,
+                                                   const bslam_sighting_t *sighting)
 {
-    return params->range_scale_sd * params->range_scale_sd;
+    const bslam_real_t sd = sighting->range_scale_sd > 0 ? sighting->range_scale_sd : params->range_scale_sd;
+    return sd * sd;
 }
 
 /// Variance of a measured direction; larger where no distance comes with it (docs/DESIGN.md, "Direction

@@ -151,8 +151,8 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
     const int at = beacon->at + BSLAM_POINT_DIM;
     bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
-    bslam_real_t scale_var =
-        is_sized ? bslam_symmat_get(ekf->covariance, at, at) : bslam_unknown_scale_var(&slam->params);
+    bslam_real_t scale_var = is_sized ? bslam_symmat_get(ekf->covariance, at, at)
+                                      : bslam_unknown_scale_var(&slam->params, sighting);
     if (beacon->known_scale > 0) {
         scale = beacon->known_scale;
         scale_var = 0;

@@ -35,19 +35,29 @@ static bool signature_is_finite(const float *signature)
     return is_finite;
 }
 
+static bool distance_is_finite(const bslam_sighting_t *sighting)
+{
+    return bslam_is_number(sighting->range_m) && bslam_is_number(sighting->range_sd_m) &&
+           bslam_is_number(sighting->range_scale_sd);
+}
+
+static bool distance_is_possible(const bslam_sighting_t *sighting)
+{
+    return bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M) &&
+           is_noise(sighting->range_sd_m, RANGE_MIN_M, RANGE_MAX_M) &&
+           bslam_in_range(sighting->range_scale_sd, 0, 1);
+}
+
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
     if (!signature_is_finite(sighting->signature) || !bslam_is_number(sighting->bearing_rad) ||
         !bslam_is_number(sighting->bearing_sd_rad) ||
-        (sighting->has_range &&
-         (!bslam_is_number(sighting->range_m) || !bslam_is_number(sighting->range_sd_m)))) {
+        (sighting->has_range && !distance_is_finite(sighting))) {
         return BSLAM_E_NOT_FINITE;
     }
     const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI) &&
                             is_noise(sighting->bearing_sd_rad, BEARING_SD_MIN_RAD, BSLAM_PI);
-    const bool range_ok =
-        !sighting->has_range || (bslam_in_range(sighting->range_m, RANGE_MIN_M, RANGE_MAX_M) &&
-                                 is_noise(sighting->range_sd_m, RANGE_MIN_M, RANGE_MAX_M));
+    const bool range_ok = !sighting->has_range || distance_is_possible(sighting);
     return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
 }
 

@@ -14,6 +14,7 @@
 
 #include "bslam/vision/detector.h"
 #include "bslam/vision/measure.h"
+#include "bslam/vision/sighting.h"
 #include "bslam/vision/thumbnail.h"
 
 /// What came of the last frame.

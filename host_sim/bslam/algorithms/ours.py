@@ -52,9 +52,10 @@ class Bslam:
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""
+        columns, looks = _columns(sightings), _signatures(sightings)
         kinds = [one.beacon_class or 0 for one in sightings]
         try:
-            told = self._slam.sightings(time_us, *_columns(sightings), _signatures(sightings), kinds)
+            told = self._slam.sightings(time_us, *columns, signature=looks, beacon_class=kinds)
         except CoreError:
             self._accounts = None  # the core has counted it
             return
@@ -85,8 +86,8 @@ class Bslam:
         ]
 
 
-def _columns(sightings: Sequence[Sighting]) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m as the core has them: no None."""
+def _columns(sightings: Sequence[Sighting]) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+    """bearing_rad, range_m, label, mappable and the three noises as the core has them: no None."""
     rows = [
         (
             one.bearing_rad,
@@ -95,11 +96,12 @@ def _columns(sightings: Sequence[Sighting]) -> tuple[Any, Any, Any, Any, Any, An
             one.mappable,
             one.bearing_sd_rad or 0.0,
             one.range_sd_m or 0.0,
+            one.range_scale_sd or 0.0,
         )
         for one in sightings
     ]
-    bearing, range_m, label, mappable, bearing_sd, range_sd = zip(*rows, strict=True) if rows else ((),) * 6
-    return bearing, range_m, label, mappable, bearing_sd, range_sd
+    bearing, range_m, label, mappable, *noise = zip(*rows, strict=True) if rows else ((),) * 7
+    return bearing, range_m, label, mappable, noise[0], noise[1], noise[2]
 
 
 def _signatures(sightings: Sequence[Sighting]) -> NDArray[np.float32] | None:

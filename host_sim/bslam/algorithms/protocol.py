@@ -53,6 +53,8 @@ class Sighting:
     """Noise as the detector gives it; None: as `robot` has it."""
     range_sd_m: float | None = None
     """The same of the distance."""
+    range_scale_sd: float | None = None
+    """By what part all distances of this thing err alike."""
     signature: NDArray[np.float32] | None = None
     """(71,) how it looks; None: nobody knows, or identities are given."""
     beacon_class: int | None = None

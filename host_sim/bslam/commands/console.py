@@ -251,7 +251,9 @@ def _input_of(told: Told) -> Reading | Frame:
         [True] * len(seen),
         [one.bearing_sd_rad for one in seen],
         [one.range_sd_m for one in seen],
+        [one.range_scale_sd for one in seen],
         np.stack(signatures) if signatures else None,
+        [one.beacon_class for one in seen],
         accounts=told.accounts if told.refused is None else None,
         refused=told.refused,
     )

@@ -51,6 +51,15 @@ class BeaconModel:
 
 
 @dataclass(frozen=True)
+class Told:
+    """What a filter is told of a candidate beside its direction and distance (bslam_sighting_of)."""
+
+    bearing_sd_rad: float
+    range_sd_m: float  # 0: no distance
+    range_scale_sd: float
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A thing that is probably a beacon, as bslam_candidate_t describes it; None: not measured."""
 
@@ -68,6 +77,7 @@ class Candidate:
     signature: NDArray[np.float32]  # (71,)
     object: str | None  # of the recogniser's, None: none of them
     object_margin: float  # what the recogniser says for the likeliest
+    told: Told | None  # None: it has no direction
 
 
 @dataclass(frozen=True)
@@ -285,7 +295,12 @@ class FrontEnd:
             signature=self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32),
             object=self._objects[found.object].name if found.object >= 0 else None,
             object_margin=found.object_margin,
+            told=self._told(found) if found.has_bearing else None,
         )
+
+    def _told(self, found: Any) -> Told:
+        sighting = self._library.lib.bslam_sighting_of(self._library.ffi.addressof(found))
+        return Told(sighting.bearing_sd_rad, sighting.range_sd_m, sighting.range_scale_sd)
 
     def _camera(self, camera: Camera) -> Any:
         lens = camera.lens

@@ -31,15 +31,8 @@ from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
-# How far too long or too short all distances of a beacon are: it is not quite as large as its kind, or is
-# taken for another. Tried on paper_room, seeds 0:8, as are the other four.
-SCALE_SD = 0.05
-# What is left of an object's errors stays alike for so far, metres.
+# What is left of an object's errors stays alike for so far, metres. Tried on paper_room, seeds 0:8.
 CORRELATION_M = 0.1
-# What a beacon's directions have in common for a whole drive, and no front end can know. Added to its noise;
-# and the same of its distances, as a part of them.
-_BEARING_BIAS_RAD = 0.004
-_RANGE_BIAS = 0.02
 
 
 @dataclass(frozen=True)
@@ -68,9 +61,10 @@ SEEN = np.dtype(
         ("frame", np.int64),  # which is the step
         ("beacon_id", np.int64),  # the beacon that covers most of the box; -1: none does
         ("bearing_rad", np.float64),  # in the robot's frame
-        ("bearing_sd_rad", np.float64),  # what the front end says
+        ("bearing_sd_rad", np.float64),  # this and the next but one: what a filter is told
         ("range_m", np.float64),  # from the camera; NaN: not measured
-        ("range_noise_sd_m", np.float64),  # 0: no range
+        ("range_sd_m", np.float64),  # 0: no range
+        ("range_scale_sd", np.float64),  # of what is alike in all distances of the thing
         ("signature", np.float32, SIGNATURE_SIZE),
         ("beacon_class", np.int64),  # the detector's kind of beacon, from 1
         ("score", np.float64),  # the detector's: larger is surer
@@ -110,10 +104,9 @@ class CameraDrive:
             bearing_rad=self.seen["bearing_rad"].copy(),
             range_m=self.seen["range_m"].copy(),
             mappable=np.ones(len(self.seen), dtype=np.bool_),
-            bearing_sd_rad=np.hypot(self.seen["bearing_sd_rad"], _BEARING_BIAS_RAD),
-            range_sd_m=np.hypot(
-                self.seen["range_noise_sd_m"], _RANGE_BIAS * np.nan_to_num(self.seen["range_m"])
-            ),
+            bearing_sd_rad=self.seen["bearing_sd_rad"].copy(),
+            range_sd_m=self.seen["range_sd_m"].copy(),
+            range_scale_sd=self.seen["range_scale_sd"].copy(),
             signature=np.ascontiguousarray(self.seen["signature"]),
             beacon_class=self.seen["beacon_class"].copy(),
         )
@@ -202,7 +195,6 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sensor_yaw_rad=0.0,  # bearings are in the robot's frame already
         sighting_delay_us=0,
         sighting_correlation_m=CORRELATION_M,
-        sighting_scale_sd=SCALE_SD,
         gyro_sigma_radps=VisualGyro.SD_RADPS,
     )
     log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
@@ -277,13 +269,12 @@ class Aim:
 
 
 def _row(step: int, one: Candidate, identity: NDArray[np.int16]) -> tuple[Any, ...]:
-    assert one.bearing_rad is not None and one.bearing_sd_rad is not None
-    range_m, range_noise_sd_m = math.nan, 0.0
-    if one.range_m is not None and one.range_noise_sd_m is not None:
-        range_m, range_noise_sd_m = one.range_m, one.range_noise_sd_m
+    assert one.bearing_rad is not None and one.told is not None
+    told = one.told
+    range_m = math.nan if one.range_m is None else one.range_m
+    measured = (one.bearing_rad, told.bearing_sd_rad, range_m, told.range_sd_m, told.range_scale_sd)
     beacon_id = covering_beacon(one.outline, identity)
-    noise = (one.bearing_sd_rad, range_m, range_noise_sd_m)
-    return step, beacon_id, one.bearing_rad, *noise, one.signature, one.beacon_class, one.score, is_cut(one)
+    return step, beacon_id, *measured, one.signature, one.beacon_class, one.score, is_cut(one)
 
 
 def is_cut(one: Candidate) -> bool:

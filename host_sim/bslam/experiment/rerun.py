@@ -141,8 +141,10 @@ class _Rerun:
         if self.rows.seen:
             self.rows.seen[-1] = self.rows.seen[-1] or bool(frame.label)
         columns = (frame.bearing_rad, frame.range_m, frame.label, frame.mappable)
-        more = (frame.bearing_sd_rad, frame.range_sd_m, frame.signature, frame.beacon_class)
-        accounts, refused = self._try("sightings", frame.time_us, *columns, *more)
+        noise = (frame.bearing_sd_rad, frame.range_sd_m, frame.range_scale_sd)
+        accounts, refused = self._try(
+            "sightings", frame.time_us, *columns, *noise, frame.signature, frame.beacon_class
+        )
         true_id = frame.label if frame.true_id is None else frame.true_id
         if accounts is None:
             self.ledger.book_refused(true_id, frame.mappable)

@@ -197,8 +197,8 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
     """The columns of a frame (`runner.columns_for_filter`) as objects; what is not known as None."""
     bearing_rad, range_m, label, mappable = columns[:4]
     nothing = [None] * len(bearing_rad)
-    bearing_sd, range_sd, signature, kind = (
-        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in (4, 5, 6, 7)
+    bearing_sd, range_sd, scale_sd, signature, kind = (
+        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in range(4, 9)
     )
     return [
         Sighting(
@@ -208,10 +208,20 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
             mappable=use,
             bearing_sd_rad=sd_rad or None,
             range_sd_m=sd_m or None,
+            range_scale_sd=alike or None,
             signature=look,
             beacon_class=told or None,
         )
-        for bearing, distance, identity, use, sd_rad, sd_m, look, told in zip(
-            bearing_rad, range_m, label, mappable, bearing_sd, range_sd, signature, kind, strict=True
+        for bearing, distance, identity, use, sd_rad, sd_m, alike, look, told in zip(
+            bearing_rad,
+            range_m,
+            label,
+            mappable,
+            bearing_sd,
+            range_sd,
+            scale_sd,
+            signature,
+            kind,
+            strict=True,
         )
     ]

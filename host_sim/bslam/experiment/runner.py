@@ -32,7 +32,7 @@ from bslam.target.remote import connect
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]
 _FROM_LOWER = [[0, 1, 3], [1, 2, 4], [3, 4, 5]]  # where entry (i, j) stands in xx, yx, yy, tx, ty, tt
-MAPPABLE, SIGNATURE = 3, 6  # their places among the columns of a frame
+MAPPABLE, SIGNATURE = 3, 7  # their places among the columns of a frame
 START_POSE = (0.0, 0.0, 0.0)  # the map's origin is where the robot starts
 FALSE_BEACONS_ROOM = 80
 # After an interruption of odometry (the core takes intervals up to 4 s): the robot may have gone this fast.
@@ -408,7 +408,7 @@ class Frames:
 def columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[Any]]:
     """bearing_rad, range_m, label, mappable of all sightings, with what the options hide hidden.
 
-    And the noise, bearing_sd_rad, range_sd_m, of a detector that gives it.
+    And the noise, bearing_sd_rad, range_sd_m, range_scale_sd, of a detector that gives it.
     """
     nothing: NDArray[np.float64] = np.full(len(sightings.time_us), np.nan)
     range_m = sightings.range_m if options.observation == "distance" else nothing
@@ -418,5 +418,7 @@ def columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[A
         label = corrupt_identities(mappable_id, options.wrong_identity_rate, options.seed)
     columns = [sightings.bearing_rad, range_m, label, sightings.mappable]
     if sightings.bearing_sd_rad is not None and sightings.range_sd_m is not None:
+        alike = sightings.range_scale_sd
         columns += [sightings.bearing_sd_rad, sightings.range_sd_m]
+        columns += [np.zeros(len(label)) if alike is None else alike]
     return [column.tolist() for column in columns]

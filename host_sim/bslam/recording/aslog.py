@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.log import TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
+from bslam.log import SIGHTING_NOISE, TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
 from bslam.parsing.settings import parse_table
 from bslam.recording.entries import Frame, Reading, Start, TruePose
 from bslam.recording.reader import Recording
@@ -88,7 +88,7 @@ def _sightings(frames: list[Frame]) -> Sightings:
     def told(name: str) -> bool:
         return bool(frames) and all(getattr(frame, name) is not None for frame in frames)
 
-    noisy = told("bearing_sd_rad")
+    noise = {name: column(name, np.float64) for name in SIGHTING_NOISE if told(name)}
     return Sightings(
         time_us=np.repeat(
             np.array([frame.time_us for frame in frames], dtype=np.int64),
@@ -98,10 +98,9 @@ def _sightings(frames: list[Frame]) -> Sightings:
         bearing_rad=column("bearing_rad", np.float64),
         range_m=column("range_m", np.float64),
         mappable=column("mappable", np.bool_),
-        bearing_sd_rad=column("bearing_sd_rad", np.float64) if noisy else None,
-        range_sd_m=column("range_sd_m", np.float64) if noisy else None,
         signature=np.concatenate([frame.signature for frame in frames]) if told("signature") else None,
         beacon_class=column("beacon_class", np.int64) if told("beacon_class") else None,
+        **noise,
     )
 
 

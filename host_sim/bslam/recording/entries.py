@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bslam.core.learner import SIGNATURE_SIZE
 from bslam.core.slam import Account, Beacon
-from bslam.log import ODOMETRY_COLUMNS
+from bslam.log import ODOMETRY_COLUMNS, SIGHTING_NOISE
 
 Json = dict[str, Any]
 Pose = tuple[float, float, float]
@@ -67,6 +67,7 @@ class Frame:
     mappable: list[bool]
     bearing_sd_rad: list[float] | None = None
     range_sd_m: list[float] | None = None
+    range_scale_sd: list[float] | None = None
     signature: NDArray[np.float32] | None = None  # (m, 71)
     beacon_class: list[int] | None = None
     true_id: list[int] | None = None  # beacon_id of each, -1: of none; None: nobody knows
@@ -153,8 +154,9 @@ def _frame_to(one: Frame) -> Json:
     for i, bearing_rad in enumerate(one.bearing_rad):
         row: Json = {"bearing_rad": bearing_rad, "range_m": _number_or_none(one.range_m[i])}
         row |= {"label": one.label[i], "mappable": bool(one.mappable[i])}
-        if one.bearing_sd_rad is not None and one.range_sd_m is not None:
-            row |= {"bearing_sd_rad": one.bearing_sd_rad[i], "range_sd_m": one.range_sd_m[i]}
+        for name in SIGHTING_NOISE:
+            told = getattr(one, name)
+            row |= {} if told is None else {name: told[i]}
         if one.true_id is not None:
             row["true_id"] = one.true_id[i]
         if one.signature is not None:
@@ -164,7 +166,8 @@ def _frame_to(one: Frame) -> Json:
         if one.accounts is not None:
             row["account"] = asdict(one.accounts[i])
         rows.append(row)
-    words = {"signed": one.signature is not None, "noisy": one.bearing_sd_rad is not None}
+    noise = [name for name in SIGHTING_NOISE if getattr(one, name) is not None]
+    words = {"signed": one.signature is not None, "noise": noise}
     return {"time_us": one.time_us, "refused": one.refused, **words, "sightings": rows}
 
 
@@ -178,13 +181,12 @@ def _frame_from(content: Json) -> Frame:
         range_m,
         _column(rows, "label"),
         _column(rows, "mappable"),
-        _column(rows, "bearing_sd_rad") if content["noisy"] else None,
-        _column(rows, "range_sd_m") if content["noisy"] else None,
-        _stacked(_column(rows, "signature")) if content["signed"] else None,
-        _column(rows, "beacon_class") if classed else None,
-        _column(rows, "true_id") if identified else None,
-        None if content["refused"] else [Account(**one) for one in _column(rows, "account")],
-        content["refused"],
+        signature=_stacked(_column(rows, "signature")) if content["signed"] else None,
+        beacon_class=_column(rows, "beacon_class") if classed else None,
+        true_id=_column(rows, "true_id") if identified else None,
+        accounts=None if content["refused"] else [Account(**one) for one in _column(rows, "account")],
+        refused=content["refused"],
+        **{name: _column(rows, name) for name in content["noise"]},
     )
 
 

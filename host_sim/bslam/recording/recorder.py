@@ -52,12 +52,13 @@ class Recorder:
         mappable: list[bool],
         bearing_sd_rad: list[float] | None = None,
         range_sd_m: list[float] | None = None,
+        range_scale_sd: list[float] | None = None,
         signature: NDArray[np.float32] | None = None,
         beacon_class: list[int] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
-        columns = (bearing_rad, range_m, label, mappable, bearing_sd_rad, range_sd_m)
-        inputs = (time_us, *columns, signature, beacon_class)
+        noise = (bearing_sd_rad, range_sd_m, range_scale_sd)
+        inputs = (time_us, bearing_rad, range_m, label, mappable, *noise, signature, beacon_class)
         accounts, refusal = self._attempt("sightings", *inputs)
         self._end_step(Frame(*inputs, self.true_id, accounts, _status(refusal)), refusal)
         return list(accounts)

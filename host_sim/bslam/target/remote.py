@@ -145,12 +145,13 @@ class RemoteSlam:
         mappable: Sequence[bool],
         bearing_sd_rad: Sequence[float] | None = None,
         range_sd_m: Sequence[float] | None = None,
+        range_scale_sd: Sequence[float] | None = None,
         signature: NDArray[np.float32] | None = None,
         beacon_class: Sequence[int] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
         silent = [0.0] * len(bearing_rad)
-        noise = (bearing_sd_rad or silent, range_sd_m or silent)
+        noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
         classes = told_classes(mappable, beacon_class)
         rows = list(zip(bearing_rad, range_m, label, classes, *noise, strict=True))
         signed, most = signature is not None, self._client.info.sightings_max

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing, Turn
+from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing, Told, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.experiment import camera
@@ -37,6 +37,7 @@ def candidate(outline=(0.0, 0.0, 320.0, 240.0), bearing_rad=0.1, range_m=2.0):
         score=1.0,
         marks=frozenset(),
         signature=np.full(SIGNATURE_SIZE, 0.5, dtype=np.float32),
+        told=None if bearing_rad is None else Told(0.011, 0.05 if range_m else 0.0, 0.02 if range_m else 0.0),
     )
 
 
@@ -95,9 +96,9 @@ def test_camera_log_has_what_the_front_end_measured_at_the_time_of_the_frame(sho
     assert seen.time_us.tolist() == [step * short.step_us for step in range(8) for _ in range(2)]
     assert seen.bearing_rad.tolist() == [0.1] * 16
     np.testing.assert_array_equal(seen.range_m, [2.0, math.nan] * 8)
-    np.testing.assert_allclose(seen.bearing_sd_rad, math.hypot(0.01, 0.004))
-    np.testing.assert_allclose(seen.range_sd_m, [math.hypot(0.03, 0.04), 0.0] * 8)
-    assert log.robot.sighting_scale_sd > 0
+    np.testing.assert_array_equal(seen.bearing_sd_rad, 0.011)
+    np.testing.assert_array_equal(seen.range_sd_m, [0.05, 0.0] * 8)
+    np.testing.assert_array_equal(seen.range_scale_sd, [0.02, 0.0] * 8)
     assert log.robot.wheel_speed_sigma_mps == 0.6
 
 

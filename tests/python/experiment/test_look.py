@@ -12,7 +12,7 @@ from PIL import Image
 import bslam
 from bslam.cli import main
 from bslam.commands import look
-from bslam.core.vision import Candidate, Seeing
+from bslam.core.vision import Candidate, Seeing, Told
 from bslam.view.frames import RIGHT, UNKNOWN, WRONG, Mark, annotate, contact_sheet
 
 GREEN, RED = (tuple(bytes.fromhex(colour[1:])) for colour in (RIGHT, WRONG))
@@ -35,6 +35,7 @@ def candidate(box, **changes):
         "signature": np.zeros(71, np.float32),
         "object": None,
         "object_margin": 0.0,
+        "told": Told(0.01, 0.05, 0.02),
     }
     return Candidate(**(values | changes))
 

@@ -147,8 +147,8 @@ def test_what_the_detector_calls_a_sighting_is_told_without_looks_too(log, assoc
     classed = replace(log.sightings, beacon_class=np.array([1, 2, 3, 4, 5]))
     _, recorder = run(replace(log, sightings=classed), RunOptions(association=association))
     frames = [call for call in recorder.calls if call[0] == "frame"]
-    assert [call[9] for call in frames] == [[1], [2, 3], [4], [5]]
-    assert all(call[6:9] == (None, None, None) for call in frames)  # no noise, no signature
+    assert [call[10] for call in frames] == [[1], [2, 3], [4], [5]]
+    assert all(call[6:10] == (None, None, None, None) for call in frames)  # no noise, no signature
 
 
 def test_direction_only_hides_the_range(log):

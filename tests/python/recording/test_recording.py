@@ -60,6 +60,7 @@ def frames(draw):
         mappable=draw(st.lists(st.booleans(), **rows)),
         bearing_sd_rad=draw(st.lists(floats, **rows)) if noisy else None,
         range_sd_m=draw(st.lists(floats, **rows)) if noisy else None,
+        range_scale_sd=draw(st.lists(floats, **rows)) if noisy and classed else None,
         signature=table if signed else None,
         beacon_class=draw(st.lists(st.integers(0, 254), **rows)) if classed and count else None,
         true_id=draw(st.lists(st.integers(-1, 99), **rows)) if known and count else None,

@@ -60,7 +60,8 @@ def test_a_robot_that_is_sent_pictures_sees_and_maps_what_the_host_does(target, 
             count += len(seen)
             assert [one.bearing_rad for one in seen] == [one.bearing_rad for one in expected]
             assert all((a.signature == b.signature).all() for a, b in zip(seen, expected, strict=True))
-            assert accounts == here.sightings(time_us, *columns_of(expected)[:-1])
+            *columns, _, kinds = columns_of(expected)
+            assert accounts == here.sightings(time_us, *columns, beacon_class=kinds)
             chain = here.fingerprint(chain)
             assert there.fingerprint(0) == chain
     assert count > 0
@@ -129,9 +130,11 @@ def columns_of(candidates):
     """What they tell the filter, as `Slam.sightings` takes it."""
     bearings = [c.bearing_rad for c in candidates]
     ranges = [np.nan if c.range_m is None else c.range_m for c in candidates]
-    sds = [c.bearing_sd_rad for c in candidates], [c.range_sd_m or 0.0 for c in candidates]
+    told = [(c.told.bearing_sd_rad, c.told.range_sd_m, c.told.range_scale_sd) for c in candidates]
+    noise = [list(column) for column in zip(*told, strict=True)] if told else [[], [], []]
     signatures = np.stack([c.signature for c in candidates]) if candidates else None
-    return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *sds, signatures
+    kinds = [c.beacon_class for c in candidates]
+    return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *noise, signatures, kinds
 
 
 def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_eyes):

@@ -133,14 +133,17 @@ static void test_add_sized_is_the_augment_step(void **state)
     for (int i = 0; i < 20; i++) {
         bslam_params_t params;
         bslam_ekf_t ekf = random_filter(&params, &random);
-        params.range_scale_sd = BSLAM_R(0.07);
+        params.range_scale_sd = i % 4 == 3 ? 0 : BSLAM_R(0.07);
         const double range_m = unit_random(&random, 0.5, 8);
         const double bearing = unit_random(&random, -3.14, 3.14);
         const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
-        const double noise_var[] = {range_sd2, 0.02 * 0.02, 0.07 * 0.07};
+        const double own_sd = i % 2 == 0 ? 0 : 0.12;  // what the detector says goes before the parameter
+        const double scale_sd = own_sd > 0 ? own_sd : 0.07;
+        const double noise_var[] = {range_sd2, 0.02 * 0.02, scale_sd * scale_sd};
         const adding_t adding = {ekf.dim, range_m, bearing};
         const twin_t expected = augmented(&ekf, new_sized, 3, noise_var, 3, &adding);
-        const bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
+        bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
+        sighting.range_scale_sd = (bslam_real_t)own_sd;
         int index;
         assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_SIZED);

@@ -401,6 +401,16 @@ static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicte
     assert_near(bslam_range_variance_m2(&params, &sighting, 8), 1, 0);
 }
 
+static void test_unknown_scale_is_the_detector_s_or_the_parameter_s(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.range_scale_sd = BSLAM_R(0.5);
+    bslam_sighting_t sighting = {.range_m = 4, .has_range = true};
+    assert_near(bslam_unknown_scale_var(&params, &sighting), 0.25, 0);
+    sighting.range_scale_sd = BSLAM_R(0.125);
+    assert_near(bslam_unknown_scale_var(&params, &sighting), 0.015625, 0);
+}
+
 static void test_correlation_factor_without_a_length_is_one(void **state)
 {
     bslam_params_t params = unit_params();
@@ -461,6 +471,7 @@ int main(void)
 
         cmocka_unit_test(test_range_variance_is_the_sum_of_its_three_parts),
         cmocka_unit_test(test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance),
+        cmocka_unit_test(test_unknown_scale_is_the_detector_s_or_the_parameter_s),
         cmocka_unit_test(test_correlation_factor_without_a_length_is_one),
         cmocka_unit_test(test_correlation_factor_is_that_of_a_first_order_process),
         cmocka_unit_test(test_correlation_factor_at_a_standstill_is_bounded),

@@ -259,16 +259,21 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
     const struct {
         double bearing_sd_rad;
         double range_sd_m;
+        double range_scale_sd;
         bslam_status_t expected;
     } noises[] = {
-        {NAN, 0, BSLAM_E_NOT_FINITE}, {0, NAN, BSLAM_E_NOT_FINITE}, {INFINITY, 0, BSLAM_E_NOT_FINITE},
-        {-0.01, 0, BSLAM_E_RANGE},    {9e-6, 0, BSLAM_E_RANGE},     {3.2, 0, BSLAM_E_RANGE},
-        {0, -0.01, BSLAM_E_RANGE},    {0, 9e-4, BSLAM_E_RANGE},     {0, 10001, BSLAM_E_RANGE},
+        {NAN, 0, 0, BSLAM_E_NOT_FINITE},      {0, NAN, 0, BSLAM_E_NOT_FINITE},
+        {INFINITY, 0, 0, BSLAM_E_NOT_FINITE}, {-0.01, 0, 0, BSLAM_E_RANGE},
+        {9e-6, 0, 0, BSLAM_E_RANGE},          {3.2, 0, 0, BSLAM_E_RANGE},
+        {0, -0.01, 0, BSLAM_E_RANGE},         {0, 9e-4, 0, BSLAM_E_RANGE},
+        {0, 10001, 0, BSLAM_E_RANGE},         {0, 0, NAN, BSLAM_E_NOT_FINITE},
+        {0, 0, -0.01, BSLAM_E_RANGE},         {0, 0, 1.01, BSLAM_E_RANGE},
     };
     for (int i = 0; i < COUNT_OF(noises); i++) {
         bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(-0.8, 3, 2)};
         seen[1].bearing_sd_rad = (bslam_real_t)noises[i].bearing_sd_rad;
         seen[1].range_sd_m = (bslam_real_t)noises[i].range_sd_m;
+        seen[1].range_scale_sd = (bslam_real_t)noises[i].range_scale_sd;
         assert_frame_refused(&slam, 11 * STEP_US, seen, 2, noises[i].expected, 1);
     }
     // A good frame forgets which sighting was bad.
