@@ -7,7 +7,7 @@ build/training, so an interrupted run goes on where it was. Nothing here looks a
 
 import argparse
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bslam.core.vision import BeaconModel, DetectorModel
@@ -22,20 +22,31 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADER = ROOT / "firmware" / "models" / "beacons.h"
 VALIDATION_FROM = 5000
 PRECISION = 0.95
-WORLDS = {"pinhole": 528, "wide": 256}  # a wide frame shows thrice as many beacons
-CELLS_STEP = 4  # the cell machine has few weights: every so many worlds are enough
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a lens is trained on. The cell machine has few weights: few worlds and cells are enough for it."""
+
+    worlds: int
+    cells_step: int  # every so many worlds give cells,
+    cells: int  # and so many are taken
+    halves: bool  # each frame is looked at once, not twice: a wide one shows thrice as many beacons
+
+
+PLANS = {"pinhole": Plan(528, 4, 200_000, False), "wide": Plan(376, 6, 80_000, True)}
 
 
 def train(folder: Path, lens: str, worlds: int, validation: int, processes: int) -> tuple[DetectorModel, str]:
     """The detector for a kind of lens, and what it reaches on worlds left out."""
-    seeds, left_out = range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
+    plan, seeds, left_out = PLANS[lens], range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
     started = time.monotonic()
     for some in (seeds, left_out):
         render_set(folder, lens, "train", some, processes)
     detector = blank_detector()
-    cells = gather_cells(folder, lens, "train", seeds[::CELLS_STEP], processes)
-    detector = replace(detector, cell=fit_cells(cells))
-    boxes = gather_boxes(folder, lens, "train", seeds, detector, processes)
+    cells = gather_cells(folder, lens, "train", seeds[:: plan.cells_step], processes)
+    detector = replace(detector, cell=fit_cells(cells, plan.cells))
+    boxes = gather_boxes(folder, lens, "train", seeds, detector, processes, plan.halves)
     print(f"{lens}: {summary(boxes)}", flush=True)
     offset, scale = normaliser(boxes.features)
     detector = replace(detector, blob_offset=offset, blob_scale=scale)
@@ -59,7 +70,7 @@ def main() -> int:
     options = parser.parse_args()
     detectors, notes, sets = {}, {}, []
     for lens in RIGS:
-        worlds = options.worlds or WORLDS[lens]
+        worlds = options.worlds or PLANS[lens].worlds
         sets.append(f"{lens} seeds 0 to {worlds - 1}")
         detectors[lens], notes[lens] = train(
             options.folder, lens, worlds, options.validation, options.processes

@@ -61,7 +61,10 @@ class Lens:
 
 @dataclass(frozen=True)
 class Camera:
-    """A lens and its place on the robot; pitch_rad positive looks down. Checked when made (BslamError)."""
+    """A lens and its place on the robot; pitch_rad positive looks down. Checked when made (BslamError).
+
+    zoom: the front end looks at a pixel as so many, across and down (bslam_camera_t).
+    """
 
     lens: Lens
     x_m: float = setting(ANY, 0.0)
@@ -69,6 +72,7 @@ class Camera:
     z_m: float = setting(POSITIVE, 0.5)
     yaw_rad: float = setting(number(-math.pi, math.pi), 0.0)
     pitch_rad: float = setting(_PITCH_RAD, 0.0)
+    zoom: int = setting(integer(1, 2), 1)
 
     def __post_init__(self) -> None:
         _check_fields(self, "camera")
@@ -119,6 +123,7 @@ class _CameraTable:
     z_m: float = setting(POSITIVE, 0.5)
     yaw_deg: float = setting(number(-180.0, 180.0), 0.0)
     pitch_deg: float = setting(number(-68.0, 68.0), 0.0)
+    zoom: int = setting(integer(1, 2), 1)
 
 
 @dataclass(frozen=True)
@@ -161,4 +166,4 @@ def _table(document: Mapping[str, Any], key: str, path: Path) -> Mapping[str, An
 
 def _camera(lens: Lens, place: _CameraTable) -> Camera:
     yaw_rad, pitch_rad = math.radians(place.yaw_deg), math.radians(place.pitch_deg)
-    return Camera(lens, place.x_m, place.y_m, place.z_m, yaw_rad, pitch_rad)
+    return Camera(lens, place.x_m, place.y_m, place.z_m, yaw_rad, pitch_rad, place.zoom)

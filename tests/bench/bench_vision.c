@@ -65,7 +65,8 @@ int main(int argc, char **argv)
                                  .fy_px = BSLAM_R(101.859),
                                  .cx_px = BSLAM_R(159.5),
                                  .cy_px = BSLAM_R(119.5),
-                                 .z_m = BSLAM_R(0.5)};
+                                 .z_m = BSLAM_R(0.5),
+                                 .zoom = 2};
     const bslam_camera_t whole = strcmp(argv[1], "wide") == 0 ? wide : pinhole;
     const bslam_camera_t camera = strcmp(argv[2], "160") == 0 ? halved(whole) : whole;
     width_px = camera.width_px;

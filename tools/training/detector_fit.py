@@ -18,7 +18,6 @@ from training.render_set import KINDS
 from training.together import fit_together
 from training.truth import IGNORED, NOTHING
 
-CELLS_MAX = 200_000
 CELL_COSTS = (0.01, 0.1)
 KIND_COSTS = (0.0005, 0.002, 0.008)
 KIND_FOLDS = 2
@@ -32,6 +31,7 @@ OVERLAP_SURE = 0.6
 OVERLAP_NEGATIVE = 0.45
 POSITIVES_MAX = 60_000
 NEGATIVES_FIRST = 30_000
+NEGATIVES_TRIED = 300_000  # of which the hard ones are taken
 NEGATIVES_HARD = 45_000
 NOT_CROSSED = np.zeros(0, np.uint8)
 CROSSED = 16  # features that are told in pairs, too
@@ -43,13 +43,13 @@ LOG_HEIGHT, PER_METRE = 1, 7  # as BSLAM_BLOB_LOG_HEIGHT, BSLAM_BLOB_PER_METRE
 FUSION_SHARE = 5  # every so many worlds are kept for the fusion
 
 
-def fit_cells(samples: CellSamples) -> Svm:
-    """The linear machine that tells a beacon's cell."""
+def fit_cells(samples: CellSamples, most: int) -> Svm:
+    """The linear machine that tells a beacon's cell, from so many of them at most."""
     random = np.random.default_rng(0)
-    chosen = random.permutation(len(samples.is_beacon))[:CELLS_MAX]
+    chosen = random.permutation(len(samples.is_beacon))[:most]
     x = samples.features[chosen].astype(np.float64)
     targets = samples.is_beacon[chosen, None]
-    few = slice(0, CELLS_MAX // 5)
+    few = slice(0, most // 5)
     cost, _ = choose_cost(
         x[few], targets[few], balanced=True, groups=samples.world[chosen][few], costs=CELL_COSTS
     )
@@ -131,7 +131,7 @@ def fit_kinds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     )
     first = fit_additive(x, targets[chosen], knots, NOT_CROSSED, cost, FIRST_ITERATIONS)
     crossed = most_telling(first, x, CROSSED)
-    rest = negatives[NEGATIVES_FIRST:]
+    rest = negatives[NEGATIVES_FIRST : NEGATIVES_FIRST + NEGATIVES_TRIED]
     if len(rest):
         worst = decide_additive(first, normalised(samples.features[rest], detector))[:, :-1].max(axis=1)
         hard = rest[np.argsort(-worst)[:NEGATIVES_HARD]]

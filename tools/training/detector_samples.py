@@ -68,10 +68,13 @@ def recoloured(picture: NDArray[np.uint16], seed: int) -> NDArray[np.uint16]:
     with another gamma; the same for all pictures of a seed."""
     random = np.random.default_rng([seed, 4])
     order = ORDERS[int(random.integers(len(ORDERS)))]
-    channels = (picture >> 11) / 31.0, (picture >> 5 & 63) / 63.0, (picture & 31) / 31.0
-    painted = [channels[one] ** random.uniform(*GAMMAS) for one in order]
+    channels = (picture >> 11, picture >> 5 & 63, picture & 31)
+    steps = (31, 63, 31)
     red, green, blue = (
-        np.rint(most * one).astype(np.uint16) for most, one in zip((31.0, 63.0, 31.0), painted, strict=True)
+        np.rint(steps[to] * (np.arange(steps[one] + 1) / steps[one]) ** random.uniform(*GAMMAS)).astype(
+            np.uint16
+        )[channels[one]]
+        for to, one in enumerate(order)
     )
     return (red << 11 | green << 5 | blue).astype(np.uint16)
 
@@ -118,10 +121,16 @@ def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], proc
 
 
 def gather_boxes(
-    folder: Path, lens: str, style: str, seeds: Iterable[int], detector: DetectorModel | None, processes: int
+    folder: Path,
+    lens: str,
+    style: str,
+    seeds: Iterable[int],
+    detector: DetectorModel | None,
+    processes: int,
+    halves: bool = False,
 ) -> BoxSamples:
-    """Proposals of the worlds' frames by a detector's cells (None: the built-in one's), each looked at twice:
-    as it is, and in other colours.
+    """Proposals of the worlds' frames by a detector's cells (None: the built-in one's), each world looked at
+    twice: as it is, and in other colours. `halves`: every second frame the one way, the others the other.
 
     The second look has RECOLOURED added to its world's number. What is a beacon hangs on shape, size, place
     more than on its colour: a detector that has seen red signs and no other red things takes those for signs.
@@ -129,7 +138,7 @@ def gather_boxes(
     seeds = list(seeds)
     seeds += [seed + RECOLOURED for seed in seeds]
     model = None if detector is None else model_of(detector)
-    work = partial(_boxes_of_world, folder, lens, style, model)
+    work = partial(_boxes_of_world, folder, lens, style, model, halves)
     return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
 
@@ -142,7 +151,8 @@ def _joined(kind, work, seeds: Iterable[int], processes: int, title: str):  # ty
 
 def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, seed: int) -> CellSamples:
     world = read_world(folder, lens, style, seed)
-    front_end = FrontEnd([camera_of(lens, seed)], model)
+    camera = camera_of(lens, seed)
+    front_end = FrontEnd([camera], model)
     random = np.random.default_rng([seed, 3])
     features, labels = [], []
     for index, picture in enumerate(world.pictures):
@@ -150,7 +160,8 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
         if index % CELL_FRAMES_STEP:
             continue
         for is_beacon in (False, True):
-            good = world.cover[index] >= 14 if is_beacon else world.cover[index] == 0
+            cover = world.cover[index].repeat(camera.zoom, axis=0).repeat(camera.zoom, axis=1)
+            good = cover >= 14 if is_beacon else cover == 0
             rows, columns = np.nonzero(good)
             chosen = random.permutation(len(rows))[:CELLS_A_FRAME]
             features.append(front_end.cell_features(rows[chosen], columns[chosen]))
@@ -159,21 +170,26 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
     return CellSamples(np.concatenate(features), label, np.full(len(label), seed, np.int32))
 
 
-def _boxes_of_world(folder: Path, lens: str, style: str, model: BeaconModel | None, seed: int) -> BoxSamples:
+def _boxes_of_world(
+    folder: Path, lens: str, style: str, model: BeaconModel | None, halves: bool, seed: int
+) -> BoxSamples:
     world = replace(read_world(folder, lens, style, seed % RECOLOURED), seed=seed)
-    front_end = FrontEnd([camera_of(lens, seed % RECOLOURED)], model)
+    camera = camera_of(lens, seed % RECOLOURED)
+    front_end = FrontEnd([camera], model)
     parts = []
     for index, picture in enumerate(world.pictures):
+        if halves and (index % 2 == 0) == (seed < RECOLOURED):
+            continue
         front_end.see(picture if seed < RECOLOURED else recoloured(picture, seed))
         found = front_end.proposals()
-        parts.append(_label_boxes(world, index, found.boxes, found.features))
+        parts.append(_label_boxes(world, index, found.boxes, found.features, CELL_PX / camera.zoom))
     return BoxSamples(
         *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(BoxSamples))
     )
 
 
 def _label_boxes(
-    world: World, index: int, boxes: NDArray[np.float32], features: NDArray[np.float32]
+    world: World, index: int, boxes: NDArray[np.float32], features: NDArray[np.float32], cell_px: float
 ) -> BoxSamples:
     rows = np.flatnonzero(world.seen["frame"] == index)
     seen = world.seen[rows]
@@ -187,7 +203,7 @@ def _label_boxes(
     top, bottom = boxes[:, 1], boxes[:, 3]
     return BoxSamples(
         features,
-        (top < CELL_PX) | (bottom > world.pictures.shape[1] - CELL_PX),
+        (top < cell_px) | (bottom > world.pictures.shape[1] - cell_px),
         label,
         overlap.astype(np.float32),
         object_row,

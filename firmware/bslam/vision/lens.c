@@ -113,7 +113,8 @@ static bool mounting_is_allowed(const bslam_camera_t *camera)
 {
     return bslam_in_range(camera->yaw_rad, -BSLAM_PI, BSLAM_PI) &&
            bslam_in_range(camera->pitch_rad, -PITCH_MAX_RAD, PITCH_MAX_RAD) &&
-           bslam_in_range(camera->z_m, 0, HEIGHT_MAX_M);
+           bslam_in_range(camera->z_m, 0, HEIGHT_MAX_M) && camera->zoom >= 0 &&
+           camera->zoom <= BSLAM_ZOOM_MAX;
 }
 
 bslam_status_t bslam_camera_check(const bslam_camera_t *camera)

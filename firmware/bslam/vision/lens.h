@@ -21,6 +21,7 @@ typedef enum bslam_lens_kind {
 
 /// Frames of at most this many pixels a side.
 #define BSLAM_FRAME_SIDE_MAX 4096
+#define BSLAM_ZOOM_MAX 2
 
 typedef struct bslam_camera {
     bslam_lens_kind_t lens;
@@ -35,6 +36,8 @@ typedef struct bslam_camera {
     bslam_real_t yaw_rad;    ///< mounting: of the axis, positive to the left
     bslam_real_t pitch_rad;  ///< positive looks down
     bslam_real_t z_m;        ///< height above the floor
+    int32_t zoom;  ///< the front end looks at a pixel as so many, across and down: 2 for a lens that shows
+                   ///< much in few pixels; 0 and 1: as it is
 } bslam_camera_t;
 
 /// A unit vector in the robot's axes.
@@ -47,8 +50,8 @@ typedef struct bslam_direction {
 /// BSLAM_OK if the other functions may be given this camera. BSLAM_E_NOT_FINITE: a value is NaN or infinite.
 /// BSLAM_E_PARAMETER: an unknown kind; a frame side outside 8 to BSLAM_FRAME_SIDE_MAX; a focal length outside
 /// 1 to 1e5 px; a centre outside the frame; |yaw| above pi, |pitch| above 1.5 rad; a height outside 0 to 10
-/// m; a distortion that folds: within the frame the radius must grow with the angle, so that every pixel
-/// looks in one direction.
+/// m; a zoom outside 0 to BSLAM_ZOOM_MAX; a distortion that folds: within the frame the radius must grow with
+/// the angle, so that every pixel looks in one direction.
 BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera);
 
 /// The direction that a point of the image looks in; it may lie outside the frame.

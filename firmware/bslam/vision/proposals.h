@@ -23,7 +23,11 @@ typedef struct bslam_proposal {
 } bslam_proposal_t;
 
 /// Cells side by side that a segmentation joins.
+#if BSLAM_CELLS_MAX > 4800
+#define BSLAM_RUNS_MAX 4096
+#else
 #define BSLAM_RUNS_MAX 1024
+#endif
 typedef struct bslam_run {
     uint16_t parent;
     uint16_t cells;

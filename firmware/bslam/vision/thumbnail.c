@@ -1,5 +1,7 @@
 #include "bslam/vision/thumbnail.h"
 
+#include <string.h>
+
 #include "bslam/math/bytes.h"
 
 /// Where the channels of an RGB565 pixel stand in a word once spread: blue in bits 0-4, red in 11-15, green
@@ -145,4 +147,17 @@ bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_
     }
     t->rows_seen++;
     return BSLAM_OK;
+}
+
+void bslam_thumbnail_stretch(bslam_row_sums_t *sums, bslam_pixel_format_t format, const void *pixels,
+                             int32_t count)
+{
+    if (format == BSLAM_PIXELS_RGB888) {
+        pack_888(sums->packed, pixels, count);
+    } else {
+        memcpy(sums->packed, pixels, (size_t)count * sizeof sums->packed[0]);
+    }
+    for (int32_t i = count - 1; i >= 0; i--) {  // from behind: none is written over before it is read
+        sums->packed[2 * i] = sums->packed[2 * i + 1] = sums->packed[i];
+    }
 }

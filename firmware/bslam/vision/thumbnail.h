@@ -21,7 +21,7 @@ typedef enum bslam_pixel_format {
 typedef struct bslam_row_sums {
     uint32_t pairs[BSLAM_IMAGE_WIDTH_MAX / 2];        ///< of an upper row of two
     uint32_t upper_quads[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of 2x2 pixels, of an upper half of a row of cells
-    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];           ///< a row that came with 8 bits a channel
+    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];  ///< a row that came with 8 bits a channel, or is stretched
 } bslam_row_sums_t;
 
 typedef struct bslam_thumbnail {
@@ -46,5 +46,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_begin(bslam_thumbnail_t *thumbna
 /// whatever they held before. BSLAM_E_COUNT, and nothing changed, if the frame has all its rows already.
 BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_t *sums,
                                                     const void *pixels);
+
+/// A row of `count` pixels as one of RGB565, each pixel twice: in sums->packed, which has room for 2 count.
+void bslam_thumbnail_stretch(bslam_row_sums_t *sums, bslam_pixel_format_t format, const void *pixels,
+                             int32_t count);
 
 #endif

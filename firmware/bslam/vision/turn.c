@@ -65,7 +65,7 @@ static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
         const bool seen = bslam_camera_project(&level, &direction, &u_px, &v_px) == BSLAM_OK;
         const bslam_real_t at_px = seen ? (u_px - BSLAM_R(0.5)) / 2 : 0;
         const bslam_real_t end_px = (bslam_real_t)(columns - 1) - BSLAM_R(0.004);
-        grid->at_px[i] = (uint16_t)((at_px < 0 ? 0 : at_px > end_px ? end_px : at_px) * 256);
+        grid->at_px[i] = (bslam_turn_place_t)((at_px < 0 ? 0 : at_px > end_px ? end_px : at_px) * 256);
     }
     for (int32_t i = 0; i <= BANDS; i++) {
         grid->row_px[i] = row_at(camera, EDGE[i]);

@@ -17,6 +17,12 @@ enum {
     BSLAM_TURN_SEARCH_STEP = 2,  ///< the search for the nearest whole shift takes every second column
 };
 #define BSLAM_TURN_COLUMNS (BSLAM_IMAGE_WIDTH_MAX / 2)
+/// A place in 256ths of a column.
+#if BSLAM_TURN_COLUMNS > 256
+typedef uint32_t bslam_turn_place_t;
+#else
+typedef uint16_t bslam_turn_place_t;
+#endif
 
 /// The turn between two frames of one camera.
 typedef struct bslam_turn {
@@ -38,10 +44,10 @@ typedef struct bslam_turn_pattern {
 
 /// Where a camera's columns are. They stand at equal angles, from the frame's left edge to its right.
 typedef struct bslam_turn_grid {
-    bslam_real_t first_rad;                ///< of the first, from the camera's axis, positive to the left
-    bslam_real_t step_rad;                 ///< to the next, to the right
-    uint16_t at_px[BSLAM_TURN_COLUMNS];    ///< in the half-resolution copy, 256ths of a pixel
-    int16_t row_px[BSLAM_TURN_BANDS + 1];  ///< its rows between the bands, the lowest first
+    bslam_real_t first_rad;  ///< of the first, from the camera's axis, positive to the left
+    bslam_real_t step_rad;   ///< to the next, to the right
+    bslam_turn_place_t at_px[BSLAM_TURN_COLUMNS];  ///< in the half-resolution copy, 256ths of a pixel
+    int16_t row_px[BSLAM_TURN_BANDS + 1];          ///< its rows between the bands, the lowest first
 } bslam_turn_grid_t;
 
 /// Sine of a column's bearing, and the same over the distance of what is there.

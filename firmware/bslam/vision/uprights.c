@@ -21,8 +21,13 @@ static const upright_t uprights[] = {
 #define UPRIGHTS ((int32_t)(sizeof uprights / sizeof uprights[0]))
 
 /// Sides of a kind in a frame, and boxes that come of them.
-#define SIDES_MAX 14
-#define BOXES_MAX 8
+#define SIDES_FEW 14
+#define BOXES_FEW 8
+#define SIDES_MANY 24
+#define BOXES_MANY 14
+/// Few in a frame of up to so many columns, many in a wider one, which shows more.
+#define COLUMNS_FEW 80
+#define SIDES_MAX (BSLAM_COLUMNS_MAX > COLUMNS_FEW ? SIDES_MANY : SIDES_FEW)
 /// Boxes of a kind that the frame's left edge cuts off, and as many by its right one. What is left of them is
 /// at least this part of the kind's least width.
 #define CUT_BOXES_MAX 2
@@ -133,9 +138,15 @@ static bool place(const bslam_view_t *view, const upright_t *kind, int32_t colum
     return end_row(side, view->frame->rows) - first_row(side) >= 2;
 }
 
-/// The strongest sides of a kind, at most SIDES_MAX, in order of columns.
+static bool shows_much(const bslam_view_t *view)
+{
+    return view->frame->columns > COLUMNS_FEW;
+}
+
+/// The strongest sides of a kind, in order of columns.
 static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_t sides[SIDES_MAX])
 {
+    const int32_t limit = shows_much(view) ? SIDES_MAX : SIDES_FEW;
     uint8_t steps[BSLAM_COLUMNS_MAX];
     const int32_t columns = view->frame->columns;
     side_t side = {0};
@@ -150,9 +161,9 @@ static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_
             continue;
         }
         int32_t at = count;
-        if (count == SIDES_MAX) {
+        if (count == limit) {
             for (int32_t i = 0; i < count; i++) {
-                at = at == SIDES_MAX || sides[i].step < sides[at].step ? i : at;
+                at = at == limit || sides[i].step < sides[at].step ? i : at;
             }
             if (sides[at].step >= (float)step) {
                 continue;
@@ -220,8 +231,9 @@ static bslam_proposal_t box_of(const bslam_view_t *view, const side_t *left, con
 static void propose_pairs(bslam_proposals_t *proposals, const bslam_view_t *view, const side_t *sides,
                           int32_t count, int32_t kind)
 {
+    const int32_t boxes = shows_much(view) ? BOXES_MANY : BOXES_FEW;
     float limit = 1e9f;
-    for (int32_t box = 0; box < BOXES_MAX; box++) {
+    for (int32_t box = 0; box < boxes; box++) {
         float best = 0;
         int32_t best_left = 0, best_right = 0;
         for (int32_t i = 0; i < count; i++) {

@@ -43,6 +43,42 @@ static const bslam_detector_model_t *detector_for(const bslam_beacon_model_t *mo
     return camera->lens == BSLAM_LENS_PINHOLE ? &model->pinhole : &model->wide;
 }
 
+/// What becomes of a place along a side when each pixel becomes `zoom`: centres at whole numbers, as before.
+static bslam_real_t zoomed(bslam_real_t px, int32_t zoom)
+{
+    return px * (bslam_real_t)zoom + (bslam_real_t)(zoom - 1) / 2;
+}
+
+static bslam_real_t unzoomed(bslam_real_t px, int32_t zoom)
+{
+    return (px - (bslam_real_t)(zoom - 1) / 2) / (bslam_real_t)zoom;
+}
+
+static bslam_box_t unzoomed_box(bslam_box_t box, int32_t zoom)
+{
+    return (bslam_box_t){unzoomed(box.left_px, zoom), unzoomed(box.top_px, zoom),
+                         unzoomed(box.right_px, zoom), unzoomed(box.bottom_px, zoom)};
+}
+
+/// The camera whose pixels are those that the front end looks at; its zoom is 1 at least.
+static bslam_camera_t zoomed_camera(bslam_camera_t camera)
+{
+    camera.zoom = camera.zoom > 1 ? camera.zoom : 1;
+    camera.width_px *= camera.zoom;
+    camera.height_px *= camera.zoom;
+    camera.fx_px *= (bslam_real_t)camera.zoom;
+    camera.fy_px *= (bslam_real_t)camera.zoom;
+    camera.cx_px = zoomed(camera.cx_px, camera.zoom);
+    camera.cy_px = zoomed(camera.cy_px, camera.zoom);
+    return camera;
+}
+
+static bool zoom_has_room(const bslam_camera_t *camera)
+{
+    return camera->zoom <= 1 || (camera->zoom * camera->width_px <= BSLAM_IMAGE_WIDTH_MAX &&
+                                 camera->zoom * camera->height_px <= BSLAM_IMAGE_HEIGHT_MAX);
+}
+
 bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
                                  const bslam_camera_t *cameras, int32_t camera_count)
 {
@@ -55,6 +91,9 @@ bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_mode
     }
     for (int32_t i = 0; i < camera_count && status == BSLAM_OK; i++) {
         status = bslam_camera_check(&cameras[i]);
+        if (status == BSLAM_OK && !zoom_has_room(&cameras[i])) {
+            status = BSLAM_E_RANGE;
+        }
     }
     if (status != BSLAM_OK) {
         return status;
@@ -64,7 +103,7 @@ bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_mode
     vision->camera_count = camera_count;
     vision->reason = BSLAM_VISION_UNFINISHED;
     for (int32_t i = 0; i < camera_count; i++) {
-        vision->cameras[i] = cameras[i];
+        vision->cameras[i] = zoomed_camera(cameras[i]);
         vision->machines[i] = bslam_cell_machine(&detector_for(model, &cameras[i])->cell);
         bslam_background_init(&vision->backgrounds[i]);
     }
@@ -80,15 +119,22 @@ static bool is_unfinished(const bslam_vision_t *vision)
 bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_pixel_format_t format,
                                   int32_t width_px, int32_t height_px)
 {
-    if (camera < 0 || camera >= vision->camera_count || width_px != vision->cameras[camera].width_px ||
-        height_px != vision->cameras[camera].height_px) {
+    if (camera < 0 || camera >= vision->camera_count) {
+        return BSLAM_E_RANGE;
+    }
+    const bslam_camera_t *lens = &vision->cameras[camera];
+    if ((int64_t)width_px * lens->zoom != lens->width_px ||
+        (int64_t)height_px * lens->zoom != lens->height_px) {
         return BSLAM_E_RANGE;
     }
     const bool gives_up = is_unfinished(vision);
-    const bslam_status_t status = bslam_thumbnail_begin(&vision->thumbnail, format, width_px, height_px);
+    const bslam_status_t status =
+        bslam_thumbnail_begin(&vision->thumbnail, format, lens->width_px, lens->height_px);
     if (status != BSLAM_OK) {
         return status;
     }
+    vision->format = format;
+    vision->thumbnail.format = lens->zoom > 1 ? BSLAM_PIXELS_RGB565 : format;  // as stretched rows are
     vision->frames[BSLAM_VISION_UNFINISHED] += gives_up ? 1 : 0;
     vision->camera = camera;
     vision->candidate_count = 0;
@@ -99,7 +145,17 @@ bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_
 
 bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
 {
-    return bslam_thumbnail_row(&vision->thumbnail, &vision->row_sums, pixels);
+    const int32_t zoom = vision->cameras[vision->camera].zoom;
+    if (zoom == 1 || vision->thumbnail.rows_seen >= vision->thumbnail.height_px) {
+        return bslam_thumbnail_row(&vision->thumbnail, &vision->row_sums, pixels);
+    }
+    bslam_row_sums_t *sums = &vision->row_sums;
+    bslam_thumbnail_stretch(sums, vision->format, pixels, vision->thumbnail.width_px / zoom);
+    bslam_status_t status = BSLAM_OK;
+    for (int32_t i = 0; i < zoom && status == BSLAM_OK; i++) {
+        status = bslam_thumbnail_row(&vision->thumbnail, sums, sums->packed);
+    }
+    return status;
 }
 
 bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)
@@ -289,6 +345,7 @@ __attribute__((noinline)) static void measure(bslam_vision_t *vision, const bsla
         if (measure_one(vision, frame, &candidate) == BSLAM_OK) {
             const bool agrees = bslam_box_overlap(&found, &candidate.outline) >= AGREE_MIN;
             candidate.outline = is_wide || !agrees ? found : candidate.outline;
+            candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
             vision->candidates[kept++] = candidate;
         }
     }
@@ -346,6 +403,11 @@ bslam_vision_reason_t bslam_vision_reason(const bslam_vision_t *vision)
     return vision->reason;
 }
 
+bslam_box_t bslam_vision_proposal_box(const bslam_vision_t *vision, int32_t index)
+{
+    return unzoomed_box(vision->proposals.items[index].box, vision->cameras[vision->camera].zoom);
+}
+
 void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
                                 float features[BSLAM_BLOB_FEATURES])
 {
@@ -366,5 +428,12 @@ bslam_status_t bslam_vision_measure(const bslam_vision_t *vision, const bslam_bo
                                     const bslam_size_t *size, bslam_candidate_t *candidate)
 {
     const bslam_frame_t frame = finished_frame(vision);
-    return bslam_measure(&frame, &vision->cameras[vision->camera], rough, size, candidate);
+    const bslam_camera_t *camera = &vision->cameras[vision->camera];
+    const bslam_box_t box = {zoomed(rough->left_px, camera->zoom), zoomed(rough->top_px, camera->zoom),
+                             zoomed(rough->right_px, camera->zoom), zoomed(rough->bottom_px, camera->zoom)};
+    const bslam_status_t status = bslam_measure(&frame, camera, &box, size, candidate);
+    if (status == BSLAM_OK) {
+        candidate->outline = unzoomed_box(candidate->outline, camera->zoom);
+    }
+    return status;
 }

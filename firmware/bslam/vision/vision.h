@@ -36,7 +36,8 @@ typedef struct bslam_vision {
     bslam_vision_reason_t reason;
     uint32_t frames[BSLAM_VISION_REASON_COUNT];  ///< finished or given up frames by what came of them
     uint32_t candidates_dropped;                 ///< BSLAM_CANDIDATES_MAX did not suffice
-    bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
+    bslam_camera_t cameras[BSLAM_CAMERAS_MAX];   ///< as they are looked at, zoomed
+    bslam_pixel_format_t format;                 ///< of the rows as they come
     bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
     bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
     union {
@@ -54,7 +55,8 @@ typedef struct bslam_vision {
 } bslam_vision_t;
 
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are
-/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. Else what bslam_camera_check,
+/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. BSLAM_E_RANGE: a zoomed frame is beyond
+/// BSLAM_IMAGE_WIDTH_MAX or _HEIGHT_MAX. Else what bslam_camera_check,
 /// bslam_beacon_model_check or, where the model has a recogniser, bslam_recogniser_check refuses. *vision is
 /// then unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
@@ -84,6 +86,9 @@ const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, i
 /// What came of the last frame, and its name: "black" say.
 bslam_vision_reason_t bslam_vision_reason(const bslam_vision_t *vision);
 const char *bslam_vision_reason_name(bslam_vision_reason_t reason);
+
+/// For training: the box of proposal `index` of the last finished frame, in the camera's pixels.
+bslam_box_t bslam_vision_proposal_box(const bslam_vision_t *vision, int32_t index);
 
 /// For training: the features of proposal `index` of the last finished frame, as bslam_blob_features gives
 /// them, and those of a cell. Indices in range.

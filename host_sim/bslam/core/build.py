@@ -29,6 +29,13 @@ LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limi
 
 Macros = Sequence[tuple[str, str]]
 
+VISION_MACROS: Macros = (
+    ("BSLAM_IMAGE_WIDTH_MAX", "640"),
+    ("BSLAM_IMAGE_HEIGHT_MAX", "480"),
+    ("BSLAM_PROPOSALS_MAX", "240"),
+)
+"""Room for a 180-degree lens of 320x240 that is looked at doubled."""
+
 
 def _macros(real: str, beacons_max: int) -> Macros:
     return [
@@ -80,16 +87,15 @@ def build_vision() -> Path:
     """Builds the vision front end, in float as on the target, with its model where there is one yet."""
     header = "vision/visual_gyro.h"  # it includes all the others
     includes = f'#include "bslam/{header}"\n'
-    text = declarations((), header)
+    text = declarations(VISION_MACROS, header)
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
-    text += "#define BSLAM_IMAGE_WIDTH_MAX ...\n#define BSLAM_IMAGE_HEIGHT_MAX ...\n"
     if BEACONS_HEADER.is_file():
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"
     else:
         model = "NULL"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    return _compile(VISION_EXTENSION, text, includes + function, ())
+    return _compile(VISION_EXTENSION, text, includes + function, VISION_MACROS)
 
 
 def _compile(name: str, declared: str, source: str, macros: Macros) -> Path:

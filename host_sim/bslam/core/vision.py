@@ -222,14 +222,15 @@ class FrontEnd:
         """The proposals of the last frame."""
         found = self._vision.proposals
         items = [found.items[i] for i in range(found.count)]
+        boxes = [self._library.lib.bslam_vision_proposal_box(self._vision, i) for i in range(found.count)]
         sides = ("left_px", "top_px", "right_px", "bottom_px")
         features = np.empty((found.count, self._library.lib.BSLAM_BLOB_FEATURES), dtype=np.float32)
         for i in range(found.count):
             self._library.lib.bslam_vision_blob_features(self._vision, i, self._library.floats(features[i]))
         return Proposals(
-            boxes=np.array(
-                [[getattr(item.box, side) for side in sides] for item in items], np.float32
-            ).reshape(-1, 4),
+            boxes=np.array([[getattr(box, side) for side in sides] for box in boxes], np.float32).reshape(
+                -1, 4
+            ),
             segmentations=np.array([item.segmentation for item in items], np.int64),
             features=features,
         )
@@ -315,6 +316,7 @@ class FrontEnd:
             yaw_rad=camera.yaw_rad,
             pitch_rad=camera.pitch_rad,
             z_m=camera.z_m,
+            zoom=camera.zoom,
             **{name: getattr(lens, name) for name in same},
         )
 
@@ -367,9 +369,3 @@ def feature_counts() -> tuple[int, int]:
     """Features of a cell and of a proposal."""
     lib = vision_library().lib
     return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_BLOB_FEATURES)
-
-
-def frame_size_max() -> tuple[int, int]:
-    """Width and height of the largest frame that the front end takes, px."""
-    lib = vision_library().lib
-    return int(lib.BSLAM_IMAGE_WIDTH_MAX), int(lib.BSLAM_IMAGE_HEIGHT_MAX)

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
-from bslam.core.vision import frame_size_max
 from bslam.errors import BslamError
 from bslam.rig import Camera, Lens
 
 SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".bmp", ".ppm")
+_TRAINED_PX: Final = (320, 240)
+"""The detector was trained on frames of this size: a larger picture of no known camera is made as small."""
 _CELL_PX: Final = 4
 _FIELD_OF_VIEW_RAD: Final = math.radians(60.0)
 _SAME_SHAPE: Final = 0.01  # width to height of a picture and of its camera's frame may differ by this share
@@ -84,8 +85,7 @@ def camera_for(width_px: int, height_px: int) -> Camera:
 
 
 def _natural_size(size: tuple[int, int], where: str) -> tuple[float, int, int]:
-    most_px = frame_size_max()
-    scale = min(1.0, *(most / side for most, side in zip(most_px, size, strict=True)))
+    scale = min(1.0, *(most / side for most, side in zip(_TRAINED_PX, size, strict=True)))
     width_px, height_px = (_CELL_PX * int(side * scale / _CELL_PX) for side in size)
     if min(width_px, height_px) < 4 * _CELL_PX:
         allowed = f"sides from {4 * _CELL_PX} px, not longer than 20:1"

@@ -342,6 +342,97 @@ static void test_end_candidates_come_surest_first(void **state)
     }
 }
 
+/// A camera of half the size that is looked at doubled.
+static bslam_camera_t small_camera(void)
+{
+    bslam_camera_t camera = camera_at(0.5);
+    camera.width_px = WIDTH / 2;
+    camera.height_px = HEIGHT / 2;
+    camera.fx_px /= 2;
+    camera.fy_px /= 2;
+    camera.cx_px = (camera.cx_px - BSLAM_R(0.5)) / 2;
+    camera.cy_px = (camera.cy_px - BSLAM_R(0.5)) / 2;
+    camera.zoom = 2;
+    return camera;
+}
+
+/// The same picture, of which each 2x2 pixels are alike, at half the size.
+static bslam_status_t show_small(bslam_pixel_format_t format)
+{
+    uint8_t rgb[WIDTH / 2][3];
+    uint16_t packed[WIDTH / 2];
+    assert_int_equal(bslam_vision_begin(&vision, 0, format, WIDTH / 2, HEIGHT / 2), BSLAM_OK);
+    for (int row = 0; row < HEIGHT; row += 2) {
+        for (int i = 0; i < WIDTH / 2; i++) {
+            const uint8_t *pixel = picture[row][2 * i];
+            memcpy(rgb[i], pixel, 3);
+            packed[i] = (uint16_t)(pixel[0] >> 3 << 11 | pixel[1] >> 2 << 5 | pixel[2] >> 3);
+        }
+        const void *pixels = format == BSLAM_PIXELS_RGB888 ? (const void *)rgb : (const void *)packed;
+        assert_int_equal(bslam_vision_row(&vision, pixels), BSLAM_OK);
+    }
+    assert_int_equal(bslam_vision_row(&vision, packed), BSLAM_E_COUNT);
+    return bslam_vision_end(&vision, true);
+}
+
+static void test_end_zoomed_camera_sees_what_a_doubled_picture_shows(void **state)
+{
+    detector.fusion_weights[UNIT_MODEL_CLASSES + 2] = 1;
+    detector.screen_weights[5] = 1;
+    detector.kind_bias[2] = 1;
+    paint_room();
+    paint(100, 60, 124, 80, 200, 30, 30);
+    paint(220, 60, 252, 84, 30, 160, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    int32_t wanted_count = 0;
+    const bslam_candidate_t *found = bslam_vision_candidates(&vision, &wanted_count);
+    bslam_candidate_t wanted[BSLAM_CANDIDATES_MAX];
+    memcpy(wanted, found, sizeof wanted);
+    const bslam_box_t wanted_box = bslam_vision_proposal_box(&vision, 0);
+    const bslam_size_t size = {.height_m = 1};
+    bslam_candidate_t wanted_one = {0};
+    const bslam_box_t rough = {99, 59, 124, 80};
+    assert_int_equal(bslam_vision_measure(&vision, &rough, &size, &wanted_one), BSLAM_OK);
+
+    const bslam_camera_t small = small_camera();
+    for (int format = 0; format < 2; format++) {
+        assert_int_equal(bslam_vision_init(&vision, &model, &small, 1), BSLAM_OK);
+        assert_int_equal(show_small((bslam_pixel_format_t)format), BSLAM_OK);
+        int32_t count = 0;
+        found = bslam_vision_candidates(&vision, &count);
+        assert_int_equal(count, wanted_count);
+        assert_true(count >= 2);
+        for (int i = 0; i < count; i++) {
+            assert_near(2 * found[i].outline.left_px + BSLAM_R(0.5), wanted[i].outline.left_px, 1e-3);
+            assert_near(2 * found[i].outline.bottom_px + BSLAM_R(0.5), wanted[i].outline.bottom_px, 1e-3);
+            assert_near(found[i].bearing_rad, wanted[i].bearing_rad, 1e-5);
+            assert_near(found[i].score, wanted[i].score, 1e-4);
+        }
+        assert_near(2 * bslam_vision_proposal_box(&vision, 0).top_px + BSLAM_R(0.5), wanted_box.top_px, 1e-3);
+        bslam_candidate_t one = {0};
+        const bslam_box_t half = {BSLAM_R(49.25), BSLAM_R(29.25), BSLAM_R(61.75), BSLAM_R(39.75)};
+        assert_int_equal(bslam_vision_measure(&vision, &half, &size, &one), BSLAM_OK);
+        assert_near(one.range_m, wanted_one.range_m, 1e-4);
+        assert_near(2 * one.outline.right_px + BSLAM_R(0.5), wanted_one.outline.right_px, 1e-3);
+    }
+}
+
+static void test_init_zoom_without_room_is_refused_and_nothing_changes(void **state)
+{
+    bslam_camera_t camera = camera_at(0);
+    camera.zoom = 2;
+    before = vision;
+    assert_int_equal(bslam_vision_init(&vision, &model, &camera, 1), BSLAM_E_RANGE);
+    camera = small_camera();
+    camera.height_px = BSLAM_IMAGE_HEIGHT_MAX / 2 + 4;
+    assert_int_equal(bslam_vision_init(&vision, &model, &camera, 1), BSLAM_E_RANGE);
+    camera.zoom = BSLAM_ZOOM_MAX + 1;
+    assert_int_equal(bslam_vision_init(&vision, &model, &camera, 1), BSLAM_E_PARAMETER);
+    camera.zoom = -1;
+    assert_int_equal(bslam_vision_init(&vision, &model, &camera, 1), BSLAM_E_PARAMETER);
+    assert_memory_equal(&vision, &before, sizeof vision);
+}
+
 static void test_end_same_frames_give_the_same_state(void **state)
 {
     paint_room();
@@ -491,6 +582,8 @@ int main(void)
         TEST(test_end_rectangle_moved_by_cells_moves_its_box),
         TEST(test_end_brighter_light_gives_the_same_boxes),
         TEST(test_end_candidates_come_surest_first),
+        TEST(test_end_zoomed_camera_sees_what_a_doubled_picture_shows),
+        TEST(test_init_zoom_without_room_is_refused_and_nothing_changes),
         TEST(test_end_same_frames_give_the_same_state),
         TEST(test_blob_features_are_means_over_the_cells),
         TEST(test_end_noise_keeps_within_all_bounds),
