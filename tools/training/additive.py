@@ -73,7 +73,7 @@ def fit_additive(
     iterations: int,
 ) -> AdditiveSvm:
     """One machine, a row a column of `targets` (samples, rows), on samples (n, features); int8 weights."""
-    phi = np.empty((len(x), _weights(len(knots), len(crossed)) + 1), np.float32)
+    phi = np.empty((len(x), weights_of(len(knots), len(crossed)) + 1), np.float32)
     for start in range(0, len(x), PART):
         phi[start : start + PART, :-1] = expand_tents(x[start : start + PART], knots, crossed)
     phi[:, -1] = 1.0
@@ -115,6 +115,6 @@ def most_telling(machine: AdditiveSvm, x: Features, count: int) -> NDArray[np.ui
     return np.sort(np.argsort(-moved, kind="stable")[:count]).astype(np.uint8)
 
 
-def _weights(features: int, crossed: int) -> int:
+def weights_of(features: int, crossed: int) -> int:
     """As BSLAM_ADDITIVE_WEIGHTS."""
     return features * KNOTS + crossed * (crossed - 1) // 2 * len(GRID_KNOTS) ** 2

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bslam.core.vision import BeaconModel
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
+from train_detector import HEADER, note_of
 from training import export, fit
+from training.built_in import built_in_detector
 from training.compiled import (
     TOLERANCE,
     CompiledSvm,
@@ -18,6 +21,8 @@ from training.compiled import (
     worst_byte_difference,
     worst_difference,
 )
+from training.detector_export import beacons_header
+from training.detector_samples import CLASSES
 
 
 def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -119,3 +124,10 @@ def test_c_float_gives_the_float_back(value: float) -> None:
     text = export.c_float(value)
     assert text.endswith("f") and ("." in text or "e" in text)
     assert np.float32(float(text[:-1])) == np.float32(value)
+
+
+def test_built_in_detectors_read_back_are_the_header_to_the_byte() -> None:
+    model = BeaconModel(CLASSES, built_in_detector("pinhole"), built_in_detector("wide"))
+    written = HEADER.read_text(encoding="utf-8").split("#ifndef")[1]
+    assert beacons_header(model, {}).split("#ifndef")[1] == written
+    assert "recall" in note_of(HEADER, "wide")

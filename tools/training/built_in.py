@@ -1,0 +1,55 @@
+"""The detectors that are compiled into the core, as training makes them: so that one lens can be trained anew
+and the other stays as it is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.raw import vision_library
+from bslam.core.vision import DetectorModel
+from bslam.modelfile import AdditiveSvm, Svm, weights_in_row
+from training.additive import KNOTS, weights_of
+
+
+def built_in_detector(lens: str) -> DetectorModel:
+    """That of a kind of lens, "pinhole" or "wide"."""
+    made = getattr(vision_library().lib.built_in_model(), lens)
+    features = made.screen.features
+    return DetectorModel(
+        cell=_svm(made.cell),
+        blob_offset=_copy(made.blob_offset, features, np.float32),
+        blob_scale=_copy(made.blob_scale, features, np.float32),
+        screen=_svm(made.screen),
+        screen_threshold=made.screen_threshold,
+        any_threshold=made.any_threshold,
+        kinds=_additive(made.kinds),
+        fusion=_svm(made.fusion),
+        threshold=made.threshold,
+    )
+
+
+def _copy(pointer: Any, count: int, dtype: type) -> NDArray[Any]:
+    return vision_library().copy_of(pointer, count, dtype)
+
+
+def _svm(made: Any) -> Svm:
+    shape = made.rows, weights_in_row(made.features, made.quadratic)
+    is_bytes = made.weights == vision_library().ffi.NULL
+    source, dtype = (made.bytes, np.int8) if is_bytes else (made.weights, np.float32)
+    weights = _copy(source, shape[0] * shape[1], dtype).reshape(shape)
+    scale = _copy(made.byte_scale, made.rows, np.float32) if is_bytes else None
+    return Svm(made.features, made.quadratic, weights, _copy(made.bias, made.rows, np.float32), scale)
+
+
+def _additive(made: Any) -> AdditiveSvm:
+    row = weights_of(made.features, made.crossed_count)
+    return AdditiveSvm(
+        _copy(made.knots, made.features * KNOTS, np.float32).reshape(-1, KNOTS),
+        _copy(made.crossed, made.crossed_count, np.uint8),
+        _copy(made.bytes, made.rows * row, np.int8).reshape(-1, row),
+        _copy(made.byte_scale, made.rows, np.float32),
+        _copy(made.bias, made.rows, np.float32),
+    )
