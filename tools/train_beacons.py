@@ -32,6 +32,10 @@ not has its horizon elsewhere, takes other colours for the wall's, and will reco
 LEAST_RECOGNISED = 0.5
 """Share of the objects below which a recogniser is of no use."""
 
+SEED_WEIGHT = 0.22
+"""What a generic seed counts, against a box, where the reject margin is chosen: all 64 as much as the other
+things in twenty pictures. At 1 the margin is for a room full of strangers, and too high."""
+
 
 def confusion(labels: NDArray[np.integer], values: NDArray[np.floating], margin: float) -> NDArray[np.int64]:
     """Counts (objects + 1, objects + 1): row what it is, column what it is taken for; the last is "none"."""
@@ -54,7 +58,9 @@ def train(
     labels, values = samples.labels[samples.counts], held_out[samples.counts]
     right = values.argmax(axis=1) == labels
     objects = int(np.sum(labels != NONE))
-    margin = reject_margin(values.max(axis=1), right, precision, math.ceil(LEAST_RECOGNISED * objects))
+    weights = np.where(samples.generic[samples.counts], SEED_WEIGHT, 1.0)
+    least = math.ceil(LEAST_RECOGNISED * objects)
+    margin = reject_margin(values.max(axis=1), right, precision, least, weights)
     if margin is None:
         raise BslamError(
             f"{folder.path}: on pictures left out only {right.sum()} of {objects} objects get their own "
@@ -82,9 +88,14 @@ def check_header(header: str, svm: str, x: NDArray[np.float32], machine: fit.Mac
 
 
 def reject_margin(
-    scores: NDArray[np.floating], right: NDArray[np.bool_], precision: float, least: int
+    scores: NDArray[np.floating],
+    right: NDArray[np.bool_],
+    precision: float,
+    least: int,
+    weights: NDArray[np.floating],
 ) -> float | None:
-    """The lowest margin of which at least `least` right samples are above, and the wanted share of all above.
+    """The lowest margin of which at least `least` right samples are above, and the wanted share of all above,
+    by weight.
 
     Where none gives that share, the one that gives most; where fewer are right at all, None. Half way to the
     next score below; where there is none 0, or the lowest: few pictures do not show how low a right score can
@@ -92,7 +103,7 @@ def reject_margin(
     """
     order = np.argsort(-scores, kind="stable")
     hits = np.cumsum(right[order])
-    shares = hits / np.arange(1, len(hits) + 1)
+    shares = np.cumsum((weights * right)[order]) / np.cumsum(weights[order])
     enough = np.flatnonzero(hits >= least)
     if len(enough) == 0:
         return None

@@ -37,13 +37,15 @@ SHAKE = 0.06
 class Samples:
     """Signatures (n, 71) with labels (n,), an index into the folder's objects or NONE, and picture (n,).
 
-    `counts` (n,) is False for the extra samples of shaken boxes, which would count a box several times.
+    `counts` (n,) is False for the extra samples of shaken boxes, which would count a box several times;
+    `generic` (n,) is True for the seeds that come with the library.
     """
 
     signatures: NDArray[np.float32]
     labels: NDArray[np.int64]
     pictures: NDArray[np.int64]
     counts: NDArray[np.bool_]
+    generic: NDArray[np.bool_]
     boxes: Counter[str]  # labelled boxes by class
     found: Counter[str]  # and how many of them the front end found by itself
     useless: dict[str, str]  # pictures that the front end sees nothing in, and its reason
@@ -93,6 +95,7 @@ def collect(folder: Folder, camera: Camera | None = None, model: BeaconModel | N
             found.update(names[owner] for owner in owners)
         else:
             useless[picture.path.name] = seeing.reason
+    own = len(collected.labels)
     for index, seed in enumerate(flash_seeds()):
         collected.add(seed, NONE, index % len(frames))
     drawn = Counter(label.name for picture in folder.pictures for label in picture.labels)
@@ -102,6 +105,7 @@ def collect(folder: Folder, camera: Camera | None = None, model: BeaconModel | N
         np.array(collected.labels, dtype=np.int64),
         np.array(collected.pictures, dtype=np.int64),
         np.array(collected.counts, dtype=np.bool_),
+        np.arange(len(collected.labels)) >= own,
         drawn,
         found,
         useless,

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 import bslam.world as world_package
 from bslam.core.build import FIRMWARE_DIR
+from bslam.core.learner import flash_seeds
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
@@ -157,7 +158,7 @@ def camera_log(
 
     threshold: what the detector is less sure of is left out; TOLD_THRESHOLD at least.
 
-    Its machines start from the same generic looks: they do as well as signatures of rendered things.
+    Its machines start from the seeds of the flash, as a robot's do.
     """
     scenario = _checked(scenario, sigma_mps, noise, rig)
     return _log_of(scenario, seed, rig, store.drive(scenario, seed, rig).surer_than(threshold))
@@ -197,7 +198,7 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sighting_correlation_m=CORRELATION_M,
         gyro_sigma_radps=VisualGyro.SD_RADPS,
     )
-    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot)
+    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=flash_seeds())
     if len(drive.turns) == 0:
         return log
     eyes = Compass(log)
@@ -308,7 +309,7 @@ def _digest(scenario: Scenario, rig: Rig) -> str:
     words = hashlib.sha256(repr((scenario, rig, SEEN)).encode())
     world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "bslam" / "vision"
     code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.glob("*.[ch]")]
-    code += [*vision.with_name("svm").glob("svm.[ch]"), *(FIRMWARE_DIR / "models").glob("*.h")]
+    code += [*vision.with_name("svm").glob("svm.[ch]"), *(FIRMWARE_DIR / "models").glob("beacons*.h")]
     for path in sorted(code):
         words.update(path.read_bytes())
     return words.hexdigest()[:12]

@@ -263,9 +263,19 @@ def test_objects_that_cannot_be_told_apart_are_refused(rows, tmp_path, capsys):
 def test_reject_margin_by_hand(right, precision, least, margin):
     scores = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
     flags = np.array([letter == "r" for letter in right])
-    assert train_beacons.reject_margin(scores, flags, precision, least) == margin
+    alike = np.ones(5)
+    assert train_beacons.reject_margin(scores, flags, precision, least, alike) == margin
     shuffled = np.array([2, 0, 4, 1, 3])
-    assert train_beacons.reject_margin(scores[shuffled], flags[shuffled], precision, least) == margin
+    assert train_beacons.reject_margin(scores[shuffled], flags[shuffled], precision, least, alike) == margin
+
+
+def test_reject_margin_counts_samples_by_weight():
+    scores, right = np.array([5.0, 4.0, 3.0, 2.0]), np.array([True, False, True, True])
+    margins = [
+        train_beacons.reject_margin(scores, right, 0.8, 1, np.array([1.0, weight, 1.0, 1.0]))
+        for weight in (1.0, 0.5)
+    ]
+    assert margins == [4.5, 0.0]  # 3 of 4 are too few; 3 of 3.5 suffice
 
 
 def test_pictures_of_another_camera_are_refused(rows, tmp_path, capsys):
