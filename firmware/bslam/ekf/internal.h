@@ -6,6 +6,19 @@
 
 #define POSE_DIM 3
 
+/// y[0..n) += factor x. Four at once, which the compiler takes together: up to the next multiple of four,
+/// what stands behind n is written, too.
+static inline void bslam_ekf_add_scaled(bslam_real_t *restrict y, bslam_real_t factor,
+                                        const bslam_real_t *restrict x, int n)
+{
+    for (int i = 0; i < n; i += 4) {
+        y[i] += factor * x[i];
+        y[i + 1] += factor * x[i + 1];
+        y[i + 2] += factor * x[i + 2];
+        y[i + 3] += factor * x[i + 3];
+    }
+}
+
 /// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
 

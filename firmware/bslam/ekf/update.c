@@ -33,9 +33,7 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
     for (int p = 0; p < ekf->pending_count; p++) {
         const bslam_real_t *column = ekf->pending[p];
         const bslam_real_t factor = ekf->pending_scale[p] * bslam_ekf_dot(row, column);
-        for (int i = 0; i < ekf->dim; i++) {
-            out[i] += factor * column[i];
-        }
+        bslam_ekf_add_scaled(out, factor, column, ekf->dim);
     }
 }
 
@@ -237,12 +235,13 @@ static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_
     const bslam_real_t *column = ekf->pending[ekf->pending_count];
     const bslam_real_t step = innovation / s;
     if (ekf->has_correction) {
-        for (int i = 0; i < ekf->dim; i++) {
-            ekf->correction[i] += column[i] * step;
-        }
+        bslam_ekf_add_scaled(ekf->correction, step, column, ekf->dim);
     } else {
-        for (int i = 0; i < ekf->dim; i++) {
+        for (int i = 0; i < ekf->dim; i += 4) {
             ekf->correction[i] = column[i] * step;
+            ekf->correction[i + 1] = column[i + 1] * step;
+            ekf->correction[i + 2] = column[i + 2] * step;
+            ekf->correction[i + 3] = column[i + 3] * step;
         }
     }
     ekf->pending_scale[ekf->pending_count] = -1 / s;
@@ -311,9 +310,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     if (innovation->has_range) {
         // The range's column and innovation, given the bearing.
         const bslam_real_t share = hph.xy / bearing_s;
-        for (int i = 0; i < ekf->dim; i++) {
-            range_column[i] -= share * bearing_column[i];
-        }
+        bslam_ekf_add_scaled(range_column, -share, bearing_column, ekf->dim);
         accept_column(ekf, range_left - share * bearing_left,
                       hph.xx - share * hph.xy + innovation->range_var_m2 / fusion->weight);
     }
@@ -369,9 +366,7 @@ static void transport_covariance(bslam_ekf_t *ekf)
     static const bslam_row_t theta_row = {.base = {0, 0, 1}};
     bslam_ekf_project(ekf, &theta_row, ekf->mirror);
     const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
-    for (int i = 0; i < ekf->dim; i++) {
-        ekf->mirror[i] += ekf->shift[i] * half_variance;
-    }
+    bslam_ekf_add_scaled(ekf->mirror, half_variance, ekf->shift, ekf->dim);
     if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
         flush(ekf);
     }
