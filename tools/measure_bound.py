@@ -18,6 +18,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from tqdm import tqdm
 
 from bslam.core.vision import FrontEnd
+from train_detector import PLANS
 from training.detector_fit import kind_targets, usable
 from training.detector_samples import gather_boxes
 from training.detector_score import DETECTION, Sightings, objects_of, score, sorted_sightings
@@ -33,7 +34,7 @@ ODDS_MIN = -4.0
 
 def fit_trees(folder: Path, lens: str, worlds: int, processes: int) -> HistGradientBoostingClassifier:
     """Trees that tell beacons of any kind from all else: all beacons' boxes and NEGATIVES others."""
-    samples = gather_boxes(folder, lens, "train", range(worlds), None, processes)
+    samples = gather_boxes(folder, lens, "train", range(worlds), None, processes, PLANS[lens].halves)
     good = np.flatnonzero(usable(samples))
     is_beacon = kind_targets(samples)[good, 0]
     others = np.random.default_rng(0).permutation(good[~is_beacon])[:NEGATIVES]
@@ -82,16 +83,17 @@ def main() -> int:
     """Prints what trees reach."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lens", choices=tuple(RIGS), default="pinhole")
-    parser.add_argument("--worlds", type=int, default=528, help="to train on (default: 528)")
+    parser.add_argument("--worlds", type=int, help="to train on (default: the detector's)")
     parser.add_argument("--first-seed", type=int, default=9000, help="of the test worlds (default: 9000)")
     parser.add_argument("--tests", type=int, default=40, help="test worlds (default: 40)")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "training", help="rendered worlds")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     lens, seeds = options.lens, range(options.first_seed, options.first_seed + options.tests)
-    render_set(options.folder, lens, "train", range(options.worlds), options.processes)
+    worlds = options.worlds or PLANS[lens].worlds
+    render_set(options.folder, lens, "train", range(worlds), options.processes)
     render_set(options.folder, lens, "test", seeds, options.processes)
-    trees = fit_trees(options.folder, lens, options.worlds, options.processes)
+    trees = fit_trees(options.folder, lens, worlds, options.processes)
     seen, proposed = look(options.folder, lens, seeds, trees)
     print(f"{lens}: a box of {proposed:.3f} of {len(seen.objects)} objects")
     for precision in (0.95, 0.90):

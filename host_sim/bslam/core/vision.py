@@ -192,7 +192,7 @@ class FrontEnd:
         the kind's size and place. It has no class. None: nothing can be measured there.
         """
         found = self._measured(box, kind)
-        return None if found is None else self._candidate(found)
+        return None if found is None else self._candidate(found[0])
 
     def _measured(self, box: tuple[float, float, float, float], kind: BeaconClass) -> Any:
         library = self._library

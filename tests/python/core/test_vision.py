@@ -1,6 +1,7 @@
 """The front end through its Python binding: what it refuses, what it says of pictures that show nothing, and
 that it finds beacons in a rendered world."""
 
+import math
 import re
 
 import numpy as np
@@ -11,6 +12,7 @@ from bslam.core.build import LIBRARY_DIR
 from bslam.core.vision import FrontEnd
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
+from bslam.modelfile import BeaconClass
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, make_world, walk
 
@@ -140,3 +142,15 @@ def test_the_gyro_s_noise_is_the_header_s() -> None:
     header = (LIBRARY_DIR / "vision" / "visual_gyro.h").read_text(encoding="utf-8")
     (value,) = re.findall(r"#define BSLAM_VISUAL_GYRO_SD_RADPS ([0-9.]+)f", header)
     assert float(value) == VisualGyro.SD_RADPS
+
+
+def test_measure_of_a_box_gives_what_a_sighting_needs(camera: Camera) -> None:
+    picture = plain(170)
+    picture[180:] = 80
+    picture[90:150, 120:170] = (150, 20, 20)
+    front_end = FrontEnd([camera])
+    front_end.see(picture)
+    found = front_end.measure((119.5, 89.5, 169.5, 149.5), BeaconClass("red", 0.6))
+    assert found is not None and found.bearing_rad is not None
+    assert found.bearing_rad == pytest.approx(math.atan((159.5 - 144.5) / 277.1), abs=0.004)
+    assert found.range_m == pytest.approx(0.6 * 277.1 / 60.0, rel=0.03)
