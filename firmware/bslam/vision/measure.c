@@ -109,11 +109,24 @@ static bslam_box_t box_around(const bslam_quad_t *quad)
                          .bottom_px = left_lower ? quad->bottom_left_px : quad->bottom_right_px};
 }
 
+/// The angle of a pixel as it came from the camera: what is doubled is not known better.
+static bslam_real_t camera_pixel(const bslam_outline_t *o, const bslam_camera_t *camera)
+{
+    return camera->zoom > 1 ? o->pixel * (bslam_real_t)camera->zoom : o->pixel;
+}
+
+static bslam_real_t point_variance(const bslam_outline_t *o, const bslam_camera_t *camera)
+{
+    const bslam_real_t sd = POINT_SD_PX * camera_pixel(o, camera);
+    return sd * sd;
+}
+
 static bslam_real_t bearing_variance(const bslam_outline_t *o, const bslam_camera_t *camera,
                                      bslam_real_t point_var)
 {
     const bslam_real_t width = o->left - o->right;
-    const bslam_real_t by_width = width * (BEARING_BY_WIDTH + width * BEARING_BY_WIDTH2_PX * o->pixel);
+    const bslam_real_t by_width =
+        width * (BEARING_BY_WIDTH + width * BEARING_BY_WIDTH2_PX * camera_pixel(o, camera));
     const bslam_real_t off_axis = bslam_angle_wrap(o->facing_rad - camera->yaw_rad) / OFF_AXIS_RAD;
     const bslam_real_t square = off_axis * off_axis;
     return (BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + point_var / 2 + by_width * by_width +
@@ -151,7 +164,7 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
     }
     const bslam_real_t band_m = size->top_high_m - size->top_low_m;
     const bslam_real_t place_var = (BAND_SD_M * BAND_SD_M + band_m * band_m / 12) * by_height * by_height;
-    const bslam_real_t horizon = HORIZON_SD_PX * o->pixel;
+    const bslam_real_t horizon = HORIZON_SD_PX * camera_pixel(o, camera);
     const bslam_real_t common = horizon * horizon + place_var;
     const bslam_real_t top_m = (size->top_low_m + size->top_high_m) / 2 - camera->z_m;
     const bslam_real_t bottom_m = top_m - height_m;
@@ -192,7 +205,7 @@ static bool agrees_with_width(const bslam_outline_t *o, const bslam_size_t *size
 static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
                             bool is_whole, bslam_candidate_t *candidate)
 {
-    const bslam_real_t point_var = POINT_SD_PX * POINT_SD_PX * o->pixel * o->pixel;
+    const bslam_real_t point_var = point_variance(o, camera);
     candidate->bearing_rad = bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1));
     candidate->bearing_sd_rad = bslam_sqrt(bearing_variance(o, camera, point_var));
     candidate->has_bearing = true;
@@ -230,7 +243,7 @@ static void measure_cut(const bslam_outline_t *found, const bslam_camera_t *came
     o.turn = 0;
     o.top_var = (marks & BSLAM_MARK_CUT_TOP) != 0U ? CUT_VAR : o.top_var;
     o.bottom_var = (marks & BSLAM_MARK_CUT_BOTTOM) != 0U ? CUT_VAR : o.bottom_var;
-    const ahead_t ahead = ahead_of(&o, camera, size, POINT_SD_PX * POINT_SD_PX * o.pixel * o.pixel);
+    const ahead_t ahead = ahead_of(&o, camera, size, point_variance(&o, camera));
     if (!(ahead.inverse > 0) || !(ahead.relative_var < 1)) {
         return;
     }
