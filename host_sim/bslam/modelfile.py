@@ -72,7 +72,8 @@ class BeaconClass:
     height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known. top_low_m to
     top_high_m: how high its upper side is above the floor; 0: not known. looks_sd: by what part a distance
     from its height errs because of its looks, a pale rim say. width_m: of what is as wide from every side.
-    narrow_m to wide_m: how wide its front is; 0: not known.
+    narrow_m to wide_m: how wide its front is; 0: not known. scale_sd: by what part all distances of one thing
+    err alike, what it may be mistaken for included; 0: not known.
     """
 
     name: str
@@ -84,6 +85,7 @@ class BeaconClass:
     width_m: float = 0.0
     narrow_m: float = 0.0
     wide_m: float = 0.0
+    scale_sd: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ typedef struct bslam_beacon_class {
     float width_m;     ///< of what is as wide from every side; 0: it is not, or not known
     float narrow_m;    ///< its front is so wide at least,
     float wide_m;      ///< and at most; 0: not known
+    float scale_sd;    ///< by what part all distances of one thing err alike, mistaken kinds included; 0: not
+                       ///< known
 } bslam_beacon_class_t;
 
 /// The detector for one kind of lens.

@@ -115,6 +115,7 @@ typedef struct bslam_candidate {
     bslam_real_t range_sd_m;
     bslam_real_t
         range_noise_sd_m;  ///< the part of it that is another one in each frame; the rest is the thing's
+    bslam_real_t range_scale_sd;  ///< by what part all distances of the thing err alike
     bool has_bearing;
     bool has_range;
     uint8_t beacon_class;  ///< 1 + index in the model's class table; BSLAM_CLASS_NONE if unsure

@@ -60,8 +60,8 @@ static bslam_status_t check_size(const bslam_size_t *size)
     const bslam_real_t lengths_m[] = {size->height_m, size->depth_m,  size->top_low_m, size->top_high_m,
                                       size->width_m,  size->narrow_m, size->wide_m};
     bool in_range = size->top_low_m <= size->top_high_m && size->narrow_m <= size->wide_m &&
-                    bslam_in_range(size->looks_sd, 0, 1);
-    bool are_numbers = bslam_is_number(size->looks_sd);
+                    bslam_in_range(size->looks_sd, 0, 1) && bslam_in_range(size->scale_sd, 0, 1);
+    bool are_numbers = bslam_is_number(size->looks_sd) && bslam_is_number(size->scale_sd);
     for (int32_t i = 0; i < (int32_t)(sizeof lengths_m / sizeof lengths_m[0]); i++) {
         in_range = in_range && bslam_in_range(lengths_m[i], 0, SIZE_MAX_M);
         are_numbers = are_numbers && bslam_is_number(lengths_m[i]);
@@ -223,6 +223,8 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     candidate->range_m = bslam_sqrt(1 + o->middle * o->middle) / ahead.inverse;
     candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
     candidate->range_noise_sd_m = candidate->range_m * bslam_sqrt(ahead.noise_var);
+    candidate->range_scale_sd =
+        size->scale_sd > 0 ? size->scale_sd : bslam_sqrt(relative_var - ahead.noise_var);
     candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
 }
 

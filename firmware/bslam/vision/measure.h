@@ -15,6 +15,7 @@ typedef struct bslam_size {
     bslam_real_t narrow_m;    ///< its front is so wide at least,
     bslam_real_t wide_m;      ///< and at most; 0: not known
     bslam_real_t looks_sd;    ///< what its looks make of a distance by its height, as a fraction
+    bslam_real_t scale_sd;    ///< by what part all its distances err alike; 0: as the error of one tells
 } bslam_size_t;
 
 /// Refines the rough box and fills the candidate's outline, bearing, range, marks and signature; its class,

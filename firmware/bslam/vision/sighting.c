@@ -12,14 +12,6 @@ static bslam_real_t hypotenuse(bslam_real_t a, bslam_real_t b)
     return bslam_sqrt(a * a + b * b);
 }
 
-/// The part of a distance's error that is the thing's, as a fraction of the distance.
-static bslam_real_t scale_sd(const bslam_candidate_t *candidate)
-{
-    const bslam_real_t sum = candidate->range_sd_m + candidate->range_noise_sd_m;
-    const bslam_real_t difference = candidate->range_sd_m - candidate->range_noise_sd_m;
-    return difference > 0 ? bslam_sqrt(sum * difference) / candidate->range_m : 0;
-}
-
 bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate)
 {
     bslam_sighting_t sighting = {
@@ -33,7 +25,7 @@ bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate)
     if (candidate->has_range) {
         sighting.range_m = candidate->range_m;
         sighting.range_sd_m = hypotenuse(candidate->range_noise_sd_m, RANGE_BIAS * candidate->range_m);
-        sighting.range_scale_sd = scale_sd(candidate);
+        sighting.range_scale_sd = candidate->range_scale_sd;
     }
     return sighting;
 }

@@ -275,6 +275,7 @@ static bslam_size_t size_of(const bslam_beacon_class_t *kind)
         .width_m = (bslam_real_t)kind->width_m,
         .narrow_m = (bslam_real_t)kind->narrow_m,
         .wide_m = (bslam_real_t)kind->wide_m,
+        .scale_sd = (bslam_real_t)kind->scale_sd,
     };
 }
 

@@ -266,6 +266,20 @@ static void test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow(void 
     assert_near(rimmed.range_sd_m / rimmed.range_m, sqrt(relative * relative + 0.08 * 0.08), 1e-5);
 }
 
+static void test_measure_says_what_all_distances_share_by_the_kind_or_by_what_is_no_noise(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0, 0);
+    bslam_size_t size = POSTER_SIZE;
+    size.looks_sd = BSLAM_R(0.08);
+    const bslam_candidate_t by_error = measured(&camera, &panel, &size);
+    const double all = (double)(by_error.range_sd_m / by_error.range_m);
+    const double noise = (double)(by_error.range_noise_sd_m / by_error.range_m);
+    assert_near(by_error.range_scale_sd, sqrt(all * all - noise * noise), 1e-5);
+    size.scale_sd = BSLAM_R(0.03);
+    assert_near(measured(&camera, &panel, &size).range_scale_sd, 0.03, 1e-7);
+}
+
 static void test_measure_marks_what_is_small(void **state)
 {
     // 4.6 px wide and 46 px high; 69 px wide and 7.4 px high.
@@ -319,17 +333,20 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
     } sizes[] = {{NAN, 0, BSLAM_E_NOT_FINITE}, {1, NAN, BSLAM_E_NOT_FINITE}, {-1, 0, BSLAM_E_RANGE},
                  {11, 0, BSLAM_E_RANGE},       {1, -0.1, BSLAM_E_RANGE},     {1, 2.1, BSLAM_E_RANGE}};
     const struct {
-        double low_m, high_m, looks_sd;
+        double low_m, high_m, looks_sd, scale_sd;
         bslam_status_t status;
-    } bands[] = {{NAN, 1, 0, BSLAM_E_NOT_FINITE}, {1, NAN, 0, BSLAM_E_NOT_FINITE},
-                 {1, 1, NAN, BSLAM_E_NOT_FINITE}, {2, 1, 0, BSLAM_E_RANGE},
-                 {-1, 1, 0, BSLAM_E_RANGE},       {1, 11, 0, BSLAM_E_RANGE},
-                 {1, 1, -0.1, BSLAM_E_RANGE},     {1, 1, 1.1, BSLAM_E_RANGE}};
+    } bands[] = {{NAN, 1, 0, 0, BSLAM_E_NOT_FINITE}, {1, NAN, 0, 0, BSLAM_E_NOT_FINITE},
+                 {1, 1, NAN, 0, BSLAM_E_NOT_FINITE}, {1, 1, 0, NAN, BSLAM_E_NOT_FINITE},
+                 {2, 1, 0, 0, BSLAM_E_RANGE},        {-1, 1, 0, 0, BSLAM_E_RANGE},
+                 {1, 11, 0, 0, BSLAM_E_RANGE},       {1, 1, -0.1, 0, BSLAM_E_RANGE},
+                 {1, 1, 1.1, 0, BSLAM_E_RANGE},      {1, 1, 0, -0.1, BSLAM_E_RANGE},
+                 {1, 1, 0, 1.1, BSLAM_E_RANGE}};
     for (int i = 0; i < COUNT_OF(bands); i++) {
         const bslam_size_t size = {.height_m = 1,
                                    .top_low_m = real(bands[i].low_m),
                                    .top_high_m = real(bands[i].high_m),
-                                   .looks_sd = real(bands[i].looks_sd)};
+                                   .looks_sd = real(bands[i].looks_sd),
+                                   .scale_sd = real(bands[i].scale_sd)};
         assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &size, &candidate), bands[i].status);
     }
     for (int i = 0; i < COUNT_OF(sizes); i++) {
@@ -360,6 +377,7 @@ int main(void)
         cmocka_unit_test(test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim),
         cmocka_unit_test(test_measure_takes_no_distance_where_height_and_width_contradict_each_other),
         cmocka_unit_test(test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow),
+        cmocka_unit_test(test_measure_says_what_all_distances_share_by_the_kind_or_by_what_is_no_noise),
         cmocka_unit_test(test_measure_marks_what_is_small),
         cmocka_unit_test(test_measure_marks_what_is_slanted),
         cmocka_unit_test(test_measure_refuses_bad_input_and_leaves_the_candidate),
