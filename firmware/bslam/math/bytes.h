@@ -73,6 +73,31 @@ static inline uint32_t bslam_bytes_apart(uint32_t a, uint32_t b)
     return bslam_bytes_less(a, b) | bslam_bytes_less(b, a);
 }
 
+/// Half of each byte of a and that of b together, rounded down.
+static inline uint32_t bslam_bytes_mean(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __uhadd8(a, b);
+#else
+    return (a & b) + ((a ^ b) >> 1 & ~BSLAM_TOP_BITS);
+#endif
+}
+
+/// Each byte of a less that of b as a signed byte, within +-127.
+static inline uint32_t bslam_bytes_difference(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    // From -128, where the subtraction stops, to -127: one less, as far as it goes, and one more.
+    const int8x4_t less = __qsub8((int8x4_t)(a ^ BSLAM_TOP_BITS), (int8x4_t)(b ^ BSLAM_TOP_BITS));
+    return (uint32_t)__sadd8(__qadd8(less, -1), 0x01010101);
+#else
+    const uint32_t more = bslam_bytes_least(bslam_bytes_less(a, b), ~BSLAM_TOP_BITS);
+    const uint32_t less = bslam_bytes_least(bslam_bytes_less(b, a), ~BSLAM_TOP_BITS);
+    // 0 - less in each byte, of which one of the two is 0: no borrow crosses bytes.
+    return more | ((BSLAM_TOP_BITS - less) ^ BSLAM_TOP_BITS);
+#endif
+}
+
 /// 1 in each byte where that of a is larger than that of b, else 0.
 static inline uint32_t bslam_bytes_above(uint32_t a, uint32_t b)
 {

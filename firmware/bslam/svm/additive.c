@@ -83,14 +83,21 @@ static uint16_t share_between(float x, float low, float high)
     return (uint16_t)(within * (float)BSLAM_SHARE_ONE + 0.5f);
 }
 
+_Static_assert(BSLAM_KNOTS == 9, "eight intervals, found by halves");
+
+/// Between which knots x lies, the lower one; beyond all of them in the outermost interval.
+static int32_t interval_of(float x, const float *knots)
+{
+    int32_t k = x >= knots[4] ? 4 : 0;
+    k += x >= knots[k + 2] ? 2 : 0;
+    return k + (x >= knots[k + 1] ? 1 : 0);
+}
+
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place)
 {
     const float *knots = machine->knots;
     for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
-        int32_t k = 0;
-        while (k < BSLAM_KNOTS - 2 && x[i] >= knots[k + 1]) {
-            k++;
-        }
+        const int32_t k = interval_of(x[i], knots);
         place->curves[i].at = (uint16_t)(i * BSLAM_KNOTS + k);
         place->curves[i].share = share_between(x[i], knots[k], knots[k + 1]);
     }

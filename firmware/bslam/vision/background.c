@@ -44,6 +44,28 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
+#if BSLAM_HAS_BYTES
+
+static uint32_t logs_of(const uint8_t *channel)
+{
+    return tone_log[channel[0]] | (uint32_t)tone_log[channel[1]] << 8 | (uint32_t)tone_log[channel[2]] << 16 |
+           (uint32_t)tone_log[channel[3]] << 24;
+}
+
+/// Light and chroma of the frame's cells; tables have room for a whole word beyond them.
+static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_t *tones)
+{
+    for (int32_t i = 0; i < count; i += BSLAM_WORD_BYTES) {
+        const uint32_t red = logs_of(cells->red + i), green = logs_of(cells->green + i);
+        const uint32_t blue = logs_of(cells->blue + i);
+        bslam_word_put(tones->light + i, bslam_bytes_mean(bslam_bytes_mean(red, blue), green));
+        bslam_word_put(tones->reddish + i, bslam_bytes_difference(red, green));
+        bslam_word_put(tones->bluish + i, bslam_bytes_difference(blue, green));
+    }
+}
+
+#else
+
 /// Chroma from the logarithms of two channels, within +-127.
 static int8_t chroma_of(int32_t colour, int32_t green)
 {
@@ -51,17 +73,26 @@ static int8_t chroma_of(int32_t colour, int32_t green)
     return (int8_t)(chroma < -127 ? -127 : chroma);
 }
 
-void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
+/// Light and chroma of the frame's cells.
+static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_t *tones)
 {
-    const int32_t count = frame->rows * frame->columns;
-    const uint8_t *reds = frame->cells->red, *greens = frame->cells->green, *blues = frame->cells->blue;
+    const uint8_t *reds = cells->red, *greens = cells->green, *blues = cells->blue;
     for (int32_t i = 0; i < count; i++) {
         const int32_t red = tone_log[reds[i]], green = tone_log[greens[i]], blue = tone_log[blues[i]];
         tones->light[i] = (uint8_t)((red + 2 * green + blue) >> 2);
         tones->reddish[i] = chroma_of(red, green);
         tones->bluish[i] = chroma_of(blue, green);
     }
+}
+
+#endif
+
+void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
+{
+    const int32_t count = frame->rows * frame->columns;
+    const uint8_t *reds = frame->cells->red, *greens = frame->cells->green;
     const uint8_t *spreads = frame->cells->spread;
+    fill_colours(frame->cells, count, tones);
     for (int32_t i = 0; i < count; i++) {
         const uint32_t luma = greens[i] + reds[i] / 2U;  // as thumbnail.c weighs it for the spread
         const uint32_t part = 128U * spreads[i] / (luma + 8);

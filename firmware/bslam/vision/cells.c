@@ -284,7 +284,8 @@ static void decide_row(const bslam_view_t *view, const bslam_cell_tables_t *bins
     const int16_t *floor_row = view->floor_line->row;
     const uint32_t by_distance = bslam_halves(w[4], w[5]);
     const int32_t by_nearest = w[6], by_colour = w[15], by_wall = w[20];
-    for (int32_t i = 0; i < view->frame->columns; i++) {
+    const int32_t columns = view->frame->columns;
+    for (int32_t i = 0; i < columns; i++) {
         const bslam_light_terms_t *a = &channels->light[lights[i]];
         const bslam_chroma_terms_t *b = &channels->reddish[reddish[i]], *c = &channels->bluish[bluish[i]];
         const uint32_t distances =

@@ -85,21 +85,39 @@ static uint8_t mean_step(const bslam_view_t *view, const side_t *side)
     return (uint8_t)(4 * sum / (bottom - top));
 }
 
-/// A lens that bends uprights: foot, middle and top of the line that crosses the horizon in this column.
-static bool bend(const bslam_view_t *view, const upright_t *kind, side_t *side)
+/// Through a lens that bends uprights: where the wall stands in each column, horizontally, from the camera;
+/// worked out once for all kinds.
+typedef struct wall {
+    bslam_real_t x_m[BSLAM_COLUMNS_MAX], y_m[BSLAM_COLUMNS_MAX];
+    bool is_seen[BSLAM_COLUMNS_MAX];
+} wall_t;
+
+static void find_wall(const bslam_view_t *view, wall_t *wall)
 {
     const bslam_camera_t *camera = view->camera;
-    const bslam_real_t u_px = (bslam_real_t)(side->column * BSLAM_CELL_PX) + BSLAM_R(1.5);
-    bslam_direction_t ahead;
     const bslam_real_t v_px = bslam_horizon_px(camera);
-    if (bslam_camera_unproject_as(camera, &view->mounting, u_px, v_px, &ahead) != BSLAM_OK) {
+    for (int32_t column = 0; column < view->frame->columns; column++) {
+        const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
+        const bslam_real_t distance_m = view->floor_line->distance_m[column];
+        bslam_direction_t ahead = {0};
+        wall->is_seen[column] =
+            bslam_camera_unproject_as(camera, &view->mounting, u_px, v_px, &ahead) == BSLAM_OK;
+        const bslam_real_t flat = bslam_sqrt(ahead.x * ahead.x + ahead.y * ahead.y);
+        wall->x_m[column] = ahead.x * distance_m / flat;
+        wall->y_m[column] = ahead.y * distance_m / flat;
+    }
+}
+
+/// A lens that bends uprights: foot, middle and top of the line that crosses the horizon in this column.
+static bool bend(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+{
+    const bslam_camera_t *camera = view->camera;
+    if (!wall->is_seen[side->column]) {
         return false;
     }
-    const bslam_real_t flat = bslam_sqrt(ahead.x * ahead.x + ahead.y * ahead.y);
-    const bslam_real_t distance_m = view->floor_line->distance_m[side->column];
     for (int32_t i = 0; i < 3; i++) {
         const float height_m = kind->bottom_m + 0.5f * (float)i * (kind->top_m - kind->bottom_m);
-        const bslam_direction_t there = {ahead.x * distance_m / flat, ahead.y * distance_m / flat,
+        const bslam_direction_t there = {wall->x_m[side->column], wall->y_m[side->column],
                                          (bslam_real_t)height_m - camera->z_m};
         bslam_real_t u = 0, v = 0;
         if (bslam_camera_project_as(camera, &view->mounting, &there, &u, &v) != BSLAM_OK) {
@@ -112,7 +130,8 @@ static bool bend(const bslam_view_t *view, const upright_t *kind, side_t *side)
 }
 
 /// Where the kind would stand in a column. False: it would leave the frame, or the floor line is not known.
-static bool place(const bslam_view_t *view, const upright_t *kind, int32_t column, side_t *side)
+static bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, int32_t column,
+                  side_t *side)
 {
     const float camera_m = (float)view->camera->z_m;
     const float horizon_px = (float)bslam_horizon_px(view->camera);
@@ -127,7 +146,7 @@ static bool place(const bslam_view_t *view, const upright_t *kind, int32_t colum
         side->u_px[i] = (float)(column * BSLAM_CELL_PX) + 1.5f;
         side->v_px[i] = horizon_px - side->metre_px * (height_m - camera_m);
     }
-    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT && !bend(view, kind, side)) {
+    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT && !bend(view, wall, kind, side)) {
         return false;
     }
     // In positive form: a camera on the floor gives no number.
@@ -144,14 +163,15 @@ static bool shows_much(const bslam_view_t *view)
 }
 
 /// The strongest sides of a kind, in order of columns.
-static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_t sides[SIDES_MAX])
+static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const upright_t *kind,
+                          side_t sides[SIDES_MAX])
 {
     const int32_t limit = shows_much(view) ? SIDES_MAX : SIDES_FEW;
     uint8_t steps[BSLAM_COLUMNS_MAX];
     const int32_t columns = view->frame->columns;
     side_t side = {0};
     for (int32_t column = 0; column < columns; column++) {
-        const bool stands = place(view, kind, column, &side);
+        const bool stands = place(view, wall, kind, column, &side);
         steps[column] = stands ? mean_step(view, &side) : 0;
     }
     int32_t count = 0;
@@ -171,7 +191,7 @@ static int32_t find_sides(const bslam_view_t *view, const upright_t *kind, side_
             memmove(&sides[at], &sides[at + 1], (size_t)(count - 1 - at) * sizeof sides[0]);
             at = --count;
         }
-        (void)place(view, kind, column, &sides[at]);
+        (void)place(view, wall, kind, column, &sides[at]);
         sides[at].step = (float)step;
         count++;
     }
@@ -303,9 +323,13 @@ static void propose_cut(bslam_proposals_t *proposals, const bslam_view_t *view, 
 
 void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view)
 {
+    wall_t wall;
+    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT) {
+        find_wall(view, &wall);
+    }
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
         side_t sides[SIDES_MAX] = {0};
-        const int32_t count = find_sides(view, &uprights[kind], sides);
+        const int32_t count = find_sides(view, &wall, &uprights[kind], sides);
         propose_pairs(proposals, view, sides, count, kind);
         propose_cut(proposals, view, sides, count, kind, true);
         propose_cut(proposals, view, sides, count, kind, false);
