@@ -41,8 +41,9 @@ else
 firmware: $(if $(filter $(TARGET),$(BOARDS)),image,library)-$(TARGET) ## build for TARGET: a core or a board
 endif
 
-# What costs flash at -Os: loops that become calls of memmove, which nothing else needs.
-SMALLER := -fno-tree-loop-distribute-patterns
+# What costs flash at -Os: loops that become calls of memmove, which nothing else needs; constants of a loop
+# kept in registers, which are saved and restored for it; functions with one caller, inlined with the same end.
+SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inline-functions-called-once
 
 # The rules for one core: $(1) is its name.
 define core_rules

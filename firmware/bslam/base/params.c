@@ -14,12 +14,27 @@
 static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)};
 
 /// What checking needs: tables of their own, so that a linker drops the names where nobody asks for them.
-/// Limits, and where a field stands in the struct, which is a multiple of 4: an odd number for an integer.
+/// Limits are a few numbers again and again, so each stands once, and a limit is a byte: its place among
+/// them, which the compiler finds. Where a field stands in the struct is a multiple of 4: an odd number for
+/// an integer.
+// clang-format off
+#define BOUNDS(BOUND, x) \
+    BOUND(x, 0, 0.0) BOUND(x, 1, 1.0) BOUND(x, 2, 2.0) BOUND(x, 3, 4.0) BOUND(x, 4, 32.0) \
+    BOUND(x, 5, 1e-9) BOUND(x, 6, 1e-6) BOUND(x, 7, 1e-4) BOUND(x, 8, 1e-3) BOUND(x, 9, 0.1) \
+    BOUND(x, 10, 3.2) BOUND(x, 11, -3.2) BOUND(x, 12, 10.0) BOUND(x, 13, 100.0) BOUND(x, 14, -100.0) \
+    BOUND(x, 15, 250.0) BOUND(x, 16, 1e3) BOUND(x, 17, 1024.0) BOUND(x, 18, 1e6) BOUND(x, 19, -1e6) \
+    BOUND(x, 20, 4e6) BOUND(x, 21, 1e7) BOUND(x, 22, 1e9)
+// clang-format on
+#define NUMBER(x, place, bound) [place] = BSLAM_R(bound),
+#define PLACE_IF(x, place, bound) (bslam_real_t)(x) == (bslam_real_t)BSLAM_R(bound) ? (place):
+static const bslam_real_t bounds[] = {BOUNDS(NUMBER, )};
+#define BOUND_AT(x) (uint8_t)(BOUNDS(PLACE_IF, x) UINT8_MAX)
+
 typedef struct limits {
-    bslam_real_t low, high;
+    uint8_t low, high;
 } limits_t;
-#define LIMITS_REAL(name, value, low, high, meaning) {BSLAM_R(low), BSLAM_R(high)},
-#define LIMITS_INTEGER(name, value, low, high, meaning) {(bslam_real_t)(low), (bslam_real_t)(high)},
+#define LIMITS_REAL(name, value, low, high, meaning) {BOUND_AT(BSLAM_R(low)), BOUND_AT(BSLAM_R(high))},
+#define LIMITS_INTEGER(name, value, low, high, meaning) {BOUND_AT(low), BOUND_AT(high)},
 static const limits_t limits[] = {BSLAM_PARAMS(LIMITS_REAL, LIMITS_INTEGER)};
 #define PLACE_REAL(name, value, low, high, meaning) (uint16_t)offsetof(bslam_params_t, name),
 #define PLACE_INTEGER(name, value, low, high, meaning) (uint16_t)(offsetof(bslam_params_t, name) + 1),
@@ -33,6 +48,16 @@ static bool is_integer(int id)
 static size_t offset_of(int id)
 {
     return places[id] / 2 * (size_t)2;
+}
+
+static bslam_real_t low_of(int id)
+{
+    return bounds[limits[id].low];
+}
+
+static bslam_real_t high_of(int id)
+{
+    return bounds[limits[id].high];
 }
 
 #define PARAMS_COUNT ((int)(sizeof limits / sizeof limits[0]))
@@ -74,7 +99,7 @@ bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
 
 bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value)
 {
-    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, limits[id].low, limits[id].high)) {
+    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, low_of(id), high_of(id))) {
         return BSLAM_E_PARAMETER;
     }
     void *target = (unsigned char *)params + offset_of(id);
@@ -102,13 +127,13 @@ static int id_at(size_t offset)
 
 static bool is_allowed(const bslam_params_t *params, int id)
 {
-    const limits_t *of = &limits[id];
+    const bslam_real_t low = low_of(id), high = high_of(id);
     if (is_integer(id)) {
         // As integers: a float does not hold every int32_t.
         const int32_t value = *(const int32_t *)field(params, id);
-        return value >= (int32_t)of->low && value <= (int32_t)of->high;
+        return value >= (int32_t)low && value <= (int32_t)high;
     }
-    return bslam_in_range(*(const bslam_real_t *)field(params, id), of->low, of->high);
+    return bslam_in_range(*(const bslam_real_t *)field(params, id), low, high);
 }
 
 bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)
