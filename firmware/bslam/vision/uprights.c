@@ -321,6 +321,17 @@ static void propose_cut(bslam_proposals_t *proposals, const bslam_view_t *view, 
     }
 }
 
+/// Not to be inlined: each function has a kilobyte of stack at most.
+__attribute__((noinline)) static void propose_kind(bslam_proposals_t *proposals, const bslam_view_t *view,
+                                                   const wall_t *wall, int32_t kind)
+{
+    side_t sides[SIDES_MAX] = {0};
+    const int32_t count = find_sides(view, wall, &uprights[kind], sides);
+    propose_pairs(proposals, view, sides, count, kind);
+    propose_cut(proposals, view, sides, count, kind, true);
+    propose_cut(proposals, view, sides, count, kind, false);
+}
+
 void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view)
 {
     wall_t wall;
@@ -328,10 +339,6 @@ void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *vi
         find_wall(view, &wall);
     }
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-        side_t sides[SIDES_MAX] = {0};
-        const int32_t count = find_sides(view, &wall, &uprights[kind], sides);
-        propose_pairs(proposals, view, sides, count, kind);
-        propose_cut(proposals, view, sides, count, kind, true);
-        propose_cut(proposals, view, sides, count, kind, false);
+        propose_kind(proposals, view, &wall, kind);
     }
 }
