@@ -92,7 +92,7 @@ bool bslam_map_owns(const bslam_slam_t *slam, int32_t slot)
 
 uint32_t bslam_map_machine_number(const bslam_slam_t *slam, int32_t slot)
 {
-    if (slam->looks == NULL || slot < 0 || slot >= BSLAM_LEARNER_SLOTS || !bslam_map_owns(slam, slot)) {
+    if (slot < 0 || !bslam_map_owns(slam, slot)) {
         return BSLAM_MAP_NO_MACHINE;
     }
     uint32_t number = 0;

@@ -195,14 +195,15 @@ static void read_beacons(bslam_passage_t *passage, const header_t *header, const
 // ---- mean and covariance ----------------------------------------------------------------------------------
 
 /// A value of the covariance, read out of turn: the diagonal.
-static bslam_real_t variance_at(const bslam_passage_t *passage, uint32_t covariance_at, uint32_t i)
+static bslam_real_t variance_at(bslam_passage_t *passage, uint32_t covariance_at, uint32_t i)
 {
     uint8_t bytes[4] = {0};
     const uint32_t at = covariance_at + REAL_BYTES * (i * (i + 1) / 2 + i);
-    if (passage->source->size < at + REAL_BYTES ||
-        !passage->source->read(passage->source->context, at, bytes, REAL_BYTES)) {
+    if (passage->source->size < at + REAL_BYTES) {
         return 0;
     }
+    bslam_passage_require(passage, passage->source->read(passage->source->context, at, bytes, REAL_BYTES),
+                          BSLAM_MAP_UNREADABLE);
     return (bslam_real_t)bslam_passage_float_of((uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 |
                                                 (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
 }

@@ -33,6 +33,19 @@ static uint32_t covariance_at(void)
     return values_at() + 4u * (uint32_t)(slam.ekf.dim - slam.ekf.base_dim);
 }
 
+/// Where the first machine stands in the blob, and its rivals.
+static uint32_t machine_at(void)
+{
+    return covariance_at() + 4u * (uint32_t)((slam.ekf.dim - 3) * (slam.ekf.dim - 2) / 2);
+}
+
+static uint32_t rivals_at(void)
+{
+    const uint32_t machine = machine_at();
+    assert_true(bytes[machine + 2] > 0);
+    return machine + 152 + 73u * bytes[machine];
+}
+
 static void put_u32(uint32_t at, uint32_t value)
 {
     for (int i = 0; i < 4; i++) {
@@ -301,7 +314,7 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
     const uint32_t v = values_at();
     const uint32_t p = covariance_at();
     const uint32_t first = BEACONS_AT;
-    const uint32_t machine = p + 4u * (uint32_t)((slam.ekf.dim - 3) * (slam.ekf.dim - 2) / 2);
+    const uint32_t machine = machine_at();
     const wrong_t cases[] = {
         {"magic", 0, 0x4d4c5343, BSLAM_MAP_NO_MAP},
         {"byte order", 4, 0x00010201, BSLAM_MAP_BYTE_ORDER},
@@ -342,10 +355,72 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
     }
 }
 
+static void test_map_load_with_a_rival_that_is_no_sample_is_refused(void **state)
+{
+    const uint32_t wrong[] = {0x00ff | 1u << 8, 0 | 4u << 8, (BSLAM_SEEDS_MAX) | 255u << 8};
+    for (int i = 0; i < COUNT_OF(wrong); i++) {
+        setup(NULL);
+        put_u32(rivals_at(), wrong[i]);
+        seal();
+        assert_refused(BSLAM_MAP_CONTENT);
+    }
+}
+
+static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
+{
+    load(BSLAM_MAP_LIVING);
+    const int rivals = other_looks.learner.machines[0].rivals;
+    put_u32(rivals_at(), 3 | 255u << 8);
+    seal();
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(other_looks.learner.machines[0].rivals, rivals - 1);
+}
+
+/// Bytes of a map from a source that fails for good after so many reads.
+static int reads_left;
+
+static bool read_while_it_lasts(const void *context, uint32_t at, void *to, uint32_t count)
+{
+    const uint8_t *from = context;
+    memcpy(to, &from[at], count);
+    reads_left--;
+    return reads_left >= 0;
+}
+
 static void test_map_load_where_the_source_fails_is_refused(void **state)
 {
-    put_float(values_at(), 1.0f);
-    assert_refused(BSLAM_MAP_BAD_CRC);
+    static bslam_slam_t before;
+    const bslam_map_source_t source = {read_while_it_lasts, bytes, size};
+    reads_left = INT32_MAX;
+    assert_int_equal(bslam_map_check(&source), BSLAM_MAP_FINE);
+    const int reads = INT32_MAX - reads_left;
+    memcpy(&before, &slam, sizeof slam);
+    for (int read = 0; read < reads; read++) {
+        bslam_map_fault_t fault = BSLAM_MAP_FINE;
+        reads_left = read;
+        assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
+        assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+        assert_memory_equal(&slam, &before, sizeof slam);
+    }
+}
+
+/// What was whole when it was looked at, and cannot be read a moment later: there is no map then, rather than
+/// half of one.
+static void test_map_load_where_the_source_fails_after_the_check_leaves_no_map(void **state)
+{
+    const bslam_map_source_t source = {read_while_it_lasts, bytes, size};
+    reads_left = INT32_MAX;
+    assert_int_equal(bslam_map_check(&source), BSLAM_MAP_FINE);
+    reads_left = INT32_MAX - reads_left + 20;
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_true(slam.is_lost);
+}
+
+static void test_map_faults_have_names(void **state)
+{
     for (int fault = 0; fault < BSLAM_MAP_FAULT_COUNT; fault++) {
         assert_true(strlen(bslam_map_fault_name((bslam_map_fault_t)fault)) > 3);
     }
@@ -377,7 +452,11 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_with_a_byte_too_many_is_refused, setup),
         cmocka_unit_test_setup(test_map_check_finds_every_flipped_bit, setup),
         cmocka_unit_test_setup(test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name, setup),
+        cmocka_unit_test_setup(test_map_load_with_a_rival_that_is_no_sample_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_where_the_source_fails_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_where_the_source_fails_after_the_check_leaves_no_map, setup),
+        cmocka_unit_test(test_map_faults_have_names),
         cmocka_unit_test_setup(test_map_write_into_too_little_room_says_so, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,3 +1,4 @@
+#include "bslam/store/crc32.h"
 #include "kept_map.h"
 
 static bslam_slam_t old_slam;
@@ -157,6 +158,52 @@ static void test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_nex
     assert_true(loads_new());
 }
 
+/// A head whose check sum is right, but which says more than the area holds, is no save.
+static void test_slots_head_that_says_too_much_is_no_save(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    save(&new_slam, BSLAM_OK);
+    for (int slot = 0; slot < BSLAM_SLOTS; slot++) {
+        uint8_t *head = flash.slots[slot];
+        if (memcmp(&head[16], new_bytes, new_size) == 0) {
+            const uint32_t length = sizeof flash.slots[0] - 15;
+            memcpy(&head[8], &length, 4);
+            const uint32_t crc = ~bslam_crc32_add(BSLAM_CRC32_START, head, 12);
+            memcpy(&head[12], &crc, 4);
+        }
+    }
+    assert_false(loads_new());
+}
+
+/// Whole pieces are written: an area that ends within the map's last one does not hold it.
+static void test_slots_area_that_ends_within_the_last_piece_is_too_small(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    bslam_flash_t small = kept_flash(&flash);
+    small.slot_bytes = 16 + new_size;
+    assert_true(small.slot_bytes % BSLAM_FLASH_PIECE != 0);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_slots_save(&small, &new_slam, &fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+    assert_false(loads_new());
+}
+
+static void test_slots_map_that_ends_with_a_piece_is_saved_as_any(void **state)
+{
+    static bslam_slam_t slam;
+    static uint8_t kept[KEPT_BYTES_MAX];
+    static uint8_t again[KEPT_BYTES_MAX];
+    bslam_map_fault_t fault;
+    (void)make_kept(&slam, 2, kept);
+    assert_int_equal(bslam_slam_remove_beacon(&slam, slam.ekf.beacons[2].uid), BSLAM_OK);
+    const uint32_t size = kept_write(&slam, kept);
+    assert_int_equal(size % BSLAM_FLASH_PIECE, 0);
+    save(&slam, BSLAM_OK);
+    assert_int_equal(load(&fault), BSLAM_OK);
+    assert_int_equal(kept_write(&loaded, again), size);
+    assert_memory_equal(again, kept, size);
+}
+
 static void test_slots_a_map_larger_than_a_slot_is_refused_and_the_old_stays(void **state)
 {
     save(&old_slam, BSLAM_OK);
@@ -176,6 +223,9 @@ int main(void)
         cmocka_unit_test_setup(test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new, setup),
         cmocka_unit_test_setup(test_slots_saves_cut_at_any_two_bytes_leave_the_old_map, setup),
         cmocka_unit_test_setup(test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next, setup),
+        cmocka_unit_test_setup(test_slots_head_that_says_too_much_is_no_save, setup),
+        cmocka_unit_test_setup(test_slots_area_that_ends_within_the_last_piece_is_too_small, setup),
+        cmocka_unit_test_setup(test_slots_map_that_ends_with_a_piece_is_saved_as_any, setup),
         cmocka_unit_test_setup(test_slots_a_map_larger_than_a_slot_is_refused_and_the_old_stays, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
