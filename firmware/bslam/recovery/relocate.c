@@ -142,8 +142,11 @@ static bool pose_of_three(const bslam_clue_t *a, const bslam_clue_t *b, const bs
     }
     pose->x_m = b->x_m + k31 * (y12 - y23) / d;
     pose->y_m = b->y_m + k31 * (x23 - x12) / d;
+    if (!bslam_is_number(pose->x_m) || !bslam_is_number(pose->y_m)) {
+        return false;
+    }
     pose->theta_rad = bslam_angle_wrap(bslam_atan2(a->y_m - pose->y_m, a->x_m - pose->x_m) - direction_of(a));
-    return bslam_is_number(pose->x_m) && bslam_is_number(pose->y_m);
+    return true;
 }
 
 // ---- refining ---------------------------------------------------------------------------------------------

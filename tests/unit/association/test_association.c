@@ -105,6 +105,29 @@ static void test_known_repeated_label_leaves_the_first(void **state)
     assert_rejected(&d.matches[4], BSLAM_REASON_DUPLICATE);
 }
 
+/// A sighting far from all that a label may be starts another rival, but not without end.
+static void test_known_label_has_so_many_rivals_and_no_more(void **state)
+{
+    enum { RIVALS = 8 };
+    bslam_params_t params = unit_params();
+    params.gate_d2 = BSLAM_R(13.8);
+    static double places[RIVALS][2];
+    for (int i = 0; i < RIVALS; i++) {
+        places[i][0] = -4;
+        places[i][1] = i;
+    }
+    for (int rivals = 1; rivals <= RIVALS; rivals++) {
+        bslam_ekf_t ekf = unit_map_of(&params, places, rivals);
+        for (int b = 0; b < rivals; b++) {
+            ekf.beacons[b].label = 10;
+            ekf.beacons[b].confirmed = false;
+        }
+        const bslam_sighting_t far = unit_polar(0, 4, 10);
+        const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, &far, 1);
+        assert_int_equal(d.matches[0].verdict, rivals < RIVALS ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH);
+    }
+}
+
 static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **state)
 {
     const bslam_params_t params = unit_params();
@@ -375,6 +398,7 @@ int main(void)
         cmocka_unit_test(test_known_label_of_the_map_is_a_match_and_another_is_new),
         cmocka_unit_test(test_known_sighting_without_a_label_is_rejected),
         cmocka_unit_test(test_known_repeated_label_leaves_the_first),
+        cmocka_unit_test(test_known_label_has_so_many_rivals_and_no_more),
         cmocka_unit_test(test_known_not_mappable_sighting_does_not_use_its_label_up),
 
         cmocka_unit_test(test_by_distance_empty_map_makes_everything_new),

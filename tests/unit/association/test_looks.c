@@ -233,6 +233,16 @@ static void test_all_beacons_alike_end_with_one_machine(void **state)
     }
 }
 
+static void test_a_signature_that_is_no_number_teaches_nothing(void **state)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    view_of(0, 0, signature);
+    signature[5] = NAN;
+    show(0, 1, signature);
+    assert_int_equal(looks.of[0].machine, BSLAM_NO_MACHINE);
+    assert_int_equal(looks.counters.taught, 0);
+}
+
 static void test_without_a_free_slot_a_beacon_goes_without(void **state)
 {
     int32_t machine;
@@ -280,6 +290,7 @@ int main(void)
         cmocka_unit_test_setup(test_forget_frees_a_machine_unless_another_beacon_has_it, setup),
         cmocka_unit_test_setup(test_forget_while_the_machine_is_in_training, setup),
         cmocka_unit_test_setup(test_all_beacons_alike_end_with_one_machine, setup),
+        cmocka_unit_test_setup(test_a_signature_that_is_no_number_teaches_nothing, setup),
         cmocka_unit_test_setup(test_without_a_free_slot_a_beacon_goes_without, setup),
         cmocka_unit_test_setup(test_init_refuses_too_many_seeds_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_clear_forgets_all, setup),

@@ -170,6 +170,17 @@ static void test_score_of_looks_is_clipped(void **state)
     assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 4, 1e-3);
 }
 
+/// bslam_slam_sightings refuses it; whoever associates by himself gets a decision by position.
+static void test_a_signature_that_is_no_number_is_as_none(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f, NAN};
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
+    give_machine(0, 5, 3);
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0), 1e-4);
+}
+
 static void test_a_machine_without_rivals_says_nothing(void **state)
 {
     const bslam_params_t params = svm_params();
@@ -410,6 +421,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
         cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
+        cmocka_unit_test_setup(test_a_signature_that_is_no_number_is_as_none, setup),
         cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
         cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
         cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),

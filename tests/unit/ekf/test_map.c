@@ -168,6 +168,23 @@ static void test_add_sized_beyond_their_room_are_points(void **state)
     assert_true(ekf.dim <= BSLAM_STATE_MAX);
 }
 
+static void test_add_sized_where_rays_took_their_room_is_a_point(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.range_scale_sd = BSLAM_R(0.07);
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    const bslam_sighting_t ray = unit_direction(0.3, 1);
+    const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
+    int index;
+    for (int i = 0; i < BSLAM_RAYS_MAX && i < BSLAM_BEACONS_MAX - 1; i++) {
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &ray, &index), BSLAM_OK);
+    }
+    const bool has_room = ekf.ray_count < BSLAM_RAYS_MAX;
+    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+    assert_int_equal(ekf.beacons[index].kind, has_room ? BSLAM_BEACON_SIZED : BSLAM_BEACON_POINT);
+}
+
 static void test_add_ray_is_the_augment_step(void **state)
 {
     unit_random_t random = {2};
@@ -437,6 +454,7 @@ static void test_settle_ray_without_a_positive_variance_stays(void **state)
     bslam_params_t params;
     bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
     const int at = ekf.beacons[2].at + 3;
+    ekf.mean[at] = BSLAM_R(0.2);
     bslam_symmat_set(ekf.covariance, at, at, -1);
     assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
 }
@@ -534,6 +552,7 @@ int main(void)
         cmocka_unit_test(test_add_point_is_the_augment_step),
         cmocka_unit_test(test_add_sized_is_the_augment_step),
         cmocka_unit_test(test_add_sized_beyond_their_room_are_points),
+        cmocka_unit_test(test_add_sized_where_rays_took_their_room_is_a_point),
         cmocka_unit_test(test_add_ray_is_the_augment_step),
         cmocka_unit_test(test_add_points_beyond_the_map_are_refused),
         cmocka_unit_test(test_add_rays_beyond_their_number_are_refused_but_points_are_not),

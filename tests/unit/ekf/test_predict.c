@@ -194,6 +194,17 @@ static void test_predict_with_constant_scales_is_the_textbook_prediction(void **
     for_every_kind(params, check_plain);
 }
 
+static void test_speeds_that_are_no_states_are_not_measured(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.velocity_states = 0;
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    const bslam_ekf_t before = ekf;
+    bslam_ekf_measure_speeds(&ekf, &params, &motion);
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
 static void test_predict_moves_no_beacon(void **state)
 {
     const bslam_params_t params = unit_params();
@@ -425,6 +436,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_predict_is_the_textbook_prediction),
         cmocka_unit_test(test_predict_with_constant_scales_is_the_textbook_prediction),
+        cmocka_unit_test(test_speeds_that_are_no_states_are_not_measured),
         cmocka_unit_test(test_predict_moves_no_beacon),
         cmocka_unit_test(test_predict_without_motion_and_noise_changes_no_value),
 

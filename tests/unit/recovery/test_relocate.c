@@ -112,6 +112,41 @@ static void test_relocate_by_directions_that_do_not_tell_finds_nothing(void **st
     }
 }
 
+/// The robot stands on a beacon: nothing tells its direction, and a clue of it agrees with nothing.
+static void test_relocate_on_a_beacon_leaves_its_direction_out(void **state)
+{
+    const bslam_clue_t ahead = {.x_m = 4, .range_m = 4, .has_range = true};
+    const bslam_clue_t behind = {
+        .x_m = -4, .bearing_rad = BSLAM_R(3.14159265), .range_m = 4, .has_range = true};
+    const bslam_clue_t here = {.bearing_rad = BSLAM_R(0.3)};
+    bslam_clue_t clues[] = {ahead, behind, here};
+    for (int i = 0; i < 3; i++) {
+        clues[i].bearing_var_rad2 = real(1e-4);
+        clues[i].range_var_m2 = real(0.01);
+    }
+    bslam_fix_t fix;
+    assert_true(bslam_relocate(clues, 3, &fix));
+    assert_near(fix.pose.x_m, 0, 1e-3);
+    assert_near(fix.pose.y_m, 0, 1e-3);
+    assert_int_equal(fix.agreeing, 2);
+    assert_int_equal(fix.dissenting, 1);
+}
+
+/// Beacons so far away that squares of their places are infinite.
+static void test_relocate_by_places_beyond_numbers_finds_nothing(void **state)
+{
+    const bslam_real_t huge = BSLAM_REAL_DOUBLE ? (bslam_real_t)1e200 : (bslam_real_t)1e25f;
+    bslam_clue_t clues[] = {clue_of(0, 1.5, 3, 0, false), clue_of(1, 1.5, 3, 0, false),
+                            clue_of(3, 1.5, 3, 0, false)};
+    for (int i = 0; i < 3; i++) {
+        clues[i].x_m *= huge;
+        clues[i].y_m *= huge;
+    }
+    bslam_fix_t fix = {.agreeing = 77};
+    assert_false(bslam_relocate(clues, 3, &fix));
+    assert_int_equal(fix.agreeing, 77);
+}
+
 static void test_relocate_with_too_little_finds_nothing(void **state)
 {
     const bslam_clue_t one[] = {clue_of(0, 1, 3, 0, true)};
@@ -134,6 +169,8 @@ int main(void)
         cmocka_unit_test(test_relocate_by_clues_from_along_the_way),
         cmocka_unit_test(test_relocate_does_not_mix_a_distance_with_directions),
         cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),
+        cmocka_unit_test(test_relocate_on_a_beacon_leaves_its_direction_out),
+        cmocka_unit_test(test_relocate_by_places_beyond_numbers_finds_nothing),
         cmocka_unit_test(test_relocate_with_too_little_finds_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -107,6 +107,17 @@ static void test_a_signature_that_is_not_finite_is_refused_and_changes_nothing(v
     }
 }
 
+/// Numbers whose bits together look like those of an infinity are numbers all the same.
+static void test_a_signature_of_large_and_small_numbers_is_taken(void **state)
+{
+    float signature[BSLAM_SAMPLE_FEATURES] = {1.5f, 2.0f};
+    bslam_sighting_t seen = unit_polar(0, 4, -1);
+    seen.signature = signature;
+    see_two(1);
+    see(&seen, 1);
+    assert_int_equal(slam.counters.frames_refused, 0);
+}
+
 static void test_what_is_surely_matched_is_learned(void **state)
 {
     see_two(10);
@@ -206,6 +217,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
+        cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),
         cmocka_unit_test_setup(test_other_methods_leave_looks_alone, setup),
         cmocka_unit_test_setup(test_without_looks_position_decides, setup),

@@ -135,6 +135,8 @@ static void test_additive_check_refuses(void **state)
     machine_t m;
     fill(&m, 1);
     assert_int_equal(bslam_additive_check(&m.view, FEATURES + 1), BSLAM_E_COUNT);
+    m.view.features = BSLAM_ADDITIVE_FEATURES_MAX + 1;
+    assert_int_equal(bslam_additive_check(&m.view, BSLAM_ADDITIVE_FEATURES_MAX + 1), BSLAM_E_COUNT);
     fill(&m, 1);
     m.view.rows = 0;
     assert_int_equal(bslam_additive_check(&m.view, FEATURES), BSLAM_E_COUNT);

@@ -253,6 +253,21 @@ static void test_show_beyond_the_margin_of_a_full_store_changes_nothing(void **s
     assert_int_equal(learner.counters.dropped, 1);
 }
 
+/// Without a training nothing says that a sample is known well enough to be left out.
+static void test_show_to_a_full_store_before_any_training_keeps_the_sample(void **state)
+{
+    begin();
+    (void)add();
+    for (int view = 0; view < FULL; view++) {
+        show(0, 0, view);
+    }
+    remember();
+    show(0, 1, 0);
+    assert_int_equal(learner.machines[0].samples, FULL);
+    assert_int_equal(learner.counters.dropped, 0);
+    assert_memory_not_equal(before.samples, learner.samples, FULL * sizeof learner.samples[0]);
+}
+
 static void test_show_inside_the_margin_replaces_what_matters_least(void **state)
 {
     learn_objects(2, FULL);
@@ -477,6 +492,7 @@ int main(void)
         cmocka_unit_test(test_show_a_rival_gets_on_a_full_list),
         cmocka_unit_test(test_show_full_store_keeps_its_size),
         cmocka_unit_test(test_show_beyond_the_margin_of_a_full_store_changes_nothing),
+        cmocka_unit_test(test_show_to_a_full_store_before_any_training_keeps_the_sample),
         cmocka_unit_test(test_show_inside_the_margin_replaces_what_matters_least),
         cmocka_unit_test(test_work_in_pieces_is_the_same_to_the_bit),
         cmocka_unit_test(test_work_an_update_takes_a_bounded_number_of_pieces),

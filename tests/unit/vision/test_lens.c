@@ -262,6 +262,22 @@ static void test_check_refuses_a_distortion_that_folds_in_one_corner(void **stat
     }
 }
 
+/// The axis near the frame's corner: of the four corners only the one across is beyond the fold.
+static void test_check_refuses_a_distortion_that_folds_across_the_frame_only(void **state)
+{
+    bslam_camera_t camera = pinhole();
+    camera.cx_px = 0;
+    camera.cy_px = 0;
+    camera.k2 = 0;
+    camera.k1 = BSLAM_R(-0.09);  // folds at 1.92, where the distorted radius is 1.28
+    camera.fx_px = 270;          // right 1.185, bottom 1.0, the corner 1.55
+    camera.fy_px = 240;
+    assert_int_equal(bslam_camera_check(&camera), BSLAM_E_PARAMETER);
+    camera.fx_px = 400;  // the corner 1.0
+    camera.fy_px = 400;
+    assert_int_equal(bslam_camera_check(&camera), BSLAM_OK);
+}
+
 static void test_check_refuses_a_distortion_that_folds_only_between(void **state)
 {
     // The slope 1 + 3 k1 q + 5 k2 q², q = r², is -0.06 at q = 0.35 and again positive at the frame's corner,
@@ -286,6 +302,7 @@ int main(void)
         cmocka_unit_test(test_nan_and_infinity_are_refused),
         cmocka_unit_test(test_check_names_what_is_wrong),
         cmocka_unit_test(test_check_refuses_a_distortion_that_folds_in_one_corner),
+        cmocka_unit_test(test_check_refuses_a_distortion_that_folds_across_the_frame_only),
         cmocka_unit_test(test_check_refuses_a_distortion_that_folds_only_between),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -353,6 +353,9 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
         const bslam_size_t size = {.height_m = real(sizes[i].height_m), .depth_m = real(sizes[i].depth_m)};
         assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &size, &candidate), sizes[i].status);
     }
+    const bslam_size_t inside_out = {
+        .height_m = 1, .top_high_m = 1, .narrow_m = BSLAM_R(0.6), .wide_m = BSLAM_R(0.5)};
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &inside_out, &candidate), BSLAM_E_RANGE);
     camera.width_px = 160;
     assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &POSTER_SIZE, &candidate),
                      BSLAM_E_PARAMETER);

@@ -44,6 +44,27 @@ static bool is_proposed(int32_t left_column, int32_t right_column, float bottom_
     return false;
 }
 
+static void test_edge_outside_the_frame_or_of_no_length_is_none(void **state)
+{
+    unit_made_view(&made, WALL_M);
+    memset(made.step_x, 50, sizeof made.step_x);
+    memset(made.step_y, 50, sizeof made.step_y);
+    const bslam_proposal_t box = {.left = 10, .top = 5, .right = 20, .bottom = 30};
+    bslam_proposal_t flat = box;
+    flat.bottom = flat.top;
+    assert_true(bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, MADE_COLUMNS - 1).step > 0);
+    assert_true(bslam_edge_along(&made.view, &box, BSLAM_SIDE_TOP, MADE_ROWS - 1).step > 0);
+    const bslam_edge_t edges[] = {
+        bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, -1),
+        bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, MADE_COLUMNS),
+        bslam_edge_along(&made.view, &box, BSLAM_SIDE_TOP, MADE_ROWS),
+        bslam_edge_along(&made.view, &flat, BSLAM_SIDE_LEFT, 10),
+    };
+    for (int i = 0; i < COUNT_OF(edges); i++) {
+        assert_true(edges[i].step == 0 && edges[i].share == 0);
+    }
+}
+
 static void test_uprights_two_edges_of_a_window_make_its_box(void **state)
 {
     unit_made_view(&made, WALL_M);
@@ -173,6 +194,7 @@ static void test_uprights_neighbours_each_have_a_box(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_edge_outside_the_frame_or_of_no_length_is_none),
         cmocka_unit_test(test_uprights_two_edges_of_a_window_make_its_box),
         cmocka_unit_test(test_uprights_one_edge_is_no_box_but_with_the_frame_s_edge),
         cmocka_unit_test(test_uprights_edges_too_far_apart_are_no_box),
