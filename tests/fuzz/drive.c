@@ -27,8 +27,8 @@ typedef struct world {
     double x_m, y_m, theta_rad;
     int64_t now_us;
     unsigned in_view;  ///< a bit a beacon
-    unsigned swap;     ///< by so much labels and looks are those of another beacon
-    double stretch;    ///< of distances
+    unsigned swap;   ///< by so much labels and looks are those of another beacon; from BEACONS on: all of one
+    double stretch;  ///< of distances
     bool has_range;
     bool by_looks;
     bool has_recovery;
@@ -52,7 +52,8 @@ static int look(const world_t *world, bslam_sighting_t seen[BSLAM_SIGHTINGS_MAX]
     for (unsigned b = 0; b < BEACONS && count < BSLAM_SIGHTINGS_MAX; b++) {
         const double dx = places[b][0] - world->x_m;
         const double dy = places[b][1] - world->y_m;
-        const unsigned looks_like = (b + world->swap) % BEACONS;
+        const unsigned looks_like =
+            world->swap < BEACONS ? (b + world->swap) % BEACONS : world->swap - BEACONS;
         if ((world->in_view >> b & 1u) == 0) {
             continue;
         }
@@ -168,7 +169,7 @@ static void happen(fuzz_input_t *input, world_t *world)
         world->theta_rad = within(input, 3);
         break;
     case 1:
-        world->swap = fuzz_u8(input) % BEACONS;
+        world->swap = fuzz_u8(input) % (2 * BEACONS);
         break;
     case 2:
         world->now_us += (int64_t)fuzz_u8(input) * STEP_US;

@@ -2,13 +2,17 @@
 // no picture makes a candidate that is not finite.
 #include <string.h>
 
+#include "bslam/math/trig.h"
+#include "bslam/vision/turn.h"
+
 #include "models/beacons.h"
 #include "picture.h"
 
-enum { FRAMES_MAX = 2 };
+enum { FRAMES_MAX = 3 };
 
 static bslam_vision_t vision;
 static bslam_vision_t before;
+static bslam_turns_t turns;
 
 static void require_unchanged_if(bslam_status_t status)
 {
@@ -24,7 +28,22 @@ static bool set_up(fuzz_input_t *input)
     }
     const bslam_status_t status = bslam_vision_init(&vision, &bslam_beacons_model, cameras, (int32_t)count);
     require_unchanged_if(status);
+    if (status == BSLAM_OK) {
+        bslam_turns_init(&turns, &vision);
+    }
     return status == BSLAM_OK;
+}
+
+/// A turn that two frames tell is one, with a doubt: at most the widest pattern and half a turn of the head.
+static void require_turn(void)
+{
+    bslam_turn_t turn;
+    if (bslam_turns_see(&turns, &vision, &turn)) {
+        fuzz_require(bslam_in_range(turn.turn_rad, -3 * BSLAM_PI, 3 * BSLAM_PI));
+        fuzz_require(turn.variance_rad2 > 0 && isfinite((double)turn.variance_rad2));
+        fuzz_require(bslam_in_range(turn.mismatch, 0, 2));
+        fuzz_require(isfinite((double)turn.parallax_rad_per_m) && isfinite((double)turn.sideways));
+    }
 }
 
 /// The rows of a frame: as many as it has, fewer, or too many.
@@ -67,6 +86,7 @@ static void give_frame(fuzz_input_t *input)
     require_unchanged_if(ended);
     if (ended == BSLAM_OK) {
         fuzz_require_candidates(&vision);
+        require_turn();
     }
     memcpy(&before, &vision, sizeof before);
     require_unchanged_if(bslam_vision_point(&vision, camera, fuzz_real(input, -4, 4)));

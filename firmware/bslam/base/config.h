@@ -1,7 +1,8 @@
 /// Every compile-time size of the library, in one place.
 ///
-/// Override with -D or by naming a header in BSLAM_CONFIG_HEADER. Tuning that may change at run time is not
-/// here: it stands in bslam_params_t. `make sizes` prints what each choice costs.
+/// Override with -D or by naming a header in BSLAM_CONFIG_HEADER; not "config.h", which would be this one.
+/// Tuning that may change at run time is not here: it stands in bslam_params_t. `make sizes` prints what each
+/// choice costs.
 #ifndef BSLAM_BASE_CONFIG_H
 #define BSLAM_BASE_CONFIG_H
 

@@ -179,8 +179,10 @@ static pattern_match_t search(const pattern_pair_t *pair, int32_t sums[2][COLUMN
     const int32_t *now_squares = sums[0], *before_squares = sums[1];
     sum_squares(pair->now, pair->columns, sums[0]);
     sum_squares(pair->before, pair->columns, sums[1]);
+    // Of a narrow frame half must stay in view.
+    const int32_t reach = pair->columns / 2 < SHIFT_MAX ? pair->columns / 2 : SHIFT_MAX;
     pattern_match_t best = {.mismatch = 2};
-    for (int32_t shift = -SHIFT_MAX; shift <= SHIFT_MAX; shift++) {
+    for (int32_t shift = -reach; shift <= reach; shift++) {
         const int32_t first = shift < 0 ? -shift : 0;
         const int32_t count = (pair->columns - (shift > 0 ? shift : 0) - first) / SEARCH_STEP;
         const int32_t end = first + count * SEARCH_STEP;

@@ -73,10 +73,11 @@ static bslam_camera_t zoomed_camera(bslam_camera_t camera)
     return camera;
 }
 
-static bool zoom_has_room(const bslam_camera_t *camera)
+static bool has_room(const bslam_camera_t *camera)
 {
-    return camera->zoom <= 1 || (camera->zoom * camera->width_px <= BSLAM_IMAGE_WIDTH_MAX &&
-                                 camera->zoom * camera->height_px <= BSLAM_IMAGE_HEIGHT_MAX);
+    const int32_t zoom = camera->zoom > 1 ? camera->zoom : 1;
+    return zoom * camera->width_px <= BSLAM_IMAGE_WIDTH_MAX &&
+           zoom * camera->height_px <= BSLAM_IMAGE_HEIGHT_MAX;
 }
 
 bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
@@ -91,7 +92,7 @@ bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_mode
     }
     for (int32_t i = 0; i < camera_count && status == BSLAM_OK; i++) {
         status = bslam_camera_check(&cameras[i]);
-        if (status == BSLAM_OK && !zoom_has_room(&cameras[i])) {
+        if (status == BSLAM_OK && !has_room(&cameras[i])) {
             status = BSLAM_E_RANGE;
         }
     }

@@ -91,6 +91,12 @@ static void test_init_bad_count_camera_or_model_is_refused_and_nothing_changes(v
     assert_int_equal(bslam_vision_init(&vision, &model, cameras, BSLAM_CAMERAS_MAX + 1), BSLAM_E_COUNT);
     cameras[1].fx_px = 0;
     assert_int_equal(bslam_vision_init(&vision, &model, cameras, 2), BSLAM_E_PARAMETER);
+    cameras[1] = camera_at(0);
+    cameras[1].width_px = BSLAM_IMAGE_WIDTH_MAX + 4;
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 2), BSLAM_E_RANGE);
+    cameras[1] = camera_at(0);
+    cameras[1].height_px = BSLAM_IMAGE_HEIGHT_MAX + 4;
+    assert_int_equal(bslam_vision_init(&vision, &model, cameras, 2), BSLAM_E_RANGE);
     model.class_count = 0;
     assert_int_equal(bslam_vision_init(&vision, &model, cameras, 1), BSLAM_E_COUNT);
     assert_memory_equal(&vision, &before, sizeof vision);

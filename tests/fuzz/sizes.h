@@ -1,6 +1,6 @@
 /// Sizes of the fuzzed build: so small that a few bytes of input fill the map, the history and the machines.
-#ifndef FUZZ_CONFIG_H
-#define FUZZ_CONFIG_H
+#ifndef FUZZ_SIZES_H
+#define FUZZ_SIZES_H
 
 #define BSLAM_BEACONS_MAX 4
 #define BSLAM_RAYS_MAX 2
