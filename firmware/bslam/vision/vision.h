@@ -55,8 +55,8 @@ typedef struct bslam_vision {
 } bslam_vision_t;
 
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are
-/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. BSLAM_E_RANGE: a frame, zoomed, is beyond
-/// BSLAM_IMAGE_WIDTH_MAX or _HEIGHT_MAX. Else what bslam_camera_check,
+/// copied. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX. BSLAM_E_RANGE: a frame, zoomed, is
+/// beyond BSLAM_IMAGE_WIDTH_MAX or _HEIGHT_MAX. Else what bslam_camera_check,
 /// bslam_beacon_model_check or, where the model has a recogniser, bslam_recogniser_check refuses. *vision is
 /// then unchanged.
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_init(bslam_vision_t *vision, const bslam_beacon_model_t *model,
