@@ -29,22 +29,28 @@ BUILD = ROOT / "build" / "bench"
 NEAR_OPTIMAL = {6: 7_500, 20: 35_000, 50: 153_000, 100: 550_000}
 """Instructions of near-optimal plain C for the same step without velocity states (docs/EXPERIMENTS.md)."""
 
+PARTS = {
+    "covariance and state (`math`, `ekf`)": ("math", "ekf"),
+    "motion and observation, their derivatives (`model`, `odometry`)": ("model", "odometry"),
+    "whose sighting it is (`association`)": ("association",),
+    "checks, accounts, history, order of time (`slam`, `base`)": ("slam", "base"),
+}
 FLAGS = ["-std=c11", "-O2", "-g", "-ffp-contract=off", f"-I{ROOT / 'firmware'}"]
 
 
-def build(beacons: int) -> Path:
-    """The bench program for a map of that many beacons."""
+def build(beacons: int, *more: str) -> Path:
+    """The bench program for a map of that many beacons; `more` are flags that follow the others."""
     BUILD.mkdir(parents=True, exist_ok=True)
-    program = BUILD / f"step_{beacons}"
+    program = BUILD / f"step_{beacons}{''.join(more)}"
     sources = [ROOT / "tests/bench/bench_step.c", *sorted((ROOT / "firmware/bslam").rglob("*.c"))]
-    command = ["cc", *FLAGS, f"-DBSLAM_BEACONS_MAX={beacons}", "-DBSLAM_RAYS_MAX=0"]
+    command = ["cc", *FLAGS, *more, f"-DBSLAM_BEACONS_MAX={beacons}", "-DBSLAM_RAYS_MAX=0"]
     subprocess.run([*command, *map(str, sources), "-lm", "-o", str(program)], check=True)
     return program
 
 
-def instructions_per_step(program: Path, mode: str) -> int:
+def instructions_per_step(program: Path, mode: str, profile: str = "/dev/null") -> int:
     """Counts measured_step and divides by the number of steps that the program says it made."""
-    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}"]
     command.append("--toggle-collect=measured_step")
     done = subprocess.run([*command, str(program), mode], capture_output=True, text=True)
     collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
@@ -65,6 +71,38 @@ def step_table() -> tuple[str, float]:
         rows.append([beacons, f"{plain:,}", f"{reference:,}", f"{plain / reference:.2f}", f"{velocity:,}"])
     head = ["beacons", "instructions a step", "near-optimal plain C", "ratio", "with velocity states"]
     return table(head, rows), worst
+
+
+def part_table() -> str:
+    """What the step on the smallest map is made of, by the core's folders, and by other flags."""
+    beacons = min(NEAR_OPTIMAL)
+    profile = BUILD / "step.callgrind"
+    total = instructions_per_step(build(beacons), "plain", str(profile))
+    parts = parts_of(profile)
+    rows: list[Row] = []
+    for words, folders in PARTS.items():
+        rows.append([words, f"{total * sum(parts.get(one, 0.0) for one in folders):,.0f}"])
+    named = {one for folders in PARTS.values() for one in folders}
+    rows.append(
+        ["all else", f"{total * sum(share for one, share in parts.items() if one not in named):,.0f}"]
+    )
+    rows.append(["together", f"{total:,}"])
+    for flags in (["-flto"], ["-O3"], ["-O3", "-flto"]):
+        count = instructions_per_step(build(beacons, *flags), "plain")
+        rows.append([f"together, `{' '.join(flags)}`", f"{count:,}"])
+    return table([f"{beacons} beacons", "instructions a step"], rows)
+
+
+def parts_of(profile: Path) -> dict[str, float]:
+    """Folder of the core -> its share of what was counted."""
+    command = ["callgrind_annotate", "--auto=no", "--threshold=100", str(profile)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    counts: dict[str, int] = {}
+    for count, file in re.findall(r"^ *([\d,]+) \([^)]*\) +([^:\n]+):", said, re.MULTILINE):
+        found = re.search(r"firmware/bslam/(\w+)/", file)
+        folder = found[1] if found else "other"
+        counts[folder] = counts.get(folder, 0) + int(count.replace(",", ""))
+    return {folder: count / sum(counts.values()) for folder, count in counts.items()}
 
 
 def machine_table(rounds: int) -> str:
@@ -132,6 +170,7 @@ def sections(step: str, rounds: int) -> Iterator[str]:
         names = "; ".join(f"{name} (`{command}`)" for name, command in absent.items())
         yield f"Left out, not being installed: {names}.\n"
     yield f"## The core's own step\n\n{step}\n{STEP_NOTE}\n"
+    yield f"## What the smallest step is made of\n\n{part_table()}\n{PART_NOTE}\n"
     yield f"## Time, in times of bslam's\n\n{filters.time_table(rounds)}\n{TIME_NOTE}\n"
     yield f"## Instructions a step\n\n{filters.count_table()}"
     yield f"## Memory kept between steps\n\n{filters.memory_table()}\n{MEMORY_NOTE}\n"
@@ -146,6 +185,8 @@ machine, with those of the others that are installed there.
 """
 STEP_NOTE = """Instructions by callgrind, `-O2`; odometry and 2 to 4 sightings with distance, invariant
 filter. They are not cycles."""
+PART_NOTE = """By callgrind, as above; inlined functions count where they stand in the source. No flag but
+`-O2` is used elsewhere on this page."""
 TIME_NOTE = f"""CPU time of a step with 2 to 4 sightings among so many beacons, all mapped, identities
 given, `-O2`: median of rounds in which each program runs once [least, largest] (goal). bslam in float,
 invariant, without velocity states; in brackets its own least time. MRPT is its range-bearing EKF-SLAM,
