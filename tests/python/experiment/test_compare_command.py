@@ -1,6 +1,9 @@
 """`bslam compare` as a user meets it: strangers' code in processes of its own."""
 
 import json
+import resource
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -120,3 +123,18 @@ def test_who_is_not_installed_or_cannot_do_it_is_left_out(scene, monkeypatch, ca
     monkeypatch.setattr("bslam.commands.compare.shipped_methods", lambda _every: [ours, here])
     assert main([*words, "--observation", "direction", "--out", "there"]) == 0
     assert "left out: mrpt (only with --observation distance)" in capsys.readouterr().err
+
+
+def test_full_disk_is_named_by_its_file_and_what_fits_is_kept(scene, made):
+    def no_room():  # no file may grow beyond this: the table does not, a trajectory does
+        resource.setrlimit(resource.RLIMIT_FSIZE, (16_000, 16_000))
+
+    write_folder(made.circle_log(300, seed=1), scene / "long")
+    words = ["compare", "long", "--only", "dead_reckoning", "--jobs", "1", "--pictures", "0", "--out", "out"]
+    command = [sys.executable, "-m", "bslam", *words]
+    result = subprocess.run(command, preexec_fn=no_room, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    (error,) = lines_of(scene / "out")["dead_reckoning"]["errors"]
+    assert "long_seed0.dead_reckoning.estimate.tum: cannot be written: " in error
+    assert error in result.stderr
+    assert sorted(path.name for path in (scene / "out").iterdir()) == ["compare.json", "summary.json"]
