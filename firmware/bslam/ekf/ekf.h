@@ -191,11 +191,9 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
 
 // ---- about given points -----------------------------------------------------------------------------------
 
-/// From now until bslam_ekf_correct the mean is where the models are linearised, and what is known of the
-/// state is the correction about it: a linear Kalman filter, for whoever goes through the same drive again
-/// (smoother/smoother.h). The robot's values are their own points, the map's are about[base_dim..dim).
-/// bslam_ekf_innovation and bslam_ekf_fuse serve as ever. O(n).
-void bslam_ekf_linearise(bslam_ekf_t *ekf, const bslam_real_t *about);
+// For whoever goes through the same drive again (smoother/smoother.h): a linear Kalman filter. With
+// has_correction set and until bslam_ekf_correct the mean is where the models are linearised, and what is
+// known of the state is the correction about it. bslam_ekf_innovation and bslam_ekf_fuse serve as ever.
 
 /// How the robot's values go through a motion, MATH (14).
 typedef struct bslam_transition {

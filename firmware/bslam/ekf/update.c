@@ -378,16 +378,6 @@ static void transport_covariance(bslam_ekf_t *ekf)
     ekf->pending_count = 0;
 }
 
-void bslam_ekf_linearise(bslam_ekf_t *ekf, const bslam_real_t *about)
-{
-    memset(ekf->correction, 0, sizeof ekf->correction);
-    for (int i = ekf->base_dim; i < ekf->dim; i++) {
-        ekf->correction[i] = ekf->mean[i] - about[i];
-        ekf->mean[i] = about[i];
-    }
-    ekf->has_correction = true;
-}
-
 void bslam_ekf_settle(bslam_ekf_t *ekf)
 {
     flush(ekf);

@@ -1,6 +1,7 @@
 // The cycle: forth, up and back. MATH "The smoother".
 #include <string.h>
 
+#include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/smoother/internal.h"
@@ -17,6 +18,10 @@ enum { UP_COST = 8, BACK_COST = 12 };
 /// Places move no farther at once, as a share of the distance from the robot: beyond that the model is far
 /// from linear, and a beacon must not jump to the robot.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
+/// The logarithm of 4.5 m, and its standard deviation: 2.7 to 7.4 m.
+static const bslam_real_t LN_GUESS_M = BSLAM_R(1.504);
+static const bslam_real_t GUESS_SD_LN = BSLAM_R(0.5);
+static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 /// How exactly the map is given to the robot alone, (1 mm)².
 static const bslam_real_t PIN_VARIANCE = BSLAM_R(1e-6);
 /// What the way back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
@@ -31,11 +36,25 @@ static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smo
                                  .bearing_sd_rad = seen->bearing_sd * BSLAM_SMOOTHER_SD_RAD,
                                  .has_range = seen->ranges > 0,
                                  .label = BSLAM_LABEL_NONE};
-    if (sighting.has_range) {
+    if (sighting.has_range && seen->ranges != BSLAM_SMOOTHER_FIRST) {
         const bslam_real_t variance = bslam_range_variance_m2(model, &sighting, sighting.range_m);
         sighting.range_sd_m = bslam_sqrt(variance / seen->ranges);
     }
     return sighting;
+}
+
+/// How far a beacon is that was never seen before: one guesses, give or take a factor. Said of the robot that
+/// saw it, not of a place in the map: where the robot is may be doubtful, too.
+static bslam_status_t guess_range(bslam_innovation_t *innovation)
+{
+    const bslam_real_t range_m = -innovation->range_m;  // what is predicted, seen->range being 0
+    const bslam_real_t sd_m = GUESS_SD_LN * range_m;
+    if (!(range_m > RANGE_MIN_M)) {
+        return BSLAM_E_SINGULAR;
+    }
+    innovation->range_m = range_m * (LN_GUESS_M - bslam_ln(range_m));
+    innovation->range_var_m2 = sd_m * sd_m;
+    return BSLAM_OK;
 }
 
 /// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
@@ -54,6 +73,9 @@ static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_
         bslam_fusion_t unused;
         bslam_status_t status =
             bslam_ekf_innovation(ekf, model, &mount, &sighting, seen->beacon, &innovation);
+        if (status == BSLAM_OK && seen->ranges == BSLAM_SMOOTHER_FIRST) {
+            status = guess_range(&innovation);
+        }
         if (status == BSLAM_OK) {
             status = bslam_ekf_fuse(ekf, model, &innovation, &unused);
         }
@@ -76,9 +98,8 @@ void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
 {
     const bslam_smoother_node_t *node = bslam_smoother_node(smoother, 0);
     smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
-    bslam_ekf_linearise(&smoother->base, smoother->place);
+    bslam_smoother_linearise_base(smoother);
     pass_node(smoother, &smoother->base, node, 0);
-    bslam_ekf_correct(&smoother->base, &smoother->model);
     smoother->first_seen = (smoother->first_seen + node->seen) % BSLAM_SMOOTHER_SEEN_MAX;
     smoother->seen_count -= node->seen;
     smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;
@@ -91,9 +112,9 @@ void bslam_smoother_begin(bslam_smoother_t *smoother)
            smoother->seen_count > BSLAM_SMOOTHER_SEEN_MAX - SLACK_SEEN) {
         bslam_smoother_drop_oldest(smoother);
     }
+    bslam_smoother_linearise_base(smoother);
     smoother->run = smoother->base;
     smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
-    bslam_ekf_linearise(&smoother->run, smoother->place);
     smoother->phase = BSLAM_SMOOTHER_FORTH;
     smoother->at = 0;
     smoother->at_seen = 0;
@@ -162,8 +183,8 @@ static void give_map(bslam_ekf_t *ekf)
 
 static void begin_up(bslam_smoother_t *smoother)
 {
+    bslam_smoother_linearise_base(smoother);
     smoother->run = smoother->base;
-    bslam_ekf_linearise(&smoother->run, smoother->place);
     give_map(&smoother->run);
     smoother->model.velocity_walk_mps_sqrt_s = smoother->path_walk;
     smoother->phase = BSLAM_SMOOTHER_UP;

@@ -20,6 +20,10 @@ static inline bslam_smoother_seen_t *bslam_smoother_seen(bslam_smoother_t *smoot
     return &smoother->seen[(smoother->first_seen + k) % BSLAM_SMOOTHER_SEEN_MAX];
 }
 
+/// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the
+/// logarithm of its distance from the base's robot, which is what directions are nearly linear in. O(n²).
+void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
+
 /// Begins a cycle: what is too old leaves first, into the base.
 void bslam_smoother_begin(bslam_smoother_t *smoother);
 

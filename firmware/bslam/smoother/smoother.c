@@ -13,6 +13,11 @@ static const bslam_real_t SLOPE_SD_RADPS = BSLAM_R(0.5);
 /// A beacon in direction only is first thought to be so far away.
 static const bslam_real_t FIRST_RANGE_M = BSLAM_R(4.0);
 static const bslam_real_t FIRST_SD_M = BSLAM_R(2.5);
+/// The same where all sightings will be gone through again: that distance is told at the first of them.
+static const bslam_real_t UNSEEN_SD_M = BSLAM_R(20.0);
+/// Passes are wanted most while the map is young. In nodes a frame: at first, and less by one for each so
+/// many nodes.
+enum { UNITS_FIRST = 60, NODES_A_UNIT_LESS = BSLAM_SMOOTHER_NODES_MAX / 16 + 1 };
 static const bslam_real_t UNITS_MAX = BSLAM_R(65535.0);
 static const bslam_real_t HUBER_D = BSLAM_R(3.0);
 
@@ -35,6 +40,8 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->model.gate_d2 = 0;
     smoother->model.huber_d = HUBER_D;
     smoother->base = *ekf;
+    memset(smoother->base.correction, 0, sizeof smoother->base.correction);
+    smoother->base.has_correction = true;
     memcpy(smoother->place, ekf->mean, sizeof smoother->place);
     smoother->first_node = 0;
     smoother->node_count = 0;
@@ -64,6 +71,15 @@ static int32_t units(bslam_real_t value)
     return (int32_t)(value < UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5)) : UNITS_MAX);
 }
 
+/// What a bslam_smoother_seen_t says of distances.
+static uint8_t ranges_of(const bslam_smoother_line_t *line, bool in_reach)
+{
+    if (line->ranges > 0) {
+        return (uint8_t)(in_reach ? line->ranges : 0);
+    }
+    return line->is_first ? BSLAM_SMOOTHER_FIRST : 0;
+}
+
 /// The line through a beacon's bearings, at the block's middle. Its slope is about that of the turn.
 static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
 {
@@ -86,7 +102,7 @@ static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
         .bearing_sd = (uint16_t)units(bslam_sqrt(sloped / determinant) / BSLAM_SMOOTHER_SD_RAD + 1),
         .range = (uint16_t)(in_reach ? units(range_m / BSLAM_SMOOTHER_RANGE_M) : 0),
         .beacon = (uint8_t)beacon,
-        .ranges = (uint8_t)(in_reach ? line->ranges : 0),
+        .ranges = ranges_of(line, in_reach),
     };
     return seen;
 }
@@ -195,11 +211,14 @@ bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf, 
     smoother->place[at] = point.x_m;
     smoother->place[at + 1] = point.y_m;
     int same;
-    status = bslam_ekf_add_guess(&smoother->base, point.x_m, point.y_m, FIRST_SD_M, &same);
+    smoother->lines[*index].is_first = true;
+    smoother->base.correction[at] = 0;
+    smoother->base.correction[at + 1] = 0;
+    status = bslam_ekf_add_guess(&smoother->base, point.x_m, point.y_m, UNSEEN_SD_M, &same);
     if (status == BSLAM_OK && smoother->phase == BSLAM_SMOOTHER_FORTH) {
         smoother->run.correction[at] = 0;
         smoother->run.correction[at + 1] = 0;
-        status = bslam_ekf_add_guess(&smoother->run, point.x_m, point.y_m, FIRST_SD_M, &same);
+        status = bslam_ekf_add_guess(&smoother->run, point.x_m, point.y_m, UNSEEN_SD_M, &same);
     }
     return status;
 }
@@ -232,8 +251,9 @@ void bslam_smoother_remove(bslam_smoother_t *smoother, int index)
     const int dim = bslam_beacon_dim(beacon->kind);
     const int at = beacon->at;
     if (dim > 0) {
-        memmove(&smoother->place[at], &smoother->place[at + dim],
-                (size_t)(smoother->base.dim - at - dim) * sizeof smoother->place[0]);
+        const size_t behind = (size_t)(smoother->base.dim - at - dim) * sizeof smoother->place[0];
+        memmove(&smoother->place[at], &smoother->place[at + dim], behind);
+        memmove(&smoother->base.correction[at], &smoother->base.correction[at + dim], behind);
     }
     memmove(&smoother->lines[index], &smoother->lines[index + 1],
             (size_t)(smoother->base.beacon_count - index - 1) * sizeof smoother->lines[0]);
@@ -268,7 +288,7 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
     if (is_whole) {
         close_block(smoother);
     }
-    if (bslam_smoother_work(smoother, 2 + smoother->node_count / 6, is_whole)) {
+    if (bslam_smoother_work(smoother, UNITS_FIRST - smoother->node_count / NODES_A_UNIT_LESS, is_whole)) {
         if (bslam_ekf_is_sane(&smoother->run)) {
             take_over(smoother, params, ekf);
             bslam_smoother_turn(smoother);

@@ -3,7 +3,7 @@
 ///
 /// A filter linearises each sighting once, at what it holds true then. In direction only that is wrong: a
 /// beacon's distance is not known for half a minute, and a wrong one enters every Jacobian. So the last
-/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames) are kept with what was read and seen
+/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of four frames) are kept with what was read and seen
 /// there, and the filter as it was before them, the *base*. A cycle is
 ///
 ///     forth   from the base through all nodes, linear about their poses and the beacons' places: ends as the
@@ -23,10 +23,13 @@
 #include "bslam/ekf/ekf.h"
 
 /// Frames of a node.
-#define BSLAM_SMOOTHER_FRAMES 3
+#define BSLAM_SMOOTHER_FRAMES 4
 /// Nodes of one of the parts in which the way back is gone.
 #define BSLAM_SMOOTHER_PART 20
 #define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
+
+/// In place of a number of distances: none, and nothing was known of the beacon before.
+#define BSLAM_SMOOTHER_FIRST 255
 
 /// What was seen of a beacon around a node, brought to its moment, in 8 bytes.
 typedef struct bslam_smoother_seen {
@@ -34,7 +37,7 @@ typedef struct bslam_smoother_seen {
     uint16_t bearing_sd;  ///< in 10 urad, 0.65 rad at most
     uint16_t range;       ///< in 5 mm, 327 m at most
     uint8_t beacon;       ///< its place in the map
-    uint8_t ranges;       ///< distances that `range` is the mean of; 0: none, or too far
+    uint8_t ranges;       ///< that `range` is the mean of; 0: none, or too far; or BSLAM_SMOOTHER_FIRST
 } bslam_smoother_seen_t;
 
 typedef struct bslam_smoother_node {
@@ -54,6 +57,7 @@ typedef struct bslam_smoother_line {
     bslam_real_t range_m;  ///< sum
     int32_t ranges;
     int32_t count;
+    bool is_first;  ///< nothing was known of the beacon before
 } bslam_smoother_line_t;
 
 /// What the way back needs of a node.
@@ -80,7 +84,7 @@ typedef struct bslam_smoother {
     bslam_params_t model;                    ///< the pipeline's, without gate and with Huber's rule
     bslam_real_t free_walk;                  ///< of v: what the estimate rests on
     bslam_real_t path_walk;                  ///< of v: where the models are linearised
-    bslam_ekf_t base;                        ///< before the first node
+    bslam_ekf_t base;                        ///< before the first node, a correction about its mean
     bslam_ekf_t run;                         ///< the present phase's
     bslam_real_t place[BSLAM_STATE_PADDED];  ///< the map's values that the models are linearised about
     bslam_smoother_node_t nodes[BSLAM_SMOOTHER_NODES_MAX];
