@@ -46,6 +46,12 @@ static void fill(machine_t *m, unsigned seed)
                                  .bias = m->bias};
 }
 
+/// A share of a way between knots, as the machine counts it: in whole parts.
+static double whole(double share)
+{
+    return round(share * BSLAM_SHARE_ONE) / BSLAM_SHARE_ONE;
+}
+
 /// How much a knot counts for x: 1 there, 0 at its neighbours and beyond, in between straight; the outermost
 /// ones count on outside.
 static double tent(const float *knots, const int *chosen, int count, int k, double x)
@@ -56,10 +62,10 @@ static double tent(const float *knots, const int *chosen, int count, int k, doub
     }
     if (x < here) {
         const double before = k > 0 ? knots[chosen[k - 1]] : here;
-        return x > before ? (x - before) / (here - before) : 0;
+        return x > before ? whole((x - before) / (here - before)) : 0;
     }
     const double after = k < count - 1 ? knots[chosen[k + 1]] : here;
-    return x < after ? (after - x) / (after - here) : 0;
+    return x < after ? whole((after - x) / (after - here)) : 0;
 }
 
 /// The definition: weights times tents and products of tents.

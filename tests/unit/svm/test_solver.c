@@ -40,6 +40,11 @@ static double feature(int sample, int k)
     return (double)store[sample].q[k] * (double)BSLAM_SAMPLE_UNIT;
 }
 
+static double sign_of(int row)
+{
+    return solver.rows[row].positive ? 1 : -1;
+}
+
 /// y w . x with w = sum of alpha y x, all in double.
 static double margin_of(int row)
 {
@@ -47,12 +52,11 @@ static double margin_of(int row)
     for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         double w = 0;
         for (int i = 0; i < solver.count; i++) {
-            w += (double)solver.rows[i].alpha * (double)solver.rows[i].sign *
-                 feature(solver.rows[i].sample, k);
+            w += (double)solver.rows[i].alpha * sign_of(i) * feature(solver.rows[i].sample, k);
         }
         value += w * feature(solver.rows[row].sample, k);
     }
-    return value * (double)solver.rows[row].sign;
+    return value * sign_of(row);
 }
 
 static double length2_of_w(void)
@@ -103,8 +107,7 @@ static void test_run_keeps_w_the_sum_of_its_rows(void **state)
     for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
         double w = 0;
         for (int i = 0; i < solver.count; i++) {
-            w += (double)solver.rows[i].alpha * (double)solver.rows[i].sign *
-                 feature(solver.rows[i].sample, k);
+            w += (double)solver.rows[i].alpha * sign_of(i) * feature(solver.rows[i].sample, k);
         }
         assert_near((double)solver.weights[k] / (double)BSLAM_SAMPLE_UNIT, w, 1e-4);
     }
