@@ -104,12 +104,12 @@ def stack_of(path: Path, functions: Sequence[str]) -> dict[str, int]:
     return {name: graph.deepest(name)[0] for name in functions}
 
 
-def costs(board: str) -> dict[tuple[str, int], int]:
+def costs(board: str, program: str = "cost") -> dict[tuple[str, int], int]:
     """Instructions by part and number of beacons."""
-    ended = run_image(board, "cost")
+    ended = run_image(board, program)
     if ended.status != 0:
-        raise SystemExit(f"cost on {board} ended with status {ended.status}: {ended.output}")
-    lines = re.findall(r"^(\w+) (\d+) (\d+)\r?$", ended.output, re.MULTILINE)
+        raise SystemExit(f"{program} on {board} ended with status {ended.status}: {ended.output}")
+    lines = re.findall(r"^(?!state)(\w+) (\d+) (\d+)\r?$", ended.output, re.MULTILINE)
     return {(name, int(size)): round(int(ticks) * INSTRUCTIONS_A_TICK) for name, size, ticks in lines}
 
 
@@ -162,6 +162,9 @@ def ram_rows() -> Iterator[Row]:
     for struct, header in STRUCTS.items():
         sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
         yield (f"`{struct}`", *sizes)
+    without_rays = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
+    sizes = [instance_bytes(without_rays, "arm-none-eabi-nm", n, "bslam_smoother_t") for n in BEACONS]
+    yield ("`bslam_smoother_t`, `BSLAM_RAYS_MAX` = 0", *sizes)
 
 
 def image_rows() -> Iterator[Row]:
@@ -171,8 +174,17 @@ def image_rows() -> Iterator[Row]:
             yield (board, *image_sections(BUILD_DIR / board / "robot.elf"))
 
 
+def smoother_rows() -> Iterator[Row]:
+    measured = costs(COST_BOARDS["Cortex-M4F"], "cost_smoother")
+    for (name, beacons), cost in measured.items():
+        share = f"{100 * cost * STEPS_A_SECOND / CORE_HZ:.1f} %"
+        yield (f"{name} step", beacons, cost, share)
+
+
 def stack_rows(program: str, functions: Sequence[str]) -> Iterator[Row]:
     for core, board in COST_BOARDS.items():
+        if not (BUILD_DIR / board / f"{program}.elf").is_file():
+            continue  # no program for a core without an FPU
         yield (core, *stack_of(BUILD_DIR / board / f"{program}.elf", functions).values())
 
 
@@ -217,7 +229,8 @@ Learning is linked where looks are attached, names of parameters where they are 
 ## RAM
 
 Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_looks_t` is \
-for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam.
+for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam, \
+`bslam_smoother_t` for `filter` = 2, which has no use for rays.
 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images
@@ -233,6 +246,9 @@ The longest path from a call on, bytes, from the linked image: the compiler's fr
 
 {table(code_heads(STEP_FUNCTIONS), stack_rows("robot", STEP_FUNCTIONS))}
 {table(code_heads(VISION_FUNCTIONS), stack_rows("cost_vision", VISION_FUNCTIONS))}
+With the smoother linked:
+
+{table(code_heads(STEP_FUNCTIONS), stack_rows("cost_smoother", STEP_FUNCTIONS))}
 ## Instructions
 
 Counted by QEMU (`-icount`), the same at every run; instructions are not cycles. `-O2`, invariant filter, \
@@ -240,6 +256,10 @@ Counted by QEMU (`-icount`), the same at every run; instructions are not cycles.
 
 {table(("part", "beacons", *COST_BOARDS), cost_rows(measured))}
 {parts}
+A step in direction only with the smoother (`filter` = 2) on a Cortex-M4F, its window full: 3 sightings a \
+frame of 6 beacons, 5 of 20; firmware/app/cost_smoother.c.
+
+{table(("", "beacons", "instructions", f"of {CORE_HZ // 1_000_000} million a second"), smoother_rows())}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
 world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
 `.venv/bin/python tools/profile_image.py cost_vision`.
