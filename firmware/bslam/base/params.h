@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "bslam/base/config.h"
 #include "bslam/base/real.h"
 #include "bslam/base/status.h"
 
@@ -13,8 +14,9 @@
 /// REAL(name, default, low, high, meaning) and INTEGER(the same).
 #define BSLAM_PARAMS(REAL, INTEGER) \
     /* estimator */ \
-    INTEGER(filter, 1, 0, 2, \
-            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant EKF, 2 fixed-lag smoother") \
+    INTEGER(filter, 1, 0, 2 + BSLAM_SIMILARITY, \
+            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant EKF, 2 fixed-lag smoother, " \
+            "3 similarity EKF") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     INTEGER(velocity_states, 1, 0, 1, \
             "1: v and omega are states and the wheels measure them (speedometer noise)") \
@@ -145,7 +147,12 @@
 // clang-format on
 
 /// Values of `filter`.
-enum { BSLAM_FILTER_STANDARD = 0, BSLAM_FILTER_INVARIANT = 1, BSLAM_FILTER_SMOOTHER = 2 };
+enum {
+    BSLAM_FILTER_STANDARD = 0,
+    BSLAM_FILTER_INVARIANT = 1,
+    BSLAM_FILTER_SMOOTHER = 2,
+    BSLAM_FILTER_SIMILARITY = 3
+};
 
 #define BSLAM_PARAMS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;
 #define BSLAM_PARAMS_FIELD_INTEGER(name, value, low, high, meaning) int32_t name;

@@ -42,6 +42,16 @@ SMOOTHER: Final[dict[str, int | float]] = {
     "turn_rate_decay_s": 1.0,
 }
 
+# A filter that knows how the scale of its map may be wrong needs no further doubt of directions.
+SIMILARITY: Final[dict[str, int | float]] = {
+    "velocity_walk_mps_sqrt_s": 0.3,
+    "turn_rate_walk_radps_sqrt_s": 1.2,
+    "bearing_only_variance_factor": 1.0,
+    "bearing_only_curvature_factor": 0.0,
+}
+
+OF_FILTER: Final = {"smoother": SMOOTHER, "similarity": SIMILARITY}
+
 REAL_LOG: Final[dict[str, int | float]] = {
     # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
     # scales.

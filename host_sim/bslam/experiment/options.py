@@ -11,7 +11,7 @@ from bslam.log import Log, Robot
 
 OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
-FILTERS = ("standard", "invariant", "smoother")
+FILTERS = ("standard", "invariant", "smoother", "similarity")
 MOTIONS = ("euler", "arc")
 SENSORS = ("simulated", "camera")
 REALS = ("float", "double")
@@ -108,7 +108,7 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         "velocity_states": int(uses_velocity_states(options, log)),
         "association": ASSOCIATIONS.index(options.association),
     }
-    params |= defaults.SMOOTHER if options.filter == "smoother" else {}
+    params |= defaults.OF_FILTER.get(options.filter, {})
     params |= _robot_params(log.robot, log.odometry.kind)
     if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
