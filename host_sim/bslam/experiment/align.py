@@ -1,4 +1,4 @@
-"""Rigid alignment in the plane: rotation and shift, no scale."""
+"""Alignment in the plane: rotation and shift, and beside it the scale that directions do not tell."""
 
 from __future__ import annotations
 
@@ -51,6 +51,18 @@ def fit_rigid(moving_m: Points, fixed_m: Points) -> Rigid:
     turn_rad = float(np.arctan2(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]), np.sum(p * q)))
     shift_m = fixed_mean - Rigid(turn_rad).points(moving_mean[None])[0]
     return Rigid(turn_rad, float(shift_m[0]), float(shift_m[1]))
+
+
+def fit_scale(moving_m: Points, fixed_m: Points) -> float:
+    """By how much `moving_m` is to be enlarged so that, after `fit_rigid`, it is nearest to `fixed_m`.
+
+    1 where fewer than two different points leave it open.
+    """
+    if len(moving_m) == 0:
+        return 1.0
+    p = fit_rigid(moving_m, fixed_m).points(moving_m) - fixed_m.mean(axis=0)
+    spread_m2 = float(np.sum(p**2))
+    return float(np.sum(p * (fixed_m - fixed_m.mean(axis=0)))) / spread_m2 if spread_m2 > 0.0 else 1.0
 
 
 def wrap_angle(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:

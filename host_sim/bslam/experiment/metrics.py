@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.experiment.align import Rigid, fit_rigid
+from bslam.experiment.align import Rigid, fit_rigid, fit_scale
 from bslam.experiment.bound import has_bound, mean_bound_m
 from bslam.experiment.consistency import POSE_95, nees
 from bslam.experiment.options import RunOptions, uses_velocity_states, wheel_noise
@@ -86,6 +86,8 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
     if evaluation is not None:
         entry |= _position_figures(evaluation)
         entry |= _map_figures(log, trace, evaluation)
+        if options.observation == "direction" and evaluation.to_truth != Rigid():
+            entry |= _scaled_figures(log, trace, evaluation)
         if has_bound(log, options) and np.isfinite(evaluation.truth).all():
             entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
         entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
@@ -210,6 +212,23 @@ def _map_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, fl
         return {}
     distance_m = _distance(evaluation.map_to_truth.points(mapped_m), true_m)
     return {"map_rmse_m": float(np.sqrt(np.mean(distance_m**2)))}
+
+
+def _scaled_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, float]:
+    """What is left of path and map if the scale, which directions leave to odometry, is fitted, too."""
+    known = np.isfinite(evaluation.error_m)
+    mapped_m, true_m = map_pairs(log, trace)
+    figures = {}
+    for name, moving_m, fixed_m in (
+        ("position", trace.pose[known, :2], evaluation.truth[known, :2]),
+        ("map", mapped_m, true_m),
+    ):
+        if len(moving_m) > 1:
+            scale = fit_scale(moving_m, fixed_m)
+            off_m = fit_rigid(scale * moving_m, fixed_m).points(scale * moving_m) - fixed_m
+            figures[f"{name}_scale"] = scale
+            figures[f"{name}_rmse_scaled_m"] = float(np.sqrt(np.mean(np.sum(off_m**2, axis=1))))
+    return figures
 
 
 def _is_lost(evaluation: Evaluation) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bslam.experiment.align import Rigid, fit_rigid, wrap_angle
+from bslam.experiment.align import Rigid, fit_rigid, fit_scale, wrap_angle
 
 ANGLES = st.floats(-math.pi, math.pi)
 METRES = st.floats(-100.0, 100.0)
@@ -62,3 +62,17 @@ def test_inverse_undoes(turn, x, y):
 def test_wrap_angle_keeps_pi_and_turns_minus_pi():
     wrapped = wrap_angle(np.array([math.pi, -math.pi, 3.0 * math.pi, 0.5]))
     np.testing.assert_allclose(wrapped, [math.pi, math.pi, math.pi, 0.5])
+
+
+def test_fit_scale_leaves_less_than_any_other_scale():
+    rng = np.random.default_rng(6)
+    moving = rng.uniform(-5, 5, (40, 2))
+    fixed = 1.3 * Rigid(-2.0, 4.0, 1.0).points(moving) + 0.3 * rng.standard_normal((40, 2))
+
+    def left(scale):
+        return np.sum((fit_rigid(scale * moving, fixed).points(scale * moving) - fixed) ** 2)
+
+    scale = fit_scale(moving, fixed)
+    assert scale == pytest.approx(1.3, abs=0.05)
+    assert left(scale) < min(left(scale - 1e-3), left(scale + 1e-3))
+    assert fit_scale(moving[:1], fixed[:1]) == fit_scale(moving[:0], fixed[:0]) == 1.0

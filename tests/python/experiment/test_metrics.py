@@ -142,6 +142,20 @@ def test_the_map_has_its_own_alignment(made, log):
     assert figures(log, trace, align=False)["map_rmse_m"] > 1.0
 
 
+def test_directions_are_judged_with_and_without_the_scale_that_they_do_not_tell(made, log):
+    places = 0.8 * np.column_stack([made.beacons.x_m, made.beacons.y_m])
+    pairs = zip(made.beacons.beacon_id, places, strict=True)
+    beacons = [made.map_beacon(uid, identity, *place) for uid, (identity, place) in enumerate(pairs)]
+    poses = true_poses(log) * (0.8, 0.8, 1.0)
+    trace = made.trace(poses, step_times_us(log), beacons)
+    options = replace(OPTIONS, observation="direction")
+    entry = summarise(log, trace, options, evaluate(log, trace, options, True))
+    assert [entry["position_scale"], entry["map_scale"]] == pytest.approx([1.25, 1.25])
+    assert max(entry["position_rmse_scaled_m"], entry["map_rmse_scaled_m"]) < 1e-9
+    assert min(entry["position_error_m"]["rmse"], entry["map_rmse_m"]) > 0.1
+    assert "map_scale" not in figures(log, trace, align=True)
+
+
 def test_beacons_true_needs_four_mappable_sightings(made, log):
     rows = [(0, 3, 0.0, 1.0, True)] * 4 + [(0, 5, 0.0, 1.0, True)] * 3 + [(0, 8, 0.0, 1.0, False)] * 9
     log = replace(log, sightings=made.sightings(rows))
