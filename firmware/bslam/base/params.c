@@ -23,7 +23,7 @@ static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)
     BOUND(x, 5, 1e-9) BOUND(x, 6, 1e-6) BOUND(x, 7, 1e-4) BOUND(x, 8, 1e-3) BOUND(x, 9, 0.1) \
     BOUND(x, 10, 3.2) BOUND(x, 11, -3.2) BOUND(x, 12, 10.0) BOUND(x, 13, 100.0) BOUND(x, 14, -100.0) \
     BOUND(x, 15, 250.0) BOUND(x, 16, 1e3) BOUND(x, 17, 1024.0) BOUND(x, 18, 1e6) BOUND(x, 19, -1e6) \
-    BOUND(x, 20, 4e6) BOUND(x, 21, 1e7) BOUND(x, 22, 1e9)
+    BOUND(x, 20, 4e6) BOUND(x, 21, 1e7) BOUND(x, 22, 1e9) BOUND(x, 23, 3.0)
 // clang-format on
 #define NUMBER(x, place, bound) [place] = BSLAM_R(bound),
 #define PLACE_IF(x, place, bound) (bslam_real_t)(x) == (bslam_real_t)BSLAM_R(bound) ? (place):

@@ -73,6 +73,7 @@ static void add_measurement(int node, const double h[DIM], double y, double vari
 
 static void start_batch(double v_walk)
 {
+    bslam_smoother_linearise_base(&smoother);  // about the places of the way that follows
     const twin_t base = twin_of(&smoother.base);
     const dense_t inverse = dense_inverse(&base.covariance);
     const int unknowns = DIM + WALKS * smoother.node_count;
@@ -82,7 +83,7 @@ static void start_batch(double v_walk)
     batch.rows[0] = dense_zero(DIM, unknowns);
     for (int i = 0; i < DIM; i++) {
         batch.rows[0].at[i][i] = 1;
-        batch.offset[0][i] = i < BASE ? 0 : base.mean.at[i][0] - (double)smoother.place[i];
+        batch.offset[0][i] = (double)smoother.base.correction[i];
         for (int j = 0; j < DIM; j++) {
             batch.information.at[i][j] = inverse.at[i][j];
         }

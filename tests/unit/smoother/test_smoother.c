@@ -133,17 +133,17 @@ static void assert_sound(void)
 static void test_node_is_the_line_through_its_bearings(void **state)
 {
     // Weighted least squares of a line, by hand: offset and slope, the slope about -omega +- 0.5 rad/s.
-    static const double t[] = {0, 0.04, 0.08};
-    static const double bearing[] = {3.12, 3.15, 3.19};  // half a turn lies between them
-    static const double sd[] = {0.01, 0.02, 0.015};
+    static const double bearing[] = {3.12, 3.15, 3.19, 3.2};  // half a turn lies between them
+    static const double sd[] = {0.01, 0.02, 0.015, 0.02};
     const double omega = -0.3;
+    assert_in_range(BSLAM_SMOOTHER_FRAMES, 1, COUNT_OF(bearing));
     drive_curve(3);
     bslam_smoother_restart(&smoother, &slam.params, &slam.ekf);
     bslam_ekf_t filter = slam.ekf;
     filter.mean[BSLAM_STATE_TURN] = real(omega);
     double a[3] = {1 / (0.5 * 0.5), 0, 0};  // of slope²; of slope, offset; of offset²
     double b[2] = {-omega / (0.5 * 0.5), 0};
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < BSLAM_SMOOTHER_FRAMES; k++) {
         const bslam_motion_t motion = {.dt_s = BSLAM_R(0.04)};
         bslam_sighting_t seen = unit_direction(unit_angle_between(bearing[k], 0), 1);
         seen.bearing_sd_rad = real(sd[k]);
@@ -152,7 +152,7 @@ static void test_node_is_the_line_through_its_bearings(void **state)
         }
         bslam_smoother_see(&smoother, &seen, 1);
         const double w = 1 / (sd[k] * sd[k]);
-        const double after = t[k] - t[1];
+        const double after = 0.04 * (k - BSLAM_SMOOTHER_FRAMES / 2);
         a[0] += w * after * after;
         a[1] += w * after;
         a[2] += w;
