@@ -4,17 +4,14 @@
 #include "bslam/math/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
+#include "bslam/recovery/identity.h"
 #include "bslam/slam/internal.h"
 
 // A sighting of a recognised beacon contradicts the pose beyond this squared distance. Rightly recognised
 // ones are there once in 10^6.
 static const bslam_real_t CONTRADICT_D2 = BSLAM_R(30.0);
-// One that was not recognised agrees with the pose if it is as near as this to any beacon.
+// It agrees with the pose up to this one. One that was not recognised agrees if it is as near to any beacon.
 static const bslam_real_t FIT_D2 = BSLAM_R(9.0);
-// A machine recognises what it puts this far above 0, and this far above what the next machine says.
-static const float RECOGNISE_WEIGHT = 0.8f;
-static const float RECOGNISE_VALUE = 0.3f;
-static const float RECOGNISE_LEAD = 0.5f;
 // A fix carried on is the same as a later one within this and both doubts.
 static const bslam_real_t SAME_PLACE_M = BSLAM_R(0.25);
 static const bslam_real_t SAME_HEADING_RAD = BSLAM_R(0.15);
@@ -30,6 +27,7 @@ static const bslam_real_t DOUBT_HEADING_MAX_RAD = BSLAM_R(0.6);
 enum {
     EVIDENCE_SEVERAL = 8,   ///< frames that contradict, less those that agree, until the robot is lost,
     EVIDENCE_ONE = 25,      ///< if all show the same beacon, or with those that say neither, once several did
+    UNDECIDED_ONE = 8,      ///< frames in a row that say neither, which end a doubt that one beacon raised
     CLUE_AGE_US = 3000000,  ///< odometry carries a clue so long
     FIX_AGE_US = 1000000,
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
@@ -47,74 +45,6 @@ bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, co
         return BSLAM_RECOVERY_LOST;
     }
     return recovery->evidence > 0 ? BSLAM_RECOVERY_DOUBTING : BSLAM_RECOVERY_FOLLOWING;
-}
-
-// ---- who is seen ------------------------------------------------------------------------------------------
-
-static int find_label(const bslam_ekf_t *ekf, int32_t label)
-{
-    for (int b = 0; b < ekf->beacon_count && label != BSLAM_LABEL_NONE; b++) {
-        if (ekf->beacons[b].label == label && ekf->beacons[b].confirmed) {  // not one of its rivals
-            return b;
-        }
-    }
-    return -1;
-}
-
-/// The beacon whose machine takes a sample for its own, if no other beacon's comes near; else -1. Beacons
-/// that share a machine look alike: neither is recognised.
-static int find_looks(const bslam_slam_t *slam, const float *signature)
-{
-    bslam_sample_t sample;
-    if (slam->looks == NULL || signature == NULL || bslam_sample_encode(signature, &sample) != BSLAM_OK) {
-        return -1;
-    }
-    int best = -1;
-    float best_value = RECOGNISE_VALUE;
-    float next_value = RECOGNISE_VALUE - RECOGNISE_LEAD;
-    for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_opinion_t opinion = bslam_looks_ask(slam->looks, &slam->params, b, &sample);
-        if (opinion.weight < RECOGNISE_WEIGHT) {
-            continue;
-        }
-        if (opinion.value > best_value) {
-            next_value = best >= 0 ? best_value : next_value;
-            best = b;
-            best_value = opinion.value;
-        } else if (opinion.value > next_value) {
-            next_value = opinion.value;
-        }
-    }
-    return best_value - next_value >= RECOGNISE_LEAD ? best : -1;
-}
-
-static bool is_seen_once(const int *who, int count, int i)
-{
-    for (int j = 0; j < count; j++) {
-        if (j != i && who[j] == who[i]) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/// Which beacon each sighting shows, by what does not come from position; -1: nobody knows.
-static void recognise(const bslam_slam_t *slam, const bslam_sighting_t *sightings, int count, int *who)
-{
-    for (int i = 0; i < count; i++) {
-        const bool by_label = slam->params.association == BSLAM_ASSOCIATION_KNOWN;
-        who[i] = sightings[i].beacon_class == BSLAM_CLASS_NOT_MAPPABLE ? -1
-                 : by_label ? find_label(&slam->ekf, sightings[i].label)
-                            : find_looks(slam, sightings[i].signature);
-        if (who[i] >= 0 && !slam->ekf.beacons[who[i]].confirmed) {
-            who[i] = -1;
-        }
-    }
-    for (int i = 0; i < count; i++) {
-        if (who[i] >= 0 && !is_seen_once(who, count, i)) {
-            who[i] = -1;
-        }
-    }
 }
 
 // ---- clues ------------------------------------------------------------------------------------------------
@@ -161,34 +91,58 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     clue->range_var_m2 = bslam_scaled_range_variance_m2(&slam->params, sighting, clue->range_m, scale_var);
 }
 
-/// A remembered sighting as it looks from where the robot is now, by odometry.
-static void make_clue(const bslam_slam_t *slam, const bslam_memory_t *memory, bslam_clue_t *clue)
+/// A remembered sighting, taken for a beacon, as it looks from where the robot is now, by odometry.
+static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memory, int beacon)
 {
     const bslam_ekf_t *ekf = &slam->ekf;
-    int beacon = 0;
-    while (ekf->beacons[beacon].uid != memory->uid) {
-        beacon++;
-    }
     const bslam_pose_t now = bslam_ekf_pose(ekf);
     const bslam_pose_t to_now = bslam_pose_inverse(&now);
     const bslam_pose_t robot = bslam_pose_compose(&to_now, &memory->robot);
     const bslam_sighting_t *sighting = &memory->sighting;
-    *clue = (bslam_clue_t){.sensor = bslam_pose_compose(&robot, &memory->mount),
-                           .bearing_rad = sighting->bearing_rad,
-                           .has_range = sighting->has_range};
-    bslam_ekf_beacon_position(ekf, beacon, &clue->x_m, &clue->y_m);
+    bslam_clue_t clue = {.sensor = bslam_pose_compose(&robot, &memory->mount),
+                         .bearing_rad = sighting->bearing_rad,
+                         .has_range = sighting->has_range};
+    bslam_ekf_beacon_position(ekf, beacon, &clue.x_m, &clue.y_m);
     const bslam_sym2_t place = bslam_ekf_beacon_covariance(ekf, beacon);
     const bslam_real_t turn_var = growth(heading_var(ekf), memory->heading_var_rad2);
     const bslam_real_t way2_m2 = robot.x_m * robot.x_m + robot.y_m * robot.y_m;
     // A heading that drifts evenly bends the way by its deviation over the root of 3.
     const bslam_real_t drift_m2 = way2_m2 * (WAY_SD * WAY_SD + turn_var / 3) + (place.xx + place.yy) / 2;
     const bslam_real_t range_m = sighting->has_range && sighting->range_m > 1 ? sighting->range_m : 1;
-    clue->bearing_var_rad2 =
+    clue.bearing_var_rad2 =
         bslam_bearing_variance_rad2(&slam->params, sighting) + turn_var + drift_m2 / (range_m * range_m);
     if (sighting->has_range) {
-        make_distance(slam, &ekf->beacons[beacon], sighting, clue);
-        clue->range_var_m2 += drift_m2;
+        make_distance(slam, &ekf->beacons[beacon], sighting, &clue);
+        clue.range_var_m2 += drift_m2;
     }
+    return clue;
+}
+
+static int place_of(const bslam_ekf_t *ekf, uint32_t uid)
+{
+    int beacon = 0;
+    while (beacon < ekf->beacon_count && ekf->beacons[beacon].uid != uid) {
+        beacon++;
+    }
+    return beacon < ekf->beacon_count ? beacon : BSLAM_NOBODY;
+}
+
+/// Adds the clues that a sighting is: one for each beacon that it may show. None if there is no room for all.
+static int add_clues(const bslam_slam_t *slam, const bslam_memory_t *memory, bslam_clue_t *clues, int count)
+{
+    const int who = place_of(&slam->ekf, memory->uid);
+    int added = 0;
+    for (int b = 0; b < slam->ekf.beacon_count && who >= 0; b++) {
+        if (bslam_may_be(slam, who, b)) {
+            if (count + added == BSLAM_CLUES_MAX) {
+                return count;
+            }
+            clues[count + added] = clue_of(slam, memory, b);
+            clues[count + added].is_other = added > 0;
+            added++;
+        }
+    }
+    return count + added;
 }
 
 // ---- noticing ---------------------------------------------------------------------------------------------
@@ -197,10 +151,11 @@ static void make_clue(const bslam_slam_t *slam, const bslam_memory_t *memory, bs
 typedef struct verdict {
     int agreeing;
     int contradicting;
+    int recognised;
     uint32_t uid;  ///< of one that contradicts
 } verdict_t;
 
-/// Squared distance of a sighting from a beacon; negative: it has none.
+/// Squared distance of a sighting from a beacon; -1: it has none.
 static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *mount,
                                  const bslam_sighting_t *sighting, int beacon)
 {
@@ -212,13 +167,25 @@ static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *m
     return has ? distance2 : -1;
 }
 
-/// Whether a sighting stands where a beacon is, other than those that were found while the pose was in doubt.
-static bool fits_any(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_pose_t *mount,
-                     const bslam_sighting_t *sighting)
+/// Of the beacons that a sighting may show, the squared distance from the nearest; -1: it has none.
+static bslam_real_t nearest2_of(const bslam_slam_t *slam, const bslam_pose_t *mount,
+                                const bslam_sighting_t *sighting, int who)
+{
+    bslam_real_t nearest = -1;
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
+        if (bslam_may_be(slam, who, b)) {
+            const bslam_real_t distance2 = distance2_of(slam, mount, sighting, b);
+            nearest = nearest < 0 || (distance2 >= 0 && distance2 < nearest) ? distance2 : nearest;
+        }
+    }
+    return nearest;
+}
+
+/// Whether a sighting stands where any beacon is.
+static bool fits_any(const bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sighting)
 {
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (beacon->confirmed && (recovery->evidence == 0 || beacon->first_seen_us < recovery->doubted_us) &&
+        if (slam->ekf.beacons[b].confirmed &&
             bslam_in_range(distance2_of(slam, mount, sighting, b), 0, FIT_D2)) {
             return true;
         }
@@ -226,31 +193,24 @@ static bool fits_any(const bslam_recovery_t *recovery, const bslam_slam_t *slam,
     return false;
 }
 
-/// Several beacons were elsewhere: what merely stands where some beacon is dispels such a doubt no more.
-static bool is_serious(const bslam_recovery_t *recovery)
-{
-    return recovery->evidence > 0 && recovery->several;
-}
-
+/// What was recognised agrees or contradicts. What stands where some beacon is agrees, too, and does not
+/// contradict: it may be that one, and look like another from here. But not in doubt: then the pose is
+/// odometry's alone and grows vague, by which anything stands somewhere, so that identities alone count.
 static verdict_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_pose_t *mount,
                        const bslam_sighting_t *sightings, int count, const int *who)
 {
-    verdict_t verdict = {0, 0, 0};
+    const bool in_doubt = recovery->evidence > 0;
+    verdict_t verdict = {0, 0, 0, 0};
     for (int i = 0; i < count; i++) {
-        if (who[i] < 0) {
-            verdict.agreeing +=
-                !is_serious(recovery) && fits_any(recovery, slam, mount, &sightings[i]) ? 1 : 0;
-            continue;
-        }
-        const bslam_real_t distance2 = distance2_of(slam, mount, &sightings[i], who[i]);
-        if (distance2 > CONTRADICT_D2) {
-            // What stands where another beacon is may be that one, and look alike from here.
-            if (!fits_any(recovery, slam, mount, &sightings[i])) {
-                verdict.contradicting++;
-                verdict.uid = slam->ekf.beacons[who[i]].uid;
-            }
-        } else if (bslam_in_range(distance2, 0, FIT_D2)) {
+        const bslam_real_t distance2 = who[i] >= 0 ? nearest2_of(slam, mount, &sightings[i], who[i]) : -1;
+        verdict.recognised += who[i] >= 0 ? 1 : 0;
+        if (bslam_in_range(distance2, 0, FIT_D2)) {
             verdict.agreeing++;
+        } else if (who[i] < 0) {
+            verdict.agreeing += !in_doubt && fits_any(slam, mount, &sightings[i]) ? 1 : 0;
+        } else if (distance2 > CONTRADICT_D2 && (in_doubt || !fits_any(slam, mount, &sightings[i]))) {
+            verdict.contradicting++;
+            verdict.uid = slam->ekf.beacons[who[i]].uid;
         }
     }
     return verdict;
@@ -262,12 +222,11 @@ static bool fits_elsewhere(const bslam_slam_t *slam, const bslam_pose_t *mount,
 {
     bslam_clue_t clues[BSLAM_CLUES_MAX];
     int clue_count = 0;
-    for (int i = 0; i < count && clue_count < BSLAM_CLUES_MAX; i++) {
+    for (int i = 0; i < count; i++) {
         if (who[i] >= 0) {
             const bslam_memory_t memory =
                 memorise(slam, 0, mount, &sightings[i], slam->ekf.beacons[who[i]].uid);
-            make_clue(slam, &memory, &clues[clue_count]);
-            clue_count++;
+            clue_count = add_clues(slam, &memory, clues, clue_count);
         }
     }
     bslam_fix_t fix;
@@ -283,12 +242,13 @@ static void get_lost(bslam_recovery_t *recovery, bslam_slam_t *slam)
             (void)removed;  // it is there
         }
     }
+    const bslam_real_t known_var_rad2 = heading_var(&slam->ekf);
     bslam_slam_lose_pose(slam);
+    for (int m = 0; m < recovery->memory_count; m++) {  // odometry's doubt begins anew
+        recovery->memories[m].heading_var_rad2 -= known_var_rad2;
+    }
     recovery->counters.lost++;
     recovery->evidence = 0;
-    recovery->memory_count = 0;
-    recovery->confirmed = 0;
-    recovery->has_fix = false;
 }
 
 static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, int64_t time_us)
@@ -301,11 +261,28 @@ static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, i
     }
     recovery->several =
         recovery->several || verdict->contradicting > 1 || verdict->uid != recovery->doubted_uid;
+    recovery->undecided = recovery->several ? recovery->undecided : 0;
     recovery->evidence++;
 }
 
-/// True if the frame may be used: one beacon alone that is elsewhere may have been carried there, or be
-/// another one that looks like it.
+/// A frame that does not speak against the pose. If several beacons did before, only what agrees speaks for
+/// it; if one did, it is that one that is odd as soon as another agrees, or was mistaken for a moment.
+static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const verdict_t *verdict)
+{
+    if (verdict->agreeing > verdict->contradicting) {
+        recovery->evidence--;
+        return;
+    }
+    recovery->undecided += recovery->several || verdict->recognised == 0 ? 1 : 0;
+    if (recovery->several && recovery->undecided + recovery->evidence >= EVIDENCE_ONE) {
+        get_lost(recovery, slam);
+    } else if (!recovery->several && (verdict->agreeing > 0 || recovery->undecided >= UNDECIDED_ONE)) {
+        recovery->evidence = 0;
+    }
+}
+
+/// True if the frame may be used. In doubt it may not, unless more agree: a robot that was carried would
+/// learn from it that its beacons' looks are those of new ones.
 static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const verdict_t *verdict)
 {
     recovery->counters.contradicting += (uint32_t)verdict->contradicting;
@@ -313,19 +290,13 @@ static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_
         add_evidence(recovery, verdict, time_us);
         if (recovery->evidence >= (recovery->several ? EVIDENCE_SEVERAL : EVIDENCE_ONE)) {
             get_lost(recovery, slam);
-            return false;
         }
-    } else if (verdict->contradicting < verdict->agreeing && recovery->evidence > 0) {
-        recovery->evidence--;
-        return true;
-    } else if (is_serious(recovery)) {
-        recovery->undecided++;
-        if (recovery->undecided + recovery->evidence >= EVIDENCE_ONE) {
-            get_lost(recovery, slam);
-            return false;
-        }
+        return false;
     }
-    return recovery->evidence == 0 || !recovery->several;
+    if (recovery->evidence > 0) {
+        doubt_less(recovery, slam, verdict);
+    }
+    return !slam->is_lost && (recovery->evidence == 0 || verdict->agreeing > verdict->contradicting);
 }
 
 // ---- finding ----------------------------------------------------------------------------------------------
@@ -349,16 +320,20 @@ static void forget_old(bslam_recovery_t *recovery, const bslam_slam_t *slam, int
 {
     int kept = 0;
     for (int m = 0; m < recovery->memory_count; m++) {
-        bool is_there = false;
-        for (int b = 0; b < slam->ekf.beacon_count; b++) {
-            is_there = is_there || slam->ekf.beacons[b].uid == recovery->memories[m].uid;
-        }
+        const bool is_there = place_of(&slam->ekf, recovery->memories[m].uid) >= 0;
         if (is_there && time_us - recovery->memories[m].time_us <= CLUE_AGE_US) {
             recovery->memories[kept] = recovery->memories[m];
             kept++;
         }
     }
     recovery->memory_count = kept;
+}
+
+static void forget_all(bslam_recovery_t *recovery)
+{
+    recovery->memory_count = 0;
+    recovery->confirmed = 0;
+    recovery->has_fix = false;
 }
 
 /// Keeps the newest sighting of each recognised beacon. True if there is one.
@@ -423,25 +398,28 @@ static bslam_real_t doubt(bslam_real_t sd, bslam_real_t least, bslam_real_t most
     return wide < most ? wide : most;
 }
 
-static void seek(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                 const bslam_sighting_t *sightings, int count, const int *who)
+/// Remembers who is seen in a frame that is not used. True if that confirms where the robot is: *fix.
+static bool seek(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
+                 const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count, const int *who,
+                 bslam_fix_t *fix)
 {
-    forget_old(recovery, slam, time_us);
-    if (recovery->memory_count == 0) {
-        bslam_slam_lose_pose(slam);  // odometry's doubt begins anew with the first clue
-    }
     if (!remember(recovery, slam, time_us, mount, sightings, count, who)) {
-        return;
+        return false;
     }
     bslam_clue_t clues[BSLAM_CLUES_MAX];
+    int clue_count = 0;
     for (int m = 0; m < recovery->memory_count; m++) {
-        make_clue(slam, &recovery->memories[m], &clues[m]);
+        clue_count = add_clues(slam, &recovery->memories[m], clues, clue_count);
     }
-    bslam_fix_t fix;
-    if (bslam_relocate(clues, recovery->memory_count, &fix) && is_clear(&fix) &&
-        confirm(recovery, slam, &fix, time_us) &&
-        bslam_slam_set_pose(slam, &fix.pose, doubt(fix.position_sd_m, DOUBT_M, DOUBT_POSITION_MAX_M),
-                            doubt(fix.heading_sd_rad, DOUBT_RAD, DOUBT_HEADING_MAX_RAD)) == BSLAM_OK) {
+    return bslam_relocate(clues, clue_count, fix) && is_clear(fix) && confirm(recovery, slam, fix, time_us);
+}
+
+static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam_fix_t *fix)
+{
+    const bslam_status_t set =
+        bslam_slam_set_pose(slam, &fix->pose, doubt(fix->position_sd_m, DOUBT_M, DOUBT_POSITION_MAX_M),
+                            doubt(fix->heading_sd_rad, DOUBT_RAD, DOUBT_HEADING_MAX_RAD));
+    if (set == BSLAM_OK) {
         recovery->counters.found++;
     }
 }
@@ -457,10 +435,19 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
         return status;
     }
     int who[BSLAM_SIGHTINGS_MAX];
-    recognise(slam, sightings, count, who);
+    bslam_identify(slam, sightings, count, who);
+    forget_old(recovery, slam, time_us);
+    bslam_fix_t fix;
     bool use = false;
     if (slam->is_lost) {
-        seek(recovery, slam, time_us, &mount, sightings, count, who);
+        if (recovery->memory_count == 0) {
+            bslam_slam_lose_pose(slam);  // odometry's doubt begins anew with the first clue
+        }
+        if (seek(recovery, slam, time_us, &mount, sightings, count, who, &fix)) {
+            be_found(recovery, slam, &fix);
+        }
+    } else if (!bslam_is_findable(slam)) {
+        use = true;
     } else {
         verdict_t verdict = weigh(recovery, slam, &mount, sightings, count, who);
         // A pose that gave way to the first beacon seen agrees with that one.
@@ -469,6 +456,12 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
             verdict.agreeing = 0;
         }
         use = notice(recovery, slam, time_us, &verdict);
+        if (use) {
+            forget_all(recovery);  // the pose is no longer odometry's alone
+        } else {
+            // Where it is by then is not believed before it is lost.
+            (void)seek(recovery, slam, time_us, &mount, sightings, count, who, &fix);
+        }
     }
     recovery->counters.withheld += use ? 0u : 1u;
     bslam_slam_close_frame(slam, time_us, sightings, count, &mount, use);

@@ -7,6 +7,8 @@
 
 // A clue agrees with a pose up to this squared distance: of two values one in 3000 does not.
 static const bslam_real_t AGREE_D2 = BSLAM_R(16.0);
+// Which beacon a sighting shows of several is told if by any other all that agree are so much farther off.
+static const bslam_real_t TOLD_D2 = BSLAM_R(9.0);
 // Beacons closer together give no heading.
 static const bslam_real_t BASE_MIN_M = BSLAM_R(0.3);
 static const bslam_real_t SINE_MIN = BSLAM_R(0.02);
@@ -36,22 +38,52 @@ static bool compare(const bslam_clue_t *clue, const bslam_pose_t *pose, residual
     return true;
 }
 
-/// Agreement of all clues with a pose.
+/// The first clue of the sighting after that of clue `i`.
+static int next_sighting(const bslam_clue_t *clues, int count, int i)
+{
+    do {
+        i++;
+    } while (i < count && clues[i].is_other);
+    return i;
+}
+
+/// Of the clues of one sighting the one that is nearest to what a pose says, if that agrees; else -1.
+static int agreeing_clue(const bslam_clue_t *clues, int first, int end, const bslam_pose_t *pose,
+                         residual_t *residual)
+{
+    int nearest = -1;
+    for (int i = first; i < end; i++) {
+        residual_t one;
+        if (compare(&clues[i], pose, &one) && one.distance2 <= AGREE_D2 &&
+            (nearest < 0 || one.distance2 < residual->distance2)) {
+            nearest = i;
+            *residual = one;
+        }
+    }
+    return nearest;
+}
+
+/// Agreement of all sightings with a pose.
 typedef struct vote {
     int32_t agreeing;
     int32_t with_range;
     bslam_real_t distance2;
+    uint32_t who;  ///< a bit for each clue by which one agrees
 } vote_t;
 
 static vote_t vote_on(const bslam_clue_t *clues, int count, const bslam_pose_t *pose)
 {
-    vote_t vote = {0, 0, 0};
-    for (int i = 0; i < count; i++) {
+    vote_t vote = {0, 0, 0, 0};
+    int end;
+    for (int first = 0; first < count; first = end) {
+        end = next_sighting(clues, count, first);
         residual_t residual;
-        if (compare(&clues[i], pose, &residual) && residual.distance2 <= AGREE_D2) {
+        const int i = agreeing_clue(clues, first, end, pose, &residual);
+        if (i >= 0) {
             vote.agreeing++;
             vote.with_range += clues[i].has_range ? 1 : 0;
             vote.distance2 += residual.distance2;
+            vote.who |= 1u << (unsigned)i;
         }
     }
     return vote;
@@ -172,9 +204,12 @@ static void add_scalar(normal_t *normal, const bslam_real_t by[3], bslam_real_t 
 static normal_t normal_at(const bslam_clue_t *clues, int count, const bslam_pose_t *pose)
 {
     normal_t normal = {{0}, {0}};
-    for (int i = 0; i < count; i++) {
+    int end;
+    for (int first = 0; first < count; first = end) {
+        end = next_sighting(clues, count, first);
         residual_t residual;
-        if (compare(&clues[i], pose, &residual) && residual.distance2 <= AGREE_D2) {
+        const int i = agreeing_clue(clues, first, end, pose, &residual);
+        if (i >= 0) {
             add_scalar(&normal, residual.seen.bearing_by_pose, residual.bearing_rad,
                        clues[i].bearing_var_rad2);
             if (clues[i].has_range) {
@@ -241,27 +276,35 @@ typedef struct search {
     int count;
     bslam_pose_t best;
     vote_t vote;
+    vote_t rival;  ///< the best by other beacons
 } search_t;
 
 static void try_pose(search_t *search, const bslam_pose_t *pose)
 {
     const vote_t vote = vote_on(search->clues, search->count, pose);
-    if (is_better(&vote, &search->vote)) {
+    const bool is_best = is_better(&vote, &search->vote);
+    const vote_t second = is_best ? search->vote : vote;
+    if (is_best) {
+        search->rival = search->rival.who == vote.who ? (vote_t){0, 0, 0, 0} : search->rival;
         search->vote = vote;
         search->best = *pose;
+    }
+    if (second.who != search->vote.who && is_better(&second, &search->rival)) {
+        search->rival = second;
     }
 }
 
 static void try_all(search_t *search)
 {
     const bslam_clue_t *clues = search->clues;
-    for (int a = 0; a < search->count; a++) {
-        for (int b = a + 1; b < search->count; b++) {
+    const int count = search->count;
+    for (int a = 0; a < count; a++) {
+        for (int b = next_sighting(clues, count, a); b < count; b++) {
             bslam_pose_t pose;
             if (clues[a].has_range && clues[b].has_range && pose_of_two(&clues[a], &clues[b], &pose)) {
                 try_pose(search, &pose);
             }
-            for (int c = b + 1; c < search->count; c++) {
+            for (int c = next_sighting(clues, count, b); c < count; c++) {
                 const bool any_range = clues[a].has_range || clues[b].has_range || clues[c].has_range;
                 if (!any_range && pose_of_three(&clues[a], &clues[b], &clues[c], &pose)) {
                     try_pose(search, &pose);
@@ -269,6 +312,13 @@ static void try_all(search_t *search)
             }
         }
     }
+}
+
+/// Whether no pose by other beacons is about as good.
+static bool is_told(const search_t *search)
+{
+    return search->rival.agreeing < search->vote.agreeing ||
+           search->rival.distance2 > search->vote.distance2 + TOLD_D2;
 }
 
 static bool is_enough(const vote_t *vote)
@@ -281,7 +331,7 @@ bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
     search_t search = {.clues = clues, .count = count};
     try_all(&search);
     bslam_fix_t found = {.pose = search.best};
-    if (!is_enough(&search.vote) || !refine(clues, count, &found)) {
+    if (!is_enough(&search.vote) || !is_told(&search) || !refine(clues, count, &found)) {
         return false;
     }
     const vote_t vote = vote_on(clues, count, &found.pose);
@@ -290,7 +340,10 @@ bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
     }
     found.agreeing = vote.agreeing;
     found.with_range = vote.with_range;
-    found.dissenting = count - vote.agreeing;
+    found.dissenting = -vote.agreeing;
+    for (int i = 0; i < count; i++) {
+        found.dissenting += clues[i].is_other ? 0 : 1;
+    }
     *fix = found;
     return true;
 }

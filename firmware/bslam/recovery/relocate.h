@@ -10,7 +10,8 @@
 /// Clues that are looked at; a pose is tried for each two, or three, of them.
 #define BSLAM_CLUES_MAX 10
 
-/// A beacon that was recognised, as seen from where the robot is now.
+/// A beacon that was recognised, as seen from where the robot is now. A sighting that shows one of several
+/// beacons is a clue for each of them, one behind the other.
 typedef struct bslam_clue {
     bslam_real_t x_m;  ///< the beacon in the map
     bslam_real_t y_m;
@@ -20,6 +21,7 @@ typedef struct bslam_clue {
     bool has_range;
     bslam_real_t bearing_var_rad2;  ///< of the sighting, of the beacon's place, and of the way since
     bslam_real_t range_var_m2;
+    bool is_other;  ///< of the same sighting as the clue before, taken for another beacon
 } bslam_clue_t;
 
 /// A pose, and what speaks for it.
@@ -27,14 +29,14 @@ typedef struct bslam_fix {
     bslam_pose_t pose;
     bslam_real_t position_sd_m;  ///< along the longer axis
     bslam_real_t heading_sd_rad;
-    int32_t agreeing;    ///< clues that fit it
+    int32_t agreeing;    ///< sightings that fit it
     int32_t with_range;  ///< of them with a distance
-    int32_t dissenting;  ///< clues that do not
+    int32_t dissenting;  ///< sightings that do not
 } bslam_fix_t;
 
-/// The pose that most of `count` <= BSLAM_CLUES_MAX clues, of different beacons, agree with. False, and *fix
-/// unchanged: fewer than two with distance agree on any, nor three without. O(count³), or O(count⁴) without
-/// distances.
+/// The pose that most sightings of `count` <= BSLAM_CLUES_MAX clues agree with. False, and *fix unchanged:
+/// fewer than two with distance agree on any, nor three without, or as many agree on another pose by taking
+/// a sighting for another beacon. O(count³), or O(count⁴) without distances.
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix);
 
 #endif
