@@ -25,9 +25,9 @@ static const bslam_real_t DOUBT_POSITION_MAX_M = BSLAM_R(1.5);
 static const bslam_real_t DOUBT_HEADING_MAX_RAD = BSLAM_R(0.6);
 
 enum {
-    EVIDENCE_SEVERAL = 8,   ///< frames that contradict, less those that agree, until the robot is lost,
-    EVIDENCE_ONE = 25,      ///< if all show the same beacon, or with those that say neither, once several did
-    UNDECIDED_ONE = 8,      ///< frames in a row that say neither, which end a doubt that one beacon raised
+    EVIDENCE_SEVERAL = 8,  ///< frames that contradict, less those that agree, until the robot is lost,
+    EVIDENCE_ONE = 25,     ///< if all show the same beacon, or with those that say neither, once several did
+    SILENT_ONE = 8,  ///< frames in which nothing is recognised, which end a doubt that one beacon raised
     CLUE_AGE_US = 3000000,  ///< odometry carries a clue so long
     FIX_AGE_US = 1000000,
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
@@ -259,25 +259,27 @@ static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, i
         recovery->several = false;
         recovery->undecided = 0;
     }
+    recovery->silent = 0;
     recovery->several =
         recovery->several || verdict->contradicting > 1 || verdict->uid != recovery->doubted_uid;
-    recovery->undecided = recovery->several ? recovery->undecided : 0;
     recovery->evidence++;
 }
 
-/// A frame that does not speak against the pose. If several beacons did before, only what agrees speaks for
-/// it; if one did, it is that one that is odd as soon as another agrees, or was mistaken for a moment.
+/// A frame that does not speak against the pose. A doubt that one beacon raised ends when another agrees, for
+/// then it is that one that is odd, and when nothing was recognised for a moment.
 static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const verdict_t *verdict)
 {
     if (verdict->agreeing > verdict->contradicting) {
         recovery->evidence--;
         return;
     }
-    recovery->undecided += recovery->several || verdict->recognised == 0 ? 1 : 0;
-    if (recovery->several && recovery->undecided + recovery->evidence >= EVIDENCE_ONE) {
-        get_lost(recovery, slam);
-    } else if (!recovery->several && (verdict->agreeing > 0 || recovery->undecided >= UNDECIDED_ONE)) {
+    const bool is_silent = verdict->recognised == 0;
+    recovery->silent += is_silent ? 1 : 0;
+    recovery->undecided += recovery->several || !is_silent ? 1 : 0;
+    if (!recovery->several && (verdict->agreeing > 0 || recovery->silent >= SILENT_ONE)) {
         recovery->evidence = 0;
+    } else if (recovery->undecided + recovery->evidence >= EVIDENCE_ONE) {
+        get_lost(recovery, slam);
     }
 }
 

@@ -6,9 +6,10 @@
 ///
 /// It lives on identities that do not come from position: labels, or looks. A sighting contradicts if it
 /// shows a beacon that is clearly elsewhere by the present pose. A frame in which more contradict than agree
-/// is not used; after some of them the robot is lost. Then no sighting is fused and the map stays as it is,
-/// until two beacons or more agree on a pose, and a third, or time, confirms it. Nothing jumps silently:
-/// state and counters say what happened, and the pose's covariance is 30 m and 3.2 rad meanwhile.
+/// is not used, but remembered; after some of them the robot is lost. Then no sighting is fused and the map
+/// stays as it is, until two beacons or more agree on a pose, and a third, or time, confirms it. Nothing
+/// jumps silently: state and counters say what happened, and the pose's covariance is 30 m and 3.2 rad
+/// meanwhile.
 ///
 /// Without labels and without looks nothing can contradict: association alone decides.
 #ifndef BSLAM_RECOVERY_RECOVERY_H
@@ -48,7 +49,8 @@ typedef struct bslam_recovery {
     int64_t doubted_us;    ///< the first frame that contradicted, of this doubt,
     uint32_t doubted_uid;  ///< and the beacon that it showed
     bool several;          ///< others have contradicted, too
-    int32_t undecided;     ///< frames since then that said neither
+    int32_t
+        undecided;  ///< frames since then that said neither; of one beacon's doubt, since it was seen last
     bslam_memory_t memories[BSLAM_CLUES_MAX];
     int32_t memory_count;
     bslam_pose_t last_fix;

@@ -124,11 +124,60 @@ static void test_recovery_goes_by_the_beacons_own_scales(void **state)
 static void test_recovery_by_two_beacons_takes_time(void **state)
 {
     look_on(50, 0, 0, 0, BEACONS);
-    look_on(10, 1, 2, -1, 2);
+    look_on(8, 1, 2, -1, 2);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
-    look_on(10, 1, 2, -1, 2);
+    look_on(2, 1, 2, -1, 2);  // the frames of the doubt count
     assert_int_equal(recovery.counters.found, 1);
     assert_at(1, 2, -1);
+}
+
+static void test_recovery_counts_no_clue_from_before_a_frame_that_was_used(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(5, 1, 2, -1, 2);
+    look_on(1, 0, 0, 0, BEACONS);
+    assert_int_equal(recovery.memory_count, 0);
+    look_on(4, 1, 2, -1, 2);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
+    look_on(3, 1, 2, -1, 2);
+    assert_int_equal(recovery.counters.found, 0);
+    look_on(2, 1, 2, -1, 2);
+    assert_int_equal(recovery.counters.found, 1);
+}
+
+static void
+test_recovery_by_one_beacon_that_is_elsewhere_gets_lost_in_a_second_and_learns_nothing(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    const bslam_ekf_t before = slam.ekf;
+    look_on(24, 1, 2, -1, 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
+    assert_memory_equal(before.mean, slam.ekf.mean, sizeof before.mean);
+    look_on(1, 1, 2, -1, 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
+}
+
+static void test_recovery_of_one_odd_beacon_ends_where_another_agrees(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(20, 1, 2, -1, 1);
+    look_on(1, 0, 0, 0, 1);
+    look_on(24, 1, 2, -1, 1);
+    assert_int_equal(recovery.counters.lost, 1);  // 19 are left, and 6 more are enough
+    setup(NULL);
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(20, 1, 2, -1, 1);
+    look_on(8, 1, 2, -1, 0);  // nothing is seen
+    look_on(24, 1, 2, -1, 1);
+    assert_int_equal(recovery.counters.lost, 0);
+}
+
+static void test_recovery_in_a_map_of_one_beacon_is_never_lost(void **state)
+{
+    look_on(50, 0, 0, 0, 1);
+    look_on(100, 1, 2, -1, 1);
+    assert_int_equal(recovery.counters.contradicting, 0);
+    assert_int_equal(recovery.counters.lost, 0);
 }
 
 static void test_recovery_by_one_beacon_is_never_a_guess(void **state)
@@ -173,6 +222,11 @@ int main(void)
                                setup),
         cmocka_unit_test_setup(test_recovery_goes_by_the_beacons_own_scales, setup),
         cmocka_unit_test_setup(test_recovery_by_two_beacons_takes_time, setup),
+        cmocka_unit_test_setup(test_recovery_counts_no_clue_from_before_a_frame_that_was_used, setup),
+        cmocka_unit_test_setup(
+            test_recovery_by_one_beacon_that_is_elsewhere_gets_lost_in_a_second_and_learns_nothing, setup),
+        cmocka_unit_test_setup(test_recovery_of_one_odd_beacon_ends_where_another_agrees, setup),
+        cmocka_unit_test_setup(test_recovery_in_a_map_of_one_beacon_is_never_lost, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),
         cmocka_unit_test_setup(test_recovery_refuses_as_the_pipeline_does, setup),

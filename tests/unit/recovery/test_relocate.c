@@ -147,6 +147,40 @@ static void test_relocate_by_places_beyond_numbers_finds_nothing(void **state)
     assert_int_equal(fix.agreeing, 77);
 }
 
+/// A sighting that is beacon 1 or 3, which look alike.
+static void test_relocate_tells_by_geometry_which_of_two_is_seen(void **state)
+{
+    bslam_clue_t clues[] = {clue_of(0, 1, 3, 0.5, true), clue_of(1, 1, 3, 0.5, true),
+                            clue_of(1, 1, 3, 0.5, true)};
+    clues[2].x_m = real(beacons[3][0]);
+    clues[2].y_m = real(beacons[3][1]);
+    clues[2].is_other = true;
+    bslam_fix_t fix;
+    for (int swapped = 0; swapped < 2; swapped++) {
+        assert_true(bslam_relocate(clues, 3, &fix));
+        assert_near(fix.pose.x_m, 1, 2e-3);
+        assert_near(fix.pose.y_m, 3, 2e-3);
+        assert_int_equal(fix.agreeing, 2);
+        assert_int_equal(fix.dissenting, 0);
+        const bslam_clue_t first = clues[1];
+        clues[1] = clues[2];
+        clues[2] = first;
+        clues[1].is_other = false;
+        clues[2].is_other = true;
+    }
+    // The same distance from beacon 0, elsewhere: a pose for each, and no telling.
+    clues[2].x_m = -clues[1].x_m;
+    clues[2].y_m = -clues[1].y_m;
+    fix.agreeing = 77;
+    assert_false(bslam_relocate(clues, 3, &fix));
+    assert_int_equal(fix.agreeing, 77);
+    // A third beacon tells.
+    const bslam_clue_t told[] = {clues[0], clues[1], clues[2], clue_of(2, 1, 3, 0.5, true)};
+    assert_true(bslam_relocate(told, 4, &fix));
+    assert_near(fix.pose.x_m, 1, 2e-3);
+    assert_int_equal(fix.agreeing, 3);
+}
+
 static void test_relocate_with_too_little_finds_nothing(void **state)
 {
     const bslam_clue_t one[] = {clue_of(0, 1, 3, 0, true)};
@@ -171,6 +205,7 @@ int main(void)
         cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),
         cmocka_unit_test(test_relocate_on_a_beacon_leaves_its_direction_out),
         cmocka_unit_test(test_relocate_by_places_beyond_numbers_finds_nothing),
+        cmocka_unit_test(test_relocate_tells_by_geometry_which_of_two_is_seen),
         cmocka_unit_test(test_relocate_with_too_little_finds_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
