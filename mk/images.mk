@@ -9,12 +9,12 @@ PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # and the front end for pictures.
-HOST_SIZES := -DSESSION_VISION=1 \
+HOST_SIZES := -DSESSION_VISION=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records stored seeing text watch)
+APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records carried stored seeing text watch)
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -55,13 +55,14 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
+HOST_ROBOT_FLAGS := -DSESSION_VISION=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 
 $(HOST_ROBOT_OBJECTS): build/host/%.o: %.c mk/config.mk mk/images.mk
 	@mkdir -p $(@D)
-	@$(UNIT_COMPILE_float) $(C_WARNINGS) $(C_WARNINGS_FLOAT) -DSESSION_VISION=1 -c $< -o $@
+	@$(UNIT_COMPILE_float) $(C_WARNINGS) $(C_WARNINGS_FLOAT) $(HOST_ROBOT_FLAGS) -c $< -o $@
 
 $(HOST_ROBOT): $(HOST_ROBOT_OBJECTS) $(UNIT_CORE_float)
 	@$(CC) $(SANITIZE) $^ -lm -o $@

@@ -274,6 +274,25 @@ static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+static void apply_map_write(session_t *session, bslam_link_reader_t *reader)
+{
+    const uint32_t at = bslam_link_get_u32(reader);
+    const bool taken = !reader->failed && carried_take(&session->carried, at, reader);
+    session->last_status = taken ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+}
+
+static void apply_map_load(session_t *session, bslam_link_reader_t *reader)
+{
+    const uint32_t size = bslam_link_get_u32(reader);
+    const bslam_map_mode_t mode = bslam_link_get_u8(reader) == 0 ? BSLAM_MAP_LIVING : BSLAM_MAP_FROZEN;
+    if (is_whole(session, reader)) {
+        keep(session, carried_load(&session->carried, &session->slam, size, mode));
+        if (session->last_status == BSLAM_OK) {
+            watch_restart(&session->watch);
+        }
+    }
+}
+
 /// A question changes nothing: it is read when it is answered.
 static void apply_nothing(session_t *session, bslam_link_reader_t *reader)
 {
@@ -424,6 +443,17 @@ _Static_assert(2 + sizeof(bslam_counters_t) + sizeof(bslam_looks_counters_t) +
                    BSLAM_LINK_PAYLOAD_MAX,
                "the counters are one answer");
 
+static void answer_map_read(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    carried_put(&session->slam, bslam_link_get_u32(reader), out);
+}
+
+static void answer_map_load(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
+{
+    (void)reader;
+    bslam_link_put_u8(out, (uint8_t)session->carried.fault);
+}
+
 static void answer_counters(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
@@ -493,6 +523,9 @@ static const exchange_t exchanges[] = {
     {SESSION_PARAM_SAVE, apply_param_save, answer_nothing},
     {SESSION_SET_POSE, apply_set_pose, answer_step},
     {SESSION_HEALTH, apply_nothing, answer_health},
+    {SESSION_MAP_READ, apply_nothing, answer_map_read},
+    {SESSION_MAP_WRITE, apply_map_write, answer_nothing},
+    {SESSION_MAP_LOAD, apply_map_load, answer_map_load},
 #if SESSION_VISION
     {SESSION_CAMERA, apply_camera, answer_nothing},
     {SESSION_IMAGE, apply_image, answer_nothing},

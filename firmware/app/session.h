@@ -8,6 +8,7 @@
 #define APP_SESSION_H
 
 #include "app/seeing.h"
+#include "app/carried.h"
 #include "app/watch.h"
 #include "bslam/bslam.h"
 #include "port/port.h"
@@ -37,6 +38,9 @@ typedef enum session_message {
     SESSION_PARAM_SAVE = 0x10,  ///< keeps the parameters as set over a restart
     SESSION_SET_POSE = 0x16,    ///< the robot is told where it is
     SESSION_HEALTH = 0x17,      ///< asks what went wrong so far, and what the robot knows of it
+    SESSION_MAP_READ = 0x18,    ///< asks for bytes of the map as a blob
+    SESSION_MAP_WRITE = 0x19,   ///< bytes of a map
+    SESSION_MAP_LOAD = 0x1a,    ///< takes the map that was written in place of its own
     SESSION_CAMERA = 0x11,      ///< what a camera is; this and the next four: only with SESSION_VISION
     SESSION_IMAGE = 0x12,       ///< starts a picture
     SESSION_PIXELS = 0x13,      ///< the next bytes of it
@@ -75,6 +79,7 @@ typedef struct session {
     seeing_t seeing;
 #endif
     watch_t watch;
+    carried_t carried;
     bslam_params_t params;  ///< as set, for the next reset
     bslam_link_parser_t parser;
     uint32_t id;  ///< the host's number of this session

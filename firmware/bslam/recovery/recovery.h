@@ -49,8 +49,8 @@ typedef struct bslam_recovery {
     int64_t doubted_us;    ///< the first frame that contradicted, of this doubt,
     uint32_t doubted_uid;  ///< and the beacon that it showed
     bool several;          ///< others have contradicted, too
-    int32_t
-        undecided;  ///< frames since then that said neither; of one beacon's doubt, since it was seen last
+    int32_t undecided;     ///< frames since then that said neither
+    int32_t silent;        ///< frames since one contradicted in which nothing was recognised
     bslam_memory_t memories[BSLAM_CLUES_MAX];
     int32_t memory_count;
     bslam_pose_t last_fix;

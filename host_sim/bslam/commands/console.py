@@ -14,7 +14,9 @@ import numpy as np
 
 from bslam.commands.arguments import add_filter_options, run_options
 from bslam.commands.report import table_of
+from bslam.core.errors import CoreError
 from bslam.errors import BslamError
+from bslam.experiment.kept import read_blob
 from bslam.experiment.options import ASSOCIATIONS
 from bslam.experiment.runner import run_log
 from bslam.link.messages import Health, PoseReport
@@ -32,12 +34,14 @@ EXAMPLES = """examples:
   bslam console serial:/dev/ttyUSB0 --record drive.mcap --reset
   bslam console serial:/dev/ttyUSB0 --set wheelbase_m=0.31 --save --reset
   bslam console serial:/dev/ttyUSB0 --set-pose 1.5,0,1.57,0.1,0.05
+  bslam console serial:/dev/ttyUSB0 --save-map flat.bslam
+  bslam console serial:/dev/ttyUSB0 --reset --map flat.bslam --set-pose 1.5,0,1.57,0.1,0.05
   bslam console qemu:mps2_an386 --drive paper_room --record drive.mcap
   bslam console qemu:mps2_an386 --drive out/run/paper_room_seed0
 
 A robot with encoders of its own drives by itself, and is watched; nothing that it knows is changed but by
---set, --save and --reset. --drive feeds it with a scenario's odometry and sightings, or a log folder's, from
-the start. A recording that begins with --reset or --drive runs again with `bslam replay` to the same bits.
+--set, --save, --reset, --map and --set-pose. --drive feeds it with a scenario's odometry and sightings, or a
+log folder's, from the start. A recording that begins with --reset or --drive runs again with `bslam replay` to the same bits.
 Ctrl-C ends it."""
 _DRAW_S = 1.0
 _LISTEN_S = 0.1
@@ -57,6 +61,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y,HEADING,SD,SD",
         help="tell it where it is in its map: m, m, rad, and how sure that is: m, rad",
     )
+    group.add_argument(
+        "--map", type=Path, metavar="FILE", help="it goes on in this map, *.bslam, at a place unknown"
+    )
+    group.add_argument("--save-map", type=Path, metavar="FILE", help="write its map as it is, FILE.bslam")
     group.add_argument("--drive", metavar="LOG", help="feed it: a scenario, or a log folder")
     group.add_argument("--seed", type=int, default=0, metavar="N", help="of the scenario (default: 0)")
     group = parser.add_argument_group("console")
@@ -158,8 +166,21 @@ def _change(slam: RemoteSlam, arguments: argparse.Namespace) -> None:
     if arguments.save:
         slam.save_params()
         print("the robot keeps its parameters")
+    if arguments.save_map is not None:
+        arguments.save_map.write_bytes(slam.save_map())
+        print(f"its map is in {arguments.save_map}")
     if arguments.reset:
         slam.reset()
+    if arguments.map is not None:
+        _load_map(slam, arguments.map)
+
+
+def _load_map(slam: RemoteSlam, path: Path) -> None:
+    try:
+        slam.load_map(read_blob(path))
+    except CoreError as error:
+        raise BslamError(f"{path}: the robot does not take it: {error}") from None
+    print(f"it goes on in {path}, at a place unknown")
 
 
 def _note_what_went_before(slam: RemoteSlam, writer: RecordingWriter) -> None:

@@ -41,6 +41,9 @@ class Message(IntEnum):
     SEEN = 0x15
     SET_POSE = 0x16
     HEALTH = 0x17
+    MAP_READ = 0x18
+    MAP_WRITE = 0x19
+    MAP_LOAD = 0x1A
 
 
 class Report(IntEnum):
@@ -69,6 +72,7 @@ _CAMERA = struct.Struct("<BBHH9f")
 _SEEN = struct.Struct("<5fiBB")
 _LOOKED = struct.Struct("<4B")
 _VALUE = struct.Struct("<f")
+_PLACE = struct.Struct("<I")
 _POSE_AT = struct.Struct("<B3f")
 _STEP = struct.Struct("<9fQI")
 _ACCOUNT = struct.Struct("<BBBIff")
@@ -198,6 +202,23 @@ def known_beacon(label: int, x_m: float, y_m: float) -> bytes:
 
 def remove_beacon(uid: int) -> bytes:
     return _UID.pack(uid)
+
+
+def map_read(at: int) -> bytes:
+    return _PLACE.pack(at)
+
+
+def map_write(at: int, part: bytes) -> bytes:
+    return _PLACE.pack(at) + part
+
+
+def map_load(size: int, frozen: bool) -> bytes:
+    return _PLACE.pack(size) + bytes((frozen,))
+
+
+def map_bytes_a_frame(sightings_max: int) -> int:
+    """How many bytes of a map a payload of that image has room for."""
+    return payload_max(sightings_max) - _PLACE.size
 
 
 def param_set(number: int, value: float) -> bytes:
@@ -401,6 +422,11 @@ class Health:
 def read_health(body: bytes) -> Health:
     flags, state, trouble, *rest = _HEALTH.unpack(body)
     return Health(bool(flags & 1), bool(flags & 2), STATES[state], TROUBLES[trouble], *rest)
+
+
+def read_map_part(body: bytes) -> tuple[int, bytes]:
+    """Of MAP_READ: bytes of the whole map, and those that came."""
+    return _PLACE.unpack_from(body)[0], body[_PLACE.size :]
 
 
 def read_counters(body: bytes) -> list[int]:

@@ -14,7 +14,7 @@ from bslam.target.lines import Line, TargetError
 ANSWER_TIMEOUT_S = 2.0
 ATTEMPTS = 5
 _MEANING = {
-    "STORE": ": the board keeps nothing over a restart",
+    "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
     "LOOKS": ": the image learns no looks (SESSION_LOOKS=0)",
 }

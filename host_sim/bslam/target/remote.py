@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
 from bslam.core.raw import library
 from bslam.core.slam import Account, Beacon, Slam, told_classes
@@ -19,6 +20,8 @@ from bslam.link.frames import crc16
 from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step, Wishes
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
+
+_MAP_ATTEMPTS = 3  # a robot that drives may change its map between two pieces of it
 
 
 @dataclass(frozen=True)
@@ -259,6 +262,35 @@ class RemoteSlam:
     def health(self) -> messages.Health:
         """What went wrong so far, and what the robot knows of it."""
         return messages.read_health(self._client.ask(Message.HEALTH).body)
+
+    def save_map(self) -> bytes:
+        """As `Slam.save_map`. Raises TargetError if the map changes while it is read, time and again."""
+        for _ in range(_MAP_ATTEMPTS):
+            blob = self._read_map()
+            if self._raw_map_fault(blob) == "fine":
+                return blob
+        raise TargetError(f"the map changed while it was read, {_MAP_ATTEMPTS} times: let the robot stand")
+
+    def _read_map(self) -> bytes:
+        blob, size = b"", 1
+        while len(blob) < size:
+            answer = self._client.ask(Message.MAP_READ, messages.map_read(len(blob)))
+            self._ensure(answer, f"map from byte {len(blob)}")
+            size, part = messages.read_map_part(answer.body)
+            blob += part
+        return blob
+
+    def _raw_map_fault(self, blob: bytes) -> str:
+        return Slam(beacons_max=SIZE_CLASSES[-1]).map_fault(blob)
+
+    def load_map(self, blob: bytes, *, frozen: bool = False) -> None:
+        """As `Slam.load_map`. Raises TargetError for an image that takes no map, or none so large."""
+        room = messages.map_bytes_a_frame(self._client.info.sightings_max)
+        for at in range(0, len(blob), room):
+            self._client.ask(Message.MAP_WRITE, messages.map_write(at, blob[at : at + room]))
+        answer = self._client.ask(Message.MAP_LOAD, messages.map_load(len(blob), frozen))
+        reason = self._raw.text(self._raw.lib.bslam_map_fault_name(answer.body[0]))
+        self._ensure(answer, f"map of {len(blob)} bytes: {reason}")
 
     # ---- what only a target has ----------------------------------------------------------------------------
 

@@ -83,6 +83,41 @@ def test_a_robot_that_recovers_is_the_host_s_and_says_how_it_is(robot_line):
         assert there.counters() == here.counters()
 
 
+def test_a_map_goes_to_the_host_and_to_another_robot_which_finds_itself_in_it(robot_line, log):
+    params = {"association": 0}
+    with RemoteSlam(robot_line(), params, 20) as robot:
+        host = Slam(params, beacons_max=20)
+        for slam in (robot, host):
+            drive(slam, log, 0, 150)
+        blob = robot.save_map()
+        assert blob == host.save_map()
+    with RemoteSlam(robot_line(), params, 20, recovery=True) as other:
+        before = other.save_map()
+        for bad in (blob[:-1], blob[:40] + bytes([blob[40] ^ 4]) + blob[41:]):
+            with pytest.raises(CoreError, match=r"truncated|bad crc"):
+                other.load_map(bad)
+            assert other.save_map() == before
+            assert not other.is_lost
+        other.load_map(blob)
+        assert other.is_lost
+        assert other.save_map() == blob
+        drive(other, log, 0, 100)
+        assert not other.is_lost
+        with pytest.raises(TargetError, match="STORE"):
+            other.load_map(bytes(70_000))
+
+
+def test_a_map_that_changes_while_it_is_read_is_read_again(robot_line, log, monkeypatch):
+    with RemoteSlam(robot_line(), {"association": 0}, 20) as robot:
+        drive(robot, log, 0, 100)
+        whole, cut = robot.save_map(), iter([True, False, True, True, True])
+        read = RemoteSlam._read_map
+        monkeypatch.setattr(RemoteSlam, "_read_map", lambda self: read(self)[: -4 if next(cut) else None])
+        assert robot.save_map() == whole
+        with pytest.raises(TargetError, match="changed while it was read"):
+            robot.save_map()
+
+
 def flip_a_bit(line):
     """In the parameters of the filter, in the memory of the running robot."""
     process = line._process.pid
