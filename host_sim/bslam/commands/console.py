@@ -41,8 +41,8 @@ EXAMPLES = """examples:
 
 A robot with encoders of its own drives by itself, and is watched; nothing that it knows is changed but by
 --set, --save, --reset, --map and --set-pose. --drive feeds it with a scenario's odometry and sightings, or a
-log folder's, from the start. A recording that begins with --reset or --drive runs again with `bslam replay` to the same bits.
-Ctrl-C ends it."""
+log folder's, from the start. A recording that begins with --reset or --drive runs again with `bslam replay`
+to the same bits. Ctrl-C ends it."""
 _DRAW_S = 1.0
 _LISTEN_S = 0.1
 
@@ -60,9 +60,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_pose,
         metavar="X,Y,HEADING,SD,SD",
         help="tell it where it is in its map: m, m, rad, and how sure that is: m, rad",
-    )
-    group.add_argument(
-        "--map", type=Path, metavar="FILE", help="it goes on in this map, *.bslam, at a place unknown"
     )
     group.add_argument("--save-map", type=Path, metavar="FILE", help="write its map as it is, FILE.bslam")
     group.add_argument("--drive", metavar="LOG", help="feed it: a scenario, or a log folder")
@@ -172,12 +169,12 @@ def _change(slam: RemoteSlam, arguments: argparse.Namespace) -> None:
     if arguments.reset:
         slam.reset()
     if arguments.map is not None:
-        _load_map(slam, arguments.map)
+        _load_map(slam, arguments.map, arguments.frozen)
 
 
-def _load_map(slam: RemoteSlam, path: Path) -> None:
+def _load_map(slam: RemoteSlam, path: Path, frozen: bool) -> None:
     try:
-        slam.load_map(read_blob(path))
+        slam.load_map(read_blob(path), frozen=frozen)
     except CoreError as error:
         raise BslamError(f"{path}: the robot does not take it: {error}") from None
     print(f"it goes on in {path}, at a place unknown")

@@ -13,7 +13,7 @@ from bslam.link.messages import CameraRecord
 
 _MAGIC = 0x4D4C4946
 _HEAD = struct.Struct("<4I")
-_CAMERA = struct.Struct("<iii9f")
+_CAMERA = struct.Struct("<iii9f4x")  # as bslam_camera_t has it; zoom 0
 _STEP = np.dtype([("left_ticks", "<u2"), ("right_ticks", "<u2"), ("picture", "<u4")])
 _NO_CAMERA = bytes(_CAMERA.size)
 
