@@ -18,9 +18,9 @@ typedef struct bslam_clue {
     bslam_pose_t sensor;  ///< where the sensor was, in the robot's present frame
     bslam_real_t bearing_rad;
     bslam_real_t range_m;
-    bool has_range;
     bslam_real_t bearing_var_rad2;  ///< of the sighting, of the beacon's place, and of the way since
     bslam_real_t range_var_m2;
+    bool has_range;
     bool is_other;  ///< of the same sighting as the clue before, taken for another beacon
 } bslam_clue_t;
 
