@@ -374,6 +374,11 @@ static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
     seal();
     load(BSLAM_MAP_LIVING);
     assert_int_equal(other_looks.learner.machines[0].rivals, rivals - 1);
+    static const bslam_sample_t seeds[4];
+    other_looks.learner.seeds = seeds;
+    other_looks.learner.seed_count = COUNT_OF(seeds);
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(other_looks.learner.machines[0].rivals, rivals);
 }
 
 /// Bytes of a map from a source that fails for good after so many reads.
