@@ -92,10 +92,8 @@ static void measure(int beacons, int most)
         drive();
         look(beacons, most);
         const uint32_t ticks = port_ticks() - began;
-        if (step >= STEPS_BEFORE) {
-            sum += ticks;
-            worst = ticks > worst ? ticks : worst;
-        }
+        worst = ticks > worst ? ticks : worst;
+        sum += step >= STEPS_BEFORE ? ticks : 0;
     }
     measure_need(bslam_slam_beacon_count(&slam) == beacons && smoother.cycles > 10 && smoother.insane == 0);
     measure_report("mean", beacons, (uint32_t)(sum / STEPS));
