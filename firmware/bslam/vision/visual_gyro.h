@@ -17,6 +17,8 @@
 /// Noise of what bslam_visual_gyro_rate says, for the parameter gyro_sd_radps. Errors of some steps follow
 /// each other; this is what their sum over seconds asks for.
 #define BSLAM_VISUAL_GYRO_SD_RADPS 0.2f
+/// The same through a lens of 180 degrees: its columns are coarse, and what is beside the robot moves most.
+#define BSLAM_VISUAL_GYRO_WIDE_SD_RADPS 1.0f
 
 /// State values: turn rate, speed, and two for each camera.
 #define BSLAM_VISUAL_GYRO_STATES (2 + 2 * BSLAM_CAMERAS_MAX)

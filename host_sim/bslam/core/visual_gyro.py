@@ -13,6 +13,8 @@ class VisualGyro:
 
     SD_RADPS = 0.2
     """Noise of the rate, for a log's `gyro_sigma_radps` (BSLAM_VISUAL_GYRO_SD_RADPS)."""
+    WIDE_SD_RADPS = 1.0
+    """The same if a lens is equidistant (BSLAM_VISUAL_GYRO_WIDE_SD_RADPS)."""
 
     def __init__(self) -> None:
         self._library = vision_library()

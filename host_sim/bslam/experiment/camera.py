@@ -33,7 +33,7 @@ from bslam.world.scenario import Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
 # What is left of an object's errors stays alike for so far, metres. Tried on paper_room, seeds 0:8.
-CORRELATION_M = 0.1
+CORRELATION_M = 0.15
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,7 @@ def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig
 
 def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
     log = simulate(replace(scenario, arena=drive.arena(scenario.arena)), seed)
+    is_wide = any(one.lens.kind == "equidistant" for one in rig.cameras)
     robot = replace(
         log.robot,
         sensor_x_m=rig.cameras[0].x_m,
@@ -196,7 +197,7 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sensor_yaw_rad=0.0,  # bearings are in the robot's frame already
         sighting_delay_us=0,
         sighting_correlation_m=CORRELATION_M,
-        gyro_sigma_radps=VisualGyro.SD_RADPS,
+        gyro_sigma_radps=VisualGyro.WIDE_SD_RADPS if is_wide else VisualGyro.SD_RADPS,
     )
     log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=flash_seeds())
     if len(drive.turns) == 0:

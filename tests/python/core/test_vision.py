@@ -140,8 +140,8 @@ def test_a_black_frame_tells_no_turn() -> None:
 
 def test_the_gyro_s_noise_is_the_header_s() -> None:
     header = (LIBRARY_DIR / "vision" / "visual_gyro.h").read_text(encoding="utf-8")
-    (value,) = re.findall(r"#define BSLAM_VISUAL_GYRO_SD_RADPS ([0-9.]+)f", header)
-    assert float(value) == VisualGyro.SD_RADPS
+    values = re.findall(r"#define BSLAM_VISUAL_GYRO_(?:WIDE_)?SD_RADPS ([0-9.]+)f", header)
+    assert [float(value) for value in values] == [VisualGyro.SD_RADPS, VisualGyro.WIDE_SD_RADPS]
 
 
 def test_measure_of_a_box_gives_what_a_sighting_needs(camera: Camera) -> None:
