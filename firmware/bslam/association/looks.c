@@ -14,6 +14,8 @@ bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seed
     const bslam_status_t status = bslam_learner_init(&looks->learner, seeds, seed_count);
     if (status == BSLAM_OK) {
         looks->counters = (bslam_looks_counters_t){0};
+        looks->left_rad = 0;
+        looks->right_rad = 0;
         for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
             looks->of[b] = BLANK;
         }

@@ -14,15 +14,18 @@
 #define BSLAM_NO_MACHINE (-1)
 /// Classes 1 to this many are evidence; what a detector calls higher ones is none.
 #define BSLAM_LOOKS_CLASSES 8
+/// Directions from which a beacon may be seen.
+#define BSLAM_LOOKS_SECTORS 16
 
 /// What happened since init. Never decreases.
 typedef struct bslam_looks_counters {
-    uint32_t taught;   ///< sightings that a machine was shown
-    uint32_t unsure;   ///< matches that none was shown, because they may be wrong
-    uint32_t shared;   ///< times that a beacon was found to look like another and took its machine
-    uint32_t retired;  ///< beacons taken out because another was in the same place
-    uint32_t parted;   ///< times that a beacon got a machine of its own again
-    uint32_t no_slot;  ///< beacons that got no machine when they were first seen, because none was free
+    uint32_t taught;    ///< sightings that a machine was shown
+    uint32_t unsure;    ///< matches that none was shown, because they may be wrong
+    uint32_t shared;    ///< times that a beacon was found to look like another and took its machine
+    uint32_t retired;   ///< beacons taken out because another was in the same place
+    uint32_t vanished;  ///< beacons taken out because they were seen no longer from where they had been
+    uint32_t parted;    ///< times that a beacon got a machine of its own again
+    uint32_t no_slot;   ///< beacons that got no machine when they were first seen, because none was free
 } bslam_looks_counters_t;
 
 /// What is known of a beacon's looks. Private.
@@ -34,15 +37,20 @@ typedef struct bslam_look {
     uint8_t alone;       ///< how often it was seen without near_uid, or that without it
     uint8_t ousted;      ///< how many beacons were retired for being in this one's place
     bool is_taught;
-    uint32_t near_uid;                     ///< an older beacon in the same place
-    uint32_t taught_um;                    ///< the robot's way when it was taught last
-    uint8_t seen_as[BSLAM_LOOKS_CLASSES];  ///< how often as which class, from 1 on
+    uint32_t near_uid;                       ///< an older beacon in the same place
+    uint32_t taught_um;                      ///< the robot's way when it was taught last
+    uint8_t seen_as[BSLAM_LOOKS_CLASSES];    ///< how often as which class, from 1 on
+    uint32_t missed_um;                      ///< the robot's way when it was seen last, or not expected
+    uint8_t missed;                          ///< from how many directions, since it was seen last
+    uint8_t seen_from[BSLAM_LOOKS_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
 } bslam_look_t;
 
 /// Private but for the counters.
 typedef struct bslam_looks {
     bslam_looks_counters_t counters;
     bslam_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
+    bslam_real_t left_rad;               ///< how far to the left of the robot a beacon was seen
+    bslam_real_t right_rad;              ///< and to the right, below 0
     bslam_learner_t learner;
 } bslam_looks_t;
 

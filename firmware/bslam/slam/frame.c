@@ -1,4 +1,5 @@
 #include "bslam/association/doubles.h"
+#include "bslam/association/vanished.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "bslam/slam/internal.h"
@@ -196,9 +197,11 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 
 void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
+    bool all_matched = count > 0;
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
+        all_matched = all_matched && account->outcome == BSLAM_OUTCOME_MATCHED;
         if (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED) {
             continue;
         }
@@ -213,6 +216,11 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
     const int leaves = bslam_doubles_settle(slam->looks, &slam->ekf, &slam->params, time_us);
     if (leaves != BSLAM_NO_DOUBLE) {
         bslam_slam_drop_beacon(slam, leaves);
+    }
+    const int vanished =
+        bslam_vanished_find(slam->looks, &slam->ekf, &slam->params, time_us, slam->way_um, all_matched);
+    if (vanished != BSLAM_NO_VANISHED) {
+        bslam_slam_drop_beacon(slam, vanished);
     }
     (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
 }

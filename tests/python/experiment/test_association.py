@@ -1,6 +1,7 @@
 """Association by position and looks, on simulated drives: what it reaches, and what it may not know."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.experiment.trace import Trace
-from bslam.log import SIGNATURE_SIZE, Log
+from bslam.log import SIGNATURE_SIZE, Log, Sightings
 from bslam.world.simulate import load_scenario, simulate
 
 SVM = RunOptions(association="svm")
@@ -74,6 +75,18 @@ def test_without_signatures_position_alone_decides(harder_pairs: Log) -> None:
     # Where looks weigh nothing, what is left of them is who is retired and who may wait.
     assert blind.counts.wrong_associations > 0.03 * blind.counts.sightings
     assert off.counts.wrong_associations > 0.03 * off.counts.sightings
+
+
+def test_a_beacon_that_vanishes_leaves_the_map_and_no_other_does() -> None:
+    log = simulate(load_scenario("paper_room"), 1, 0.6, "speedometer")
+    seen = log.sightings
+    rows = (seen.beacon_id != 1) | (seen.time_us < log.odometry.time_us[-1] // 2)
+    left: dict[str, Any] = {
+        name: None if values is None else values[rows] for name, values in vars(seen).items()
+    }
+    gone = replace(log, sightings=Sightings(**left))
+    confirmed = [sum(one.confirmed for one in run_log(drive, SVM).beacons) for drive in (log, gone)]
+    assert confirmed == [6, 5]
 
 
 def with_classes(log: Log, share_right: float) -> Log:

@@ -1,0 +1,93 @@
+#include "bslam/association/vanished.h"
+
+#include "bslam/math/symmat.h"
+#include "bslam/math/trig.h"
+
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+static const bslam_real_t STEPS_PER_M = BSLAM_R(10.0);  // of a kept distance
+// A view is from the same place if its distance differs by no more than this share: with the sector's 22
+// degrees, the line of sight passes the same corners.
+static const bslam_real_t SAME_PLACE = BSLAM_R(0.25);
+// Of what was seen to either side: what is nearer to the edge may be cut off.
+static const bslam_real_t INSIDE = BSLAM_R(0.8);
+static const bslam_real_t HEADING_VAR_MAX_RAD2 = BSLAM_R(0.01);
+// Missed all along so much way it is missed from there: longer than a few frames without a hit, or than what
+// walks past hides it.
+static const bslam_real_t MISSED_M = BSLAM_R(0.3);
+static const bslam_real_t POSITION_SD_MAX = BSLAM_R(0.125);  // of the distance
+
+enum { STEPS_MAX = UINT8_MAX };
+
+/// How a beacon and the robot stand to each other.
+typedef struct bslam_outlook {
+    bslam_real_t range_m;
+    bslam_real_t bearing_rad;  ///< of the beacon from the robot
+    int sector;                ///< of the robot from the beacon
+} bslam_outlook_t;
+
+static bslam_outlook_t outlook_of(const bslam_ekf_t *ekf, const bslam_pose_t *robot, int index)
+{
+    const int at = ekf->beacons[index].at;
+    const bslam_real_t dx_m = ekf->mean[at] - robot->x_m;
+    const bslam_real_t dy_m = ekf->mean[at + 1] - robot->y_m;
+    const bslam_real_t direction_rad = bslam_atan2(dy_m, dx_m);
+    const bslam_real_t turns = (direction_rad + BSLAM_PI) / (2 * BSLAM_PI);
+    bslam_outlook_t outlook;
+    outlook.range_m = bslam_sqrt(dx_m * dx_m + dy_m * dy_m);
+    outlook.bearing_rad = bslam_angle_wrap(direction_rad - robot->theta_rad);
+    outlook.sector = (int)(turns * BSLAM_LOOKS_SECTORS) % BSLAM_LOOKS_SECTORS;
+    return outlook;
+}
+
+static void note_seen(bslam_looks_t *looks, int index, const bslam_outlook_t *outlook)
+{
+    bslam_look_t *look = &looks->of[index];
+    const bslam_real_t steps = outlook->range_m * STEPS_PER_M + 1;
+    look->seen_from[outlook->sector] = (uint8_t)(steps < STEPS_MAX ? steps : STEPS_MAX);
+    look->missed = 0;
+    looks->left_rad = outlook->bearing_rad > looks->left_rad ? outlook->bearing_rad : looks->left_rad;
+    looks->right_rad = outlook->bearing_rad < looks->right_rad ? outlook->bearing_rad : looks->right_rad;
+}
+
+/// Whether a beacon that stands where the map has it would be seen.
+static bool is_expected(const bslam_looks_t *looks, const bslam_ekf_t *ekf, int index,
+                        const bslam_outlook_t *outlook)
+{
+    const bslam_real_t seen_m = (bslam_real_t)looks->of[index].seen_from[outlook->sector] / STEPS_PER_M;
+    const bslam_real_t off_m = bslam_abs(outlook->range_m - seen_m);
+    const bslam_real_t *p = ekf->covariance;
+    const bslam_real_t sd_m = POSITION_SD_MAX * outlook->range_m;
+    return off_m <= SAME_PLACE * seen_m && outlook->bearing_rad < INSIDE * looks->left_rad &&
+           outlook->bearing_rad > INSIDE * looks->right_rad &&
+           bslam_symmat_get(p, 2, 2) <= HEADING_VAR_MAX_RAD2 &&
+           bslam_symmat_get(p, 0, 0) + bslam_symmat_get(p, 1, 1) <= sd_m * sd_m;
+}
+
+int bslam_vanished_find(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                        int64_t time_us, uint32_t way_um, bool judges)
+{
+    const bslam_pose_t robot = bslam_ekf_pose(ekf);
+    const uint32_t least_um = (uint32_t)(MISSED_M * MICROMETRES_PER_M);
+    int vanished = BSLAM_NO_VANISHED;
+    for (int b = 0; b < ekf->beacon_count && params->vanish_views > 0; b++) {
+        bslam_look_t *look = &looks->of[b];
+        if (ekf->beacons[b].kind != BSLAM_BEACON_POINT && ekf->beacons[b].kind != BSLAM_BEACON_SIZED) {
+            continue;
+        }
+        const bslam_outlook_t outlook = outlook_of(ekf, &robot, b);
+        const bool is_seen = ekf->beacons[b].last_seen_us == time_us;
+        if (is_seen) {
+            note_seen(looks, b, &outlook);
+        }
+        if (is_seen || !is_expected(looks, ekf, b, &outlook)) {
+            look->missed_um = way_um;
+        } else if (judges && way_um - look->missed_um >= least_um) {
+            look->missed_um = way_um;
+            look->seen_from[outlook.sector] = 0;
+            look->missed++;
+            vanished = look->missed >= params->vanish_views ? b : vanished;
+        }
+    }
+    looks->counters.vanished += vanished != BSLAM_NO_VANISHED ? 1u : 0u;
+    return vanished;
+}
