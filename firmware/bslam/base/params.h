@@ -138,7 +138,7 @@
     INTEGER(share_sightings, 12, 1, 250, "svm: so often before it shares that machine, or leaves one again") \
     INTEGER(doubt_sightings, 25, 1, 250, \
             "svm: of two beacons in one place, seen so often and never both, one is retired") \
-    INTEGER(vanish_views, 3, 0, 16, \
+    INTEGER(vanish_views, 3, 0, 32, \
             "svm: one missed from so many directions from which it was seen before leaves (0: never)") \
     INTEGER(learn_budget, 600, 0, 1000000, "svm: pieces of training after each frame") \
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
