@@ -3,8 +3,8 @@
 //
 //   first line   bearing_sd_rad mount_x_m mount_y_m mount_yaw_rad
 //   s            a step: moved (0 or 1), x y theta of the move in the frame of its start, its covariance (xx
-//                xy xt yy yt tt), sd of a distance, how many sightings, of each label (-1: none) bearing range
-//                answer: x y theta of the pose and its covariance, nine numbers
+//                xy xt yy yt tt), sd of a distance, how many sightings, of each label (-1: none) bearing
+//                range answer: x y theta of the pose and its covariance, nine numbers
 //   m            the map; answer: how many landmarks, of each label (-1: none) x y
 #include <mrpt/obs/CActionRobotMovement2D.h>
 #include <mrpt/obs/CObservationBearingRange.h>
