@@ -9,6 +9,8 @@ TARGET_FLAGS_m0plus := -mcpu=cortex-m0plus
 TARGET_FLAGS_m4f := -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m7 := -mcpu=cortex-m7 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m33 := -mcpu=cortex-m33 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+# Without its vector extension (MVE), whose floating point flushes denormals to zero: other bits.
+TARGET_FLAGS_m55 := -mcpu=cortex-m55+nomve -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 # Single precision in hardware, as on ESP32-P4, CH32V307 or GD32VF; with a library of its own, since Debian's
 # compiler comes without.
 TARGET_FLAGS_rv32 := -march=rv32imafc -mabi=ilp32f
@@ -42,8 +44,10 @@ firmware: $(if $(filter $(TARGET),$(BOARDS)),image,library)-$(TARGET) ## build f
 endif
 
 # What costs flash at -Os: loops that become calls of memmove, which nothing else needs; constants of a loop
-# kept in registers, which are saved and restored for it; functions with one caller, inlined with the same end.
-SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inline-functions-called-once
+# kept in registers, which are saved and restored for it; functions with one caller, inlined with the same end;
+# instructions in an order for pipelines, which takes registers too.
+SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inline-functions-called-once \
+    -fno-schedule-insns2
 
 # The rules for one core: $(1) is its name.
 define core_rules

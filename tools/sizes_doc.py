@@ -41,13 +41,16 @@ STRUCTS = {
     "bslam_looks_t": "bslam/bslam.h",
     "bslam_vision_t": "bslam/vision/vision.h",
 }
+LOOKING_STRUCTS = ("bslam_slam_t", "bslam_looks_t")
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
     "predict": "odometry and an empty frame",
     "step": "odometry and a frame of 3 sightings with distance, identity known",
+    "filter": "of that the filter's own functions: a prediction, 3 sightings with distance, the correction",
     "predict_velocity": "the same as predict, with velocity states",
     "step_velocity": "the same as step, with velocity states",
+    "filter_velocity": "the same as filter, with velocity states",
     "augment": "a frame that starts a beacon",
     "associate_mahalanobis": "3 sightings against the whole map",
     "train": "one training of a machine, mean, on made-up signatures that are hard to part",
@@ -137,19 +140,23 @@ def vision_costs() -> dict[tuple[str, str], int]:
     return found
 
 
-def budget(filter_costs: dict[tuple[str, int], int], frame: int) -> list[Row]:
+def share(cost: int) -> str:
+    return f"{100 * cost * STEPS_A_SECOND / CORE_HZ:.1f} %"
+
+
+def budget(filter_costs: dict[tuple[str, int], int], frames: dict[str, int]) -> Iterator[Row]:
     """A second of a robot with 20 beacons: what each part takes of the core's instructions."""
     each = {
         "filter: `step_velocity`": filter_costs["step_velocity", 20],
         "association: `associate_mahalanobis`": filter_costs["associate_mahalanobis", 20],
         "learning: one `train` a step": filter_costs["train", 20],
-        "vision: one QVGA frame a step, the dearer lens": frame,
     }
-    rows: list[Row] = [
-        (name, cost, f"{100 * cost * STEPS_A_SECOND / CORE_HZ:.0f} %") for name, cost in each.items()
-    ]
-    total = sum(each.values())
-    return [*rows, ("all", total, f"{100 * total * STEPS_A_SECOND / CORE_HZ:.0f} %")]
+    rest = sum(each.values())
+    for name, cost in each.items():
+        yield (name, cost, share(cost))
+    for lens, frame in frames.items():
+        yield (f"vision: one QVGA frame a step, {lens}", frame, share(frame))
+        yield (f"all, {lens}", rest + frame, share(rest + frame))
 
 
 def flash_rows() -> list[Row]:
@@ -162,9 +169,17 @@ def ram_rows() -> Iterator[Row]:
     for struct, header in STRUCTS.items():
         sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
         yield (f"`{struct}`", *sizes)
+<<<<<<< HEAD
     without_rays = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
     sizes = [instance_bytes(without_rays, "arm-none-eabi-nm", n, "bslam_smoother_t") for n in BEACONS]
     yield ("`bslam_smoother_t`, `BSLAM_RAYS_MAX` = 0", *sizes)
+=======
+    compiler = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
+    both = [
+        sum(instance_bytes(compiler, "arm-none-eabi-nm", n, one) for one in LOOKING_STRUCTS) for n in BEACONS
+    ]
+    yield ("both of SLAM, all beacons seen with distance (`BSLAM_RAYS_MAX=0`)", *both)
+>>>>>>> 73240e8 (firmware: Cortex-M55 and a board for it by the guide; what the filter's own functions cost; sizes and figures anew)
 
 
 def image_rows() -> Iterator[Row]:
@@ -209,7 +224,7 @@ def document() -> str:
     measured = {core: costs(board) for core, board in COST_BOARDS.items()}
     parts = "".join(f"- `{name}`: {what}.\n" for name, what in PARTS.items())
     seeing = vision_costs()
-    dearest = max(seeing["Cortex-M4F", lens] for lens in RIGS)
+    frames = {lens: seeing["Cortex-M4F", lens] for lens in RIGS}
     return f"""# What bslam costs on a microcontroller
 
 Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. Compiler: \
@@ -272,7 +287,7 @@ world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
 {CORE_HZ // 1_000_000} million a second. A core takes more than a cycle for some instructions: \
 this is a lower bound of its load.
 
-{table(("part", "instructions", "share"), budget(measured["Cortex-M4F"], dearest))}"""
+{table(("part", "instructions", "share"), budget(measured["Cortex-M4F"], frames))}"""
 
 
 def differences(stands: str, measured: str) -> Iterator[str]:

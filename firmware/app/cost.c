@@ -81,6 +81,39 @@ static uint32_t step_ticks(int beacons, int count)
     return ticks / STEPS;
 }
 
+/// The filter's own functions alone: a prediction, SEEN sightings with distance, the correction.
+static uint32_t filter_ticks(int beacons)
+{
+    const bslam_motion_t motion = {.dt_s = 0.04f, .forward_var_m2 = 1e-4f, .turn_var_rad2 = 1e-3f};
+    const bslam_pose_t mount = {0, 0, 0};
+    uint32_t ticks = 0;
+    for (int k = 0; k < STEPS; k++) {
+        const int first = k * SEEN % (beacons - SEEN + 1);
+        bslam_sighting_t seen[SEEN];
+        bslam_innovation_t innovations[SEEN];
+        bslam_fusion_t fusion;
+        bslam_motion_t moved;
+        for (int i = 0; i < SEEN; i++) {
+            seen[i] = see(first + i);
+        }
+        bool good = true;
+        const uint32_t began = port_ticks();
+        bslam_ekf_predict(&slam.ekf, &slam.params, &motion, &moved);
+        for (int i = 0; i < SEEN; i++) {
+            good = bslam_ekf_innovation(&slam.ekf, &slam.params, &mount, &seen[i], first + i,
+                                        &innovations[i]) == BSLAM_OK &&
+                   good;
+        }
+        for (int i = 0; i < SEEN; i++) {
+            good = bslam_ekf_fuse(&slam.ekf, &slam.params, &innovations[i], &fusion) == BSLAM_OK && good;
+        }
+        bslam_ekf_correct(&slam.ekf, &slam.params);
+        ticks += port_ticks() - began;
+        measure_need(good);
+    }
+    return ticks / STEPS;
+}
+
 /// Starting a beacon, in a frame of its own.
 static uint32_t augment_ticks(int beacons)
 {
@@ -154,6 +187,7 @@ static void measure_filter(int beacons, int velocity_states)
     (void)step_ticks(beacons, SEEN);  // until the covariance has no zeros left
     measure_report(velocity_states != 0 ? "predict_velocity" : "predict", beacons, step_ticks(beacons, 0));
     measure_report(velocity_states != 0 ? "step_velocity" : "step", beacons, step_ticks(beacons, SEEN));
+    measure_report(velocity_states != 0 ? "filter_velocity" : "filter", beacons, filter_ticks(beacons));
     if (velocity_states == 0) {
         measure_report("augment", beacons, augment_ticks(beacons));
         measure_report("associate_mahalanobis", beacons,

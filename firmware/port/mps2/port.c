@@ -1,6 +1,7 @@
 /// Arm's MPS2 boards as QEMU has them: AN385 (Cortex-M3), AN386 (M4F), AN500 (M7), AN505 (M33). They differ
-/// in where the serial line is, UART_BASE. Boards without a robot: what a robot would measure comes over the
-/// link, or from a film at FILM_ADDRESS, the upper half of RAM.
+/// in where the serial line is, UART_BASE, and MPS3's AN547 (M55) in its clock, CORE_HZ. Boards without a
+/// robot: what a robot would measure comes over the link, or from a film at FILM_ADDRESS, the upper half of
+/// RAM.
 #include "port/cortex_m/semihosting.h"
 #include "port/cortex_m/systick.h"
 #include "port/film.h"
@@ -18,7 +19,9 @@ typedef struct uart {
 #define STATE_SEND_FULL 1u
 #define STATE_RECEIVED 2u
 #define CONTROL_SEND_AND_RECEIVE 3u
+#ifndef CORE_HZ
 #define CORE_HZ 25000000u
+#endif
 #define BAUD 115200u
 
 void port_init(void)
