@@ -169,17 +169,14 @@ def ram_rows() -> Iterator[Row]:
     for struct, header in STRUCTS.items():
         sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
         yield (f"`{struct}`", *sizes)
-<<<<<<< HEAD
     without_rays = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
     sizes = [instance_bytes(without_rays, "arm-none-eabi-nm", n, "bslam_smoother_t") for n in BEACONS]
     yield ("`bslam_smoother_t`, `BSLAM_RAYS_MAX` = 0", *sizes)
-=======
-    compiler = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
     both = [
-        sum(instance_bytes(compiler, "arm-none-eabi-nm", n, one) for one in LOOKING_STRUCTS) for n in BEACONS
+        sum(instance_bytes(without_rays, "arm-none-eabi-nm", n, one) for one in LOOKING_STRUCTS)
+        for n in BEACONS
     ]
-    yield ("both of SLAM, all beacons seen with distance (`BSLAM_RAYS_MAX=0`)", *both)
->>>>>>> 73240e8 (firmware: Cortex-M55 and a board for it by the guide; what the filter's own functions cost; sizes and figures anew)
+    yield ("`bslam_slam_t` and `bslam_looks_t`, `BSLAM_RAYS_MAX` = 0", *both)
 
 
 def image_rows() -> Iterator[Row]:
