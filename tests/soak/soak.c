@@ -183,9 +183,13 @@ static double nees_of(const bslam_slam_t *slam, const double e[3])
 static void error_of(const bslam_slam_t *slam, const world_t *world, const world_t *start, double e[3])
 {
     const bslam_pose_t pose = bslam_slam_pose(slam);
-    e[0] = (double)pose.x_m - (world->x_m - start->x_m);
-    e[1] = (double)pose.y_m - (world->y_m - start->y_m);
-    e[2] = remainder((double)pose.theta_rad - world->theta_rad, 2 * PI);
+    const double dx = world->x_m - start->x_m;
+    const double dy = world->y_m - start->y_m;
+    const double sine = sin(start->theta_rad);
+    const double cosine = cos(start->theta_rad);
+    e[0] = (double)pose.x_m - (cosine * dx + sine * dy);
+    e[1] = (double)pose.y_m - (cosine * dy - sine * dx);
+    e[2] = remainder((double)pose.theta_rad - (world->theta_rad - start->theta_rad), 2 * PI);
 }
 
 static void require(bool condition, const char *what)
@@ -196,22 +200,24 @@ static void require(bool condition, const char *what)
     }
 }
 
-/// It stands for a while before it drives off: what errs in the first moments, while the filter believes that
-/// it stands, is an error of the map's frame for ever.
+/// It may stand for a while before it drives off.
 static void soak(uint64_t seed, long steps, long standing)
 {
     static bslam_slam_t slam;
     const bslam_params_t params = filter_params();
     int bad_id;
     require(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK, "a parameter is refused");
-    const world_t start = begin(seed);
-    world_t world = start;
+    world_t world = begin(seed);
+    world_t start = world;
     double nees = 0;
     double nees_last = 0;
     double error_m = 0;
     for (long step = 1; step <= steps; step++) {
         if (step > standing) {
             drive(&world);
+        }
+        if (step == 1) {
+            start = world;  // odometry begins with the first reading: the map has the frame of that moment
         }
         const bslam_odometry_reading_t reading = read_wheels(&world, step * (int64_t)STEP_US);
         bslam_sighting_t seen[BEACONS];
