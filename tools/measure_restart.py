@@ -1,0 +1,199 @@
+"""Switched on in a kept map, at a place that nobody knows, with cameras: how soon it is found again.
+
+Of each drive a map is kept after 3000 steps, with identity by looks; then the robot is switched on in that
+map three times, further on in the drive. Looked at five seconds of driving after power-on, and five seconds
+after the first frame that shows two beacons of the map:
+
+    near       within 0.2 m
+    off        within 1 m
+    elsewhere  a metre or more off
+    lost       it says that it has no pose
+
+The error is that against the truth, and that in the map's own frame: the kept map's confirmed beacons that
+stand within a metre of the true ones are laid on these first, as a robot that goes by its map needs no other
+frame. A frame is that of one camera. What is not near in the map's frame, five seconds after two beacons, is
+told with what there was to go by. Takes drives as
+`bslam tables --sensor camera` keeps them (out/camera; rendered if they are not there, a minute each):
+
+    .venv/bin/python tools/measure_restart.py --seeds 1000:1020
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.commands.arguments import seeds_range
+from bslam.experiment.align import Rigid, fit_rigid
+from bslam.experiment.camera import CameraStore, camera_log
+from bslam.experiment.metrics import map_pairs
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
+from bslam.experiment.truth import truth_at
+from bslam.log import Log, Sightings
+from bslam.maps.blob import SUFFIX
+from bslam.rig import load_rig
+from bslam.world.simulate import load_scenario
+
+ROOT = Path(__file__).resolve().parent.parent
+KEPT_AFTER = 3000  # steps
+SWITCHED_ON_AT = (3200, 3800, 4400)  # steps
+DRIVEN_US = 5_000_000
+NEAR_M, ELSEWHERE_M = 0.2, 1.0
+NEEDED = 2  # beacons of the map in one frame
+OUTCOMES = ("near", "off", "elsewhere", "lost")
+SINCE = ("power-on", "two beacons in view")
+
+
+@dataclass(frozen=True)
+class Restart:
+    """One robot that was switched on in a kept map."""
+
+    time_us: NDArray[np.int64]  # (k,) of the steps
+    lost: NDArray[np.bool_]  # (k,)
+    error_m: NDArray[np.float64]  # (k,)
+    aligned_m: NDArray[np.float64]  # (k,) in the frame of the map
+    power_us: int
+    view_us: int | None  # the first frame with two beacons of the map
+    views: Counter[int]  # frames that show each of these until five seconds after that
+    map_text: str
+
+    def why(self) -> str:
+        """What there was to go by."""
+        found = np.flatnonzero(~self.lost)
+        found_s = f"{(self.time_us[found[0]] - self.power_us) * 1e-6:.1f} s" if len(found) else "never"
+        view_s = "never" if self.view_us is None else f"{(self.view_us - self.power_us) * 1e-6:.1f} s"
+        views = ", ".join(f"{one} in {count}" for one, count in sorted(self.views.items()))
+        return f"first a pose {found_s}, two in view {view_s}; {self.map_text}; frames: beacon {views}"
+
+    def outcome(self, since_us: int | None, aligned: bool) -> str:
+        """One of OUTCOMES, five seconds of driving after a time, or at the drive's end if that is sooner.
+
+        None: that time never came, so at the drive's end.
+        """
+        last = len(self.time_us) - 1
+        at = last if since_us is None else min(int(np.searchsorted(self.time_us, since_us + DRIVEN_US)), last)
+        if self.lost[at]:
+            return "lost"
+        error_m = (self.aligned_m if aligned else self.error_m)[at]
+        if error_m <= NEAR_M:
+            return "near"
+        return "off" if error_m < ELSEWHERE_M else "elsewhere"
+
+
+def in_view_us(seen: Sightings, mapped: Collection[int], since_us: int) -> int | None:
+    """When a frame first shows so many different beacons of a map; None: it never does."""
+    rows = (seen.time_us >= since_us) & np.isin(seen.beacon_id, list(mapped))
+    pairs = np.unique(np.stack([seen.time_us[rows], seen.beacon_id[rows]]), axis=1)
+    times_us, counts = np.unique(pairs[0], return_counts=True)
+    enough = times_us[counts >= NEEDED]
+    return int(enough[0]) if len(enough) else None
+
+
+def part(log: Log, first: int, end: int | None) -> Log:
+    """These steps of a drive, with what is seen meanwhile."""
+    odometry, seen = log.odometry, log.sightings
+    begin_us, last_us = odometry.time_us[first], odometry.time_us[first:end][-1]
+    steps = np.arange(len(odometry.time_us))[first:end]
+    shown = np.flatnonzero((seen.time_us >= begin_us) & (seen.time_us <= last_us))
+    return replace(log, odometry=_rows(odometry, steps), sightings=_rows(seen, shown))
+
+
+def _rows(table: Any, rows: NDArray[np.int64]) -> Any:
+    """A dataclass of columns with these rows alone."""
+    columns = {name: one[rows] for name, one in vars(table).items() if isinstance(one, np.ndarray)}
+    return replace(table, **columns)
+
+
+class _Losses:
+    """Notes at each step whether the robot says that it is lost."""
+
+    def __init__(self) -> None:
+        self.lost: list[bool] = []
+
+    def frame(self, *_: Any) -> None:
+        """A frame tells nothing of it."""
+
+    def step(self, _time_us: int, _pose: tuple[float, float, float], slam: Any) -> None:
+        """After each step."""
+        self.lost.append(slam.is_lost)
+
+
+def restarts(log: Log, options: RunOptions, folder: Path) -> list[Restart]:
+    """Keeps a map of a drive; then each robot that is switched on in it."""
+    start = part(log, 0, KEPT_AFTER)
+    kept = run_log(start, options)
+    assert kept.kept_map is not None
+    path = folder / f"kept{SUFFIX}"
+    path.write_bytes(kept.kept_map)
+    mapped_m, true_m = map_pairs(start, kept)
+    right = np.hypot(*(mapped_m - true_m).T) < ELSEWHERE_M
+    to_truth = fit_rigid(mapped_m[right], true_m[right])
+    confirmed = [one.true_id for one in kept.beacons if one.confirmed]
+    mapped = {one for one in confirmed if one is not None and one >= 0}
+    text = f"map of {len(confirmed)}, {len(mapped)} beacons in it, {right.sum()} within a metre"
+    options = replace(options, kept_map=str(path))
+    return [_restart(part(log, first, None), options, to_truth, mapped, text) for first in SWITCHED_ON_AT]
+
+
+def _restart(log: Log, options: RunOptions, to_truth: Rigid, mapped: set[int], text: str) -> Restart:
+    """Runs the filter in the kept map of the options."""
+    losses = _Losses()
+    trace = run_log(log, options, watcher=losses)
+    assert log.truth is not None
+    true_m = truth_at(log.truth, trace.time_us)[0][:, :2]
+    place_m = trace.pose[:, :2]
+    error_m, aligned_m = (np.hypot(*(one - true_m).T) for one in (place_m, to_truth.points(place_m)))
+    seen, power_us = log.sightings, int(log.odometry.time_us[0])
+    view_us = in_view_us(seen, mapped, power_us)
+    until_us = trace.time_us[-1] if view_us is None else view_us + DRIVEN_US
+    views = Counter(
+        seen.beacon_id[(seen.time_us <= until_us) & np.isin(seen.beacon_id, list(mapped))].tolist()
+    )
+    return Restart(trace.time_us, np.array(losses.lost), error_m, aligned_m, power_us, view_us, views, text)
+
+
+def main() -> int:
+    """Measures and prints."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=seeds_range, default=range(1000, 1020), metavar="A:B")
+    parser.add_argument("--scenario", default="paper_room")
+    parser.add_argument("--rig", default="three60")
+    parser.add_argument("--sigma", type=float, default=0.6, metavar="M/S", help="the wheels' (default: 0.6)")
+    parser.add_argument("--store", type=Path, default=ROOT / "out" / "camera", metavar="DIR")
+    args = parser.parse_args()
+    scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
+    options = RunOptions(association="svm", sigma_mps=args.sigma, recovery=True)
+    counts: dict[tuple[str, bool], Counter[str]] = {
+        (since, aligned): Counter() for since in SINCE for aligned in (False, True)
+    }
+    for seed in args.seeds:
+        log = camera_log(scenario, seed, args.sigma, None, rig, store)
+        with tempfile.TemporaryDirectory() as folder:
+            for first, robot in zip(SWITCHED_ON_AT, restarts(log, options, Path(folder)), strict=True):
+                for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
+                    for aligned in (False, True):
+                        counts[since, aligned][robot.outcome(since_us, aligned)] += 1
+                outcome = robot.outcome(robot.view_us, True)
+                if outcome != "near":
+                    print(f"seed {seed}, step {first}: {outcome}; {robot.why()}", flush=True)
+    print(f"{args.scenario}, {rig.name}, seeds {args.seeds.start}:{args.seeds.stop}, sigma {args.sigma}")
+    for (since, aligned), count in counts.items():
+        figures = ", ".join(f"{count[one]} {one}" for one in OUTCOMES)
+        frame = "in the map's frame" if aligned else "against the truth"
+        print(f"5 s after {since}, {frame}: {figures} of {count.total()}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
