@@ -44,8 +44,8 @@ firmware: $(if $(filter $(TARGET),$(BOARDS)),image,library)-$(TARGET) ## build f
 endif
 
 # What costs flash at -Os: loops that become calls of memmove, which nothing else needs; constants of a loop
-# kept in registers, which are saved and restored for it; functions with one caller, inlined with the same end;
-# instructions in an order for pipelines, which takes registers too.
+# kept in registers, which are saved and restored for it; functions with one caller, inlined with the same
+# end; instructions in an order for pipelines, which takes registers too.
 SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inline-functions-called-once \
     -fno-schedule-insns2
 

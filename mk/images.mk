@@ -14,7 +14,8 @@ HOST_SIZES := -DSESSION_VISION=1 -DSESSION_MAP_BYTES=65536 \
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records carried stored seeing text watch)
+APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records carried stored seeing \
+    text watch)
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 

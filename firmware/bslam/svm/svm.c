@@ -49,8 +49,8 @@ bslam_status_t bslam_svm_check(const bslam_svm_t *svm, int32_t features)
     return BSLAM_OK;
 }
 
-/// The sum of w[i] x[i], in eight sums side by side: each by its name, for vector instructions where there are
-/// any, and for registers where not.
+/// The sum of w[i] x[i], in eight sums side by side: each by its name, for vector instructions where there
+/// are any, and for registers where not.
 static float dot(const float *restrict w, const float *restrict x, int32_t count)
 {
     float s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0, s5 = 0, s6 = 0, s7 = 0;
