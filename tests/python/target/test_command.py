@@ -28,7 +28,7 @@ def test_a_replay_on_a_board_writes_what_the_host_writes(folder, tmp_path, assoc
     way = ("--association", association)
     here, files_here = replay(folder, tmp_path / "host", *way)
     there, files_there = replay(folder, tmp_path / "board", *way, "--target", "qemu:mps2_an386")
-    assert files_here.pop("short.bslam")  # the link carries no map to keep
+    assert "short.bslam" in files_here
     assert files_here == files_there
     image = there.pop("target_image")
     assert image["image"] == "mps2_an386/robot.elf"
