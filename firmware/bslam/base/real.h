@@ -2,6 +2,7 @@
 #ifndef BSLAM_BASE_REAL_H
 #define BSLAM_BASE_REAL_H
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -11,9 +12,12 @@
 typedef double bslam_real_t;
 /// A literal of the scalar type: BSLAM_R(0.5).
 #define BSLAM_R(literal) literal
+/// From one to the next number.
+#define BSLAM_REAL_EPSILON DBL_EPSILON
 #else
 typedef float bslam_real_t;
 #define BSLAM_R(literal) literal##f
+#define BSLAM_REAL_EPSILON FLT_EPSILON
 #endif
 
 /// Square root, correctly rounded by IEEE 754 and so the same bits everywhere. The argument is not negative.

@@ -621,6 +621,58 @@ static void test_fuse_and_distance2_of_an_indefinite_state_are_singular(void **s
     }
 }
 
+// ---- after a great doubt ----------------------------------------------------------------------------------
+
+/// The largest |P_ij| / sqrt(P_ii P_jj) of all pairs of state values.
+static double largest_correlation(const bslam_ekf_t *ekf)
+{
+    double largest = 0;
+    for (int i = 0; i < ekf->dim; i++) {
+        for (int j = 0; j < i; j++) {
+            const double pii = (double)bslam_symmat_get(ekf->covariance, i, i);
+            const double pjj = (double)bslam_symmat_get(ekf->covariance, j, j);
+            const double pij = (double)bslam_symmat_get(ekf->covariance, i, j);
+            const double correlation = pii > 0 && pjj > 0 ? fabs(pij) / sqrt(pii * pjj) : INFINITY;
+            largest = fmax(largest, correlation);
+        }
+    }
+    return largest;
+}
+
+static void assert_one_accurate_sighting_leaves_correlations_possible(int filter, double range_sd_m,
+                                                                      double bearing_sd_rad)
+{
+    const bslam_params_t params = params_of(filter, false);
+    unit_random_t random = {21};
+    for (int round = 0; round < 2000; round++) {
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        if (round % 2 == 0) {
+            bslam_ekf_resume(&ekf, &params, 400, BSLAM_R(0.01));
+        } else {
+            const bslam_pose_t pose = bslam_ekf_pose(&ekf);
+            bslam_ekf_set_pose(&ekf, &pose, 400, BSLAM_R(0.01));
+        }
+        const plan_t plan = {round % 3, true, 0, 0};
+        bslam_sighting_t sighting = sighting_of(&ekf, &plan);
+        sighting.range_sd_m = (bslam_real_t)range_sd_m;
+        sighting.bearing_sd_rad = (bslam_real_t)bearing_sd_rad;
+        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        bslam_fusion_t fusion;
+        assert_int_equal(bslam_ekf_fuse(&ekf, &params, &innovation, &fusion), BSLAM_OK);
+        bslam_ekf_correct(&ekf, &params);
+        assert_true(bslam_ekf_is_sane(&ekf));
+        assert_true(largest_correlation(&ekf) <= 1);
+    }
+}
+
+static void test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible(void **state)
+{
+    for (int filter = 0; filter <= 1; filter++) {
+        assert_one_accurate_sighting_leaves_correlations_possible(filter, 0.05, 0.02);
+        assert_one_accurate_sighting_leaves_correlations_possible(filter, 0.001, 0.0005);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -651,6 +703,8 @@ int main(void)
         cmocka_unit_test(test_innovation_of_a_beacon_at_the_sensor_is_singular),
         cmocka_unit_test(test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular),
         cmocka_unit_test(test_fuse_and_distance2_of_an_indefinite_state_are_singular),
+
+        cmocka_unit_test(test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
