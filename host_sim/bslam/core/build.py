@@ -17,10 +17,9 @@ from pathlib import Path
 
 from cffi import FFI
 
-from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
+from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 
 CORE_DIR = Path(__file__).resolve().parent
-FIRMWARE_DIR = CORE_DIR.parents[2] / "firmware"
 LIBRARY_DIR = FIRMWARE_DIR / "bslam"
 BEACONS_HEADER = FIRMWARE_DIR / "models" / "beacons.h"
 

@@ -1,4 +1,8 @@
-"""Which builds of the C library there are: one a scalar type and size class."""
+"""Which builds of the C library there are, one a scalar type and size class, and where its sources are."""
+
+from pathlib import Path
+
+FIRMWARE_DIR = Path(__file__).resolve().parents[3] / "firmware"
 
 SIZE_CLASSES = (20, 80)
 """Beacons that a build holds; `Slam` takes the smallest that suffices."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.build import FIRMWARE_DIR
+from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.raw import Library, library
 from bslam.errors import BslamError
 

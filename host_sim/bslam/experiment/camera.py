@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import bslam.world as world_package
-from bslam.core.build import FIRMWARE_DIR
+from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.learner import flash_seeds
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro

@@ -20,7 +20,7 @@ from typing import Any, Final
 from tqdm import tqdm
 
 import bslam
-from bslam.core.build import FIRMWARE_DIR
+from bslam.core.builds import FIRMWARE_DIR
 from bslam.errors import BslamError
 from bslam.experiment.batch import Job, Outcome, outcomes_of, prepare
 from bslam.experiment.output import finite, write_atomically
