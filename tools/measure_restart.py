@@ -20,7 +20,6 @@ told with what there was to go by. Takes drives as
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Collection
@@ -31,7 +30,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.commands.arguments import seeds_range
 from bslam.experiment.align import Rigid, fit_rigid
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.metrics import map_pairs
@@ -42,8 +40,8 @@ from bslam.log import Log, Sightings
 from bslam.maps.blob import SUFFIX
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
+from camera_drives import arguments
 
-ROOT = Path(__file__).resolve().parent.parent
 KEPT_AFTER = 3000  # steps
 SWITCHED_ON_AT = (3200, 3800, 4400)  # steps
 DRIVEN_US = 5_000_000
@@ -163,15 +161,7 @@ def _restart(log: Log, options: RunOptions, to_truth: Rigid, mapped: set[int], t
 
 def main() -> int:
     """Measures and prints."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--seeds", type=seeds_range, default=range(1000, 1020), metavar="A:B")
-    parser.add_argument("--scenario", default="paper_room")
-    parser.add_argument("--rig", default="three60")
-    parser.add_argument("--sigma", type=float, default=0.6, metavar="M/S", help="the wheels' (default: 0.6)")
-    parser.add_argument("--store", type=Path, default=ROOT / "out" / "camera", metavar="DIR")
-    args = parser.parse_args()
+    args = arguments(__doc__, range(1000, 1020))
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
     options = RunOptions(association="svm", sigma_mps=args.sigma, recovery=True)
     counts: dict[tuple[str, bool], Counter[str]] = {

@@ -10,33 +10,21 @@ and by the wheels alone:
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.commands.arguments import seeds_range
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.truth import odometry_increments
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
+from camera_drives import arguments
 
-ROOT = Path(__file__).resolve().parent.parent
 SPANS_S = (1, 3, 30)
 
 
 def main() -> int:
     """Measures and prints."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--seeds", type=seeds_range, default=range(1000, 1008), metavar="A:B")
-    parser.add_argument("--scenario", default="paper_room")
-    parser.add_argument("--rig", default="three60")
-    parser.add_argument("--sigma", type=float, default=0.6, metavar="M/S", help="the wheels' (default: 0.6)")
-    parser.add_argument("--store", type=Path, default=ROOT / "out" / "camera", metavar="DIR")
-    args = parser.parse_args()
+    args = arguments(__doc__, range(1000, 1008))
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
     frames: list[NDArray[np.float64]] = []
     rates: list[NDArray[np.float64]] = []
