@@ -15,8 +15,7 @@
 #define BSLAM_PARAMS(REAL, INTEGER) \
     /* estimator */ \
     INTEGER(filter, 1, 0, 3, \
-            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 fixed-lag smoother, " \
-            "3 similarity") \
+            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 smoother, 3 similarity") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     INTEGER(velocity_states, 1, 0, 1, \
             "1: v and omega are states and the wheels measure them (speedometer noise)") \

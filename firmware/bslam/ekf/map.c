@@ -55,15 +55,16 @@ static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
     ekf->dim = at + 1;
 }
 
-/// The sighted point, with which the caller may go on.
+/// The sighted point, with which the caller may go on. scale_var: of the scale that all its distances have.
 static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t *params,
-                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting)
+                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting,
+                                          bslam_real_t scale_var)
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t range_var = bslam_scaled_range_variance_m2(params, sighting, sighting->range_m,
-                                                                  bslam_unknown_scale_var(params, sighting));
+    const bslam_real_t range_var =
+        bslam_scaled_range_variance_m2(params, sighting, sighting->range_m, scale_var);
     const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
@@ -84,11 +85,10 @@ static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t
 
 /// As a point, and the scale: where it is larger, the point is nearer.
 static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
-                         const bslam_sighting_t *sighting)
+                         const bslam_sighting_t *sighting, bslam_real_t scale_var)
 {
     static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
-    const bslam_sighted_point_t point = append_point(ekf, params, mount, sighting);
-    const bslam_real_t scale_var = bslam_unknown_scale_var(params, sighting);
+    const bslam_sighted_point_t point = append_point(ekf, params, mount, sighting, scale_var);
     const bslam_real_t by_range = -scale_var * sighting->range_m;
     const new_value_t scale = {BY_NOTHING, 1, scale_var};
     const int at = ekf->dim;
@@ -137,6 +137,7 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
                              const bslam_sighting_t *sighting, int *index)
 {
     const bool ray = !sighting->has_range;
+    const bslam_real_t scale_var = bslam_unknown_scale_var(params, sighting);
     const int room = 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;  // values beyond two a beacon
     if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && room < 2)) {
         return BSLAM_E_MAP_FULL;
@@ -145,13 +146,13 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
         *index = append_beacon(ekf, BSLAM_BEACON_RAY);
         append_ray(ekf, params, mount, sighting);
         ekf->ray_count++;
-    } else if (bslam_unknown_scale_var(params, sighting) > 0 && room > 0) {
+    } else if (scale_var > 0 && room > 0) {
         *index = append_beacon(ekf, BSLAM_BEACON_SIZED);
-        append_sized(ekf, params, mount, sighting);
+        append_sized(ekf, params, mount, sighting, scale_var);
         ekf->sized_count++;
     } else {
         *index = append_beacon(ekf, BSLAM_BEACON_POINT);
-        (void)append_point(ekf, params, mount, sighting);
+        (void)append_point(ekf, params, mount, sighting, scale_var);
     }
     return BSLAM_OK;
 }

@@ -279,9 +279,9 @@ static bslam_status_t judge(const bslam_params_t *params, bslam_fusion_t *fusion
 
 /// A measurement's variance, and at least what h P hᵀ itself is rounded by: a sighting that is surer than
 /// that of a pose in great doubt would leave no positive definite covariance. MATH "Update".
-static bslam_real_t noise_of(bslam_real_t variance, const bslam_fusion_t *fusion, bslam_real_t hph)
+static bslam_real_t noise_of(bslam_real_t variance, bslam_real_t weight, bslam_real_t hph)
 {
-    const bslam_real_t noise = variance / fusion->weight;
+    const bslam_real_t noise = variance / weight;
     const bslam_real_t rounding = ROUNDINGS * hph;
     return noise > rounding ? noise : rounding;
 }
@@ -317,14 +317,14 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     if (status != BSLAM_OK) {
         return status;
     }
-    const bslam_real_t bearing_s = hph.yy + noise_of(innovation->bearing_var_rad2, fusion, hph.yy);
+    const bslam_real_t bearing_s = hph.yy + noise_of(innovation->bearing_var_rad2, fusion->weight, hph.yy);
     accept_column(ekf, bearing_left, bearing_s);
     if (innovation->has_range) {
         // The range's column and innovation, given the bearing.
         const bslam_real_t share = hph.xy / bearing_s;
         bslam_ekf_add_scaled(range_column, -share, bearing_column, ekf->dim);
         accept_column(ekf, range_left - share * bearing_left,
-                      hph.xx - share * hph.xy + noise_of(innovation->range_var_m2, fusion, hph.xx));
+                      hph.xx - share * hph.xy + noise_of(innovation->range_var_m2, fusion->weight, hph.xx));
     }
     return BSLAM_OK;
 }

@@ -272,18 +272,25 @@ static int32_t difference(const strip_t *strip, int32_t first, int32_t at, int32
     return sum;
 }
 
-/// The same of the SHARP rows above and below each boundary; 0 where there are not so many.
+/// The same of the SHARP rows above and below each boundary that has so many; 0 before the first and after
+/// the last of them.
 static void fill_contrasts(const strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
 {
-    memset(contrasts, 0, (FINE_ROWS + 2) * sizeof contrasts[0]);
-    for (int32_t i = SHARP; i <= strip->rows - SHARP; i++) {
+    int32_t i = SHARP;
+    contrasts[i - 1] = 0;
+    for (; i <= strip->rows - SHARP; i++) {
         const int32_t *before = strip->sums[i - SHARP], *here = strip->sums[i];
         const int32_t *after = strip->sums[i + SHARP];
+        int32_t sum = 0;
         for (int32_t k = 0; k < 3; k++) {
-            const int32_t above = (here[k] - before[k]) / SHARP, below = (after[k] - here[k]) / SHARP;
-            contrasts[i] += above < below ? below - above : above - below;
+            // Sums only grow; halves of numbers that cannot be negative take one instruction each.
+            const uint32_t above = (uint32_t)(here[k] - before[k]) / SHARP;
+            const uint32_t below = (uint32_t)(after[k] - here[k]) / SHARP;
+            sum += (int32_t)(above < below ? below - above : above - below);
         }
+        contrasts[i] = sum;
     }
+    contrasts[i] = 0;
 }
 
 /// True if it is sharp, and what lies between it and the coarse end differs from what lies below it: a line

@@ -1,5 +1,6 @@
 #include "bslam/vision/side.h"
 
+#include <stddef.h>
 #include <string.h>
 
 enum { CHANNELS = 3, STEP_MAX = 255, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
@@ -55,7 +56,7 @@ static void begin(bslam_side_t *side, const bslam_frame_t *frame, bslam_side_nam
 {
     const int32_t width = frame->width_px / 2;
     const int32_t height = frame->height_px / 2;
-    memset(side, 0, sizeof *side);
+    memset(side, 0, offsetof(bslam_side_t, scan));  // of its lines nothing is read beyond `count`
     side->half = frame->half;
     side->level = name == BSLAM_SIDE_TOP || name == BSLAM_SIDE_BOTTOM;
     side->backwards = name == BSLAM_SIDE_RIGHT || name == BSLAM_SIDE_BOTTOM;

@@ -292,7 +292,8 @@ static float misplacement(const bslam_candidate_t *candidate)
 static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *frame,
                              const bslam_box_t *rough, bslam_candidate_t *candidate)
 {
-    if (candidate->second_class == BSLAM_CLASS_NONE || !(candidate->misplaced_sds > 0)) {
+    // Even where the second kind hangs perfectly, it must outweigh the margin.
+    if (candidate->second_class == BSLAM_CLASS_NONE || !(misplacement(candidate) > candidate->class_margin)) {
         return;
     }
     bslam_candidate_t other = *candidate;
