@@ -78,12 +78,14 @@ def fault_proofs(seeds: int) -> list[Proof]:
 def other_proofs() -> list[Proof]:
     """Of the whole project."""
     bits = [PYTHON, "tools/same_bits.py", "--steps", "5000"]
+    smoothed = [*bits, "--association", "known", "--observation", "direction", "--filter", "smoother"]
     sweep = [PYTHON, "tools/kill_sweep.py", "--runs", "1000"]
     return [
         Proof("test", "make test", "passes", r"make test: (.*)", ["make", "test"]),
         Proof("cores", "library for every core", "builds", LAST_LINE, ["make", "firmware-all"]),
         Proof("bits", "the same bits over 5000 steps", "on every board", LAST_LINE, bits),
         Proof("bits180", "the same, wide180", "on every board", LAST_LINE, [*bits, "--rig", "wide180"]),
+        Proof("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed),
         Proof("sweep", "1000 runs, killed three times", "0 lost", LAST_LINE, sweep),
     ]
 

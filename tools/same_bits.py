@@ -1,8 +1,8 @@
 """Feeds one log to the core on this computer and on emulated boards, and compares the state after every step.
 
 Prints the fingerprint of all states for each, and where the first difference is. The fingerprint is computed
-where the core runs (bslam_slam_fingerprint): the state, its covariance, and the weights of every machine that
-was learned on the way.
+where the core runs (bslam_slam_fingerprint): the state, its covariance, the weights of every machine that was
+learned on the way, and all that a smoother keeps.
 
 A board whose image is too small for the run is left out, and named.
 
@@ -18,7 +18,7 @@ from bslam.commands.arguments import CAMERA_STORE
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.experiment.camera import CameraStore, camera_log
-from bslam.experiment.options import RunOptions
+from bslam.experiment.options import FILTERS, RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import Log, first_steps, read_folder
 from bslam.recording.recorder import FINGERPRINT_START
@@ -113,9 +113,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--boards", nargs="+", default=boards_here(), help="default: all that are here")
     parser.add_argument("--association", default="svm", help="default: svm")
     parser.add_argument("--observation", default="distance", help="default: distance")
+    parser.add_argument("--filter", choices=FILTERS, default="invariant", help="default: invariant")
     options = parser.parse_args(argv)
     log = first_steps(read_log(options), options.steps)
-    words = {"association": options.association, "observation": options.observation}
+    words = {
+        "association": options.association,
+        "observation": options.observation,
+        "filter": options.filter,
+    }
     if options.rig is not None:
         words["sensor"] = "camera"
     here = fingerprints(log, RunOptions(**words))

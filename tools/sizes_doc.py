@@ -256,7 +256,7 @@ stm32f405 learns looks, stm32f405_seeing has the front end for one QVGA camera, 
 The longest path from a call on, bytes, from the linked image: the compiler's frames along the call graph \
 (tools/check_image.py).
 
-{table(code_heads(STEP_FUNCTIONS), stack_rows("robot", STEP_FUNCTIONS))}
+{table(code_heads(STEP_FUNCTIONS), stack_rows("cost", STEP_FUNCTIONS))}
 {table(code_heads(VISION_FUNCTIONS), stack_rows("cost_vision", VISION_FUNCTIONS))}
 With the smoother linked:
 

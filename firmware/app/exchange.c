@@ -78,12 +78,27 @@ static uint8_t attach_looks(session_t *session)
 #endif
 }
 
+/// Where the parameters ask for it.
+static uint8_t attach_smoother(session_t *session)
+{
+#if SESSION_SMOOTHER
+    bslam_slam_attach_smoother(&session->slam, &session->smoother);
+    return BSLAM_OK;
+#else
+    return session->params.filter == BSLAM_FILTER_SMOOTHER ? SESSION_E_SMOOTHER : BSLAM_OK;
+#endif
+}
+
 uint8_t session_start_over(session_t *session, int *bad_id)
 {
     const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, bad_id);
     session->fingerprint = BSLAM_FINGERPRINT_START;
     watch_restart(&session->watch);
-    return status == BSLAM_OK ? attach_looks(session) : (uint8_t)status;
+    uint8_t attached = (uint8_t)status;
+    if (status == BSLAM_OK) {
+        attached = attach_smoother(session);
+    }
+    return attached == BSLAM_OK ? attach_looks(session) : attached;
 }
 
 static void apply_reset(session_t *session, bslam_link_reader_t *reader)

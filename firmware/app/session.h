@@ -17,6 +17,10 @@
 #ifndef SESSION_LOOKS
 #define SESSION_LOOKS 1
 #endif
+/// 1: where the parameter `filter` asks for the smoother, it has one, which takes bslam_smoother_t.
+#ifndef SESSION_SMOOTHER
+#define SESSION_SMOOTHER 0
+#endif
 
 /// What the host may send. The answer to message m has type m | SESSION_ANSWER and the same sequence number.
 typedef enum session_message {
@@ -63,7 +67,8 @@ typedef enum session_status {
     SESSION_E_TYPE = 0x41,        ///< no such message
     SESSION_E_LENGTH = 0x42,      ///< the payload is not as long as its message is
     SESSION_E_STORE = 0x43,       ///< the board keeps nothing, or failed to
-    SESSION_E_LOOKS = 0x44        ///< the image learns no looks
+    SESSION_E_LOOKS = 0x44,       ///< the image learns no looks
+    SESSION_E_SMOOTHER = 0x45     ///< the image has no smoother
 } session_status_t;
 
 /// All members are the session's own.
@@ -74,6 +79,9 @@ typedef struct session {
     float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
     bslam_sample_t seeds[BSLAM_SEEDS_MAX];
     int32_t seed_count;
+#endif
+#if SESSION_SMOOTHER
+    bslam_smoother_t smoother;
 #endif
 #if SESSION_VISION
     seeing_t seeing;

@@ -9,8 +9,8 @@ static uint64_t add_word(uint64_t hash, uint32_t word)
     return (hash ^ word) * FNV_PRIME;
 }
 
-/// A multiple of four bytes.
-static uint64_t add_words(uint64_t hash, const void *from, size_t size)
+/// A multiple of four bytes. Not to be inlined: one loop, not one for each that is added.
+__attribute__((noinline)) static uint64_t add_words(uint64_t hash, const void *from, size_t size)
 {
     const uint8_t *bytes = from;
     for (size_t at = 0; at < size; at += sizeof(uint32_t)) {
@@ -44,8 +44,30 @@ static uint64_t add_machines(uint64_t hash, const bslam_learner_t *learner)
     return hash;
 }
 
+/// What the smoother keeps: where its window begins, and what was read and seen since.
+static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
+{
+    hash = add_state(hash, &smoother->base);
+    hash = add_words(hash, smoother->place, (size_t)smoother->base.dim * sizeof smoother->place[0]);
+    for (int n = 0; n < smoother->node_count; n++) {
+        const bslam_smoother_node_t *node =
+            &smoother->nodes[(smoother->first_node + n) % BSLAM_SMOOTHER_NODES_MAX];
+        hash = add_words(hash, node->at, sizeof node->at);
+        hash = add_words(hash, &node->motion, sizeof node->motion);
+        hash = add_word(hash, (uint32_t)node->seen);
+    }
+    for (int s = 0; s < smoother->seen_count; s++) {
+        const int at = (smoother->first_seen + s) % BSLAM_SMOOTHER_SEEN_MAX;
+        hash = add_words(hash, &smoother->seen[at], sizeof smoother->seen[at]);
+    }
+    return add_word(hash, smoother->cycles);
+}
+
 uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
 {
-    const uint64_t hash = add_state(before, &slam->ekf);
+    uint64_t hash = add_state(before, &slam->ekf);
+    if (slam->smoother != NULL) {
+        hash = add_smoother(hash, slam->smoother);
+    }
     return slam->looks != NULL ? add_machines(hash, &slam->looks->learner) : hash;
 }

@@ -89,8 +89,6 @@ def run_log(
             raise BslamError(f"--map {options.kept_map} with --target {options.target}: allowed is host")
         if options.real != "float":
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
-        if options.filter == "smoother":
-            raise BslamError(f"--filter smoother with --target {options.target}: allowed is host")
         looks = uses_looks(options)
         with connect(
             options.target,

@@ -55,7 +55,14 @@ class Report(IntEnum):
     LOOKED = 0x43
 
 
-LINK_STATUSES = {0x40: "NO_SESSION", 0x41: "TYPE", 0x42: "LENGTH", 0x43: "STORE", 0x44: "LOOKS"}
+LINK_STATUSES = {
+    0x40: "NO_SESSION",
+    0x41: "TYPE",
+    0x42: "LENGTH",
+    0x43: "STORE",
+    0x44: "LOOKS",
+    0x45: "SMOOTHER",
+}
 """Statuses that are the link's own; below are the library's."""
 NO_DETAIL = 255
 

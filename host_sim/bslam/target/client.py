@@ -17,6 +17,7 @@ _MEANING = {
     "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
     "LOOKS": ": the image learns no looks (SESSION_LOOKS=0)",
+    "SMOOTHER": ": the image has no smoother (SESSION_SMOOTHER=0)",
 }
 
 

@@ -12,7 +12,7 @@ from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import first_steps
-from bslam.target.lines import ROOT, boards_here, emulator_of, qemu_machines
+from bslam.target.lines import ROOT, TargetError, boards_here, emulator_of, qemu_machines
 from bslam.world.simulate import load_scenario, simulate
 
 STEPS = 120
@@ -39,15 +39,13 @@ BOARDS = [
     )
     for board in sorted(qemu_machines())
 ]
-WAYS = (
-    (("association", "svm"),),
-    (("association", "known"), ("observation", "direction")),
-)
+DIRECTION = (("association", "known"), ("observation", "direction"))
+WAYS = ((("association", "svm"),), (*DIRECTION, ("filter", "smoother")), DIRECTION)
 
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_state_is_that_of_the_host(log, host, board):
-    ways = WAYS[1:] if board in SMALL else WAYS  # unknown identity is given room for 80 beacons
+    ways = WAYS[2:] if board in SMALL else WAYS  # for the others they have no room
     for words in ways:
         there = same_bits.fingerprints(log, RunOptions(**dict(words), target=f"qemu:{board}"))
         assert len(there) == len(host[words]) > STEPS
@@ -68,6 +66,11 @@ def test_the_self_test_passes_on_the_board(board):
 def test_a_board_that_is_too_small_is_refused(log):
     with pytest.raises(BslamError, match="room for 80 beacons, the image has 20"):
         run_log(log, RunOptions(association="mahalanobis", target="qemu:stm32f405"))
+
+
+def test_a_board_without_a_smoother_says_so(log):
+    with pytest.raises(TargetError, match="the image has no smoother"):
+        run_log(log, RunOptions(filter="smoother", target="qemu:stm32f405"))
 
 
 def test_a_run_names_its_image_and_counts_the_same_instructions_twice(log):
