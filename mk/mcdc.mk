@@ -16,14 +16,14 @@ define mcdc_rules
 MCDC_COMPILE_$(1) = $$(CLANG) $$(C_STANDARD) $$(C_INCLUDES) $$(MCDC_FLAGS_$(1)) -O1 -g -MMD -MP
 MCDC_CORE_$(1) := $$(CORE_SOURCES:%.c=build/mcdc/$(1)/%.o)
 
-$$(MCDC_CORE_$(1)): build/mcdc/$(1)/%.o: %.c mk/config.mk mk/mcdc.mk
+$$(MCDC_CORE_$(1)): build/mcdc/$(1)/%.o: %.c mk/config.mk mk/fuzz.mk mk/mcdc.mk
 	@mkdir -p $$(@D)
 	@$$(MCDC_COMPILE_$(1)) -fPIC $$(MCDC_COVERAGE) -Werror -c $$< -o $$@
 
 build/mcdc/$(1)/libbslam.so: $$(MCDC_CORE_$(1))
 	@$$(CLANG) -shared $$(MCDC_COVERAGE) $$^ -lm -o $$@
 
-build/mcdc/$(1)/%.o: %.c mk/config.mk mk/mcdc.mk
+build/mcdc/$(1)/%.o: %.c mk/config.mk mk/fuzz.mk mk/mcdc.mk
 	@mkdir -p $$(@D)
 	@$$(MCDC_COMPILE_$(1)) -Itests/unit $$(CMOCKA_CFLAGS) -c $$< -o $$@
 

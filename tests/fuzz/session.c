@@ -5,10 +5,14 @@
 
 #include <string.h>
 
+#include "bslam/store/map.h"
 #include "picture.h"
 #include "port/port.h"
 
-enum { MESSAGES_MAX = 40, STORE_BYTES = 1024 };
+enum { MESSAGES_MAX = 40, STORE_BYTES = 1024, MAP_BYTES = 4096, PIECE_BYTES = 400 };
+
+/// One above the last message there is.
+enum { TYPES = SESSION_MAP_LOAD + 1 };
 
 static session_t session;
 static bslam_link_parser_t answers;
@@ -91,12 +95,11 @@ static void take(uint8_t byte)
 /// Payload bytes of a message that is as long as it should be, where that is a fixed number.
 static unsigned size_of(unsigned type)
 {
-    static const uint8_t sizes[0x17] = {
-        [SESSION_HELLO] = 5,         [SESSION_ODOMETRY] = 14,     [SESSION_RESUME] = 8,
-        [SESSION_KNOWN_BEACON] = 12, [SESSION_REMOVE_BEACON] = 4, [SESSION_PARAM_SET] = 6,
-        [SESSION_PARAM_GET] = 2,     [SESSION_MAP] = 1,           [SESSION_SET_POSE] = 20,
-        [SESSION_CAMERA] = 42,       [SESSION_IMAGE] = 2,         [SESSION_LOOK] = 1,
-        [SESSION_SEEN] = 1};
+    static const uint8_t sizes[TYPES] = {
+        [SESSION_HELLO] = 5,         [SESSION_RESUME] = 8,    [SESSION_KNOWN_BEACON] = 12,
+        [SESSION_REMOVE_BEACON] = 4, [SESSION_PARAM_GET] = 2, [SESSION_MAP] = 1,
+        [SESSION_SET_POSE] = 20,     [SESSION_MAP_READ] = 4,  [SESSION_IMAGE] = 2,
+        [SESSION_LOOK] = 1,          [SESSION_SEEN] = 1};
     return type < sizeof sizes ? sizes[type] : 0;
 }
 
@@ -104,6 +107,39 @@ static void put_reals(bslam_link_writer_t *writer, fuzz_input_t *input, int coun
 {
     for (; count > 0; count--) {
         bslam_link_put_real(writer, fuzz_real(input, -high, high));
+    }
+}
+
+/// Whether a signature came before, or a distance, is for the last byte to say.
+static void put_sighting(bslam_link_writer_t *writer, fuzz_input_t *input)
+{
+    const unsigned flags = fuzz_u8(input);
+    put_reals(writer, input, 1, 3.2);
+    bslam_link_put_real(writer, fuzz_real(input, 0.1, 10));
+    for (int i = 0; i < 3; i++) {
+        bslam_link_put_real(writer, (flags & 4u) != 0 ? fuzz_real(input, 0, 0.2) : 0);
+    }
+    bslam_link_put_i32(writer, (int32_t)(flags >> 3 & 7u) - 1);
+    bslam_link_put_u8(writer, (flags & 64u) != 0 ? fuzz_u8(input) : 0);
+    bslam_link_put_u8(writer, (uint8_t)flags);
+}
+
+/// A piece of the robot's own map, as a host gives back what it has read, perhaps with a byte changed.
+static void put_map_piece(bslam_link_writer_t *writer, fuzz_input_t *input, unsigned piece)
+{
+    static uint8_t bytes[MAP_BYTES];
+    bslam_map_memory_t memory = {bytes, MAP_BYTES, 0};
+    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    fuzz_require(bslam_map_write(&session.slam, &sink, &fault) == BSLAM_OK);
+    const unsigned change = fuzz_u8(input);
+    if (change < 64) {
+        bytes[fuzz_u16(input) % memory.count] ^= (uint8_t)(change + 1);
+    }
+    const uint32_t at = piece * PIECE_BYTES;
+    bslam_link_put_u32(writer, at);
+    for (uint32_t i = at; i < memory.count && i < at + PIECE_BYTES; i++) {
+        bslam_link_put_u8(writer, bytes[i]);
     }
 }
 
@@ -115,13 +151,15 @@ static void put_payload(bslam_link_writer_t *writer, fuzz_input_t *input, unsign
     case SESSION_SIGHTINGS:
         bslam_link_put_u8(writer, (uint8_t)count);
         for (unsigned i = 0; i < count; i++) {
-            put_reals(writer, input, 1, 3.2);
-            bslam_link_put_real(writer, fuzz_real(input, 0.1, 10));
-            put_reals(writer, input, 2, 0);
-            bslam_link_put_i32(writer, (int32_t)fuzz_u8(input) % 8 - 1);
-            bslam_link_put_u8(writer, fuzz_u8(input));
-            bslam_link_put_u8(writer, fuzz_u8(input));
+            put_sighting(writer, input);
         }
+        break;
+    case SESSION_MAP_WRITE:
+        put_map_piece(writer, input, count);
+        break;
+    case SESSION_MAP_LOAD:
+        bslam_link_put_u32(writer, bslam_map_size(&session.slam) + (count == 0 ? fuzz_u8(input) : 0));
+        bslam_link_put_u8(writer, (uint8_t)(count % 2));
         break;
     case SESSION_SIGNATURES:
     case SESSION_SEEDS:
@@ -169,7 +207,7 @@ static void send_message(fuzz_input_t *input, uint16_t *sequence, int64_t *now_u
     const unsigned odd = fuzz_u8(input);
     *sequence = (uint16_t)(*sequence + (odd < 16 ? odd - 8 : 1));
     *now_us += odd < 32 ? 10000 * (int64_t)odd - 150000 : 40000;
-    const bslam_link_header_t header = {.type = type < 224 ? (uint8_t)(type % 0x18) : (uint8_t)type,
+    const bslam_link_header_t header = {.type = type < 224 ? (uint8_t)(type % TYPES) : (uint8_t)type,
                                         .sequence = *sequence,
                                         .time_us = *now_us};
     bslam_link_writer_t writer;

@@ -23,6 +23,20 @@ bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2],
     return ekf;
 }
 
+void unit_give_machine(bslam_looks_t *looks, int index, double value, int samples)
+{
+    int32_t machine;
+    assert_int_equal(bslam_learner_add(&looks->learner, &machine), BSLAM_OK);
+    looks->of[index].machine = (int16_t)machine;
+    bslam_machine_t *made = &looks->learner.machines[machine];
+    made->trained = true;
+    made->rivals = 1;
+    made->samples = (uint8_t)samples;
+    float weights[BSLAM_SAMPLE_SIZE] = {0};
+    weights[0] = (float)value * BSLAM_SAMPLE_UNIT;
+    bslam_weights_round(weights, &made->weights);
+}
+
 void unit_assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
                          int beacon)
 {

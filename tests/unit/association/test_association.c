@@ -128,6 +128,21 @@ static void test_known_label_has_so_many_rivals_and_no_more(void **state)
     }
 }
 
+/// A rival where the robot stands has no direction, and so no distance to compare.
+static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **state)
+{
+    const bslam_params_t params = unit_params();
+    static const double places[2][2] = {{4, 0}, {0, 0}};
+    bslam_ekf_t ekf = unit_map_of(&params, places, 2);
+    for (int b = 0; b < 2; b++) {
+        ekf.beacons[b].label = 10;
+        ekf.beacons[b].confirmed = false;
+    }
+    const bslam_sighting_t seen = unit_polar(0, 4.1, 10);
+    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, &seen, 1);
+    assert_match(&d.matches[0], 0);
+}
+
 static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **state)
 {
     const bslam_params_t params = unit_params();
@@ -399,6 +414,7 @@ int main(void)
         cmocka_unit_test(test_known_sighting_without_a_label_is_rejected),
         cmocka_unit_test(test_known_repeated_label_leaves_the_first),
         cmocka_unit_test(test_known_label_has_so_many_rivals_and_no_more),
+        cmocka_unit_test(test_known_rival_that_cannot_be_weighed_is_not_the_nearest),
         cmocka_unit_test(test_known_not_mappable_sighting_does_not_use_its_label_up),
 
         cmocka_unit_test(test_by_distance_empty_map_makes_everything_new),

@@ -154,6 +154,25 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
     }
 }
 
+/// A variance below zero: what is seen of that beacon cannot be weighed, so it is in no pair, and near
+/// nobody.
+static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **state)
+{
+    const bslam_params_t params = joint_params();
+    const double places[2][2] = {{4, 0}, {0, 4}};
+    bslam_ekf_t ekf = map_of(&params, places, 2);
+    for (int k = 0; k < 2; k++) {
+        const int at = ekf.beacons[0].at + k;
+        bslam_symmat_set(ekf.covariance, at, at, -1);
+    }
+    const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
+    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, 2, 0};
+    bslam_match_t matches[2];
+    bslam_associate_joint(&frame, matches);
+    unit_assert_decided(&matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+}
+
 static void test_joint_out_of_nodes_still_decides_all(void **state)
 {
     bslam_params_t params = joint_params();
@@ -195,6 +214,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_joint_finds_what_trying_all_pairings_finds),
         cmocka_unit_test(test_joint_sees_through_a_wrong_heading),
+        cmocka_unit_test(test_joint_beacon_of_indefinite_covariance_is_passed_over),
         cmocka_unit_test(test_joint_out_of_nodes_still_decides_all),
         cmocka_unit_test(test_joint_more_sightings_than_are_paired_together),
     };

@@ -141,6 +141,40 @@ static void test_a_beacon_that_only_once_looked_like_another_gets_its_own(void *
     assert_int_equal(looks.counters.shared, 0);
 }
 
+static void test_a_beacon_that_looks_like_one_and_then_like_another_gets_its_own(void **state)
+{
+    learn_two(8);
+    teach(2, 3, 0, 20);
+    teach(2, 3, 1, 21);  // whom it looked like first is not there again
+    assert_int_equal(looks.counters.shared, 0);
+    assert_true(looks.of[2].machine >= 0);
+    assert_int_not_equal(looks.of[2].machine, looks.of[0].machine);
+    assert_int_not_equal(looks.of[2].machine, looks.of[1].machine);
+}
+
+static void test_a_shared_machine_is_kept_while_it_knows_its_beacons(void **state)
+{
+    learn_two(8);
+    looks.of[2].machine = looks.of[0].machine;
+    for (int view = 0; view < 3 * SHARE; view++) {
+        teach(2, 3, 0, 30 + view);
+    }
+    assert_int_equal(looks.of[2].machine, looks.of[0].machine);
+    assert_int_equal(looks.counters.parted, 0);
+}
+
+/// It has nothing to tell its beacons from, and so refuses nobody.
+static void test_a_shared_machine_without_rivals_is_kept(void **state)
+{
+    teach(0, 2, 0, 0);
+    looks.of[1].machine = looks.of[0].machine;
+    for (int view = 0; view < 3 * SHARE; view++) {
+        teach(1, 2, 1, 30 + view);
+    }
+    assert_int_equal(looks.of[1].machine, looks.of[0].machine);
+    assert_int_equal(looks.counters.parted, 0);
+}
+
 static void test_a_shared_machine_that_refuses_a_beacon_is_left(void **state)
 {
     learn_two(8);
@@ -286,6 +320,9 @@ int main(void)
         cmocka_unit_test_setup(test_a_robot_that_stands_still_teaches_once, setup),
         cmocka_unit_test_setup(test_a_new_beacon_that_looks_like_another_shares_its_machine, setup),
         cmocka_unit_test_setup(test_a_beacon_that_only_once_looked_like_another_gets_its_own, setup),
+        cmocka_unit_test_setup(test_a_beacon_that_looks_like_one_and_then_like_another_gets_its_own, setup),
+        cmocka_unit_test_setup(test_a_shared_machine_is_kept_while_it_knows_its_beacons, setup),
+        cmocka_unit_test_setup(test_a_shared_machine_without_rivals_is_kept, setup),
         cmocka_unit_test_setup(test_a_shared_machine_that_refuses_a_beacon_is_left, setup),
         cmocka_unit_test_setup(test_forget_frees_a_machine_unless_another_beacon_has_it, setup),
         cmocka_unit_test_setup(test_forget_while_the_machine_is_in_training, setup),

@@ -12,19 +12,9 @@ static const float PLAIN[BSLAM_SAMPLE_FEATURES] = {0.0f};
 
 static bslam_looks_t looks;
 
-/// A machine for beacon `index` that has learned from `samples`, and answers value * first feature.
 static void give_machine(int index, double value, int samples)
 {
-    int32_t machine;
-    assert_int_equal(bslam_learner_add(&looks.learner, &machine), BSLAM_OK);
-    looks.of[index].machine = (int16_t)machine;
-    bslam_machine_t *made = &looks.learner.machines[machine];
-    made->trained = true;
-    made->rivals = 1;
-    made->samples = (uint8_t)samples;
-    float weights[BSLAM_SAMPLE_SIZE] = {0};
-    weights[0] = (float)value * BSLAM_SAMPLE_UNIT;
-    bslam_weights_round(weights, &made->weights);
+    unit_give_machine(&looks, index, value, samples);
 }
 
 static bslam_sighting_t seen_with(bslam_sighting_t sighting, const float *signature)
@@ -270,6 +260,38 @@ static void test_far_but_clearly_alike_is_not_new(void **state)
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
+static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
+    give_machine(0, 2, 2);
+    decision_t d = decide(&ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    looks.learner.machines[0].samples = 16;
+    looks.of[0].seen_as[2] = 10;
+    seen.beacon_class = 3;
+    d = decide(&ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    seen.beacon_class = 4;
+    d = decide(&ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+}
+
+/// From where the sensor is it has no direction.
+static void test_alike_but_where_the_robot_stands_is_new(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const double here[1][2] = {{0, 0}};
+    const bslam_ekf_t ekf = unit_map_of(&params, here, 1);
+    const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    give_machine(0, 2, 16);
+    const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
+    const decision_t d = decide(&ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+}
+
 static const double pair[2][2] = {{4, 0}, {4, 0.4}};
 
 static void test_one_to_one_the_clearest_choice_first(void **state)
@@ -321,7 +343,7 @@ static void test_looks_decide_between_two_in_the_gate(void **state)
 
 static void test_sure_enough_to_learn_from(void **state)
 {
-    const bslam_params_t params = svm_params();
+    bslam_params_t params = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t near = seen_with(unit_polar(0, 4, -1), signature);
@@ -334,6 +356,12 @@ static void test_sure_enough_to_learn_from(void **state)
     // Grown up, and its machine says no.
     looks.learner.machines[0].weights.unit = -looks.learner.machines[0].weights.unit;
     assert_false(decide(&ekf, &params, &near, 1).matches[0].sure);
+    // Or says yes, but not enough, however much the beacon leads by what else is known of it.
+    params.learn_margin = BSLAM_R(0.5);
+    params.learn_lead = BSLAM_R(-20.0);
+    assert_false(decide(&ekf, &params, &near, 1).matches[0].sure);
+    params.learn_margin = BSLAM_R(-1.5);
+    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure);
 }
 
 static void test_directions_alone_have_their_own_density_of_new(void **state)
@@ -426,6 +454,9 @@ int main(void)
         cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
         cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_not_new, setup),
+        cmocka_unit_test_setup(test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another,
+                               setup),
+        cmocka_unit_test_setup(test_alike_but_where_the_robot_stands_is_new, setup),
         cmocka_unit_test_setup(test_one_to_one_the_clearest_choice_first, setup),
         cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),
         cmocka_unit_test_setup(test_two_sightings_that_want_a_beacon_alike_both_wait, setup),

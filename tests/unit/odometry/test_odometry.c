@@ -414,6 +414,18 @@ static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(vo
     assert_near(after.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
 }
 
+static void test_read_jump_of_another_source_leaves_the_tick_reference(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.speed_max_mps = 2;
+    bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
+    const bslam_odometry_reading_t jump = wheels(START_US + STEP_US, 5, 5);
+    bslam_motion_t motion;
+    assert_int_equal(bslam_odometry_read(&odometry, &params, &jump, &motion), BSLAM_E_JUMP);
+    motion = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 20010, 20010));
+    assert_near(motion.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
+}
+
 static void test_restart_starts_clock_and_ticks_anew(void **state)
 {
     bslam_params_t params = unit_params();
@@ -563,6 +575,7 @@ int main(void)
         cmocka_unit_test(test_read_turn_of_many_revolutions_is_a_jump),
         cmocka_unit_test(test_read_gyro_turn_of_many_revolutions_is_refused),
         cmocka_unit_test(test_read_after_an_encoder_reset_the_next_ticks_are_the_reference),
+        cmocka_unit_test(test_read_jump_of_another_source_leaves_the_tick_reference),
         cmocka_unit_test(test_restart_starts_clock_and_ticks_anew),
         cmocka_unit_test(test_read_first_ticks_after_the_clock_started_leave_the_interval_open),
         cmocka_unit_test(test_read_ticks_after_another_source_start_afresh),

@@ -181,6 +181,26 @@ static void test_relocate_tells_by_geometry_which_of_two_is_seen(void **state)
     assert_int_equal(fix.agreeing, 3);
 }
 
+/// Of the beacons that one sighting may show the nearest counts, whichever is asked first.
+static void test_relocate_of_two_that_agree_the_nearest_is_seen(void **state)
+{
+    for (int asked_first = 0; asked_first < 2; asked_first++) {
+        bslam_clue_t clues[6];
+        for (int i = 0; i < 5; i++) {
+            clues[i] = clue_of(i, 1, 3, 0, true);
+        }
+        clues[5] = clues[4];
+        clues[5].is_other = true;
+        clues[5 - asked_first].y_m += real(0.19);  // seen 3.8 deviations from there
+        bslam_fix_t fix;
+        assert_true(bslam_relocate(clues, 6, &fix));
+        assert_near(fix.pose.x_m, 1, 2e-3);
+        assert_near(fix.pose.y_m, 3, 2e-3);
+        assert_int_equal(fix.agreeing, 5);
+        assert_int_equal(fix.dissenting, 0);
+    }
+}
+
 static void test_relocate_with_too_little_finds_nothing(void **state)
 {
     const bslam_clue_t one[] = {clue_of(0, 1, 3, 0, true)};
@@ -206,6 +226,7 @@ int main(void)
         cmocka_unit_test(test_relocate_on_a_beacon_leaves_its_direction_out),
         cmocka_unit_test(test_relocate_by_places_beyond_numbers_finds_nothing),
         cmocka_unit_test(test_relocate_tells_by_geometry_which_of_two_is_seen),
+        cmocka_unit_test(test_relocate_of_two_that_agree_the_nearest_is_seen),
         cmocka_unit_test(test_relocate_with_too_little_finds_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
