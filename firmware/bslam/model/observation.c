@@ -43,20 +43,24 @@ bslam_status_t bslam_observe_point(const bslam_pose_t *pose, const bslam_pose_t 
     const bslam_real_t range = bslam_sqrt(square);
     seen->range_m = range;
     seen->bearing_rad = bslam_angle_wrap(bslam_atan2(dy, dx) - sensor.pose.theta_rad);
-    by_pose(&sensor, -dx / range, -dy / range, 0, seen->range_by_pose);
-    by_pose(&sensor, dy / square, -dx / square, -1, seen->bearing_by_pose);
-    by_pose(&sensor, -dx / square, -dy / square, 0, seen->stretch_by_pose);
+    const bslam_real_t along_x = dx / range;
+    const bslam_real_t along_y = dy / range;
+    const bslam_real_t inverse_x = dx / square;
+    const bslam_real_t inverse_y = dy / square;
+    by_pose(&sensor, -along_x, -along_y, 0, seen->range_by_pose);
+    by_pose(&sensor, inverse_y, -inverse_x, -1, seen->bearing_by_pose);
+    by_pose(&sensor, -inverse_x, -inverse_y, 0, seen->stretch_by_pose);
     for (int k = BSLAM_POINT_DIM; k < BSLAM_RAY_DIM; k++) {
         seen->range_by_beacon[k] = 0;
         seen->bearing_by_beacon[k] = 0;
         seen->stretch_by_beacon[k] = 0;
     }
-    seen->range_by_beacon[0] = dx / range;
-    seen->range_by_beacon[1] = dy / range;
-    seen->bearing_by_beacon[0] = -dy / square;
-    seen->bearing_by_beacon[1] = dx / square;
-    seen->stretch_by_beacon[0] = dx / square;
-    seen->stretch_by_beacon[1] = dy / square;
+    seen->range_by_beacon[0] = along_x;
+    seen->range_by_beacon[1] = along_y;
+    seen->bearing_by_beacon[0] = -inverse_y;
+    seen->bearing_by_beacon[1] = inverse_x;
+    seen->stretch_by_beacon[0] = inverse_x;
+    seen->stretch_by_beacon[1] = inverse_y;
     return BSLAM_OK;
 }
 

@@ -35,10 +35,13 @@ static bool signature_is_finite(const float *signature)
     return is_finite;
 }
 
-static bool distance_is_finite(const bslam_sighting_t *sighting)
+static bool is_finite(const bslam_sighting_t *sighting)
 {
-    return bslam_is_number(sighting->range_m) && bslam_is_number(sighting->range_sd_m) &&
-           bslam_is_number(sighting->range_scale_sd);
+    const bool direction =
+        bslam_is_number(sighting->bearing_rad) && bslam_is_number(sighting->bearing_sd_rad);
+    const bool distance = bslam_is_number(sighting->range_m) && bslam_is_number(sighting->range_sd_m) &&
+                          bslam_is_number(sighting->range_scale_sd);
+    return direction && (distance || !sighting->has_range) && signature_is_finite(sighting->signature);
 }
 
 static bool distance_is_possible(const bslam_sighting_t *sighting)
@@ -50,15 +53,15 @@ static bool distance_is_possible(const bslam_sighting_t *sighting)
 
 static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
 {
-    if (!signature_is_finite(sighting->signature) || !bslam_is_number(sighting->bearing_rad) ||
-        !bslam_is_number(sighting->bearing_sd_rad) ||
-        (sighting->has_range && !distance_is_finite(sighting))) {
-        return BSLAM_E_NOT_FINITE;
-    }
     const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI) &&
                             is_noise(sighting->bearing_sd_rad, BEARING_SD_MIN_RAD, BSLAM_PI);
     const bool range_ok = !sighting->has_range || distance_is_possible(sighting);
-    return bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE ? BSLAM_OK : BSLAM_E_RANGE;
+    // What is no number is in no range: what is wrong is asked only where something is.
+    if (bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE &&
+        signature_is_finite(sighting->signature)) {
+        return BSLAM_OK;
+    }
+    return is_finite(sighting) ? BSLAM_E_RANGE : BSLAM_E_NOT_FINITE;
 }
 
 bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,

@@ -263,7 +263,8 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
         if (is_unconfirmed(&slam->params, beacon, time_us)) {
             bslam_slam_drop_beacon(slam, b);
             slam->counters.removed++;
-        } else if (bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
+        } else if (beacon->kind == BSLAM_BEACON_RAY &&
+                   bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
             slam->counters.settled++;
         }
     }
