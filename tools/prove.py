@@ -1,24 +1,32 @@
 """Runs the long proofs and prints what each reached beside its goal.
 
 Examples:
-    tools/prove.py                        all of them: hours
+    tools/prove.py                        all of them: some hours
+    tools/prove.py --list                 what there is, how long each takes, what is proved already
     tools/prove.py --only soak mcdc       some
-    tools/prove.py --seeds 3              fewer drives for each fault of a drive, for a first look
+    tools/prove.py --quick                a little of each in half an hour: whether all of it runs here
 
-`make proof` builds what this runs. What a proof prints is in out/proof/NAME.txt. Exit status 0: every goal is
-reached; 1: one is not, or could not be measured.
+`make proof` builds what this runs. What a proof prints is in out/proof/NAME.txt, what came of it in
+out/proof/NAME.json: a proof that ended on the sources as they are is not run again (--again does), so that
+one that was stopped goes on where it was. Times are of two idle cores; what is left is told at the pace so
+far. Exit status 0: every goal is reached; 1: one is not, or could not be measured.
 """
 
 import argparse
+import hashlib
+import json
 import os
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
+
+from bslam.experiment.output import write_atomically
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out/proof"
@@ -26,6 +34,9 @@ PYTHON = str(ROOT / ".venv/bin/python")
 BSLAM = str(ROOT / ".venv/bin/bslam")
 THOROUGH = MappingProxyType({"BSLAM_THOROUGH": "1"})
 LAST_LINE = r"([^\n]+)\n?\Z"
+SOURCES = ("firmware", "host_sim", "tests", "tools", "mk")
+SUFFIXES = frozenset((".c", ".h", ".py", ".mk", ".toml", ".sh", ".bin", ".npz"))
+SAY_EVERY_S = 60.0
 
 
 class Proof(NamedTuple):
@@ -36,10 +47,23 @@ class Proof(NamedTuple):
     goal: str
     figure: str
     command: list[str]
+    minutes: float  # about, on two idle cores
     environment: Mapping[str, str] = MappingProxyType({})
+    least: float | None = None  # share that is near, where the exit status does not judge it
 
 
-def own_proofs() -> list[Proof]:
+class Result(NamedTuple):
+    """What came of one."""
+
+    reached: bool
+    figure: str
+    seconds: float
+
+
+# --- What is proved -----------------------------------------------------------------------------------------
+
+
+def own_proofs(quick: bool) -> list[Proof]:
     """Of the core alone."""
     store = ROOT / "build/unit/float/bin/store"
     cuts = ("power cuts at every byte, at every pair", "0 mixed", r"power cuts: (.*)")
@@ -47,101 +71,217 @@ def own_proofs() -> list[Proof]:
     soak = ("6 h x 20 seeds, float beside double", "NEES 2.4-3.7, 0, 10 %", r"soak: .* seeds: (.*)")
     mcdc = ("MC/DC of firmware/bslam", "95 %", r"mcdc: (\d.*?),")
     fuzz = ("fuzzing: executions, crashes", "2e8, 1e6 each, 0", r"fuzz: (.*)")
+    depth = MappingProxyType({}) if quick else THOROUGH
+    less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []
+    less_fuzz = ["--seconds", "60"] if quick else []
     return [
-        Proof("cuts", *cuts, [str(store / "test_slots")], THOROUGH),
-        Proof("flips", *flips, [str(store / "test_guard")], THOROUGH),
-        Proof("soak", *soak, [PYTHON, "tools/soak.py"]),
-        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"]),
-        Proof("fuzz", *fuzz, [PYTHON, "tools/fuzz.py"]),
+        Proof("cuts", *cuts, [str(store / "test_slots")], 1, depth),
+        Proof("flips", *flips, [str(store / "test_guard")], 0.1, depth),
+        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 1),
+        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 0.2),
+        Proof("fuzz", *fuzz, [PYTHON, "tools/fuzz.py", *less_fuzz], 1 if quick else 20),
     ]
 
 
-def fault_proof(name: str, title: str, goal: str, only: str, seeds: int) -> Proof:
-    """Some faults of a drive, injected into so many."""
+def fault_proof(name: str, title: str, goal: str, only: str, seeds: int, minutes: float) -> Proof:
+    """Some faults of a drive, injected into so many; a drive takes so long."""
     measured = r"\| (.*) \| (?:as promised|NOT AS PROMISED)"
     command = [BSLAM, "faults", "--out", str(OUT / name), "--only", only, "--seeds", str(seeds)]
-    return Proof(name, f"{title}, {seeds} drives", goal, measured, command)
+    return Proof(name, f"{title}, {seeds} drives", goal, measured, command, seeds * minutes)
 
 
 def fault_proofs(seeds: int) -> list[Proof]:
     """Each fault once, and those of a drive in many."""
     rows = ("fault rows as promised", "all", r"(\d+ of \d+) as promised")
     found, near = "noticed, found, 0 alarms", "all within 0.2 m"
+    third = max(1, seeds // 3)
+    cameras = [PYTHON, "tools/measure_restart.py", "--seeds", f"1000:{1000 + third}"]
+    in_frame = r"5 s after (two.*in the map's frame.*)"
+    camera_row = (f"the same, camera in, {3 * third} restarts", "59 of 60", in_frame)
     return [
-        Proof("faults", *rows, [BSLAM, "faults", "--out", str(OUT / "faults")]),
-        fault_proof("kidnapping", "kidnapped, and not", found, "kidnapping", seeds),
-        fault_proof("restart", "restart in a kept map", near, "restart", seeds),
-        fault_proof("outliers", "40 % outliers", "1.5 x clean, 0 false", "outlier", max(1, seeds // 3)),
+        Proof("faults", *rows, [BSLAM, "faults", "--out", str(OUT / "faults")], 3),
+        fault_proof("kidnapping", "kidnapped, and not", found, "kidnapping", seeds, 0.1),
+        fault_proof("restart", "restart in a kept map", near, "restart", seeds, 0.1),
+        Proof("restart_camera", *camera_row, cameras, third * 2, least=59 / 60),
+        fault_proof("outliers", "40 % outliers", "1.5 x clean, 0 false", "outlier", third, 0.1),
     ]
 
 
-def other_proofs() -> list[Proof]:
+def other_proofs(quick: bool) -> list[Proof]:
     """Of the whole project."""
-    bits = [PYTHON, "tools/same_bits.py", "--steps", "5000"]
-    smoothed = [*bits, "--association", "known", "--observation", "direction", "--filter", "smoother"]
-    sweep = [PYTHON, "tools/kill_sweep.py", "--runs", "1000"]
+    steps, runs = (200, 30) if quick else (5000, 1000)
+    bits = [PYTHON, "tools/same_bits.py", "--steps", str(steps)]
+    wide = [*bits, "--rig", "wide180"]
+    sweep = [PYTHON, "tools/kill_sweep.py", "--runs", str(runs)]
     return [
-        Proof("test", "make test", "passes", r"make test: (.*)", ["make", "test"]),
-        Proof("cores", "library for every core", "builds", LAST_LINE, ["make", "firmware-all"]),
-        Proof("bits", "the same bits over 5000 steps", "on every board", LAST_LINE, bits),
-        Proof("bits180", "the same, wide180", "on every board", LAST_LINE, [*bits, "--rig", "wide180"]),
-        Proof("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed),
-        Proof("sweep", "1000 runs, killed three times", "0 lost", LAST_LINE, sweep),
+        Proof("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),
+        Proof("cores", "library for every core", "builds", LAST_LINE, ["make", "firmware-all"], 1),
+        Proof("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, steps / 500),
+        Proof("bits180", "the same, wide180", "on every board", LAST_LINE, wide, steps / 500),
+        Proof("sweep", f"{runs} runs, killed three times", "0 lost", LAST_LINE, sweep, runs / 100),
     ]
 
 
-def proofs(seeds: int) -> list[Proof]:
+def proofs(seeds: int = 60, quick: bool = False) -> list[Proof]:
     """All rows."""
-    return [*own_proofs(), *fault_proofs(seeds), *other_proofs()]
+    return [*own_proofs(quick), *fault_proofs(seeds), *other_proofs(quick)]
 
 
-def reached(proof: Proof, output: str) -> str:
+# --- Running them -------------------------------------------------------------------------------------------
+
+
+def source_digest() -> str:
+    """Of all that a proof may run: what was proved on other sources is not proved."""
+    digest = hashlib.sha256()
+    for folder in SOURCES:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in SUFFIXES:
+                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kept_result(folder: Path, proof: Proof, sources: str) -> Result | None:
+    """What came of a proof on these sources, if it ended before."""
+    try:
+        kept = json.loads((folder / f"{proof.name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    same = kept["sources"] == sources and kept["command"] == [*proof.environment, *proof.command]
+    return Result(kept["reached"], kept["figure"], kept["seconds"]) if same else None
+
+
+def keep_result(folder: Path, proof: Proof, sources: str, result: Result) -> None:
+    """For kept_result()."""
+    command = [*proof.environment, *proof.command]
+    told = {"sources": sources, "command": command, **result._asdict()}
+    write_atomically(folder / f"{proof.name}.json", json.dumps(told, indent=1) + "\n")
+
+
+def figure_of(proof: Proof, output: str) -> str:
     """All in the output that looks like the figure."""
     return "; ".join(re.findall(proof.figure, output)) or "not measured"
 
 
-def run(proof: Proof) -> tuple[bool, str]:
-    """Whether the goal is reached, and the figure."""
-    done = subprocess.run(
-        proof.command,
-        cwd=ROOT,
-        env={**os.environ, **proof.environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    (OUT / f"{proof.name}.txt").write_text(done.stdout, encoding="utf-8")
-    return done.returncode == 0, reached(proof, done.stdout)
+def is_enough(proof: Proof, status: int, figure: str) -> bool:
+    """Whether the goal is reached."""
+    if proof.least is None:
+        return status == 0 and figure != "not measured"
+    share = re.search(r"(\d+) near.* of (\d+)", figure)
+    return status == 0 and share is not None and int(share[1]) >= proof.least * int(share[2])
 
 
-def main() -> int:
-    """Exit status as said above."""
-    names = [proof.name for proof in proofs(1)]
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME")
-    parser.add_argument("--seeds", type=int, default=60, help="drives for each fault of a drive (60)")
-    options = parser.parse_args()
-    OUT.mkdir(parents=True, exist_ok=True)
+def run(proof: Proof, folder: Path) -> Result:
+    """Runs one; each minute the last line that it printed is told."""
+    began = time.monotonic()
+    environment = {**os.environ, **proof.environment, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        proof.command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        lines = [""]
+        ended = threading.Event()
+        watch = threading.Thread(target=tell, args=(proof, lines, ended), daemon=True)
+        watch.start()
+        try:
+            assert process.stdout is not None
+            lines += process.stdout
+        finally:
+            ended.set()
+    output = "".join(lines)
+    (folder / f"{proof.name}.txt").write_text(output, encoding="utf-8")
+    figure = figure_of(proof, output)
+    return Result(is_enough(proof, process.returncode, figure), figure, time.monotonic() - began)
+
+
+def tell(proof: Proof, lines: list[str], ended: threading.Event) -> None:
+    """What a proof said last, each minute until it has ended."""
+    minutes = 0
+    while not ended.wait(SAY_EVERY_S):
+        minutes += 1
+        say(f"  {proof.name}, {minutes} min: {lines[-1].rstrip()[:100]}")
+
+
+def say(text: str) -> None:
+    """Progress."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def duration(minutes: float) -> str:
+    """As people say it."""
+    whole = max(1, round(minutes))
+    return f"{whole} min" if whole < 60 else f"{whole // 60} h {whole % 60} min"
+
+
+def run_all(chosen: list[Proof], folder: Path, sources: str, again: bool) -> list[tuple[Proof, Result]]:
+    """The results of all, those that are kept not made again."""
+    kept = {proof.name: None if again else kept_result(folder, proof, sources) for proof in chosen}
+    spent = expected = 0.0
     rows = []
-    for proof in proofs(options.seeds):
-        if proof.name in options.only:
-            began = time.monotonic()
-            kept, figure = run(proof)
-            rows.append((proof, kept, figure))
-            print(f"proof {proof.name}: {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
-    for proof, kept, figure in rows:
-        print(f"{'yes' if kept else 'NO ':<4}{proof.title:<42}{proof.goal:<26}{figure}")
-    missed = [proof.name for proof, kept, _ in rows if not kept]
+    for number, proof in enumerate(chosen, 1):
+        result = kept[proof.name]
+        if result is None:
+            pace = spent / expected if expected > 0 else 1.0
+            left = sum(other.minutes for other in chosen[number - 1 :] if kept[other.name] is None)
+            say(
+                f"proof {number} of {len(chosen)}, {proof.name}: about {duration(pace * proof.minutes)} "
+                f"of {duration(pace * left)} left"
+            )
+            result = run(proof, folder)
+            keep_result(folder, proof, sources, result)
+            spent, expected = spent + result.seconds / 60, expected + proof.minutes
+        else:
+            say(f"proof {number} of {len(chosen)}, {proof.name}: kept from before")
+        rows.append((proof, result))
+    return rows
+
+
+# --- What is printed ----------------------------------------------------------------------------------------
+
+
+def print_table(rows: list[tuple[Proof, Result]]) -> bool:
+    """Goal beside figure; true if all are reached."""
+    for proof, result in rows:
+        print(f"{'yes' if result.reached else 'NO ':<4}{proof.title:<42}{proof.goal:<26}{result.figure}")
+    missed = [proof.name for proof, result in rows if not result.reached]
     reasons = f"; not: {', '.join(missed)}" if missed else ""
     print(f"proof: {len(rows) - len(missed)} of {len(rows)} goals reached{reasons}")
-    return 1 if missed else 0
+    return not missed
+
+
+def print_list(chosen: list[Proof], folder: Path, sources: str) -> None:
+    """What there is, and what came of it so far."""
+    for proof in chosen:
+        result = kept_result(folder, proof, sources)
+        state = "to do" if result is None else "reached" if result.reached else "missed"
+        print(f"{proof.name:<16}{duration(proof.minutes):>12}  {state:<9}{proof.title}")
+    print(f"{'all':<16}{duration(sum(proof.minutes for proof in chosen)):>12}")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit status as said above."""
+    names = [proof.name for proof in proofs()]
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="names: " + " ".join(names),
+    )
+    parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help="these")
+    parser.add_argument("--seeds", type=int, metavar="N", help="drives for each fault of a drive (60)")
+    parser.add_argument("--quick", action="store_true", help="a little of each; its figures prove nothing")
+    parser.add_argument("--again", action="store_true", help="those that ended before, too")
+    parser.add_argument("--list", action="store_true", help="print what there is, run nothing")
+    options = parser.parse_args(argv)
+    seeds = options.seeds or (1 if options.quick else 60)
+    chosen = [proof for proof in proofs(seeds, options.quick) if proof.name in options.only]
+    OUT.mkdir(parents=True, exist_ok=True)
+    sources = source_digest()
+    if options.list:
+        print_list(chosen, OUT, sources)
+        return 0
+    return 0 if print_table(run_all(chosen, OUT, sources, options.again)) else 1
 
 
 if __name__ == "__main__":
     try:
         sys.exit(main())
     except KeyboardInterrupt:
-        sys.exit("proof: stopped; what was printed so far is in out/proof")
+        sys.exit("proof: stopped; the same command goes on with what has not ended (out/proof)")
