@@ -8,14 +8,14 @@ BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board
 PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
-# the front end for pictures and the smoother.
-HOST_SIZES := -DSESSION_VISION=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
+# the front end for pictures, turns seen, and the smoother.
+HOST_SIZES := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
 APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records carried stored seeing \
-    text watch)
+    turning text watch)
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -56,7 +56,7 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DSESSION_VISION=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536
+HOST_ROBOT_FLAGS := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)

@@ -28,7 +28,7 @@ CALLED_BY_POINTER = (
     ),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
-    (r"read_head|kept_", r"(erase|write|read)$"),
+    (r"read_head|kept_|port_(save|load)", r"(erase|write|read)$"),
     (r"bslam_passage_|variance_at", r"take_piece|read_memory"),
 )
 """Callers, and whom they may call through a pointer."""

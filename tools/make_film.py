@@ -30,7 +30,7 @@ STEP_US = 40_000
 def camera_record(camera: Camera) -> CameraRecord:
     """The camera as it goes over the link."""
     kind, *numbers = astuple(camera.lens)
-    mounting = (camera.yaw_rad, camera.pitch_rad, camera.z_m)
+    mounting = (camera.yaw_rad, camera.pitch_rad, camera.z_m, camera.zoom)
     return CameraRecord(*(0 if kind == "pinhole" else 1, *numbers, *mounting))
 
 
@@ -51,8 +51,19 @@ def turn_ticks(steps: int) -> np.ndarray:
     return np.stack([-np.diff(gone), np.diff(gone)], axis=1)
 
 
-def make_film(path: Path, scenario_name: str, seed: int, camera: Camera, pictures: int, steps: int) -> None:
-    """Render and write it. The first picture is taken at the first reading, after a step of the turn."""
+def make_film(
+    path: Path,
+    scenario_name: str,
+    seed: int,
+    camera: Camera,
+    pictures: int,
+    steps: int,
+    gyro_sd_radps: float | None = None,
+) -> None:
+    """Render and write it. The first picture is taken at the first reading, after a step of the turn.
+
+    gyro_sd_radps: the noise of the robot's gyro; None: it has none.
+    """
     scenario = load_scenario(scenario_name)
     renderer, drive = Renderer(dress(scenario, seed), camera, [seed, 1]), true_drive(scenario, seed)
     x_m, y_m, theta_rad = (float(column[0]) for column in (drive.x_m, drive.y_m, drive.theta_rad))
@@ -61,7 +72,11 @@ def make_film(path: Path, scenario_name: str, seed: int, camera: Camera, picture
     for number in range(pictures):
         turned_rad = theta_rad + 2 * math.pi * (1 + number * every) / steps
         shots.append(to_rgb565(renderer.render((x_m, y_m, turned_rad), 0.04 * number).rgb))
-    write_film(path, STEP_US, turn_ticks(steps), camera_record(camera), np.stack(shots), every)
+    rates = None
+    if gyro_sd_radps is not None:
+        rate_radps = 2 * math.pi / steps / (STEP_US * 1e-6)
+        rates = rate_radps + gyro_sd_radps * np.random.default_rng([seed, 2]).standard_normal(steps)
+    write_film(path, STEP_US, turn_ticks(steps), camera_record(camera), np.stack(shots), every, rates)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -73,11 +88,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--pictures", type=int, default=3, help="a turn (default: 3)")
     parser.add_argument("--steps", type=int, default=96, help="readings a turn (default: 96)")
     parser.add_argument("--smaller", type=int, default=1, help="fewer pixels by this factor each way")
+    parser.add_argument("--gyro", type=float, metavar="SD", help="the robot has a gyro of this noise, rad/s")
     options = parser.parse_args(argv)
     cameras = load_rig(options.rig).cameras
     camera = smaller(cameras[len(cameras) // 2], options.smaller)
     options.film.parent.mkdir(parents=True, exist_ok=True)
-    make_film(options.film, options.scenario, options.seed, camera, options.pictures, options.steps)
+    sizes = (options.pictures, options.steps)
+    make_film(options.film, options.scenario, options.seed, camera, *sizes, options.gyro)
     print(f"{options.film}: {options.film.stat().st_size} bytes")
     return 0
 

@@ -11,7 +11,6 @@
 #define FLAG_AS_IT_IS 4u
 #define FLAG_RECOVERY 8u
 #define FLAG_GUARD 16u
-#define FLAG_GYRO 1u
 #define FLAG_MOVED 1u
 
 // ---- applied: the payload in, a status out ---------------------------------------------------------------
@@ -114,7 +113,7 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
 {
     bslam_odometry_reading_t reading = {.time_us = session->parser.header.time_us};
     reading.source = (bslam_odometry_source_t)bslam_link_get_u8(reader);
-    reading.has_gyro = (bslam_link_get_u8(reader) & FLAG_GYRO) != 0;
+    reading.has_gyro = (bslam_link_get_u8(reader) & SESSION_HAS_GYRO) != 0;
     if (reading.source == BSLAM_ODOMETRY_TICKS) {
         reading.left_ticks = bslam_link_get_u32(reader);
         reading.right_ticks = bslam_link_get_u32(reader);
@@ -329,6 +328,7 @@ static void apply_camera(session_t *session, bslam_link_reader_t *reader)
     for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
         *values[i] = bslam_link_get_real(reader);
     }
+    camera.zoom = bslam_link_get_u8(reader);
     if (is_whole(session, reader)) {
         keep(session, seeing_set_camera(&session->seeing, index, &camera));
     }
@@ -549,6 +549,11 @@ static const exchange_t exchanges[] = {
     {SESSION_SEEN, apply_nothing, answer_seen},
 #endif
 };
+
+bool exchange_changes(const exchange_t *exchange)
+{
+    return exchange->apply != apply_nothing;
+}
 
 const exchange_t *exchange_find(uint8_t type)
 {

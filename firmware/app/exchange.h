@@ -19,6 +19,9 @@ typedef struct exchange {
 /// NULL: there is no such message.
 const exchange_t *exchange_find(uint8_t type);
 
+/// False: a message of this kind only asks.
+bool exchange_changes(const exchange_t *exchange);
+
 /// Starts over with the parameters as they were set and an empty map. The status of the library or the link,
 /// and which parameter it is about.
 uint8_t session_start_over(session_t *session, int *bad_id);
@@ -36,6 +39,9 @@ void session_send(session_t *session, bslam_link_writer_t *out);
 /// Before anything is done with the filter. False: its memory is no longer what it was, and it has started
 /// over with an empty map.
 bool session_is_good(session_t *session, int64_t time_us);
+
+/// If a reading of the robot's own waits for a picture: it waits no longer (sensors.c).
+void session_end_wait(session_t *session);
 
 /// After whatever may have changed the filter: its fingerprint, if the host takes any.
 void session_end_step(session_t *session);

@@ -1,5 +1,5 @@
-/// The example application: a robot whose encoders and cameras, if the port has any, and whose host, over the
-/// link, feed the filter; pose, map and accounts go back over the link.
+/// The example application: a robot whose encoders, gyro and cameras, if the port has any, and whose host,
+/// over the link, feed the filter; pose, map and accounts go back over the link.
 #include "app/session.h"
 #include "port/port.h"
 
@@ -14,13 +14,11 @@ static void take_bytes(void)
     }
 }
 
-static void take_encoders(void)
+static void take_reading(void)
 {
-    int64_t time_us;
-    uint32_t left_ticks;
-    uint32_t right_ticks;
-    if (port_encoders(&time_us, &left_ticks, &right_ticks)) {
-        session_take_encoders(&session, time_us, left_ticks, right_ticks);
+    bslam_odometry_reading_t reading;
+    if (session_read_body(&reading)) {
+        session_take_reading(&session, &reading);
     }
 }
 
@@ -40,7 +38,7 @@ int main(void)
     session_init(&session);
     for (;;) {
         take_bytes();
-        take_encoders();
+        take_reading();
         take_camera();
         port_watchdog();
     }

@@ -20,7 +20,12 @@ bslam_status_t seeing_set_camera(seeing_t *seeing, int index, const bslam_camera
         return BSLAM_E_COUNT;
     }
     seeing->cameras[index] = *camera;
-    return bslam_vision_init(&seeing->vision, &bslam_beacons_model, seeing->cameras, index + 1);
+    const bslam_status_t status =
+        bslam_vision_init(&seeing->vision, &bslam_beacons_model, seeing->cameras, index + 1);
+#if SESSION_TURNS
+    turning_start(&seeing->turning, &seeing->vision);
+#endif
+    return status;
 }
 
 static bslam_status_t begin(seeing_t *seeing, int camera, bslam_pixel_format_t format)

@@ -3,6 +3,7 @@
 #ifndef APP_SEEING_H
 #define APP_SEEING_H
 
+#include "app/turning.h"
 #include "bslam/bslam.h"
 #include "bslam/vision/vision.h"
 
@@ -22,6 +23,9 @@ typedef struct seeing {
     bool takes_rows;   ///< a frame streams in by whole rows
     bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];
     int count;  ///< of sightings in the last finished frame
+#if SESSION_TURNS
+    turning_t turning;
+#endif
 } seeing_t;
 
 /// Sets camera `index`, and that there are index + 1; starts over, with empty memories of the room. What

@@ -9,30 +9,75 @@ static void begin_report(session_t *session, bslam_link_writer_t *out, uint8_t t
     session_begin(session, out, type, session->report_sequence, time_us);
 }
 
-void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks)
+bool session_read_body(bslam_odometry_reading_t *reading)
 {
-    const bslam_odometry_reading_t reading = {.time_us = time_us,
-                                              .source = BSLAM_ODOMETRY_TICKS,
-                                              .left_ticks = left_ticks,
-                                              .right_ticks = right_ticks};
-    const uint32_t began = port_ticks();
-    const bool good = session_is_good(session, time_us);
-    const bslam_status_t status = good ? bslam_slam_odometry(&session->slam, &reading) : BSLAM_E_STATE;
-    watch_end_step(&session->watch, &session->slam, time_us);
-    session->ticks = port_ticks() - began;
-    if (left_ticks != session->left_ticks || right_ticks != session->right_ticks) {
-        session->moves++;
+    *reading = (bslam_odometry_reading_t){.source = BSLAM_ODOMETRY_TICKS};
+    if (!port_encoders(&reading->time_us, &reading->left_ticks, &reading->right_ticks)) {
+        return false;
     }
-    session->left_ticks = left_ticks;
-    session->right_ticks = right_ticks;
+    float rate_radps = 0;
+    reading->has_gyro = port_gyro(&rate_radps);
+    reading->gyro_radps = (bslam_real_t)rate_radps;
+    return true;
+}
+
+/// Into the filter, and out as a report.
+static void use_reading(session_t *session, const bslam_odometry_reading_t *reading)
+{
+    const uint32_t began = port_ticks();
+    const bool good = session_is_good(session, reading->time_us);
+    const bslam_status_t status = good ? bslam_slam_odometry(&session->slam, reading) : BSLAM_E_STATE;
+    watch_end_step(&session->watch, &session->slam, reading->time_us);
+    session->ticks = port_ticks() - began;
     session_end_step(session);
     bslam_link_writer_t out;
-    begin_report(session, &out, SESSION_POSE, time_us);
+    begin_report(session, &out, SESSION_POSE, reading->time_us);
     bslam_link_put_u8(&out, (uint8_t)status);
-    bslam_link_put_u32(&out, left_ticks);
-    bslam_link_put_u32(&out, right_ticks);
+    bslam_link_put_u32(&out, reading->left_ticks);
+    bslam_link_put_u32(&out, reading->right_ticks);
+    bslam_link_put_u8(&out, reading->has_gyro ? SESSION_HAS_GYRO : 0);
+    bslam_link_put_real(&out, reading->gyro_radps);
     session_put_step(session, &out);
     session_send(session, &out);
+}
+
+void session_end_wait(session_t *session)
+{
+#if SESSION_TURNS
+    bslam_odometry_reading_t reading;
+    if (turning_end_wait(&session->seeing.turning, &reading)) {
+        use_reading(session, &reading);
+    }
+#else
+    (void)session;
+#endif
+}
+
+/// Whether a picture of the robot's own may tell what this reading does not.
+static bool waits(session_t *session, const bslam_odometry_reading_t *reading)
+{
+#if SESSION_TURNS
+    seeing_t *seeing = &session->seeing;
+    return !reading->has_gyro && seeing->vision.camera_count > 0 &&
+           turning_wait(&seeing->turning, &seeing->vision, &session->slam.params, reading);
+#else
+    (void)session;
+    (void)reading;
+    return false;
+#endif
+}
+
+void session_take_reading(session_t *session, const bslam_odometry_reading_t *reading)
+{
+    session_end_wait(session);
+    if (reading->left_ticks != session->left_ticks || reading->right_ticks != session->right_ticks) {
+        session->moves++;
+    }
+    session->left_ticks = reading->left_ticks;
+    session->right_ticks = reading->right_ticks;
+    if (!waits(session, reading)) {
+        use_reading(session, reading);
+    }
 }
 
 #if SESSION_VISION
@@ -54,12 +99,20 @@ static void look(session_t *session, const port_row_t *row)
     bslam_status_t status = seeing_look(seeing, session->moves != session->moves_seen[row->camera]);
     status = session_is_good(session, row->time_us) ? status : BSLAM_E_STATE;
     session->moves_seen[row->camera] = session->moves;
+#if SESSION_TURNS
+    if (status == BSLAM_OK) {
+        turning_see(&seeing->turning, &seeing->vision, row->camera, row->time_us);
+    }
+#endif
+    session->row_ticks += port_ticks() - began;
+    session_end_wait(session);
+    const uint32_t again = port_ticks();
     if (status == BSLAM_OK) {
         status =
             watch_sightings(&session->watch, &session->slam, row->time_us, seeing->sightings, seeing->count);
     }
     watch_end_step(&session->watch, &session->slam, row->time_us);
-    session->ticks += port_ticks() - began;
+    session->ticks = session->row_ticks + (port_ticks() - again);
     session_end_step(session);
     for (int i = 0; i < seeing->count; i++) {
         report_sighting(session, row->time_us, i);
@@ -80,13 +133,13 @@ void session_take_row(session_t *session, const port_row_t *row)
     const uint32_t began = port_ticks();
     bslam_status_t status = BSLAM_OK;
     if (row->is_first) {
-        session->ticks = 0;
+        session->row_ticks = 0;
         status = seeing_begin_rows(&session->seeing, row->camera);
     }
     if (status == BSLAM_OK) {
         status = seeing_take_row(&session->seeing, row->pixels);
     }
-    session->ticks += port_ticks() - began;
+    session->row_ticks += port_ticks() - began;
     if (row->is_last && status == BSLAM_OK) {
         look(session, row);
     }

@@ -100,6 +100,9 @@ static void take_message(session_t *session)
     if (session->open && !starts && ahead(session) == 0) {
         session->repeated++;
     } else {
+        if (exchange != NULL && exchange_changes(exchange)) {
+            session_end_wait(session);
+        }
         apply(session, exchange);
     }
     answer(session, exchange);
@@ -130,7 +133,8 @@ static int open_eyes(session_t *session)
 #endif
 }
 
-/// What was stored; else the defaults, but that what a camera sees has no label.
+/// What was stored; else the defaults, but that what a camera sees has no label, and that its turn rates are
+/// rough.
 static uint8_t start_with_params(session_t *session, bool has_eyes)
 {
     int bad_id = NO_DETAIL;
@@ -143,6 +147,9 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
     }
     if (has_eyes) {
         session->params.association = SESSION_LOOKS ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
+#if SESSION_TURNS
+        session->params.gyro_sd_radps = turning_sd_radps(&session->seeing.vision);
+#endif
     }
     return session_start_over(session, &bad_id);
 }

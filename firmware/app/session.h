@@ -61,6 +61,9 @@ typedef enum session_report {
     SESSION_LOOKED = 0x43    ///< what became of them
 } session_report_t;
 
+/// A flag of SESSION_ODOMETRY and SESSION_POSE: a gyro's rate goes with the reading.
+#define SESSION_HAS_GYRO 1u
+
 /// Statuses of the link itself; those of the library are below, from 0 up.
 typedef enum session_status {
     SESSION_E_NO_SESSION = 0x40,  ///< no SESSION_HELLO came since the robot started
@@ -99,6 +102,7 @@ typedef struct session {
     uint32_t moves;  ///< readings that showed a movement
 #if SESSION_VISION
     uint32_t moves_seen[BSLAM_CAMERAS_MAX];  ///< when each camera's last picture was looked at
+    uint32_t row_ticks;                      ///< that the picture which streams in took so far
 #endif
     uint16_t last_sequence;
     uint16_t report_sequence;
@@ -119,8 +123,13 @@ void session_init(session_t *session);
 /// Takes a byte that came over the link; applies and answers the message that it completes.
 void session_take(session_t *session, uint8_t byte);
 
-/// A reading of the robot's own encoders; reports it, and the pose.
-void session_take_encoders(session_t *session, int64_t time_us, uint32_t left_ticks, uint32_t right_ticks);
+/// A reading of the robot's own encoders, and of its gyro; reports it, and the pose. Without a gyro, and with
+/// SESSION_TURNS, it waits until the picture of its moment has been looked at, but not beyond the next
+/// reading, or message that changes anything.
+void session_take_reading(session_t *session, const bslam_odometry_reading_t *reading);
+
+/// The reading that port_encoders and port_gyro have, if one is due.
+bool session_read_body(bslam_odometry_reading_t *reading);
 
 #if SESSION_VISION
 /// A row of a picture of the robot's own camera. The last one puts what the picture shows into the filter,

@@ -13,6 +13,11 @@ ABSENT bool port_encoders(int64_t *time_us, uint32_t *left_ticks, uint32_t *righ
     return film_encoders(port_time_us(), time_us, left_ticks, right_ticks);
 }
 
+ABSENT bool port_gyro(float *rate_radps)
+{
+    return film_gyro(rate_radps);
+}
+
 ABSENT const struct bslam_camera *port_cameras(int *count)
 {
     return film_cameras(count);
@@ -23,16 +28,7 @@ ABSENT bool port_camera_row(port_row_t *row)
     return film_row(row);
 }
 
-ABSENT bool port_save(const uint8_t *bytes, size_t count)
+ABSENT const struct bslam_flash *port_flash(void)
 {
-    (void)bytes;
-    (void)count;
-    return false;
-}
-
-ABSENT bool port_load(uint8_t *bytes, size_t count)
-{
-    (void)bytes;
-    (void)count;
-    return false;
+    return NULL;
 }

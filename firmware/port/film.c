@@ -1,9 +1,12 @@
 #include "port/film.h"
 
+#include <math.h>
+
 #define COUNTER_MASK 0xffffu
 
 static const film_t *film;  // NULL: there is none
 static uint32_t next_step;
+static float gyro_radps;  // of the last reading
 static int64_t last_us;
 static uint32_t left;
 static uint32_t right;
@@ -42,10 +45,20 @@ bool film_encoders(int64_t now_us, int64_t *time_us, uint32_t *left_ticks, uint3
     last_us += film->step_us;
     left = (left + step->left_ticks) & COUNTER_MASK;
     right = (right + step->right_ticks) & COUNTER_MASK;
+    gyro_radps = step->gyro_radps;
     take_picture(step->picture);
     *time_us = last_us;
     *left_ticks = left;
     *right_ticks = right;
+    return true;
+}
+
+bool film_gyro(float *rate_radps)
+{
+    if (film == NULL || isnan(gyro_radps)) {
+        return false;
+    }
+    *rate_radps = gyro_radps;
     return true;
 }
 

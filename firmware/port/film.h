@@ -15,6 +15,7 @@ typedef struct film_step {
     uint16_t left_ticks;
     uint16_t right_ticks;
     uint32_t picture;
+    float gyro_radps;  ///< NaN: no gyro tells
 } film_step_t;
 
 /// The film's head. Behind it: `steps` of film_step_t, then `pictures` pictures of the camera's size, RGB565.
@@ -33,6 +34,9 @@ void film_start(const film_t *film);
 /// counters have 16 bits. While a picture's rows are to be fetched no further reading is due: what a robot
 /// makes of a film does not depend on how fast it is.
 bool film_encoders(int64_t now_us, int64_t *time_us, uint32_t *left_ticks, uint32_t *right_ticks);
+
+/// As port_gyro, of that reading.
+bool film_gyro(float *rate_radps);
 
 /// As port_cameras, port_camera_row.
 const bslam_camera_t *film_cameras(int *count);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "bslam/store/crc32.h"
+#include "port/port.h"
 
 #define MAGIC 0x5450454bu  // "KEPT"
 
@@ -93,4 +94,16 @@ bool kept_load(const bslam_flash_t *flash, uint8_t *bytes, uint32_t count)
     uint32_t sequence;
     const int slot = find_newest(flash, count, &sequence);
     return slot >= 0 && flash->read(flash->context, slot, BSLAM_FLASH_PIECE, bytes, count);
+}
+
+bool port_save(const uint8_t *bytes, size_t count)
+{
+    const bslam_flash_t *flash = port_flash();
+    return flash != NULL && kept_save(flash, bytes, (uint32_t)count);
+}
+
+bool port_load(uint8_t *bytes, size_t count)
+{
+    const bslam_flash_t *flash = port_flash();
+    return flash != NULL && kept_load(flash, bytes, (uint32_t)count);
 }

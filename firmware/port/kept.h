@@ -1,5 +1,5 @@
 /// A few hundred bytes in flash that survive a power cut at any moment: two areas, of which one always holds
-/// what was kept last. For port_save and port_load.
+/// what was kept last. port_save and port_load of every board that has port_flash.
 #ifndef PORT_KEPT_H
 #define PORT_KEPT_H
 

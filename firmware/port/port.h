@@ -42,6 +42,10 @@ void port_watchdog(void);
 /// They may roll over.
 bool port_encoders(int64_t *time_us, uint32_t *left_ticks, uint32_t *right_ticks);
 
+/// How fast the robot turns by its gyro, to the left: the mean since the reading before. Asked right after
+/// each reading. False: it has none, or cannot tell now.
+bool port_gyro(float *rate_radps);
+
 /// The robot's cameras, as bslam/vision/lens.h describes them, and how many there are.
 struct bslam_camera;
 const struct bslam_camera *port_cameras(int *count);
@@ -58,8 +62,12 @@ typedef struct port_row {
 /// The next row, if one has come.
 bool port_camera_row(port_row_t *row);
 
+/// Two areas of flash for what port_save keeps, as bslam/store/slots.h describes them.
+struct bslam_flash;
+const struct bslam_flash *port_flash(void);
+
 /// Keeps bytes over a restart, the same number at each call, a few hundred; and gives them back. False: the
-/// board has no memory for that, it failed, or nothing was ever kept.
+/// board has no memory for that, it failed, or nothing was ever kept. port/kept.c has both for every board.
 bool port_save(const uint8_t *bytes, size_t count);
 bool port_load(uint8_t *bytes, size_t count);
 

@@ -243,6 +243,18 @@ static void show_picture(fuzz_input_t *input)
     }
 }
 
+static void take_reading(fuzz_input_t *input)
+{
+    const uint16_t left_ticks = fuzz_u16(input);
+    const bslam_odometry_reading_t reading = {.time_us = clock_us,
+                                              .source = BSLAM_ODOMETRY_TICKS,
+                                              .left_ticks = left_ticks,
+                                              .right_ticks = fuzz_u16(input),
+                                              .has_gyro = left_ticks % 2 != 0,
+                                              .gyro_radps = (bslam_real_t)left_ticks / 10000 - 3};
+    session_take_reading(&session, &reading);
+}
+
 static void talk(fuzz_input_t *input)
 {
     uint16_t sequence = 0;
@@ -253,7 +265,7 @@ static void talk(fuzz_input_t *input)
         if (choice < 4 && own_cameras > 0) {
             show_picture(input);
         } else if (choice < 16) {
-            session_take_encoders(&session, clock_us, fuzz_u16(input), fuzz_u16(input));
+            take_reading(input);
         } else {
             send_message(input, &sequence, &now_us);
         }

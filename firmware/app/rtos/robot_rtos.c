@@ -17,12 +17,6 @@
 #define ROBOT_PRIORITY 1
 #define BODY_PRIORITY 2
 
-typedef struct reading {
-    int64_t time_us;
-    uint32_t left_ticks;
-    uint32_t right_ticks;
-} reading_t;
-
 static session_t session;
 static QueueHandle_t readings;
 
@@ -30,8 +24,8 @@ static void read_body(void *unused)
 {
     (void)unused;
     for (;;) {
-        reading_t reading;
-        while (port_encoders(&reading.time_us, &reading.left_ticks, &reading.right_ticks)) {
+        bslam_odometry_reading_t reading;
+        while (session_read_body(&reading)) {
             // A queue that is full loses the reading: the next one has its ticks.
             (void)xQueueSend(readings, &reading, 0);
         }
@@ -50,9 +44,9 @@ static void take_bytes(void)
 
 static void take_readings(void)
 {
-    reading_t reading;
+    bslam_odometry_reading_t reading;
     while (xQueueReceive(readings, &reading, 0) == pdTRUE) {
-        session_take_encoders(&session, reading.time_us, reading.left_ticks, reading.right_ticks);
+        session_take_reading(&session, &reading);
     }
 }
 
@@ -102,9 +96,9 @@ int main(void)
     static StaticTask_t robot_task, body_task;
     static StackType_t robot_stack[ROBOT_STACK], body_stack[BODY_STACK];
     static StaticQueue_t queue;
-    static uint8_t queue_room[READINGS_MAX * sizeof(reading_t)];
+    static uint8_t queue_room[READINGS_MAX * sizeof(bslam_odometry_reading_t)];
     port_init();
-    readings = xQueueCreateStatic(READINGS_MAX, sizeof(reading_t), queue_room, &queue);
+    readings = xQueueCreateStatic(READINGS_MAX, sizeof(bslam_odometry_reading_t), queue_room, &queue);
     (void)xTaskCreateStatic(run_robot, "robot", ROBOT_STACK, NULL, ROBOT_PRIORITY, robot_stack, &robot_task);
     (void)xTaskCreateStatic(read_body, "body", BODY_STACK, NULL, BODY_PRIORITY, body_stack, &body_task);
     vTaskStartScheduler();

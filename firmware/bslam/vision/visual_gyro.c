@@ -83,6 +83,13 @@ static void scale_state(bslam_visual_gyro_t *gyro, int32_t place, bslam_real_t f
     gyro->covariance[place][place] += variance;
 }
 
+/// Of a time that is not negative; one beyond 32 bits, half an hour, is as long as that. A conversion from 64
+/// bits would be one by way of double on a core without floating point.
+static bslam_real_t seconds(int64_t time_us)
+{
+    return (bslam_real_t)(time_us < INT32_MAX ? (int32_t)time_us : INT32_MAX) * SECONDS_PER_US;
+}
+
 static void predict(bslam_visual_gyro_t *gyro, bslam_real_t dt_s)
 {
     gyro->covariance[RATE][RATE] += square(RATE_SD_PER_SQRT_S) * dt_s;
@@ -116,7 +123,7 @@ bslam_status_t bslam_visual_gyro_advance(bslam_visual_gyro_t *gyro, int64_t time
         return BSLAM_E_TIME;
     }
     if (gyro->running) {
-        predict(gyro, (bslam_real_t)(time_us - gyro->time_us) * SECONDS_PER_US);
+        predict(gyro, seconds(time_us - gyro->time_us));
         const bslam_real_t coefficients[STATES] = {[SPEED] = 1};
         (void)update(gyro, coefficients, speed_mps - gyro->state[SPEED], square(speed_sd_mps), false);
     }
@@ -129,7 +136,7 @@ bslam_status_t bslam_visual_gyro_advance(bslam_visual_gyro_t *gyro, int64_t time
 static void take_turn(bslam_visual_gyro_t *gyro, int32_t camera, const bslam_turn_t *turn)
 {
     const int32_t nearness = NEARNESS + camera;
-    const bslam_real_t span_s = (bslam_real_t)(gyro->time_us - gyro->frame_us[camera]) * SECONDS_PER_US;
+    const bslam_real_t span_s = seconds(gyro->time_us - gyro->frame_us[camera]);
     const bslam_real_t speed_mps = gyro->state[SPEED];
     const bslam_real_t parallax = turn->parallax_rad_per_m + turn->sideways * gyro->state[nearness];
     bslam_real_t coefficients[STATES] = {0};

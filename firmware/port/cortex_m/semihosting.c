@@ -1,6 +1,6 @@
 #include "port/cortex_m/semihosting.h"
 
-#include <stdint.h>
+#include "port/port.h"
 
 #define SYS_EXIT_EXTENDED 0x20u
 #define APPLICATION_EXIT 0x20026u
@@ -13,4 +13,9 @@ void semihosting_exit(int status)
     __asm__ volatile("bkpt 0xab" : "+r"(operation) : "r"(argument) : "memory");
     for (;;) {
     }
+}
+
+__attribute__((weak)) void port_exit(int status)
+{
+    semihosting_exit(status);
 }

@@ -1,5 +1,7 @@
 #include "port/cortex_m/systick.h"
 
+#include "port/port.h"
+
 #define CONTROL (*(volatile uint32_t *)0xe000e010u)
 #define LOAD (*(volatile uint32_t *)0xe000e014u)
 #define VALUE (*(volatile uint32_t *)0xe000e018u)
@@ -53,3 +55,22 @@ uint64_t systick_ticks(void)
     } while (at != rounds);
     return before + (uint64_t)at * period + (period - 1 - value);
 }
+
+#ifdef CORE_HZ
+
+__attribute__((weak)) int64_t port_time_us(void)
+{
+    return (int64_t)(systick_ticks() / (CORE_HZ / 1000000u));
+}
+
+__attribute__((weak)) uint32_t port_ticks(void)
+{
+    return (uint32_t)systick_ticks();
+}
+
+__attribute__((weak)) uint32_t port_ticks_hz(void)
+{
+    return CORE_HZ;
+}
+
+#endif

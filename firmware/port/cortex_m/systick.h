@@ -1,4 +1,5 @@
-/// Time from SysTick, the timer that a Cortex-M has; an M0 or M0+ may be without.
+/// Time from SysTick, the timer that a Cortex-M has; an M0 or M0+ may be without. A board whose board.mk says
+/// its core's clock, -DCORE_HZ, has port_time_us, port_ticks and port_ticks_hz from here.
 #ifndef PORT_CORTEX_M_SYSTICK_H
 #define PORT_CORTEX_M_SYSTICK_H
 

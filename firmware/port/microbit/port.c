@@ -2,8 +2,6 @@
 /// nRF51 reference manual has them. A board without a robot: what a robot would measure comes over the link.
 #include "port/port.h"
 
-#include "port/cortex_m/semihosting.h"
-
 #define REGISTER(address) (*(volatile uint32_t *)(address))
 
 #define CLOCK_TASKS_HFCLKSTART REGISTER(0x40000000u)
@@ -89,9 +87,4 @@ int64_t port_time_us(void)
 void port_watchdog(void)
 {
     (void)port_time_us();
-}
-
-void port_exit(int status)
-{
-    semihosting_exit(status);
 }

@@ -2,7 +2,6 @@
 /// in where the serial line is, UART_BASE, and MPS3's AN547 (M55) in its clock, CORE_HZ. Boards without a
 /// robot: what a robot would measure comes over the link, or from a film at FILM_ADDRESS, the upper half of
 /// RAM.
-#include "port/cortex_m/semihosting.h"
 #include "port/cortex_m/systick.h"
 #include "port/film.h"
 
@@ -19,9 +18,6 @@ typedef struct uart {
 #define STATE_SEND_FULL 1u
 #define STATE_RECEIVED 2u
 #define CONTROL_SEND_AND_RECEIVE 3u
-#ifndef CORE_HZ
-#define CORE_HZ 25000000u
-#endif
 #define BAUD 115200u
 
 void port_init(void)
@@ -44,24 +40,4 @@ void port_write(const uint8_t *bytes, size_t count)
         }
         UART->data = bytes[i];
     }
-}
-
-int64_t port_time_us(void)
-{
-    return (int64_t)(systick_ticks() / (CORE_HZ / 1000000u));
-}
-
-uint32_t port_ticks(void)
-{
-    return (uint32_t)systick_ticks();
-}
-
-uint32_t port_ticks_hz(void)
-{
-    return CORE_HZ;
-}
-
-void port_exit(int status)
-{
-    semihosting_exit(status);
 }

@@ -1,6 +1,6 @@
 /// A process on this computer: bytes over standard input and output. For tests of the application, under the
-/// sanitizers, without an emulator. With the environment variable BSLAM_ENCODERS set it is a robot whose
-/// wheels turn steadily, one 4/3 as fast as the other.
+/// sanitizers, without an emulator. BSLAM_FILM in the environment names a film that moves
+/// its robot.
 #define _POSIX_C_SOURCE 200809L
 
 #include "port/film.h"

@@ -2,5 +2,5 @@
 # image. Sizes as they are by default, 20 beacons.
 BOARD_CORE_stm32f405 := m4f
 BOARD_SOURCES_stm32f405 := $(wildcard firmware/port/stm32f405/*.c) $(PORT_SOURCES)
-BOARD_FLAGS_stm32f405 := -DFILM_ADDRESS=0x08040000u
+BOARD_FLAGS_stm32f405 := -DCORE_HZ=168000000u -DFILM_ADDRESS=0x08040000u
 BOARD_QEMU_stm32f405 := netduinoplus2

@@ -90,12 +90,7 @@ static bool read(void *context, int slot, uint32_t at, void *bytes, uint32_t cou
 
 static const bslam_flash_t flash = {.erase = erase, .write = write, .read = read, .slot_bytes = SECTOR_BYTES};
 
-bool port_save(const uint8_t *bytes, size_t count)
+const bslam_flash_t *port_flash(void)
 {
-    return kept_save(&flash, bytes, (uint32_t)count);
-}
-
-bool port_load(uint8_t *bytes, size_t count)
-{
-    return kept_load(&flash, bytes, (uint32_t)count);
+    return &flash;
 }

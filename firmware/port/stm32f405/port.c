@@ -33,7 +33,6 @@
 #define NVIC_ISER1 REGISTER(0xe000e104u)
 #define SCB_AIRCR REGISTER(0xe000ed0cu)
 
-#define CORE_HZ 168000000u
 #define APB2_HZ 84000000u
 #define BAUD 115200u
 #define STEP_US 40000
@@ -141,21 +140,6 @@ void port_write(const uint8_t *bytes, size_t count)
         }
         USART1_DR = bytes[i];
     }
-}
-
-int64_t port_time_us(void)
-{
-    return (int64_t)(systick_ticks() / (CORE_HZ / 1000000u));
-}
-
-uint32_t port_ticks(void)
-{
-    return (uint32_t)systick_ticks();
-}
-
-uint32_t port_ticks_hz(void)
-{
-    return CORE_HZ;
 }
 
 void port_watchdog(void)

@@ -74,8 +74,8 @@ _KNOWN_BEACON = struct.Struct("<iff")
 _UID = struct.Struct("<I")
 _PARAM_ID = struct.Struct("<H")
 _PARAM = struct.Struct("<Hf")
-_REPORT = struct.Struct("<BII")
-_CAMERA = struct.Struct("<BBHH9f")
+_REPORT = struct.Struct("<BIIBf")
+_CAMERA = struct.Struct("<BBHH9fB")
 _SEEN = struct.Struct("<5fiBB")
 _LOOKED = struct.Struct("<4B")
 _VALUE = struct.Struct("<f")
@@ -185,6 +185,7 @@ class CameraRecord:
     yaw_rad: float
     pitch_rad: float
     z_m: float
+    zoom: int
 
 
 def camera(index: int, record: CameraRecord) -> bytes:
@@ -292,12 +293,14 @@ class PoseReport:
     status: int
     left_ticks: int
     right_ticks: int
+    gyro_radps: float | None  # what its gyro, or its cameras, told with it
     step: Step
 
 
 def read_pose_report(payload: bytes) -> PoseReport:
-    status, left_ticks, right_ticks = _REPORT.unpack_from(payload)
-    return PoseReport(status, left_ticks, right_ticks, read_step(payload[_REPORT.size :]))
+    status, left_ticks, right_ticks, flags, rate_radps = _REPORT.unpack_from(payload)
+    gyro_radps = rate_radps if flags & 1 else None
+    return PoseReport(status, left_ticks, right_ticks, gyro_radps, read_step(payload[_REPORT.size :]))
 
 
 def read_look(body: bytes) -> tuple[list[RawAccount], int, int]:

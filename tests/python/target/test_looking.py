@@ -1,6 +1,8 @@
 """Pictures over the link: the robot's own front end sees what the host's sees, to the bit."""
 
+import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +12,20 @@ from bslam.cli import main
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.core.vision import FrontEnd
+from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.link.messages import CameraRecord, LookReport, PoseReport
 from bslam.recording import load
 from bslam.recording.entries import Frame
 from bslam.rig import load_rig
+from bslam.target.film import write_film
 from bslam.target.lines import ProcessLine, open_line
 from bslam.target.remote import RemoteSlam
 from bslam.world.camera.renderer import Renderer
 from bslam.world.camera.rgb565 import to_rgb565
 from bslam.world.camera.worlds import dress
 from bslam.world.simulate import load_scenario, true_drive
-from make_film import camera_record, make_film, smaller
+from make_film import STEP_US, camera_record, make_film, smaller, turn_ticks
 
 ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"
 STEPS = (240, 300, 330, 420, 570)
@@ -33,13 +37,17 @@ def camera():
     return smaller(load_rig("three60").cameras[1], 2)
 
 
-@pytest.fixture(scope="module")
-def pictures(camera):
-    """What the camera shows at STEPS of a drive, RGB565."""
+def pictures_of(camera):
+    """What a camera shows at STEPS of a drive, RGB565."""
     scenario = load_scenario("paper_room")
     renderer, path = Renderer(dress(scenario, 0), camera, [0, 1]), true_drive(scenario, 0)
     poses = [(path.x_m[step], path.y_m[step], path.theta_rad[step]) for step in STEPS]
     return [to_rgb565(renderer.render(pose, 0.04 * i).rgb) for i, pose in enumerate(poses)]
+
+
+@pytest.fixture(scope="module")
+def pictures(camera):
+    return pictures_of(camera)
 
 
 @pytest.mark.parametrize(("target", "last"), [(f"process:{ROBOT}", 5), ("qemu:mps2_an386", 2)])
@@ -137,6 +145,21 @@ def columns_of(candidates):
     return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *noise, signatures, kinds
 
 
+def feed(slam, told):
+    """The reading that a robot tells of."""
+    report = told.report
+    slam.odometry("ticks", told.time_us, report.left_ticks, report.right_ticks, report.gyro_radps)
+
+
+def readings_of(robot, count):
+    """The first reports of readings, in order."""
+    told, end_s = [], time.monotonic() + 60.0
+    while len(told) < count:
+        assert time.monotonic() < end_s, f"no more than {len(told)} readings in a minute"
+        told += [one for one in robot.reports(5.0) if isinstance(one.report, PoseReport)]
+    return told[:count]
+
+
 def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_eyes):
     robot, camera, shots = own_eyes
     told, params = [], robot.host_params
@@ -148,7 +171,7 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_e
     for step, one in enumerate(told, start=1):
         assert one.refused is None
         if isinstance(one.report, PoseReport):
-            here.odometry("ticks", one.time_us, one.report.left_ticks, one.report.right_ticks)
+            feed(here, one)
             assert one.time_us == (step - looks) * 40_000
         else:
             expected = bearing_candidates(eyes, shots[looks % len(shots)])
@@ -159,6 +182,74 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_e
         assert here.pose() == one.report.step.pose
         assert here.pose_covariance_lower() == one.report.step.covariance
     assert looks >= len(shots) and count > 0
+
+
+CLOSE = 90  # readings a turn, a picture at each: near enough to the one before to tell the turn
+
+
+def test_its_pictures_tell_how_fast_it_turns_as_on_the_host(camera, tmp_path, monkeypatch):
+    path = tmp_path / "close"
+    make_film(path, "paper_room", 0, camera, CLOSE, CLOSE)
+    monkeypatch.setenv("BSLAM_FILM", str(path))
+    found = []
+    for target in (f"process:{ROBOT}", f"qemu:mps2_an386:{path}"):
+        with RemoteSlam(open_line(target), None, 20) as robot:
+            assert robot.params["gyro_sd_radps"] == np.float32(VisualGyro.SD_RADPS)
+            told = readings_of(robot, 40)
+            here = Slam(robot.host_params, beacons_max=80)
+        for one in told[:2]:  # before what it sees comes in between
+            feed(here, one)
+        assert here.pose() == told[1].report.step.pose
+        found.append([one.report.gyro_radps for one in told])
+    assert found[0] == found[1]
+    eyes, gyro, expected = FrontEnd([camera]), VisualGyro(), []
+    for one, picture in zip(told, shots_of(path, camera, CLOSE), strict=False):
+        gyro.advance(one.time_us, 0.0, 0.01)
+        gyro.take(0, eyes.see(picture).turn)
+        expected.append(gyro.rate_radps())
+    assert found[0][0] is None and expected[0] is None
+    rates = found[0][1:]
+    assert rates == pytest.approx(expected[1:], rel=1e-4)  # but for what the wheels say of the speed
+    assert np.mean(rates) == pytest.approx(2 * np.pi / CLOSE / 0.04, rel=0.01)
+
+
+@pytest.mark.parametrize("target", ["process", "qemu:stm32f405"])
+def test_a_board_s_own_gyro_goes_with_each_reading(target, tmp_path, monkeypatch):
+    path, rates = tmp_path / "gyro", np.linspace(1.4, 1.8, TURN)
+    write_film(path, STEP_US, turn_ticks(TURN), gyro_radps=rates)
+    monkeypatch.setenv("BSLAM_FILM", str(path))
+    name = f"process:{ROBOT}" if target == "process" else f"{target}:{path}"
+    with RemoteSlam(open_line(name), None, 20) as robot:
+        told = readings_of(robot, 2 * TURN)
+        here = Slam(robot.host_params, beacons_max=80)
+    for one in told:
+        feed(here, one)
+        assert here.pose() == one.report.step.pose
+    assert [one.report.gyro_radps for one in told] == 2 * [float(one) for one in rates.astype(np.float32)]
+    blind = Slam(beacons_max=80)
+    for one in told:
+        blind.odometry("ticks", one.time_us, one.report.left_ticks, one.report.right_ticks)
+    assert blind.pose() != here.pose()
+
+
+def test_a_camera_whose_pixels_are_doubled_is_doubled_over_the_link():
+    wide = load_rig("wide180").cameras[0]
+    half = smaller(wide, 2)
+    assert half.zoom == 2
+    doubled, plain = FrontEnd([half]), FrontEnd([replace(half, zoom=1)])
+    count, differing = 0, 0
+    with RemoteSlam(ProcessLine(ROBOT), {"association": 2}, 20) as robot:
+        with pytest.raises(CoreError, match="BSLAM_E_RANGE"):
+            robot.set_camera(0, camera_record(wide))  # 640 x 480 has no room
+        robot.set_camera(0, camera_record(half))
+        for step, picture in enumerate(pictures_of(half), start=1):
+            robot.odometry("wheels", step * 40_000, 0.03, 0.03)
+            seen, _ = robot.look(step * 40_000, 0, picture, True)
+            bearings = [one.bearing_rad for one in seen]
+            assert bearings == [one.bearing_rad for one in bearing_candidates(doubled, picture)]
+            differing += bearings != [one.bearing_rad for one in bearing_candidates(plain, picture)]
+            count += len(seen)
+    assert count > 0 and differing > 0
 
 
 def test_its_console_recording_replays_to_the_same_bits(film, tmp_path, monkeypatch, capsys):

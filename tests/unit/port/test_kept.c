@@ -44,8 +44,16 @@ static bool plain_read(void *context, int slot, uint32_t at, void *bytes, uint32
 static const bslam_flash_t chip = {
     .erase = cut_erase, .write = cut_write, .read = plain_read, .slot_bytes = AREA_BYTES};
 
+static bool has_flash;
+
+const bslam_flash_t *port_flash(void)
+{
+    return has_flash ? &chip : NULL;
+}
+
 static int start(void **state)
 {
+    has_flash = true;
     memset(areas, 0xff, sizeof areas);
     left = 1 << 30;
     is_broken = false;
@@ -63,7 +71,7 @@ static void fill(uint8_t bytes[COUNT], int version)
 static int kept_version(void)
 {
     uint8_t found[COUNT], expected[COUNT];
-    if (!kept_load(&chip, found, COUNT)) {
+    if (!port_load(found, COUNT)) {
         return -1;
     }
     for (int version = 0; version < 8; version++) {
@@ -80,7 +88,7 @@ static bool keep(int version)
 {
     uint8_t bytes[COUNT];
     fill(bytes, version);
-    return kept_save(&chip, bytes, COUNT);
+    return port_save(bytes, COUNT);
 }
 
 static void test_the_newest_of_many_saves_is_loaded(void **state)
@@ -142,9 +150,17 @@ static void test_bytes_of_another_number_are_none(void **state)
     assert_false(kept_save(&chip, bytes, AREA_BYTES));
 }
 
+static void test_a_board_without_flash_keeps_nothing(void **state)
+{
+    has_flash = false;
+    assert_false(keep(1));
+    assert_int_equal(kept_version(), -1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_a_board_without_flash_keeps_nothing, start),
         cmocka_unit_test_setup(test_the_newest_of_many_saves_is_loaded, start),
         cmocka_unit_test_setup(test_power_cut_at_every_byte_leaves_the_old_or_the_new_never_a_mix, start),
         cmocka_unit_test_setup(test_any_flipped_bit_of_the_newer_gives_the_older, start),
