@@ -7,7 +7,8 @@
 /// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
 bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2], int count);
 
-/// A machine for beacon `index` that has learned from `samples`, and answers value * first feature.
+/// A machine for beacon `index` that has learned from `samples` (16 at most), and answers value * first
+/// feature.
 void unit_give_machine(bslam_looks_t *looks, int index, double value, int samples);
 
 void unit_assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,

@@ -6,7 +6,7 @@
 
 #include "bslam/recovery/identity.h"
 
-enum { BEACONS = 3, GROWN = 20, YOUNG = 11 };
+enum { BEACONS = 3, GROWN = 16, YOUNG = 11 };
 
 static const double places[BEACONS][2] = {{4, 0}, {0, 4}, {-4, 0}};
 static const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};

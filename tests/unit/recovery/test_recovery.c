@@ -1,3 +1,4 @@
+#include "known_map.h"
 #include "support.h"
 
 #include <math.h>
@@ -199,6 +200,67 @@ static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
     assert_at(0, 0, 0);
 }
 
+// ---- by looks ---------------------------------------------------------------------------------------------
+
+static bslam_looks_t looks;
+
+/// From here on looks tell who is seen: beacon 1 has a machine of its own, 0 and 3 share one.
+static void go_by_looks(void)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    assert_int_equal(bslam_looks_init(&looks, NULL, 0), BSLAM_OK);
+    slam.params.association = BSLAM_ASSOCIATION_SVM;
+    slam.params.looks_samples = 3;
+    bslam_slam_attach_looks(&slam, &looks);
+    unit_give_machine(&looks, 0, 1, 16);
+    unit_give_machine(&looks, 1, -1, 16);
+    looks.of[3].machine = looks.of[0].machine;
+}
+
+/// What a frame contradicts in which beacon 1 is seen where it is, and at (x, y) something that looks as
+/// beacons 0 and 3 do.
+static uint32_t contradicting(double x, double y)
+{
+    const float one[BSLAM_SAMPLE_FEATURES] = {-1.0f};
+    const float shared[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    bslam_sighting_t seen[] = {
+        unit_polar(atan2(beacons[1][1], beacons[1][0]), hypot(beacons[1][0], beacons[1][1]), -1),
+        unit_polar(atan2(y, x), hypot(x, y), -1)};
+    seen[0].signature = one;
+    seen[1].signature = shared;
+    now_us += STEP_US;
+    const uint32_t before = recovery.counters.contradicting;
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, 2), BSLAM_OK);
+    return recovery.counters.contradicting - before;
+}
+
+static void test_recovery_of_beacons_that_look_alike_either_may_be_seen(void **state)
+{
+    go_by_looks();
+    assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
+    assert_int_equal(contradicting(beacons[3][0], beacons[3][1]), 0);
+    assert_int_equal(contradicting(-3, 3), 1);
+}
+
+/// A beacon where the robot stands, or one whose variance is negative, has no distance from what is seen: it
+/// says nothing, and the other one that looks like it is asked.
+static void test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_passed_over(void **state)
+{
+    go_by_looks();
+    bslam_beacon_t *other = &slam.ekf.beacons[3];
+    slam.ekf.mean[other->at] = slam.ekf.mean[0];
+    slam.ekf.mean[other->at + 1] = slam.ekf.mean[1];
+    assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
+    setup(NULL);
+    go_by_looks();
+    for (int k = 0; k < 2; k++) {
+        bslam_symmat_set(slam.ekf.covariance, other->at + k, other->at + k, -1);
+    }
+    assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
+}
+
+// ---- what is refused --------------------------------------------------------------------------------------
+
 static void test_recovery_refuses_as_the_pipeline_does(void **state)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -229,6 +291,9 @@ int main(void)
         cmocka_unit_test_setup(test_recovery_in_a_map_of_one_beacon_is_never_lost, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),
+        cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_either_may_be_seen, setup),
+        cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_passed_over,
+                               setup),
         cmocka_unit_test_setup(test_recovery_refuses_as_the_pipeline_does, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
