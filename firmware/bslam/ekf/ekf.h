@@ -137,14 +137,6 @@ void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_pose_t *pose, bslam_real_t
 
 // ---- sightings --------------------------------------------------------------------------------------------
 
-/// A row of H: not zero only at the robot's own values and at `dim` neighbouring state values from `at` on.
-typedef struct bslam_row {
-    bslam_real_t base[5];  ///< by x, y, theta and, where a speedometer measures, v, omega; else those are 0
-    bslam_real_t other[BSLAM_RAY_DIM];
-    uint16_t at;
-    uint16_t dim;
-} bslam_row_t;
-
 /// A sighting against a beacon of the map: equations (6)-(8), at the present mean.
 typedef struct bslam_innovation {
     bool has_range;

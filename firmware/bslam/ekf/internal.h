@@ -19,14 +19,20 @@ static inline void bslam_ekf_add_scaled(bslam_real_t *restrict y, bslam_real_t f
     }
 }
 
+/// x[0..n) = 0, and what stands behind n up to the next multiple of four. A loop of its own: the memset of
+/// small C libraries goes byte by byte.
+static inline void bslam_ekf_clear(bslam_real_t *x, int n)
+{
+    for (int i = 0; i < n; i += 4) {
+        x[i] = 0;
+        x[i + 1] = 0;
+        x[i + 2] = 0;
+        x[i + 3] = 0;
+    }
+}
+
 /// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
 void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
-
-/// True if a row has derivatives by v or omega.
-static inline bool bslam_row_has_velocity(const bslam_row_t *row)
-{
-    return row->base[3] != 0 || row->base[4] != 0;
-}
 
 /// row · vector.
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);

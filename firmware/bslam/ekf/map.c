@@ -45,7 +45,9 @@ static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
     const int at = ekf->dim;
     bslam_real_t *row = ekf->covariance + bslam_symmat_row(at);
     memset(row, 0, (size_t)BSLAM_SYMMAT_PADDED(at + 1) * sizeof *row);
-    bslam_symmat_add_columns(ekf->covariance, at, 0, 3, value->by_pose, row);
+    bslam_row_t by_pose = {.dim = 0};
+    memcpy(by_pose.base, value->by_pose, sizeof by_pose.base);
+    bslam_symmat_times(ekf->covariance, at, &by_pose, row);
     bslam_real_t variance = value->own_var;
     for (int k = 0; k < 3; k++) {
         variance += value->by_pose[k] * row[k];
@@ -261,10 +263,11 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
     bslam_real_t *x_row = ekf->shift;
     bslam_real_t *y_row = ekf->mirror;
-    memset(ekf->shift, 0, sizeof ekf->shift);
-    memset(ekf->mirror, 0, sizeof ekf->mirror);
-    bslam_symmat_add_columns(ekf->covariance, ekf->dim, at, BSLAM_RAY_DIM, point.x_by_ray, x_row);
-    bslam_symmat_add_columns(ekf->covariance, ekf->dim, at, BSLAM_RAY_DIM, point.y_by_ray, y_row);
+    bslam_row_t x_by_ray = {.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
+    bslam_row_t y_by_ray = x_by_ray;
+    memcpy(x_by_ray.other, point.x_by_ray, sizeof x_by_ray.other);
+    memcpy(y_by_ray.other, point.y_by_ray, sizeof y_by_ray.other);
+    bslam_symmat_times_two(ekf->covariance, ekf->dim, &x_by_ray, &y_by_ray, x_row, y_row);
     bslam_sym2_t own = {0, 0, 0};
     for (int k = 0; k < BSLAM_RAY_DIM; k++) {
         own.xx += point.x_by_ray[k] * x_row[at + k];

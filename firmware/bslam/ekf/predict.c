@@ -90,8 +90,8 @@ static void move_covariance(const moving_t *state, const bslam_transition_t *tra
     }
     const bslam_transition_t f = *transition;
     const bool extended = base > POSE_DIM;
+    bslam_real_t *row = state->covariance + bslam_symmat_row(base);
     for (int i = base; i < state->dim; i++) {
-        bslam_real_t *row = state->covariance + bslam_symmat_row(i);
         row[0] += f.by[0][2] * row[2];
         row[1] += f.by[1][2] * row[2];
         if (extended) {
@@ -99,6 +99,7 @@ static void move_covariance(const moving_t *state, const bslam_transition_t *tra
             row[1] += f.by[1][3] * row[3] + f.by[1][4] * row[4];
             row[2] += f.by[2][4] * row[4];
         }
+        row += bslam_symmat_filled(i);
     }
 }
 
@@ -227,7 +228,7 @@ static void measure_speeds(bslam_ekf_t *ekf, const speeds_t *speeds)
 {
     for (int k = 0; k < 2; k++) {
         const bslam_real_t *by = speeds->by_velocity[k];
-        const bslam_row_t row = {.base = {0, 0, 0, by[0], by[1]}};
+        const bslam_row_t row = {.other = {by[0], by[1]}, .at = BSLAM_STATE_FORWARD, .dim = 2};
         bslam_ekf_apply_scalar(ekf, &row, speeds->innovation[k], 1);
     }
 }

@@ -114,15 +114,10 @@ void bslam_ekf_scale_covariance(bslam_ekf_t *ekf)
     bslam_real_t *column = ekf->pending[COLUMN];
     bslam_real_t *change = ekf->pending[CHANGE];
     fill_stretch(ekf, change);
-    memset(column, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof *column);
     for (int i = 0; i < ekf->dim; i++) {
         change[i] -= ekf->pending[STRETCH][i];
     }
-    for (int i = 0; i < ekf->dim; i += BSLAM_SYMMAT_COLUMNS_MAX) {
-        const int left = ekf->dim - i;
-        const int count = left < BSLAM_SYMMAT_COLUMNS_MAX ? left : BSLAM_SYMMAT_COLUMNS_MAX;
-        bslam_symmat_add_columns(ekf->covariance, ekf->dim, i, count, gauge + i, column);
-    }
+    bslam_symmat_multiply(ekf->covariance, ekf->dim, gauge, column);
     const bslam_real_t half_variance = dot(column, gauge, ekf->dim) / 2;
     for (int i = 0; i < ekf->dim; i++) {
         column[i] += change[i] * half_variance;

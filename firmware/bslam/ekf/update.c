@@ -15,24 +15,15 @@ static const bslam_real_t ROUNDINGS = 8 * BSLAM_REAL_EPSILON;
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
-    if (bslam_row_has_velocity(row)) {
-        sum += row->base[3] * vector[3] + row->base[4] * vector[4];
-    }
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * vector[row->at + k];
     }
     return sum;
 }
 
-void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+/// Adds to P rowᵀ what the waiting down-dates make of it.
+static void add_pending(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
-    bslam_symmat_first_columns(ekf->covariance, ekf->dim, row->base, out);
-    if (bslam_row_has_velocity(row)) {
-        bslam_symmat_add_columns(ekf->covariance, ekf->dim, BSLAM_STATE_FORWARD, 2, row->base + 3, out);
-    }
-    if (row->dim > 0) {
-        bslam_symmat_add_columns(ekf->covariance, ekf->dim, row->at, row->dim, row->other, out);
-    }
     for (int p = 0; p < ekf->pending_count; p++) {
         const bslam_real_t *column = ekf->pending[p];
         const bslam_real_t factor = ekf->pending_scale[p] * bslam_ekf_dot(row, column);
@@ -40,14 +31,32 @@ void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_rea
     }
 }
 
+void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+{
+    bslam_symmat_times(ekf->covariance, ekf->dim, row, out);
+    add_pending(ekf, row, out);
+}
+
+/// P times the rows of a sighting's bearing and, if it has one, range.
+static void project_sighting(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
+                             bslam_real_t *by_bearing, bslam_real_t *by_range)
+{
+    if (!innovation->has_range) {
+        bslam_ekf_project(ekf, &innovation->bearing_row, by_bearing);
+        return;
+    }
+    bslam_symmat_times_two(ekf->covariance, ekf->dim, &innovation->bearing_row, &innovation->range_row,
+                           by_bearing, by_range);
+    add_pending(ekf, &innovation->bearing_row, by_bearing);
+    add_pending(ekf, &innovation->range_row, by_range);
+}
+
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
     row->at = (uint16_t)beacon->at;
     row->dim = (uint16_t)bslam_beacon_dim(beacon->kind);
-    memcpy(row->base, by_pose, 3 * sizeof row->base[0]);
-    row->base[3] = 0;
-    row->base[4] = 0;
+    memcpy(row->base, by_pose, sizeof row->base);
     memcpy(row->other, by_beacon, sizeof row->other);
 }
 
@@ -231,25 +240,51 @@ static bslam_real_t foreseen(const bslam_ekf_t *ekf, const bslam_row_t *row)
     return ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
 }
 
-/// Takes the column P hᵀ, which stands in the next free pending slot, into the correction and the pending
-/// down-dates.
-static void accept_column(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s)
+/// How far a scalar measurement moves the mean and the covariance along its column P hᵀ.
+typedef struct gain {
+    bslam_real_t step;   ///< innovation / S
+    bslam_real_t scale;  ///< -1 / S
+} gain_t;
+
+static gain_t gain_of(bslam_real_t innovation, bslam_real_t s)
 {
-    const bslam_real_t *column = ekf->pending[ekf->pending_count];
-    const bslam_real_t step = innovation / s;
-    if (ekf->has_correction) {
-        bslam_ekf_add_scaled(ekf->correction, step, column, ekf->dim);
-    } else {
-        for (int i = 0; i < ekf->dim; i += 4) {
-            ekf->correction[i] = column[i] * step;
-            ekf->correction[i + 1] = column[i + 1] * step;
-            ekf->correction[i + 2] = column[i + 2] * step;
-            ekf->correction[i + 3] = column[i + 3] * step;
-        }
+    return (gain_t){innovation / s, -1 / s};
+}
+
+static void begin_correction(bslam_ekf_t *ekf)
+{
+    if (!ekf->has_correction) {
+        bslam_ekf_clear(ekf->correction, ekf->dim);
+        ekf->has_correction = true;
     }
-    ekf->pending_scale[ekf->pending_count] = -1 / s;
+}
+
+/// Takes the column in the next free pending slot into the correction and the pending down-dates.
+static void accept_column(bslam_ekf_t *ekf, gain_t gain)
+{
+    begin_correction(ekf);
+    bslam_ekf_add_scaled(ekf->correction, gain.step, ekf->pending[ekf->pending_count], ekf->dim);
+    ekf->pending_scale[ekf->pending_count] = gain.scale;
     ekf->pending_count++;
-    ekf->has_correction = true;
+}
+
+/// The same for the columns of a bearing and a range in the next two slots; the range's less `share` of the
+/// bearing's first, which makes it that of the range given the bearing.
+static void accept_two(bslam_ekf_t *ekf, gain_t bearing, gain_t range, bslam_real_t share)
+{
+    bslam_real_t *restrict by_range = ekf->pending[ekf->pending_count + 1];
+    const bslam_real_t *restrict by_bearing = ekf->pending[ekf->pending_count];
+    bslam_real_t *restrict correction = ekf->correction;
+    begin_correction(ekf);
+    for (int i = 0; i < ekf->dim; i++) {
+        const bslam_real_t of_bearing = by_bearing[i];
+        const bslam_real_t own = by_range[i] - share * of_bearing;
+        by_range[i] = own;
+        correction[i] = correction[i] + bearing.step * of_bearing + range.step * own;
+    }
+    ekf->pending_scale[ekf->pending_count] = bearing.scale;
+    ekf->pending_scale[ekf->pending_count + 1] = range.scale;
+    ekf->pending_count += 2;
 }
 
 void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
@@ -261,7 +296,7 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
     bslam_real_t *column = ekf->pending[ekf->pending_count];
     bslam_ekf_project(ekf, row, column);
     const bslam_real_t left = innovation - foreseen(ekf, row);
-    accept_column(ekf, left, bslam_ekf_dot(row, column) + variance);
+    accept_column(ekf, gain_of(left, bslam_ekf_dot(row, column) + variance));
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
@@ -298,10 +333,9 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
     const bslam_real_t bearing_left = innovation->bearing_rad - foreseen(ekf, bearing_row);
-    bslam_ekf_project(ekf, bearing_row, bearing_column);
+    project_sighting(ekf, innovation, bearing_column, range_column);
     hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
     if (innovation->has_range) {
-        bslam_ekf_project(ekf, &innovation->range_row, range_column);
         range_left = innovation->range_m - foreseen(ekf, &innovation->range_row);
         hph.xx = bslam_ekf_dot(&innovation->range_row, range_column);
         hph.xy = bslam_ekf_dot(&innovation->range_row, bearing_column);
@@ -318,14 +352,16 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
         return status;
     }
     const bslam_real_t bearing_s = hph.yy + noise_of(innovation->bearing_var_rad2, fusion->weight, hph.yy);
-    accept_column(ekf, bearing_left, bearing_s);
-    if (innovation->has_range) {
-        // The range's column and innovation, given the bearing.
-        const bslam_real_t share = hph.xy / bearing_s;
-        bslam_ekf_add_scaled(range_column, -share, bearing_column, ekf->dim);
-        accept_column(ekf, range_left - share * bearing_left,
-                      hph.xx - share * hph.xy + noise_of(innovation->range_var_m2, fusion->weight, hph.xx));
+    const gain_t bearing = gain_of(bearing_left, bearing_s);
+    if (!innovation->has_range) {
+        accept_column(ekf, bearing);
+        return BSLAM_OK;
     }
+    // The range's variance and innovation, given the bearing.
+    const bslam_real_t share = hph.xy / bearing_s;
+    const bslam_real_t range_s =
+        hph.xx - share * hph.xy + noise_of(innovation->range_var_m2, fusion->weight, hph.xx);
+    accept_two(ekf, bearing, gain_of(range_left - share * bearing_left, range_s), share);
     return BSLAM_OK;
 }
 
@@ -344,16 +380,27 @@ static void move_position(bslam_ekf_t *ekf, int at, const bslam_turning_t *turni
     ekf->shift[at + 1] = dx;
 }
 
+/// Moves what is no position by its correction: the transport does not shift it.
+static void move_value(bslam_ekf_t *ekf, int at)
+{
+    ekf->mean[at] += ekf->correction[at];
+    ekf->shift[at] = 0;
+}
+
+static void move_angle(bslam_ekf_t *ekf, int at)
+{
+    move_value(ekf, at);
+    ekf->mean[at] = bslam_angle_wrap(ekf->mean[at]);
+}
+
 /// mean <- exp(correction) mean, whose translation is V(turn) correction; with turn = 0, mean + correction.
 static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 {
-    memset(ekf->shift, 0, (size_t)BSLAM_SYMMAT_PADDED(ekf->dim) * sizeof ekf->shift[0]);
     const bslam_turning_t turning = bslam_turning(turn_rad);
     move_position(ekf, BSLAM_STATE_X, &turning);
-    ekf->mean[BSLAM_STATE_THETA] =
-        bslam_angle_wrap(ekf->mean[BSLAM_STATE_THETA] + ekf->correction[BSLAM_STATE_THETA]);
+    move_angle(ekf, BSLAM_STATE_THETA);
     for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
-        ekf->mean[i] += ekf->correction[i];
+        move_value(ekf, i);
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &ekf->beacons[b];
@@ -362,12 +409,15 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
             move_position(ekf, at, &turning);
         }
         if (beacon->kind == BSLAM_BEACON_SIZED) {
-            ekf->mean[at + 2] += ekf->correction[at + 2];
+            move_value(ekf, at + 2);
         }
         if (beacon->kind == BSLAM_BEACON_RAY) {
-            ekf->mean[at + 2] = bslam_angle_wrap(ekf->mean[at + 2] + ekf->correction[at + 2]);
-            ekf->mean[at + 3] += ekf->correction[at + 3];
+            move_angle(ekf, at + 2);
+            move_value(ekf, at + 3);
         }
+    }
+    for (int i = ekf->dim; i % 4 != 0; i++) {
+        ekf->shift[i] = 0;
     }
 }
 
@@ -376,7 +426,8 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 static void transport_covariance(bslam_ekf_t *ekf)
 {
     static const bslam_row_t theta_row = {.base = {0, 0, 1}};
-    bslam_ekf_project(ekf, &theta_row, ekf->mirror);
+    bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, ekf->mirror);
+    add_pending(ekf, &theta_row, ekf->mirror);
     const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
     bslam_ekf_add_scaled(ekf->mirror, half_variance, ekf->shift, ekf->dim);
     if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {

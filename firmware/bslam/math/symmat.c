@@ -1,97 +1,186 @@
 #include "bslam/math/symmat.h"
 
-/// factors · (a, b, c, d), of which the first `count` exist. The compiler knows the count: no test is left.
-static inline bslam_real_t weigh(const bslam_real_t *factors, const int count, const bslam_real_t *a,
-                                 const bslam_real_t *b, const bslam_real_t *c, const bslam_real_t *d)
+extern inline size_t bslam_symmat_row(int i);
+extern inline size_t bslam_symmat_at(int i, int j);
+extern inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j);
+extern inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value);
+extern inline size_t bslam_symmat_filled(int i);
+
+/// A function whose callers name constants: where speed is asked for, each has a copy without tests of them.
+#ifdef __OPTIMIZE_SIZE__
+#define COPIED static
+#else
+#define COPIED __attribute__((always_inline)) static inline
+#endif
+
+// ---- products ---------------------------------------------------------------------------------------------
+
+/// row · a line of the matrix: its columns 0 to 2, and those where the row's others stand. The compiler knows
+/// their count: no test is left.
+static inline bslam_real_t product(const bslam_row_t *row, const int count, const bslam_real_t base[3],
+                                   const bslam_real_t others[BSLAM_ROW_OTHERS_MAX])
 {
-    bslam_real_t sum = factors[0] * *a;
+    const bslam_real_t sum = row->base[0] * base[0] + row->base[1] * base[1] + row->base[2] * base[2];
+    if (count == 0) {
+        return sum;
+    }
+    bslam_real_t rest = row->other[0] * others[0];
     if (count > 1) {
-        sum += factors[1] * *b;
+        rest += row->other[1] * others[1];
     }
     if (count > 2) {
-        sum += factors[2] * *c;
+        rest += row->other[2] * others[2];
     }
     if (count > 3) {
-        sum += factors[3] * *d;
+        rest += row->other[3] * others[3];
     }
-    return sum;
+    return sum + rest;
 }
 
-/// bslam_symmat_add_columns for a count that the compiler knows.
-static inline void add_columns(const bslam_real_t *restrict m, int n, int first, const int count,
-                               const bslam_real_t *restrict factors, bslam_real_t *restrict out)
+/// others[k] = *from[k], of which the first `count` exist.
+static inline void read_others(const bslam_real_t *const from[BSLAM_ROW_OTHERS_MAX], const int count, int i,
+                               bslam_real_t others[BSLAM_ROW_OTHERS_MAX])
 {
-    // Above the columns' own rows they are read as rows, by symmetry; below, as `count` neighbours of each
-    // row.
-    const bslam_real_t *rows[BSLAM_SYMMAT_COLUMNS_MAX] = {m, m, m, m};
-    for (int k = 0; k < count; k++) {
-        rows[k] = m + bslam_symmat_row(first + k);
+    others[0] = count > 0 ? from[0][i] : 0;
+    others[1] = count > 1 ? from[1][i] : 0;
+    others[2] = count > 2 ? from[2][i] : 0;
+    others[3] = count > 3 ? from[3][i] : 0;
+}
+
+/// One row or two that look at the same places, and where what they make of a line goes.
+typedef struct lanes {
+    bslam_row_t a, b;
+    bslam_real_t *by_a, *by_b;
+} lanes_t;
+
+/// Whether there are two, and their count of others, the compiler knows.
+COPIED void put(const lanes_t *lanes, const bool two, const int count, int i, const bslam_real_t *line,
+                const bslam_real_t *others)
+{
+    // Both sums before anything is written: what they look at is read once.
+    const bslam_real_t a = product(&lanes->a, count, line, others);
+    if (two) {
+        const bslam_real_t b = product(&lanes->b, count, line, others);
+        lanes->by_b[i] = b;
     }
-    for (int i = 0; i < first; i++) {
-        out[i] += weigh(factors, count, rows[0] + i, rows[1] + i, rows[2] + i, rows[3] + i);
+    lanes->by_a[i] = a;
+}
+
+/// One pass over what one row or two look at.
+COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool two, const int count)
+{
+    const lanes_t lanes = *given;
+    const int first = count > 0 ? lanes.a.at : n;
+    // Above the others' own rows their columns are read as rows, by symmetry; below, as neighbours.
+    const bslam_real_t *rows[BSLAM_ROW_OTHERS_MAX];
+    bslam_real_t others[BSLAM_ROW_OTHERS_MAX];
+    for (int k = 0; k < BSLAM_ROW_OTHERS_MAX; k++) {
+        rows[k] = m + bslam_symmat_row(k < count ? first + k : 0);
+    }
+    for (int i = 0; i < 3; i++) {
+        const bslam_real_t line[3] = {bslam_symmat_get(m, i, 0), bslam_symmat_get(m, i, 1),
+                                      bslam_symmat_get(m, i, 2)};
+        read_others(rows, count, i, others);
+        put(&lanes, two, count, i, line, others);
+    }
+    const bslam_real_t *line = m + bslam_symmat_row(3);
+    for (int i = 3; i < first; i++) {
+        read_others(rows, count, i, others);
+        put(&lanes, two, count, i, line, others);
+        line += bslam_symmat_filled(i);
     }
     for (int i = first; i < first + count; i++) {
         for (int k = 0; k < count; k++) {
-            out[i] += factors[k] * bslam_symmat_get(m, i, first + k);
+            others[k] = bslam_symmat_get(m, i, first + k);
+        }
+        put(&lanes, two, count, i, line, others);
+        line += bslam_symmat_filled(i);
+    }
+    for (int i = first + count; i < n; i++) {
+        put(&lanes, two, count, i, line, line + first);
+        line += bslam_symmat_filled(i);
+    }
+    for (int i = n; i % 4 != 0; i++) {
+        lanes.by_a[i] = 0;
+        if (two) {
+            lanes.by_b[i] = 0;
         }
     }
-    const bslam_real_t *element = m + bslam_symmat_row(first + count) + first;
-    for (int i = first + count; i < n; i++) {
-        out[i] += weigh(factors, count, element, element + (count > 1 ? 1 : 0), element + (count > 2 ? 2 : 0),
-                        element + (count > 3 ? 3 : 0));
-        // To the next row: the filled length of this one.
-        element += ((size_t)i / 4 + 1) * 4;
-    }
 }
 
-void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count, const bslam_real_t *factors,
-                              bslam_real_t *out)
+/// As times, for any count.
+COPIED void times_any(const bslam_real_t *m, int n, const lanes_t *lanes, const bool two)
 {
-    switch (count) {
+#ifdef __OPTIMIZE_SIZE__
+    times(m, n, lanes, two, lanes->a.dim);
+#else
+    switch (lanes->a.dim) {
+    case 0:
+        times(m, n, lanes, two, 0);
+        break;
     case 1:
-        add_columns(m, n, first, 1, factors, out);
+        times(m, n, lanes, two, 1);
         break;
     case 2:
-        add_columns(m, n, first, 2, factors, out);
+        times(m, n, lanes, two, 2);
         break;
     case 3:
-        add_columns(m, n, first, 3, factors, out);
+        times(m, n, lanes, two, 3);
         break;
     default:
-        add_columns(m, n, first, BSLAM_SYMMAT_COLUMNS_MAX, factors, out);
+        times(m, n, lanes, two, BSLAM_ROW_OTHERS_MAX);
         break;
     }
+#endif
 }
 
-void bslam_symmat_first_columns(const bslam_real_t *restrict m, int n, const bslam_real_t factors[3],
-                                bslam_real_t *restrict out)
+void bslam_symmat_times(const bslam_real_t *m, int n, const bslam_row_t *row, bslam_real_t *out)
 {
-    const bslam_real_t a = factors[0];
-    const bslam_real_t b = factors[1];
-    const bslam_real_t c = factors[2];
-    for (int i = 0; i < 3; i++) {
-        out[i] =
-            a * bslam_symmat_get(m, i, 0) + b * bslam_symmat_get(m, i, 1) + c * bslam_symmat_get(m, i, 2);
+    const lanes_t lanes = {*row, *row, out, out};
+    times_any(m, n, &lanes, false);
+}
+
+void bslam_symmat_times_two(const bslam_real_t *m, int n, const bslam_row_t *a, const bslam_row_t *b,
+                            bslam_real_t *by_a, bslam_real_t *by_b)
+{
+    const lanes_t lanes = {*a, *b, by_a, by_b};
+    times_any(m, n, &lanes, true);
+}
+
+void bslam_symmat_column(const bslam_real_t *m, int n, int j, bslam_real_t *out)
+{
+    // Up to its own row the column is read as a row, by symmetry.
+    const bslam_real_t *row = m + bslam_symmat_row(j);
+    for (int i = 0; i <= j; i++) {
+        out[i] = row[i];
     }
-    const bslam_real_t *row = m + bslam_symmat_row(3);
-    out[3] = a * row[0] + b * row[1] + c * row[2];
-    row += 4;
-    // Blocks of four rows of one filled length; what is behind n is overwritten.
-    for (int i = 4; i < n; i += 4) {
-        const bslam_real_t *second = row + i + 4, *third = second + i + 4, *fourth = third + i + 4;
-        out[i] = a * row[0] + b * row[1] + c * row[2];
-        out[i + 1] = a * second[0] + b * second[1] + c * second[2];
-        out[i + 2] = a * third[0] + b * third[1] + c * third[2];
-        out[i + 3] = a * fourth[0] + b * fourth[1] + c * fourth[2];
-        row = fourth + i + 4;
+    const bslam_real_t *element = row + j;
+    for (int i = j + 1; i < n; i++) {
+        element += bslam_symmat_filled(i - 1);
+        out[i] = *element;
     }
-    // The last block's rows behind n. At most three.
     for (int i = n; i % 4 != 0; i++) {
         out[i] = 0;
     }
 }
 
-#if defined(__SSE2__) || defined(__ARM_NEON)
+void bslam_symmat_multiply(const bslam_real_t *m, int n, const bslam_real_t *vector, bslam_real_t *out)
+{
+    const bslam_real_t *line = m;
+    for (int i = 0; i < n; i++) {
+        out[i] = 0;
+        for (int j = 0; j < i; j++) {
+            out[i] += line[j] * vector[j];
+            out[j] += line[j] * vector[i];
+        }
+        out[i] += line[i] * vector[i];
+        line += bslam_symmat_filled(i);
+    }
+}
+
+// ---- the sum of terms -------------------------------------------------------------------------------------
+
+#if defined(__SSE2__) || defined(__ARM_NEON) || defined(__OPTIMIZE_SIZE__)
 
 /// Four rows from i on, a multiple of four, so that all are filled up to the same length. With vector
 /// instructions four columns of a row are one step. The same bits as below: each element has the same sum.
@@ -132,15 +221,30 @@ static inline void fill_factors(const bslam_symmat_term_t *term, int k, int i, f
     factors->by[3][k] = term->scale * row_factors[3];
 }
 
-/// One column of four rows of the same length: what the four terms have there is read once for all.
-static inline void add_column(const factors_t *f, bslam_real_t a, bslam_real_t b, bslam_real_t c,
-                              bslam_real_t d, bslam_real_t *r0, bslam_real_t *r1, bslam_real_t *r2,
-                              bslam_real_t *r3)
+/// What the four terms have in one column.
+typedef struct column {
+    bslam_real_t a, b, c, d;
+} column_t;
+
+static inline void add_element(const bslam_real_t by[4], column_t column, bslam_real_t *element)
 {
-    *r0 += f->by[0][0] * a + f->by[0][1] * b + f->by[0][2] * c + f->by[0][3] * d;
-    *r1 += f->by[1][0] * a + f->by[1][1] * b + f->by[1][2] * c + f->by[1][3] * d;
-    *r2 += f->by[2][0] * a + f->by[2][1] * b + f->by[2][2] * c + f->by[2][3] * d;
-    *r3 += f->by[3][0] * a + f->by[3][1] * b + f->by[3][2] * c + f->by[3][3] * d;
+    *element += by[0] * column.a + by[1] * column.b + by[2] * column.c + by[3] * column.d;
+}
+
+/// One column of the rows from `k` on of four of the same length: what the terms have there is read once.
+static inline void add_column(const factors_t *f, const int k, column_t column, bslam_real_t *r0,
+                              bslam_real_t *r1, bslam_real_t *r2, bslam_real_t *r3)
+{
+    if (k < 1) {
+        add_element(f->by[0], column, r0);
+    }
+    if (k < 2) {
+        add_element(f->by[1], column, r1);
+    }
+    if (k < 3) {
+        add_element(f->by[2], column, r2);
+    }
+    add_element(f->by[3], column, r3);
 }
 
 /// Four rows from i on, a multiple of four, so that all are filled up to the same length. On a Cortex-M4F the
@@ -160,16 +264,21 @@ static void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_t
     fill_factors(&terms[1], 1, i, &f);
     fill_factors(&terms[2], 2, i, &f);
     fill_factors(&terms[3], 3, i, &f);
-    for (const bslam_real_t *end = c0 + filled; c0 != end; c0 += 4, c1 += 4, c2 += 4, c3 += 4) {
-        add_column(&f, c0[0], c1[0], c2[0], c3[0], r0, r1, r2, r3);
-        add_column(&f, c0[1], c1[1], c2[1], c3[1], r0 + 1, r1 + 1, r2 + 1, r3 + 1);
-        add_column(&f, c0[2], c1[2], c2[2], c3[2], r0 + 2, r1 + 2, r2 + 2, r3 + 2);
-        add_column(&f, c0[3], c1[3], c2[3], c3[3], r0 + 3, r1 + 3, r2 + 3, r3 + 3);
+    for (const bslam_real_t *end = c0 + i; c0 != end; c0 += 4, c1 += 4, c2 += 4, c3 += 4) {
+        add_column(&f, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
+        add_column(&f, 0, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
+        add_column(&f, 0, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
+        add_column(&f, 0, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
         r0 += 4;
         r1 += 4;
         r2 += 4;
         r3 += 4;
     }
+    // On the diagonal what is above it is no part of the matrix.
+    add_column(&f, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
+    add_column(&f, 1, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
+    add_column(&f, 2, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
+    add_column(&f, 3, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
 }
 
 #endif
@@ -182,6 +291,9 @@ void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_
         row += 4 * (i + 4);
     }
 }
+
+// ---- the rest
+// -----------------------------------------------------------------------------------------------
 
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count)
 {

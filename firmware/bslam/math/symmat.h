@@ -9,6 +9,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "bslam/base/real.h"
 
@@ -19,42 +20,64 @@
 #define BSLAM_SYMMAT_LENGTH(n) (BSLAM_SYMMAT_PADDED(n) * (BSLAM_SYMMAT_PADDED(n) + 4) / 2)
 
 /// Where row i begins.
-static inline size_t bslam_symmat_row(int i)
+inline size_t bslam_symmat_row(int i)
 {
     const size_t block = (size_t)i / 4;
     return 4 * (block + 1) * (2 * block + (size_t)i % 4);
 }
 
 /// Where element (i, j) stands, for any order of i and j.
-static inline size_t bslam_symmat_at(int i, int j)
+inline size_t bslam_symmat_at(int i, int j)
 {
     return i >= j ? bslam_symmat_row(i) + (size_t)j : bslam_symmat_row(j) + (size_t)i;
 }
 
 /// Element (i, j).
-static inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
+inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
 {
     return m[bslam_symmat_at(i, j)];
 }
 
 /// Sets element (i, j), and so (j, i).
-static inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
+inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
 {
     m[bslam_symmat_at(i, j)] = value;
 }
 
-/// Columns that bslam_symmat_add_columns takes at once.
-#define BSLAM_SYMMAT_COLUMNS_MAX 4
+/// How long row i is with its fill: from its beginning to the next one's.
+inline size_t bslam_symmat_filled(int i)
+{
+    return ((size_t)i / 4 + 1) * 4;
+}
 
-/// out[0..n) += the sum of factors[k] * column first + k of the n x n matrix, 1 <= count <=
-/// BSLAM_SYMMAT_COLUMNS_MAX. O(count n).
-void bslam_symmat_add_columns(const bslam_real_t *m, int n, int first, int count, const bslam_real_t *factors,
-                              bslam_real_t *out);
+// ---- products ---------------------------------------------------------------------------------------------
 
-/// out[0..n) = the sum of factors[k] * column k of the n x n matrix, k < 3 <= n; out is 0 from there up to
-/// BSLAM_SYMMAT_PADDED(n). O(n).
-void bslam_symmat_first_columns(const bslam_real_t *m, int n, const bslam_real_t factors[3],
-                                bslam_real_t *out);
+/// Places of a sparse row apart from the first three.
+#define BSLAM_ROW_OTHERS_MAX 4
+
+/// A sparse row: not zero only at 0, 1, 2 and at `dim` neighbouring places from `at` on, at >= 3.
+typedef struct bslam_row {
+    bslam_real_t base[3];
+    bslam_real_t other[BSLAM_ROW_OTHERS_MAX];
+    uint16_t at;
+    uint16_t dim;
+} bslam_row_t;
+
+/// out[0..n) = the n x n matrix times rowᵀ, n >= 3; out is 0 from there up to BSLAM_SYMMAT_PADDED(n).
+/// O((3 + dim) n).
+void bslam_symmat_times(const bslam_real_t *m, int n, const bslam_row_t *row, bslam_real_t *out);
+
+/// The same of two rows that look at the same places: what they look at is read once for both.
+void bslam_symmat_times_two(const bslam_real_t *m, int n, const bslam_row_t *a, const bslam_row_t *b,
+                            bslam_real_t *by_a, bslam_real_t *by_b);
+
+/// out[0..n) = column j; out is 0 from there up to BSLAM_SYMMAT_PADDED(n). O(n).
+void bslam_symmat_column(const bslam_real_t *m, int n, int j, bslam_real_t *out);
+
+/// out[0..n) = the n x n matrix times a vector. O(n^2).
+void bslam_symmat_multiply(const bslam_real_t *m, int n, const bslam_real_t *vector, bslam_real_t *out);
+
+// ---- the sum of terms -------------------------------------------------------------------------------------
 
 /// One symmetric term of a sum: row i of the matrix gets row_factors[i] * columns[0..i].
 typedef struct bslam_symmat_term {

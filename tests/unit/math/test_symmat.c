@@ -130,33 +130,86 @@ static void test_set_is_read_back_from_both_sides(void **state)
 
 // ---- arithmetic -------------------------------------------------------------------------------------------
 
-static void test_add_columns_is_the_naive_product(void **state)
+/// A row that looks at `dim` neighbours from `at` on, all factors random.
+static bslam_row_t random_row(unit_random_t *random, int at, int dim)
+{
+    bslam_row_t row = {.at = (uint16_t)at, .dim = (uint16_t)dim};
+    for (int k = 0; k < 3; k++) {
+        row.base[k] = real(unit_random(random, -2, 2));
+    }
+    for (int k = 0; k < dim; k++) {
+        row.other[k] = real(unit_random(random, -2, 2));
+    }
+    return row;
+}
+
+static void assert_product(const pair_t *pair, int n, const bslam_row_t *row, const bslam_real_t *out)
+{
+    for (int i = 0; i < n; i++) {
+        double expected = 0;
+        for (int k = 0; k < 3; k++) {
+            expected += (double)row->base[k] * pair->naive[i][k];
+        }
+        for (int k = 0; k < row->dim; k++) {
+            expected += (double)row->other[k] * pair->naive[i][row->at + k];
+        }
+        // Two roundings a term, of values below 3 * terms.
+        assert_near(out[i], expected, 6 * (3 + row->dim) * (3 + row->dim) * UNIT_ROUNDING);
+    }
+    for (int i = n; i < BSLAM_SYMMAT_PADDED(n); i++) {
+        assert_true(out[i] == 0);
+    }
+}
+
+static void test_times_is_the_naive_product_for_one_row_and_for_two(void **state)
 {
     unit_random_t random = {2};
-    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+    for (int n = 3; n <= SIZE_MAX_TESTED; n++) {
         pair_t pair = new_random_pair(&random, n);
-        for (int count = 1; count <= BSLAM_SYMMAT_COLUMNS_MAX; count++) {
-            for (int first = 0; first + count <= n; first++) {
-                bslam_real_t *out = new_random_vector(&random, n);
-                bslam_real_t factors[BSLAM_SYMMAT_COLUMNS_MAX];
-                double expected[SIZE_MAX_TESTED];
-                for (int k = 0; k < count; k++) {
-                    factors[k] = real(unit_random(&random, -2, 2));
-                }
-                for (int i = 0; i < n; i++) {
-                    expected[i] = (double)out[i];
-                    for (int k = 0; k < count; k++) {
-                        expected[i] += (double)factors[k] * pair.naive[i][first + k];
-                    }
-                }
-                bslam_symmat_add_columns(pair.m, n, first, count, factors, out);
-                for (int i = 0; i < n; i++) {
-                    // Two roundings a term, of values below 3 * terms.
-                    assert_near(out[i], expected[i], 6 * count * count * UNIT_ROUNDING);
-                }
-                free(out);
+        for (int dim = 0; dim <= BSLAM_ROW_OTHERS_MAX; dim++) {
+            for (int at = 3; at + dim <= n; at++) {
+                const bslam_row_t a = random_row(&random, at, dim);
+                const bslam_row_t b = random_row(&random, at, dim);
+                bslam_real_t *alone = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+                bslam_real_t *by_a = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+                bslam_real_t *by_b = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+                bslam_symmat_times(pair.m, n, &a, alone);
+                bslam_symmat_times_two(pair.m, n, &a, &b, by_a, by_b);
+                assert_product(&pair, n, &a, by_a);
+                assert_product(&pair, n, &b, by_b);
+                assert_memory_equal(alone, by_a, (size_t)BSLAM_SYMMAT_PADDED(n) * sizeof *alone);
+                free(alone);
+                free(by_a);
+                free(by_b);
             }
         }
+        free(pair.m);
+    }
+}
+
+static void test_column_and_multiply_are_the_naive_ones(void **state)
+{
+    unit_random_t random = {4};
+    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
+        pair_t pair = new_random_pair(&random, n);
+        bslam_real_t *vector = new_random_vector(&random, n);
+        bslam_real_t *out = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
+        for (int j = 0; j < n; j++) {
+            bslam_symmat_column(pair.m, n, j, out);
+            for (int i = 0; i < BSLAM_SYMMAT_PADDED(n); i++) {
+                assert_true((double)out[i] == (i < n ? pair.naive[i][j] : 0));
+            }
+        }
+        bslam_symmat_multiply(pair.m, n, vector, out);
+        for (int i = 0; i < n; i++) {
+            double expected = 0;
+            for (int j = 0; j < n; j++) {
+                expected += pair.naive[i][j] * (double)vector[j];
+            }
+            assert_near(out[i], expected, 2.0 * n * n * UNIT_ROUNDING);
+        }
+        free(vector);
+        free(out);
         free(pair.m);
     }
 }
@@ -324,7 +377,8 @@ int main(void)
         cmocka_unit_test(test_row_is_filled_up_to_a_multiple_of_four_and_the_next_follows),
         cmocka_unit_test(test_set_is_read_back_from_both_sides),
 
-        cmocka_unit_test(test_add_columns_is_the_naive_product),
+        cmocka_unit_test(test_times_is_the_naive_product_for_one_row_and_for_two),
+        cmocka_unit_test(test_column_and_multiply_are_the_naive_ones),
         cmocka_unit_test(test_add_rank4_is_the_naive_sum),
         cmocka_unit_test(test_add_rank4_with_zero_scales_changes_no_bit),
 
