@@ -86,8 +86,6 @@ typedef struct bslam_ekf {
     bslam_real_t pending[BSLAM_PENDING_MAX][BSLAM_STATE_PADDED];
     bslam_real_t pending_scale[BSLAM_PENDING_MAX];
     bslam_real_t correction[BSLAM_STATE_PADDED];
-    bslam_real_t shift[BSLAM_STATE_PADDED];
-    bslam_real_t mirror[BSLAM_STATE_PADDED];
     int32_t pending_count;
     bool has_correction;
 } bslam_ekf_t;

@@ -261,8 +261,8 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
         return false;
     }
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
-    bslam_real_t *x_row = ekf->shift;
-    bslam_real_t *y_row = ekf->mirror;
+    bslam_real_t *x_row = ekf->pending[0];
+    bslam_real_t *y_row = ekf->pending[1];
     bslam_row_t x_by_ray = {.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
     bslam_row_t y_by_ray = x_by_ray;
     memcpy(x_by_ray.other, point.x_by_ray, sizeof x_by_ray.other);

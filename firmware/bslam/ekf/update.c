@@ -367,8 +367,8 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
 
 // ---- end of a frame ---------------------------------------------------------------------------------------
 
-/// Moves the position at `at` by V(turn) correction, and notes the shift J V(turn) correction of the
-/// transport.
+/// Moves the position at `at` by V(turn) correction, in whose place it leaves the shift J V(turn) correction
+/// of the transport.
 static void move_position(bslam_ekf_t *ekf, int at, const bslam_turning_t *turning)
 {
     bslam_real_t dx = ekf->correction[at];
@@ -376,15 +376,15 @@ static void move_position(bslam_ekf_t *ekf, int at, const bslam_turning_t *turni
     bslam_turning_apply(turning, &dx, &dy);
     ekf->mean[at] += dx;
     ekf->mean[at + 1] += dy;
-    ekf->shift[at] = -dy;
-    ekf->shift[at + 1] = dx;
+    ekf->correction[at] = -dy;
+    ekf->correction[at + 1] = dx;
 }
 
 /// Moves what is no position by its correction: the transport does not shift it.
 static void move_value(bslam_ekf_t *ekf, int at)
 {
     ekf->mean[at] += ekf->correction[at];
-    ekf->shift[at] = 0;
+    ekf->correction[at] = 0;
 }
 
 static void move_angle(bslam_ekf_t *ekf, int at)
@@ -394,6 +394,7 @@ static void move_angle(bslam_ekf_t *ekf, int at)
 }
 
 /// mean <- exp(correction) mean, whose translation is V(turn) correction; with turn = 0, mean + correction.
+/// Where the correction stood, the shift of the transport does.
 static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 {
     const bslam_turning_t turning = bslam_turning(turn_rad);
@@ -416,9 +417,6 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
             move_value(ekf, at + 3);
         }
     }
-    for (int i = ekf->dim; i % 4 != 0; i++) {
-        ekf->shift[i] = 0;
-    }
 }
 
 /// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need:
@@ -426,17 +424,19 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 static void transport_covariance(bslam_ekf_t *ekf)
 {
     static const bslam_row_t theta_row = {.base = {0, 0, 1}};
-    bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, ekf->mirror);
-    add_pending(ekf, &theta_row, ekf->mirror);
-    const bslam_real_t half_variance = ekf->mirror[BSLAM_STATE_THETA] / 2;
-    bslam_ekf_add_scaled(ekf->mirror, half_variance, ekf->shift, ekf->dim);
+    const bslam_real_t *shift = ekf->correction;
+    bslam_real_t *mirror = ekf->pending[BSLAM_PENDING_MAX - 1];
     if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
         flush(ekf);
     }
+    bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, mirror);
+    add_pending(ekf, &theta_row, mirror);
+    const bslam_real_t half_variance = mirror[BSLAM_STATE_THETA] / 2;
+    bslam_ekf_add_scaled(mirror, half_variance, shift, ekf->dim);
     bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
     fill_terms(ekf, terms);
-    terms[2] = (bslam_symmat_term_t){.row_factors = ekf->shift, .scale = 1, .columns = ekf->mirror};
-    terms[3] = (bslam_symmat_term_t){.row_factors = ekf->mirror, .scale = 1, .columns = ekf->shift};
+    terms[2] = (bslam_symmat_term_t){.row_factors = shift, .scale = 1, .columns = mirror};
+    terms[3] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
     bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
     ekf->pending_count = 0;
 }

@@ -50,7 +50,7 @@ static inline void read_others(const bslam_real_t *const from[BSLAM_ROW_OTHERS_M
 /// One row or two that look at the same places, and where what they make of a line goes.
 typedef struct lanes {
     bslam_row_t a, b;
-    bslam_real_t *by_a, *by_b;
+    bslam_real_t *out_a, *out_b;
 } lanes_t;
 
 /// Whether there are two, and their count of others, the compiler knows.
@@ -61,9 +61,9 @@ COPIED void put(const lanes_t *lanes, const bool two, const int count, int i, co
     const bslam_real_t a = product(&lanes->a, count, line, others);
     if (two) {
         const bslam_real_t b = product(&lanes->b, count, line, others);
-        lanes->by_b[i] = b;
+        lanes->out_b[i] = b;
     }
-    lanes->by_a[i] = a;
+    lanes->out_a[i] = a;
 }
 
 /// One pass over what one row or two look at.
@@ -101,9 +101,9 @@ COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool
         line += bslam_symmat_filled(i);
     }
     for (int i = n; i % 4 != 0; i++) {
-        lanes.by_a[i] = 0;
+        lanes.out_a[i] = 0;
         if (two) {
-            lanes.by_b[i] = 0;
+            lanes.out_b[i] = 0;
         }
     }
 }
@@ -141,9 +141,9 @@ void bslam_symmat_times(const bslam_real_t *m, int n, const bslam_row_t *row, bs
 }
 
 void bslam_symmat_times_two(const bslam_real_t *m, int n, const bslam_row_t *a, const bslam_row_t *b,
-                            bslam_real_t *by_a, bslam_real_t *by_b)
+                            bslam_real_t *out_a, bslam_real_t *out_b)
 {
-    const lanes_t lanes = {*a, *b, by_a, by_b};
+    const lanes_t lanes = {*a, *b, out_a, out_b};
     times_any(m, n, &lanes, true);
 }
 

@@ -69,7 +69,7 @@ void bslam_symmat_times(const bslam_real_t *m, int n, const bslam_row_t *row, bs
 
 /// The same of two rows that look at the same places: what they look at is read once for both.
 void bslam_symmat_times_two(const bslam_real_t *m, int n, const bslam_row_t *a, const bslam_row_t *b,
-                            bslam_real_t *by_a, bslam_real_t *by_b);
+                            bslam_real_t *out_a, bslam_real_t *out_b);
 
 /// out[0..n) = column j; out is 0 from there up to BSLAM_SYMMAT_PADDED(n). O(n).
 void bslam_symmat_column(const bslam_real_t *m, int n, int j, bslam_real_t *out);

@@ -48,10 +48,10 @@ def _macros(real: str, beacons_max: int) -> Macros:
 
 
 def _drop_inline_functions(text: str) -> str:
-    """Takes `static inline` functions out: cffi declares, it does not define."""
+    """Takes inline functions out: cffi declares, it does not define."""
     kept = []
     at = 0
-    for match in re.finditer(r"static inline[^{;]*\{", text):
+    for match in re.finditer(r"(?:static )?inline[^{;]*\{", text):
         if match.start() < at:
             continue
         kept.append(text[at : match.start()])
