@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = ROOT / "build/fuzz"
+BUILT_OF = PROGRAMS / "sources"
 CORPUS = ROOT / "tests/fuzz/corpus"
 LEDGER = ROOT / "tests/fuzz/ledger.csv"
 OUT = ROOT / "out/fuzz"
@@ -110,7 +111,7 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
         f"-artifact_prefix={crashes}/{target}-", f"-seed={seed}", str(corpus),
     ]  # fmt: skip
     began = time.monotonic()
-    commit, sources = commit_name(), source_hash()
+    commit, sources = commit_name(), BUILT_OF.read_text(encoding="utf-8")
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     found = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
     line = Slice(
@@ -238,11 +239,15 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--targets", nargs="+", choices=TARGETS, default=list(TARGETS), metavar="TARGET")
     parser.add_argument("--table", action="store_true", help="print what ran, run nothing")
+    parser.add_argument("--built", action="store_true", help="for make: the programs are of these sources")
     parser.add_argument("--keep", action="store_true", help="reduce what was found to tests/fuzz/corpus")
     options = parser.parse_args()
-    absent = [target for target in options.targets if not (PROGRAMS / target).exists()]
-    if absent and not options.table:
-        print(f"fuzz: not built: {' '.join(absent)}; `make fuzz` does it", file=sys.stderr)
+    if options.built:
+        BUILT_OF.write_text(source_hash(), encoding="utf-8")
+        return 0
+    is_built = BUILT_OF.exists() and BUILT_OF.read_text(encoding="utf-8") == source_hash()
+    if not is_built and not options.table:
+        print("fuzz: not built of the sources as they are; `make fuzz` does it", file=sys.stderr)
         return 2
     OUT.mkdir(parents=True, exist_ok=True)
     if options.keep:
