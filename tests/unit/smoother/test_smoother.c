@@ -194,6 +194,19 @@ static void test_more_beacons_than_the_window_holds_push_the_oldest_out(void **s
     assert_true(smoother.seen_count > BSLAM_SMOOTHER_SEEN_MAX / 2);
 }
 
+static void test_frames_that_show_one_beacon_fill_the_window_with_nodes(void **state)
+{
+    look(0, 1);
+    for (int k = 0; k < 4 * BSLAM_SMOOTHER_NODES_MAX; k++) {
+        drive(0.016, 0.018);
+        look(0, 1);
+    }
+    assert_sound();
+    assert_int_equal(smoother.seen_count, smoother.node_count);
+    assert_true(smoother.node_count > BSLAM_SMOOTHER_NODES_MAX / 2);
+    assert_true(bslam_smoother_node(&smoother, 0)->seen == 1);
+}
+
 static void test_beacon_leaves_in_any_phase(void **state)
 {
     bool met[3] = {false, false, false};
@@ -373,6 +386,7 @@ int main(void)
         cmocka_unit_test_setup(test_node_is_the_line_through_its_bearings, setup),
         cmocka_unit_test_setup(test_windows_of_any_length_stay_within_their_room, setup),
         cmocka_unit_test_setup(test_more_beacons_than_the_window_holds_push_the_oldest_out, setup),
+        cmocka_unit_test_setup(test_frames_that_show_one_beacon_fill_the_window_with_nodes, setup),
         cmocka_unit_test_setup(test_beacon_leaves_in_any_phase, setup),
         cmocka_unit_test_setup(test_refusals_leave_smoother_and_filter_as_they_are_in_any_phase, setup),
         cmocka_unit_test_setup(test_full_map_takes_no_beacon_and_says_so, setup),
