@@ -21,6 +21,9 @@ static size_t stored;
 static uint32_t clock_us;
 static bslam_camera_t own_camera;
 static int own_cameras;
+static uint32_t left_ticks, right_ticks;
+static bool has_gyro;
+static float gyro_radps;
 
 // ---- a board of nothing but memory -----------------------------------------------------------------------
 
@@ -67,6 +70,20 @@ bool port_load(uint8_t *bytes, size_t count)
     }
     memcpy(bytes, store, count);
     return true;
+}
+
+bool port_encoders(int64_t *time_us, uint32_t *left, uint32_t *right)
+{
+    *time_us = clock_us;
+    *left = left_ticks;
+    *right = right_ticks;
+    return true;
+}
+
+bool port_gyro(float *rate_radps)
+{
+    *rate_radps = gyro_radps;
+    return has_gyro;
 }
 
 const struct bslam_camera *port_cameras(int *count)
@@ -243,15 +260,15 @@ static void show_picture(fuzz_input_t *input)
     }
 }
 
+/// Wheels and gyro, as a robot's main loop reads them; a gyro may say what none should.
 static void take_reading(fuzz_input_t *input)
 {
-    const uint16_t left_ticks = fuzz_u16(input);
-    const bslam_odometry_reading_t reading = {.time_us = clock_us,
-                                              .source = BSLAM_ODOMETRY_TICKS,
-                                              .left_ticks = left_ticks,
-                                              .right_ticks = fuzz_u16(input),
-                                              .has_gyro = left_ticks % 2 != 0,
-                                              .gyro_radps = (bslam_real_t)left_ticks / 10000 - 3};
+    bslam_odometry_reading_t reading;
+    left_ticks = fuzz_u16(input);
+    right_ticks = fuzz_u16(input);
+    has_gyro = left_ticks % 2 != 0;
+    gyro_radps = has_gyro ? (float)fuzz_real(input, -4, 4) : 0;
+    fuzz_require(session_read_body(&reading));
     session_take_reading(&session, &reading);
 }
 
