@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 from bslam.commands.arguments import run_options, scenario_source
 from bslam.commands.drawing import draw
@@ -13,6 +13,9 @@ from bslam.experiment.batch import Job, make_jobs
 from bslam.experiment.options import RunOptions
 from bslam.experiment.sources import Source
 from bslam.world.simulate import load_scenario
+
+BEST_FILTERS: Final = {"distance": ["invariant"], "direction": ["invariant", "similarity", "smoother"]}
+"""Those worth a column where a command is told none (`--filter` None), by observation."""
 
 
 def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None) -> list[Job]:
@@ -39,10 +42,11 @@ def grid(
             seed=seed,
             noise=noise,
         )
-        for sigma_mps, observation, filter_name, association, seed in itertools.product(
-            sigmas_mps or (wheels.sigma_mps,),
-            _values(arguments.observation),
-            _values(arguments.filter),
+        for sigma_mps, observation in itertools.product(
+            sigmas_mps or (wheels.sigma_mps,), _values(arguments.observation)
+        )
+        for filter_name, association, seed in itertools.product(
+            _values(arguments.filter or BEST_FILTERS[observation]),
             _values(arguments.association),
             arguments.seeds,
         )

@@ -23,7 +23,15 @@ from bslam.experiment.consistency import half_interval_95
 from bslam.experiment.datasets import VARIABLE, data_root
 from bslam.experiment.output import write_atomically
 from bslam.experiment.sweep import code_digest
-from bslam.experiment.tables import OBSERVATION_TITLES, STATISTICS, TITLES, Cell, make_cell
+from bslam.experiment.tables import (
+    STATISTICS,
+    TITLES,
+    Cell,
+    heads,
+    make_cell,
+    paper_figure,
+    with_paper,
+)
 from bslam.view.report import Picture, Section, Table, render
 from bslam.world.simulate import load_scenario
 
@@ -164,13 +172,11 @@ def _tables(maker: _Maker) -> Section:
 
 
 def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
-    titles = [OBSERVATION_TITLES[cell.observation] for cell in cells]
-    heads = [f"{title}: {whose}" for title in titles for whose in ("paper", "here")]
-    rows = [["", *heads]]
+    rows = [["", *heads(cells)]]
     for name in STATISTICS:
         row = [TITLES[name]]
-        for cell in cells:
-            row.append(f"{cell.paper_cm[name]:g}" if cell.paper_cm else "-")
+        for cell, is_after_paper in with_paper(cells):
+            row += [paper_figure(cell, name)] if is_after_paper else []
             half = cell.mean_half_95_cm if name == "mean" else None
             row.append(f"{cell.error_cm[name]:.2f}" + ("" if half is None else f" ± {half:.2f}"))
         rows.append(row)
@@ -184,7 +190,10 @@ def _table_of_sigma(number: int, cells: Sequence[Cell]) -> Table:
         "Runs lost": lambda c: f"{c.lost} of {c.runs}",
     }
     for title, text in more.items():
-        rows.append([title, *(cell for one in cells for cell in ("", text(one)))])
+        row = [title]
+        for cell, is_after_paper in with_paper(cells):
+            row += ["", text(cell)] if is_after_paper else [text(cell)]
+        rows.append(row)
     roman = ("I", "II", "III")[number] if number < 3 else str(number + 1)
     return Table(rows, f"Table {roman}: sigma {cells[0].sigma_mps:g} m/s")
 

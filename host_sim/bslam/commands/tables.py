@@ -17,6 +17,7 @@ from bslam.experiment.metrics import WINDOW_S
 from bslam.experiment.options import OBSERVATIONS
 from bslam.experiment.output import write_atomically, write_json
 from bslam.experiment.tables import (
+    NAMES,
     OBSERVATION_TITLES,
     SIGMAS_MPS,
     STATISTICS,
@@ -24,8 +25,11 @@ from bslam.experiment.tables import (
     make_cell,
     markdown,
 )
-from bslam.view.series import Series, draw_pair
+from bslam.view.series import Series, draw_cells
 from bslam.view.style import png
+
+Key = tuple[float, str, str]
+"""Sigma in m/s, observation and filter of a cell."""
 
 SUMMARY = "the paper's Tables I to III and Fig. 6 to 9, with this estimator's figures beside"
 EXAMPLES = """examples:
@@ -33,6 +37,10 @@ EXAMPLES = """examples:
   bslam tables --seeds 100:120 --jobs 2 --out out/fresh
   bslam tables --filter standard --no-velocity-states --motion euler --out out/as_printed
   bslam tables --sigma 0.3 --observation distance --seeds 0:3
+  bslam tables --observation direction --filter invariant,smoother --association known
+
+Without --filter there is a column for each estimator that is worth one: the invariant filter, and in
+direction only the similarity form and the smoother beside it.
 
 Writes tables.md, tables.json, sigmaX.png (errors and NEES over time) and the files of every run."""
 
@@ -43,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario", default="paper_room", help="name, or path of a TOML file (default: paper_room)"
     )
     add_sensor_options(parser)
-    add_filter_options(parser, lists=("observation", "sigma"))
-    parser.set_defaults(sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
+    add_filter_options(parser, lists=("observation", "filter", "sigma"))
+    parser.set_defaults(filter=None, sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
     add_batch_options(parser, "tables", seeds="0:10", pictures=1)
 
 
@@ -60,38 +68,41 @@ def execute(arguments: argparse.Namespace) -> int:
     }
     room = f"{jobs[0].name}.map.png" if arguments.pictures > 0 else None
     runs = len(arguments.seeds)
-    heading = f"Tables I to III: {arguments.scenario}, {arguments.filter} filter, {runs} runs a cell"
+    heading = f"Tables I to III: {arguments.scenario}, {runs} runs a cell"
     write_atomically(arguments.out / "tables.md", markdown(cells, heading, pictures, room))
     write_json(arguments.out / "tables.json", {"schema": 1, "cells": [cell.as_json() for cell in cells]})
     return finish(result, arguments.out, table_of(_rows(cells)), more="tables.md, tables.json")
 
 
-def group(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> dict[tuple[float, str], list[Outcome]]:
-    """Outcomes by sigma and observation, in the order of the jobs."""
-    cell_of = {job.name: (float(job.options.sigma_mps or 0.0), job.options.observation) for job in jobs}
-    by_cell: dict[tuple[float, str], list[Outcome]] = {}
+def group(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> dict[Key, list[Outcome]]:
+    """Outcomes by sigma, observation and filter, in the order of the jobs."""
+    cell_of = {
+        job.name: (float(job.options.sigma_mps or 0.0), job.options.observation, job.options.filter)
+        for job in jobs
+    }
+    by_cell: dict[Key, list[Outcome]] = {}
     for outcome in outcomes:
         by_cell.setdefault(cell_of[outcome.name], []).append(outcome)
     return by_cell
 
 
-def _draw_sigma(out: Path, sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -> str:
+def _draw_sigma(out: Path, sigma_mps: float, by_cell: dict[Key, list[Outcome]]) -> str:
     """Write the picture of a sigma; the name of the file."""
     name = f"sigma{sigma_mps:g}.png"
     write_atomically(out / name, picture(sigma_mps, by_cell))
     return name
 
 
-def picture(sigma_mps: float, by_cell: dict[tuple[float, str], list[Outcome]]) -> bytes:
-    """Both observations of one sigma over time, as PNG."""
-    pair = []
-    for observation in OBSERVATIONS:
-        runs = [one for one in by_cell.get((sigma_mps, observation), []) if len(one.time_s)]
-        if runs:
+def picture(sigma_mps: float, by_cell: dict[Key, list[Outcome]]) -> bytes:
+    """All cells of one sigma over time, as PNG."""
+    cells = []
+    for (sigma, observation, filter_name), outcomes in by_cell.items():
+        runs = [one for one in outcomes if len(one.time_s)]
+        if sigma == sigma_mps and runs:
             error_m, nees = np.array([one.error_m for one in runs]), np.array([one.nees for one in runs])
-            title = OBSERVATION_TITLES[observation]
-            pair.append(Series(title, runs[0].time_s, error_m, nees, nees_band_95(len(runs)), WINDOW_S))
-    return png(draw_pair(f"Position error and NEES, sigma = {sigma_mps:g} m/s", pair))
+            title = f"{OBSERVATION_TITLES[observation]}: {NAMES[filter_name]}"
+            cells.append(Series(title, runs[0].time_s, error_m, nees, nees_band_95(len(runs)), WINDOW_S))
+    return png(draw_cells(f"Position error and NEES, sigma = {sigma_mps:g} m/s", cells))
 
 
 def _rows(cells: Sequence[Cell]) -> list[list[str]]:
@@ -105,5 +116,5 @@ def _rows(cells: Sequence[Cell]) -> list[list[str]]:
         rest = [f"{cell.first_50s_cm:.2f}", f"{cell.last_50s_cm:.2f}"]
         rest += ["-" if cell.bound_cm is None else f"{cell.bound_cm:.2f}", f"{cell.nees_mean:.2f}"]
         rest += [f"{100 * cell.nees_inside_95:.1f} %", f"{cell.lost}/{cell.runs}"]
-        rows.append([f"sigma {cell.sigma_mps:g} {cell.observation}", *pairs, *rest])
+        rows.append([f"sigma {cell.sigma_mps:g} {cell.observation}, {cell.filter}", *pairs, *rest])
     return rows

@@ -20,6 +20,12 @@ TITLES: Final = {
     "std": "Standard deviation",
 }
 OBSERVATION_TITLES: Final = {"distance": "Distance observation", "direction": "Direction only"}
+NAMES: Final = {
+    "standard": "standard filter",
+    "invariant": "invariant filter",
+    "similarity": "similarity form",
+    "smoother": "smoother",
+}
 # Section V, Tables I to III: position error in cm, one run each. (Its text says 0.2 where Table I says 0.3
 # m/s.)
 PAPER_CM: Final[dict[tuple[float, str], dict[str, float]]] = {
@@ -35,10 +41,11 @@ SIGMAS_MPS: Final = (0.3, 0.6, 1.0)
 
 @dataclass(frozen=True)
 class Cell:
-    """One sigma and observation: means over the runs of the runs' own statistics."""
+    """One sigma, observation and filter: means over the runs of the runs' own statistics."""
 
     sigma_mps: float
     observation: str
+    filter: str
     runs: int
     lost: int
     error_cm: dict[str, float]  # by STATISTICS
@@ -64,7 +71,9 @@ class Cell:
         return {**vars(self), "nees_band": list(self.nees_band), "paper_cm": self.paper_cm}
 
 
-def make_cell(sigma_mps: float, observation: str, outcomes: Sequence[Outcome]) -> Cell | None:
+def make_cell(
+    sigma_mps: float, observation: str, filter_name: str, outcomes: Sequence[Outcome]
+) -> Cell | None:
     """The cell of these runs; None if every one of them failed."""
     entries = [one.entry for one in outcomes if "position_error_m" in one.entry]
     if not entries:
@@ -80,6 +89,7 @@ def make_cell(sigma_mps: float, observation: str, outcomes: Sequence[Outcome]) -
     return Cell(
         sigma_mps=sigma_mps,
         observation=observation,
+        filter=filter_name,
         runs=len(outcomes),
         lost=sum(bool(one.entry["diverged"]) for one in outcomes),
         error_cm={name: 100.0 * statistics.fmean(error[name] for error in errors) for name in STATISTICS},
@@ -133,17 +143,13 @@ def _section_title(number: int, sigma_mps: float) -> str:
 
 
 def _table(cells: Sequence[Cell]) -> list[str]:
-    """One column for the paper's figure and one for ours, for each observation."""
-    head, rule = "| cm |", "|---|"
-    for cell in cells:
-        head += f" {OBSERVATION_TITLES[cell.observation]}: paper | here, {cell.runs} runs |"
-        rule += "---:|---:|"
-    lines = [head, rule]
+    """For each observation one column for the paper's figures, and one for each of our filters."""
+    lines = [f"| cm | {' | '.join(heads(cells))} |", "|---|" + "---:|" * len(heads(cells))]
     for name in STATISTICS:
         row = f"| {TITLES[name]} |"
-        for cell in cells:
-            paper = f"{cell.paper_cm[name]:g}" if cell.paper_cm else "-"
-            row += f" {paper} | {cell.error_cm[name]:.2f} |"
+        for cell, is_after_paper in with_paper(cells):
+            row += f" {paper_figure(cell, name)} |" if is_after_paper else ""
+            row += f" {cell.error_cm[name]:.2f} |"
         lines.append(row)
     extra = {
         "Mean error, best to worst run": lambda c: f"{c.mean_low_cm:.2f} to {c.mean_high_cm:.2f}",
@@ -160,7 +166,33 @@ def _table(cells: Sequence[Cell]) -> list[str]:
         ),
         "Runs lost": lambda c: str(c.lost),
     }
-    lines += [
-        f"| {title} |" + "".join(f" | {text(cell)} |" for cell in cells) for title, text in extra.items()
-    ]
+    for title, text in extra.items():
+        row = "".join(
+            (" |" if is_after_paper else "") + f" {text(cell)} |"
+            for cell, is_after_paper in with_paper(cells)
+        )
+        lines.append(f"| {title} |{row}")
     return lines
+
+
+def with_paper(cells: Sequence[Cell]) -> list[tuple[Cell, bool]]:
+    """Each cell, and whether the paper's column stands before it: before the first of an observation."""
+    return [
+        (cell, number == 0 or cell.observation != cells[number - 1].observation)
+        for number, cell in enumerate(cells)
+    ]
+
+
+def heads(cells: Sequence[Cell]) -> list[str]:
+    """Of all columns of figures."""
+    found = []
+    for cell, is_after_paper in with_paper(cells):
+        title = OBSERVATION_TITLES[cell.observation]
+        found += [f"{title}: paper"] if is_after_paper else []
+        found.append(f"{title}: {NAMES[cell.filter]}")
+    return found
+
+
+def paper_figure(cell: Cell, name: str) -> str:
+    """What the paper has in the cell's place, as text."""
+    return f"{cell.paper_cm[name]:g}" if cell.paper_cm else "-"

@@ -39,16 +39,16 @@ def draw_run(series: Series) -> Figure:
     return figure
 
 
-def draw_pair(title: str, pair: Sequence[Series]) -> Figure:
-    """Distance available and direction only side by side, errors on one scale above and NEES below."""
-    figure = new_figure(12.5, 6.8)
-    panels = figure.subplots(2, len(pair), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2))
-    for column, series in enumerate(pair):
+def draw_cells(title: str, cells: Sequence[Series]) -> Figure:
+    """Ways of running side by side, errors on one scale above and NEES below."""
+    figure = new_figure(2.5 + 5.0 * len(cells), 6.8)
+    panels = figure.subplots(2, len(cells), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2))
+    for column, series in enumerate(cells):
         draw_error(panels[0, column], series)
         draw_nees(panels[1, column], series)
         panels[0, column].set_title(series.title, fontsize=10)
         panels[0, column].set_xlabel("")
-    panels[0, 0].set_ylim(0.0, _TOP * max(_highest_cm(series) for series in pair))
+    panels[0, 0].set_ylim(0.0, _TOP * max(_highest_cm(series) for series in cells))
     for axes in panels[:, 1:].flat:
         axes.set_ylabel("")
     figure.suptitle(title, fontsize=12)

@@ -67,7 +67,7 @@ def runs(out):
         (["replay", "csv", "/no/such/log"], ["/no/such/log", "allowed"]),
         (["replay", "csv", "x", "--robot", "1"], ["--robot", "mrclam"]),
         (["replay", "mrclam", "/no/such/set", "--robot", "9"], ["--robot", "9", "1, 2, 3, 4, 5"]),
-        (["tables", "--filter", "standard,invariant"], ["--filter", "standard,invariant"]),
+        (["tables", "--filter", "standard,x"], ["--filter", "'x'", "standard, invariant"]),
         (["sweep", "paper_room", "--filter", "standard,x"], ["--filter", "'x'", "standard, invariant"]),
         (["live", "paper_room", "pairs"], ["'pairs' after paper_room", "one SCENARIO"]),
         (["live", "csv", "/no/such/log"], ["/no/such/log", "allowed"]),
@@ -226,12 +226,19 @@ def test_tables_writes_the_paper_s_figures_beside_ours(tmp_path):
     assert "| Mean error | 10.11 |" in text
     assert "## Table II" in text
     cells = json.loads((out / "tables.json").read_text())["cells"]
-    assert [cell["observation"] for cell in cells] == ["distance", "direction"]
+    directions = [("direction", name) for name in ("invariant", "similarity", "smoother")]
+    assert [(cell["observation"], cell["filter"]) for cell in cells] == [
+        ("distance", "invariant"),
+        *directions,
+    ]
+    assert len({cell["bound_cm"] for cell in cells[1:]}) == 1, "the drives are the same"
+    assert "Direction only: paper | Direction only: invariant filter | Direction only: similarity" in text
+    assert "| Mean error of the bound: Jacobians at the truth | | - | |" in text
     assert cells[0]["paper_cm"]["mean"] == 10.11
     own = [entry["position_error_m"]["mean"] for entry in runs(out) if entry["observation"] == "distance"]
     assert cells[0]["error_cm"]["mean"] == pytest.approx(100.0 * np.mean(own))
     assert (out / "sigma0.6.png").read_bytes().startswith(b"\x89PNG")
-    assert len(runs(out)) == 4
+    assert len(runs(out)) == 8
 
 
 def test_sweep_runs_every_combination(tmp_path, capsys):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bslam.view.room import Mapped, Room, draw_room
-from bslam.view.series import Series, draw_pair, draw_run
+from bslam.view.series import Series, draw_cells, draw_run
 from bslam.view.style import moving_mean, png, thinned
 
 PATH = np.column_stack([np.linspace(0, 5, 200), np.sin(np.linspace(0, 5, 200))])
@@ -80,7 +80,7 @@ def test_run_shows_the_means_at_both_ends():
 
 
 def test_pair_shares_one_scale_that_a_lost_run_does_not_stretch():
-    figure = draw_pair("both", [series(runs=5), series(runs=5, lost=False)])
+    figure = draw_cells("both", [series(runs=5), series(runs=5, lost=False)])
     pixels(figure)
     top = figure.axes[0].get_ylim()[1]
     assert 10.0 < top < 100.0
