@@ -4,9 +4,10 @@ Walks through rendered worlds; of every whole object of 150 px or more that is s
 from its front and at most a tenth hidden, takes the error of direction and of distance. `--boxes rough`
 (default) measures the true box with each edge moved by up to `--jitter` px, evenly; `--boxes detected` what
 the detector finds of it. Columns: n; of how many percent it is measured; rms and 1.4826 median |error|; mean
-square of error over standard deviation, and percent beyond three of these. A distance by the height of a kind
-that it is not does not count. `--correlation` prints besides how alike an object's errors are in
-two frames of a walk, by how far the robot moved between them.
+square of error over standard deviation, and percent beyond three of these; percent marked as hidden. A
+distance by the height of a kind that it is not does not count. `--hidden 0.25:0.9` asks for objects of which
+that share is hidden, in place of whole ones. `--correlation` prints besides how alike an object's errors are
+in two frames of a walk, by how far the robot moved between them.
 `.venv/bin/python tools/measure_outline.py [--rig wide180] [--boxes detected] [--style train]`
 """
 
@@ -47,17 +48,23 @@ ERROR = np.dtype(
         ("bearing_sd", np.float64),
         ("range", np.float64),  # error, a fraction of the distance; NaN: not measured
         ("range_sd", np.float64),
+        ("marked", np.bool_),  # as half hidden
     ]
 )
 Errors = NDArray[np.void]
 Box = tuple[float, float, float, float]
+Hidden = tuple[float, float]  # at least and at most
 
 
-def is_counted(seen: Seen) -> bool:
-    """Whether an object is one of those that must be measured well."""
-    hidden = 1.0 - seen.visible_px / max(seen.own_px, 1)
+def visible_share(seen: Seen) -> float:
+    """How much of an object nothing stands before."""
+    return seen.visible_px / max(seen.own_px, 1)
+
+
+def is_counted(seen: Seen, hidden: Hidden) -> bool:
+    """Whether an object is one of those that are asked for."""
     whole = not seen.cut and seen.visible_px >= VISIBLE_PX_MIN
-    return whole and hidden <= HIDDEN_MAX and seen.slant_rad < SLANT_RAD_MAX
+    return whole and hidden[0] <= 1.0 - visible_share(seen) <= hidden[1] and seen.slant_rad < SLANT_RAD_MAX
 
 
 def overlap(a: Box, b: Box) -> float:
@@ -80,25 +87,27 @@ def measured(
     front_end: FrontEnd,
     frame: Frame,
     found: tuple[Candidate, ...],
+    hidden: Hidden,
     jitter_px: float,
     random: np.random.Generator,
 ) -> Iterator[tuple[Seen, Candidate | None]]:
     """Each counted object with what is measured of it. jitter_px negative: among the detected ones, and only
     those that were."""
     by_name = {one.name: one for one in CLASSES}
-    for seen in filter(is_counted, frame.seen):
+    for seen in (one for one in frame.seen if is_counted(one, hidden)):
         if jitter_px >= 0.0:
             yield (
                 seen,
                 front_end.measure(rough_box(seen, frame, jitter_px, random), by_name[seen.kind]),
             )
             continue
-        near = [one for one in found if overlap(one.outline, seen.box) >= OVERLAP_MIN]
+        least = OVERLAP_MIN * visible_share(seen)
+        near = [one for one in found if overlap(one.outline, seen.box) >= least]
         if near:
             yield seen, max(near, key=lambda one: overlap(one.outline, seen.box))
 
 
-def errors_of_world(seed: int, rig: str, style: str, jitter_px: float) -> Errors:
+def errors_of_world(seed: int, rig: str, style: str, hidden: Hidden, jitter_px: float) -> Errors:
     """Walks through one world with one camera of the rig."""
     cameras = load_rig(rig).cameras
     camera = cameras[seed % len(cameras)]
@@ -110,7 +119,7 @@ def errors_of_world(seed: int, rig: str, style: str, jitter_px: float) -> Errors
     for step, (x_m, y_m, theta_rad) in enumerate(walk(scene, random, FRAMES_A_WORLD, WALK_HZ).tolist()):
         frame = renderer.render((x_m, y_m, theta_rad), step / WALK_HZ)
         found = front_end.see(frame.rgb).candidates
-        for seen, candidate in measured(front_end, frame, found, jitter_px, random):
+        for seen, candidate in measured(front_end, frame, found, hidden, jitter_px, random):
             bearing = bearing_sd = distance = distance_sd = np.nan
             if (
                 candidate is not None
@@ -128,7 +137,8 @@ def errors_of_world(seed: int, rig: str, style: str, jitter_px: float) -> Errors
                 distance = candidate.range_m / seen.range_m - 1.0
                 distance_sd = candidate.range_sd_m / seen.range_m
             row = (seed, step, seen.beacon_id, seen.kind, seen.range_m, (x_m, y_m))
-            rows.append((*row, bearing, bearing_sd, distance, distance_sd))
+            marked = candidate is not None and "hidden" in candidate.marks
+            rows.append((*row, bearing, bearing_sd, distance, distance_sd, marked))
     return np.array(rows, ERROR)
 
 
@@ -152,16 +162,18 @@ def honesty(errors: NDArray[np.floating], sd: NDArray[np.floating]) -> str:
 def print_line(name: str, errors: Errors) -> None:
     has_bearing, has_range = np.isfinite(errors["bearing"]), np.isfinite(errors["range"])
     print(
-        f"{name:13s}{len(errors):6d}   {100 * has_bearing.mean() if len(errors) else 0:4.0f} "
+        f"{name:13s}{len(errors):6d}   {100 * has_bearing.mean():4.0f} "
         f"{spread(errors['bearing'])} {honesty(errors['bearing'], errors['bearing_sd'])}   "
-        f"{100 * has_range.mean() if len(errors) else 0:4.0f} {spread(100 * errors['range'])} "
-        f"{honesty(errors['range'], errors['range_sd'])}"
+        f"{100 * has_range.mean():4.0f} {spread(100 * errors['range'])} "
+        f"{honesty(errors['range'], errors['range_sd'])}   {100 * errors['marked'].mean():4.1f}"
+        if len(errors)
+        else f"{name:13s}     0"
     )
 
 
 def print_tables(errors: Errors) -> None:
-    print("                   n   direction, deg                  distance, %")
-    print("                       has    rms median (e/sd)2 >3sd   has    rms median (e/sd)2 >3sd")
+    print("                   n   direction, deg                  distance, %                    marked,")
+    print("                       has    rms median (e/sd)2 >3sd   has    rms median (e/sd)2 >3sd     %")
     for low, high in DISTANCES_M:
         print_line(f"{low}-{high} m", errors[(errors["distance_m"] >= low) & (errors["distance_m"] < high)])
     middle = errors[(errors["distance_m"] >= 2.5) & (errors["distance_m"] < 7.0)]
@@ -215,12 +227,20 @@ def main() -> None:
     parser.add_argument("--worlds", default="0:60", help="seeds FIRST:END (default 0:60)")
     parser.add_argument("--boxes", default="rough", choices=("rough", "detected"))
     parser.add_argument("--jitter", type=float, default=3.0, help="of rough boxes, px (default 3)")
+    parser.add_argument("--hidden", default=f"0:{HIDDEN_MAX}", help="share hidden, FROM:TO (default 0:0.1)")
     parser.add_argument("--correlation", action="store_true")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     arguments = parser.parse_args()
     first, end = (int(part) for part in arguments.worlds.split(":"))
+    low, high = (float(part) for part in arguments.hidden.split(":"))
     jitter_px = arguments.jitter if arguments.boxes == "rough" else -1.0
-    work = partial(errors_of_world, rig=arguments.rig, style=arguments.style, jitter_px=jitter_px)
+    work = partial(
+        errors_of_world,
+        rig=arguments.rig,
+        style=arguments.style,
+        hidden=(low, high),
+        jitter_px=jitter_px,
+    )
     with ProcessPoolExecutor(arguments.jobs) as pool:
         errors = np.concatenate(
             list(tqdm(pool.map(work, range(first, end)), total=end - first, disable=None))

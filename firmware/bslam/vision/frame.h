@@ -101,6 +101,7 @@ enum {
     BSLAM_MARK_SLANTED = 32,     ///< seen too obliquely
     BSLAM_MARK_MISPLACED = 128,  ///< its height contradicts its place or its width: no distance
     BSLAM_MARK_PART = 64,        ///< its level sides go on beyond it: the outline is that of a part
+    BSLAM_MARK_HIDDEN = 256,     ///< narrower than its kind: something is before it, its direction is rough
 };
 
 /// No object of the model's recogniser.

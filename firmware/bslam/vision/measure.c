@@ -37,6 +37,9 @@ static const bslam_real_t HORIZON_SD_PX = BSLAM_R(0.7);
 // A round thing's width may be off by this part, and contradict its height by so many standard deviations.
 static const bslam_real_t WIDTH_SD = BSLAM_R(0.04);
 static const bslam_real_t WIDTH_SDS = 2;
+// What is seen narrower than this part of the least width of its kind has something before its side: less
+// would mark what is only seen a little more obliquely than its level sides tell.
+static const bslam_real_t HIDDEN_BELOW = BSLAM_R(0.8);
 // What is cut off is seen this much narrower than it is, because it is seen obliquely: mean and deviation.
 static const bslam_real_t OBLIQUE_MEAN = BSLAM_R(0.9);
 static const bslam_real_t OBLIQUE_SD = BSLAM_R(0.12);
@@ -200,6 +203,21 @@ static bool agrees_with_width(const bslam_outline_t *o, const bslam_size_t *size
     return (ratio - 1) * (ratio - 1) <= WIDTH_SDS * WIDTH_SDS * variance;
 }
 
+/// Marks a front that is narrower than its kind: something stands before one of its sides, so its middle may
+/// be off by half of what is missing, to either side. Its height, and with it its distance, is not touched.
+static void mark_hidden(const bslam_outline_t *o, const bslam_size_t *size, const ahead_t *ahead,
+                        bslam_candidate_t *candidate)
+{
+    const bslam_real_t seen = o->left - o->right;
+    const bslam_real_t both = (1 + o->turn * o->left) * (1 + o->turn * o->right);
+    const bslam_real_t width_m = seen * bslam_sqrt(1 + o->turn * o->turn) / (ahead->inverse * both);
+    if (width_m < HIDDEN_BELOW * size->narrow_m) {
+        const bslam_real_t sd = candidate->bearing_sd_rad, off = (size->narrow_m / width_m - 1) * seen / 2;
+        candidate->marks |= BSLAM_MARK_HIDDEN;
+        candidate->bearing_sd_rad = bslam_sqrt(sd * sd + off * off);
+    }
+}
+
 /// Direction, and distance if the height is known, with what is left of their errors when the outline is
 /// known.
 static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
@@ -215,8 +233,11 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     const ahead_t ahead = ahead_of(o, camera, size, point_var);
     const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var;
     candidate->misplaced_sds = (float)ahead.residual_sds;
-    if (ahead.residual_sds > MISPLACED_SDS || !(ahead.inverse > 0) ||
-        !agrees_with_width(o, size, point_var, &ahead)) {
+    const bool hangs_right = ahead.residual_sds <= MISPLACED_SDS && ahead.inverse > 0;
+    if (hangs_right) {
+        mark_hidden(o, size, &ahead, candidate);
+    }
+    if (!hangs_right || !agrees_with_width(o, size, point_var, &ahead)) {
         candidate->marks |= BSLAM_MARK_MISPLACED;
         return;
     }

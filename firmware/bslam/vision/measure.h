@@ -27,7 +27,9 @@ typedef struct bslam_size {
 /// the right has a rough direction, from the end that is seen and how wide its kind is, if that is known;
 /// what is cut off on both sides has none. What is cut off above or below has a direction and no distance;
 /// nor has one whose distance would be less certain than 15 %, or that would hang elsewhere than its kind.
-/// That something stands before an object is not noticed. A candidate without has_bearing must not be used.
+/// What is much narrower than its kind is taken for half hidden: marked, its direction as rough as what is
+/// missing makes it, its distance by its height. That something hides less of it, or of a kind whose width is
+/// not known, is not noticed. A candidate without has_bearing must not be used.
 /// Signature values are 0 where none could be taken.
 ///
 /// The standard deviations are those of the errors left, of which a large part repeats from frame to frame:

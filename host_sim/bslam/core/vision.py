@@ -22,7 +22,17 @@ SIGNATURE_SIZE = 71
 UNKNOWN = BeaconClass("")
 """A kind of which no size is known."""
 
-MARKS = ("cut_left", "cut_right", "cut_top", "cut_bottom", "small", "slanted", "part", "misplaced")
+MARKS = (
+    "cut_left",
+    "cut_right",
+    "cut_top",
+    "cut_bottom",
+    "small",
+    "slanted",
+    "part",
+    "misplaced",
+    "hidden",
+)
 """Names of the bits of a candidate's marks, lowest first."""
 
 

@@ -280,6 +280,30 @@ static void test_measure_says_what_all_distances_share_by_the_kind_or_by_what_is
     assert_near(measured(&camera, &panel, &size).range_scale_sd, 0.03, 1e-7);
 }
 
+/// A board before the left two fifths of a poster: its middle is not that of what is seen.
+static void test_measure_marks_what_is_half_hidden_and_gives_it_a_rough_direction(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t seen = {3, 0.07, 3, -0.35, 0.7, 1.5, 60, 80, 150};
+    const unit_panel_t panels[2] = {poster(3, 0, 0), {2.7, 0.5, 2.7, 0.063, 0, 1.9, 90, 130, 70}};
+    unit_picture_draw(&picture, &camera, WALL, panels, COUNT_OF(panels));
+    const bslam_box_t rough = box_of(&camera, &seen);
+    bslam_size_t size = POSTER_SIZE;
+    bslam_candidate_t blind, told;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &blind), BSLAM_OK);
+    size.narrow_m = size.wide_m = BSLAM_R(0.7);
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &told), BSLAM_OK);
+    assert_int_equal(blind.marks, 0);
+    assert_true(fabs((double)blind.bearing_rad) > 5 * (double)blind.bearing_sd_rad);  // the poster's is 0
+    assert_int_equal(told.marks, BSLAM_MARK_HIDDEN);
+    assert_true(told.has_bearing && fabs((double)told.bearing_rad) < 1.5 * (double)told.bearing_sd_rad);
+    assert_near(told.bearing_sd_rad, 0.14 / 3, 0.008);
+    assert_true(told.has_range && fabs((double)told.range_m - 3) < 3 * (double)told.range_sd_m);
+    const unit_panel_t whole = poster(3, 0, 0.9);  // what is only seen obliquely is not
+    assert_int_equal(measured(&camera, &whole, &size).marks, 0);
+}
+
 static void test_measure_marks_what_is_small(void **state)
 {
     // 4.6 px wide and 46 px high; 69 px wide and 7.4 px high.
@@ -381,6 +405,7 @@ int main(void)
         cmocka_unit_test(test_measure_takes_no_distance_where_height_and_width_contradict_each_other),
         cmocka_unit_test(test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow),
         cmocka_unit_test(test_measure_says_what_all_distances_share_by_the_kind_or_by_what_is_no_noise),
+        cmocka_unit_test(test_measure_marks_what_is_half_hidden_and_gives_it_a_rough_direction),
         cmocka_unit_test(test_measure_marks_what_is_small),
         cmocka_unit_test(test_measure_marks_what_is_slanted),
         cmocka_unit_test(test_measure_refuses_bad_input_and_leaves_the_candidate),
