@@ -92,13 +92,11 @@ test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak
 pytest: images ## the Python tests only
 	@$(PYTHON) -m pytest --quiet
 
-# Which of its parts: PROOF="--only soak mcdc --seeds 3".
+# What of it: PROOF="--only soak mcdc", PROOF="--quick".
 PROOF :=
-PROOF_PROGRAMS := $(SOAK_PROGRAMS) build/unit/float/bin/store/test_slots build/unit/float/bin/store/test_guard
 
 .PHONY: proof
-proof: setup fuzz-programs mcdc-programs ## every long proof beside its goal, in a table (hours); out/proof
-	@$(MAKE) --no-print-directory --silent $(PROOF_PROGRAMS)
+proof: setup ## every long proof beside its goal, in a table (two hours; goes on if stopped); out/proof
 	@$(PYTHON) tools/prove.py $(PROOF)
 
 .PHONY: clean

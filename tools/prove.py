@@ -6,10 +6,10 @@ Examples:
     tools/prove.py --only soak mcdc       some
     tools/prove.py --quick                a little of each in half an hour: whether all of it runs here
 
-`make proof` builds what this runs. What a proof prints is in out/proof/NAME.txt, what came of it in
-out/proof/NAME.json: a proof that ended on the sources as they are is not run again (--again does), so that
-one that was stopped goes on where it was. Times are of two idle cores; what is left is told at the pace so
-far. Exit status 0: every goal is reached; 1: one is not, or could not be measured.
+What a proof prints is in out/proof/NAME.txt, what came of it in out/proof/NAME.json: a proof that ended on
+the sources as they are is not run again (--again does), so that one that was stopped goes on where it was.
+Times are of two idle cores; what is left is told at the pace so far. Exit status 0: every goal is reached;
+1: one is not, or could not be measured.
 """
 
 import argparse
@@ -37,6 +37,7 @@ LAST_LINE = r"([^\n]+)\n?\Z"
 SOURCES = ("firmware", "host_sim", "tests", "tools", "mk")
 SUFFIXES = frozenset((".c", ".h", ".py", ".mk", ".toml", ".sh", ".bin", ".npz"))
 SAY_EVERY_S = 60.0
+UNMEASURED = "not measured"
 
 
 class Proof(NamedTuple):
@@ -48,6 +49,7 @@ class Proof(NamedTuple):
     figure: str
     command: list[str]
     minutes: float  # about, on two idle cores
+    needs: tuple[str, ...] = ()  # targets of make, before it
     environment: Mapping[str, str] = MappingProxyType({})
     least: float | None = None  # share that is near, where the exit status does not judge it
 
@@ -65,7 +67,8 @@ class Result(NamedTuple):
 
 def own_proofs(quick: bool) -> list[Proof]:
     """Of the core alone."""
-    store = ROOT / "build/unit/float/bin/store"
+    slots, guard = "build/unit/float/bin/store/test_slots", "build/unit/float/bin/store/test_guard"
+    soaks = ("build/soak/float/soak", "build/soak/double/soak")
     cuts = ("power cuts at every byte, at every pair", "0 mixed", r"power cuts: (.*)")
     flips = ("bit flips of the guarded state", "found, or without effect", r"bit flips: (.*)")
     soak = ("6 h x 20 seeds, float beside double", "NEES 2.4-3.7, 0, 10 %", r"soak: .* seeds: (.*)")
@@ -75,11 +78,11 @@ def own_proofs(quick: bool) -> list[Proof]:
     less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []
     less_fuzz = ["--seconds", "60"] if quick else []
     return [
-        Proof("cuts", *cuts, [str(store / "test_slots")], 1, depth),
-        Proof("flips", *flips, [str(store / "test_guard")], 0.1, depth),
-        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 1),
-        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 0.2),
-        Proof("fuzz", *fuzz, [PYTHON, "tools/fuzz.py", *less_fuzz], 1 if quick else 20),
+        Proof("cuts", *cuts, [slots], 1, (slots,), depth),
+        Proof("flips", *flips, [guard], 0.1, (guard,), depth),
+        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 1, soaks),
+        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 1, ("mcdc-programs",)),
+        Proof("fuzz", *fuzz, [PYTHON, "tools/fuzz.py", *less_fuzz], 1 if quick else 20, ("fuzz-programs",)),
     ]
 
 
@@ -159,37 +162,44 @@ def keep_result(folder: Path, proof: Proof, sources: str, result: Result) -> Non
 
 def figure_of(proof: Proof, output: str) -> str:
     """All in the output that looks like the figure."""
-    return "; ".join(re.findall(proof.figure, output)) or "not measured"
+    return "; ".join(re.findall(proof.figure, output)) or UNMEASURED
 
 
 def is_enough(proof: Proof, status: int, figure: str) -> bool:
     """Whether the goal is reached."""
     if proof.least is None:
-        return status == 0 and figure != "not measured"
+        return status == 0 and figure != UNMEASURED
     share = re.search(r"(\d+) near.* of (\d+)", figure)
     return status == 0 and share is not None and int(share[1]) >= proof.least * int(share[2])
 
 
 def run(proof: Proof, folder: Path) -> Result:
-    """Runs one; each minute the last line that it printed is told."""
+    """Builds what one needs and runs it; each minute the last line that it printed is told."""
     began = time.monotonic()
-    environment = {**os.environ, **proof.environment, "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(
-        proof.command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
-        lines = [""]
-        ended = threading.Event()
-        watch = threading.Thread(target=tell, args=(proof, lines, ended), daemon=True)
-        watch.start()
-        try:
-            assert process.stdout is not None
-            lines += process.stdout
-        finally:
-            ended.set()
+    lines = [""]
+    ended = threading.Event()
+    threading.Thread(target=tell, args=(proof, lines, ended), daemon=True).start()
+    try:
+        make = ["make", "--no-print-directory", "--silent", *proof.needs]
+        status = follow(make, proof, lines) if proof.needs else 0
+        status = status or follow(proof.command, proof, lines)
+    finally:
+        ended.set()
     output = "".join(lines)
     (folder / f"{proof.name}.txt").write_text(output, encoding="utf-8")
     figure = figure_of(proof, output)
-    return Result(is_enough(proof, process.returncode, figure), figure, time.monotonic() - began)
+    return Result(is_enough(proof, status, figure), figure, time.monotonic() - began)
+
+
+def follow(command: list[str], proof: Proof, lines: list[str]) -> int:
+    """The exit status; what it prints goes behind the lines there are."""
+    environment = {**os.environ, **proof.environment, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        assert process.stdout is not None
+        lines += process.stdout
+    return process.returncode
 
 
 def tell(proof: Proof, lines: list[str], ended: threading.Event) -> None:
@@ -226,7 +236,8 @@ def run_all(chosen: list[Proof], folder: Path, sources: str, again: bool) -> lis
                 f"of {duration(pace * left)} left"
             )
             result = run(proof, folder)
-            keep_result(folder, proof, sources, result)
+            if result.figure != UNMEASURED:
+                keep_result(folder, proof, sources, result)
             spent, expected = spent + result.seconds / 60, expected + proof.minutes
         else:
             say(f"proof {number} of {len(chosen)}, {proof.name}: kept from before")
