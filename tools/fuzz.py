@@ -231,7 +231,7 @@ def campaign(targets: list[str], seconds: float) -> bool:
     return True
 
 
-def main() -> int:
+def main(argv: list[str] | None = None) -> int:
     """Exit status as said above."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -241,7 +241,7 @@ def main() -> int:
     parser.add_argument("--table", action="store_true", help="print what ran, run nothing")
     parser.add_argument("--built", action="store_true", help="for make: the programs are of these sources")
     parser.add_argument("--keep", action="store_true", help="reduce what was found to tests/fuzz/corpus")
-    options = parser.parse_args()
+    options = parser.parse_args(argv)
     if options.built:
         BUILT_OF.write_text(source_hash(), encoding="utf-8")
         return 0

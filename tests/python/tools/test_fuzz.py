@@ -1,0 +1,56 @@
+"""The ledger of fuzzing: what counts for which goal, and what is never run."""
+
+from pathlib import Path
+
+import pytest
+
+import fuzz
+from fuzz import FILLER, GOAL_ALL, GOAL_EACH, TARGETS, Slice, main, missing
+
+
+def slices(sources: str, executions: int, crashes: int = 0) -> list[Slice]:
+    """One of each target."""
+    return [Slice("when", "commit", sources, name, 1, executions, 60, crashes) for name in TARGETS]
+
+
+@pytest.fixture(autouse=True)
+def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "LEDGER", tmp_path / "ledger.csv")
+    monkeypatch.setattr(fuzz, "source_hash", lambda: "now")
+
+
+def test_a_million_on_a_target_counts_on_the_sources_as_they_are_only() -> None:
+    assert missing(slices("before", GOAL_EACH), "map") == GOAL_EACH
+    assert missing(slices("before", GOAL_EACH) + slices("now", 400_000), "map") == GOAL_EACH - 400_000
+    assert missing(slices("now", 2 * GOAL_EACH), "map") == 0
+
+
+def test_the_filler_makes_up_what_the_others_leave_of_the_sum() -> None:
+    others = (len(TARGETS) - 1) * GOAL_EACH
+    assert missing([], FILLER) == GOAL_ALL - others
+    done = slices("before", GOAL_EACH)
+    assert missing(done, FILLER) == GOAL_ALL - others - len(TARGETS) * GOAL_EACH
+    assert missing([*done, done[0]._replace(executions=GOAL_ALL)], FILLER) == GOAL_EACH
+
+
+@pytest.mark.parametrize(("sources", "status"), [("before", 0), ("now", 1)])
+def test_a_crash_counts_until_the_sources_are_others(
+    sources: str, status: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = slices("now", GOAL_ALL)
+    lines[0] = lines[0]._replace(sources=sources, crashes=1, executions=0)
+    for line in [*lines, lines[1]._replace(target=lines[0].target)]:
+        fuzz.write_down(line)
+    assert main(["--table"]) == status
+    assert f"{status} crashes ({1 - status} on earlier sources)" in capsys.readouterr().out
+
+
+def test_programs_of_other_sources_are_not_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    for built_of in (None, "before"):
+        if built_of is not None:
+            fuzz.BUILT_OF.write_text(built_of)
+        assert main(["--seconds", "1"]) == 2
+        assert "`make fuzz` does it" in capsys.readouterr().err
