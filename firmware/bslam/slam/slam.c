@@ -168,6 +168,9 @@ bslam_status_t bslam_slam_remove_beacon(bslam_slam_t *slam, uint32_t uid)
 
 bslam_pose_t bslam_slam_pose(const bslam_slam_t *slam)
 {
+    if (slam->history.filter.behind_us == 0) {
+        return bslam_ekf_pose(&slam->ekf);  // nothing waits: no copy of the robot is to go further
+    }
     bslam_pose_t pose;
     (void)bslam_slam_robot_at(slam, 0, &pose);
     return pose;

@@ -7,7 +7,14 @@
 
 #include "bslam/bslam.h"
 
+typedef struct step {
+    bslam_odometry_reading_t wheels;
+    int count;
+    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
+} step_t;
+
 static bslam_slam_t slam;
+static step_t *own_steps;
 
 static void fail(const char *what)
 {
@@ -25,6 +32,25 @@ static void set(bslam_params_t *params, const char *name, size_t length, double 
         }
     }
     fail(name);
+}
+
+static step_t step_of(const bench_step_t *from)
+{
+    if (from->count > BSLAM_SIGHTINGS_MAX) {
+        fail("more sightings in a step than it takes");
+    }
+    step_t step = {.wheels = {.time_us = from->time_us,
+                              .source = BSLAM_ODOMETRY_WHEELS,
+                              .left_m = (bslam_real_t)from->left_m,
+                              .right_m = (bslam_real_t)from->right_m},
+                   .count = from->count};
+    for (int i = 0; i < from->count; i++) {
+        step.sightings[i] = (bslam_sighting_t){.bearing_rad = (bslam_real_t)from->sightings[i].bearing_rad,
+                                               .range_m = (bslam_real_t)from->sightings[i].range_m,
+                                               .has_range = true,
+                                               .label = from->sightings[i].label};
+    }
+    return step;
 }
 
 void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count, int words, char **word)
@@ -49,23 +75,21 @@ void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count
     if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
         fail("a parameter is refused");
     }
+    own_steps = calloc((size_t)count, sizeof *own_steps);
+    if (own_steps == NULL) {
+        fail("no memory for the drive");
+    }
+    for (int number = 0; number < count; number++) {
+        own_steps[number] = step_of(&steps[number]);
+    }
 }
 
-void peer_step(const bench_step_t *step, int number)
+void peer_step(const bench_step_t *unused, int number)
 {
-    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
-    for (int i = 0; i < step->count; i++) {
-        sightings[i] = (bslam_sighting_t){.bearing_rad = (bslam_real_t)step->sightings[i].bearing_rad,
-                                          .range_m = (bslam_real_t)step->sightings[i].range_m,
-                                          .has_range = true,
-                                          .label = step->sightings[i].label};
-    }
-    const bslam_odometry_reading_t wheels = {.time_us = step->time_us,
-                                             .source = BSLAM_ODOMETRY_WHEELS,
-                                             .left_m = (bslam_real_t)step->left_m,
-                                             .right_m = (bslam_real_t)step->right_m};
-    if ((number > 0 && bslam_slam_odometry(&slam, &wheels) != BSLAM_OK) ||
-        bslam_slam_sightings(&slam, step->time_us, sightings, step->count) != BSLAM_OK) {
+    (void)unused;
+    const step_t *step = &own_steps[number];
+    if ((number > 0 && bslam_slam_odometry(&slam, &step->wheels) != BSLAM_OK) ||
+        bslam_slam_sightings(&slam, step->wheels.time_us, step->sightings, step->count) != BSLAM_OK) {
         fail("a step is refused");
     }
 }
