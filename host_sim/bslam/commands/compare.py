@@ -44,6 +44,9 @@ that are installed run: bslam, dead_reckoning, map (the exact causal MAP, the bo
 The table's ratio is to the map at the steps at which that is solved. compare.json has the table, summary.json
 the runs, compare.png the errors over time."""
 
+TOLD = (BOUND, "isam2")
+"""Those that cannot do without identities."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
@@ -201,8 +204,9 @@ def _say(
     rows[0] += ["mapped", "of", "wrong", "us/step", ""]
     rows += [_row(line) for line in lines]
     print(table_of(rows))
-    if options.association != "known":
-        print(f"association {options.association}: map and isam2 are given the identities")
+    told = [line["method"] for line in lines if line["method"] in TOLD]
+    if options.association != "known" and told:
+        print(f"association {options.association}: {' and '.join(told)}: given the identities")
     print(
         f"files in {arguments.out}: compare.json, compare.png, summary.json, NAME.estimate.tum, NAME.map.csv"
     )

@@ -8,7 +8,7 @@ import itertools
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -203,7 +203,7 @@ def jobs_and_plan(arguments: argparse.Namespace) -> tuple[list[Job], dict[str, s
     words |= {f"with {one.where}": method_digest(one) for one in methods}
     guests = [guest_jobs(jobs, Guest(one, grids[0].call_limit)) for one in methods]
     jobs += itertools.chain.from_iterable(guests)
-    worlds = {f"scenario {one.scenario}": repr(load_scenario(one.scenario)) for one in grids}
+    worlds = {f"scenario {one.scenario}": json.dumps(asdict(load_scenario(one.scenario))) for one in grids}
     return jobs, words | worlds | {"bslam": code_digest()}
 
 

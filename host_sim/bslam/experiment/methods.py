@@ -123,12 +123,10 @@ def load_method(method: Method) -> Callable[[Setup], Algorithm]:
     if not callable(made):
         classes = [word for word, one in vars(module).items() if inspect.isclass(one)]
         there = ", ".join(classes) or "none"
-        raise BslamError(f"{method.where}: {place} has no class {name}; allowed: those that it has, {there}")
+        raise BslamError(f"{place} has no class {name}; allowed: those that it has, {there}")
     missing = [word for word in ("reset", "odometry", "observe", "pose", "map") if not hasattr(made, word)]
     if missing:
-        raise BslamError(
-            f"{method.where}: has no {', '.join(missing)}; allowed: a class as in docs/PLUGIN.md"
-        )
+        raise BslamError(f"{name} has no {', '.join(missing)}; allowed: a class as in docs/PLUGIN.md")
     settings = dict(method.settings)
     takes_setup = bool(inspect.signature(made).parameters)
     return (lambda setup: made(setup, **settings)) if takes_setup else (lambda setup: made(**settings))

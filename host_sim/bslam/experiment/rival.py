@@ -158,7 +158,12 @@ class _Drive:
         )
 
     def _map(self) -> Iterable[MapBeacon]:
-        for number, landmark in enumerate(self._algorithm.map()):
+        landmarks: Any = self._algorithm.map()
+        if not isinstance(landmarks, Iterable):
+            raise AlgorithmError(f"map() returned {landmarks!r}; allowed: a list of Landmark")
+        for number, landmark in enumerate(landmarks):
+            if not isinstance(landmark, Landmark):
+                raise AlgorithmError(f"map() returned {landmark!r}; allowed: Landmark, of bslam.algorithms")
             place = (float(landmark.x_m), float(landmark.y_m))
             if not all(map(math.isfinite, place)):
                 raise AlgorithmError(f"map() returned {landmark!r}; allowed: finite places")

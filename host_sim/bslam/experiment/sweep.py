@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, Final
 
 from tqdm import tqdm
@@ -97,10 +98,9 @@ class Store:
         finished = then.pop(_FINISHED, None)
         changed = [word for word in dict.fromkeys((*plan, *then)) if plan.get(word) != then.get(word)]
         if then and changed and finished is None:
-            word = changed[0]
-            old, new = then.get(word, "not there"), plan.get(word, "not there")
+            change = _change(changed[0], *(one.get(changed[0], "not there") for one in (then, plan)))
             raise BslamError(
-                f"{self.path}: holds part of another sweep: {word} was {old} and is {new} now; "
+                f"{self.path}: holds part of another sweep: {change} now; "
                 "allowed: the sweep as it was, another --out, or --restart"
             )
         if changed:
@@ -135,6 +135,18 @@ class Store:
                 why = "another process is at work on this sweep"
             allowed = "the same command again, which goes on"
             raise BslamError(f"{self.path}: {why}; what it holds is kept; allowed: {allowed}") from error
+
+
+def _change(word: str, old: str, new: str) -> str:
+    """What changed, in words; of a table the first key that did."""
+    try:
+        then, now = json.loads(old), json.loads(new)
+    except ValueError:
+        then, now = old, new
+    if isinstance(then, dict) and isinstance(now, dict):
+        values = ((key, json.dumps(then.get(key)), json.dumps(now.get(key))) for key in {**then, **now})
+        return next(_change(f"{word}, {key}", *both) for key, *both in values if both[0] != both[1])
+    return f"{word} was {shorten(old, 200)} and is {shorten(new, 200)}"
 
 
 def forget(folder: Path) -> None:

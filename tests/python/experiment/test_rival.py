@@ -270,6 +270,16 @@ def test_class_that_is_not_there_or_lacks_methods_is_named(tmp_path):
         load_method(own_method(f"{file}:Half"))
 
 
+@pytest.mark.parametrize(("returned", "said"), [(None, "a list of Landmark"), ([1], "Landmark, of bslam")])
+def test_map_of_something_else_is_named(made, returned, said):
+    class Strange(Scribe):
+        def map(self):
+            return returned
+
+    with pytest.raises(AlgorithmError, match=rf"map\(\) returned .*; allowed: {said}"):
+        told(made.circle_log(3), RunOptions(), Strange)
+
+
 def test_class_without_a_constructor_is_made_without_a_setup(tmp_path, made):
     file = tmp_path / "plain.py"
     body = "".join(f"    def {call}: return {value}\n" for call, value in {

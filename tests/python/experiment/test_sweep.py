@@ -109,7 +109,7 @@ def test_sweep_scenario_that_was_changed_half_way_is_named(
         assert sweep_into(out, sweep) == 0
     short.write_text(short.read_text().replace("speed_mps = 0.4", "speed_mps = 0.5"))
     assert sweep_into(out, sweep) == 2
-    assert f"holds part of another sweep: scenario {short} was Scenario(" in last_line(capsys)
+    assert f"another sweep: scenario {short}, driving, speed_mps was 0.4 and is 0.5 now;" in last_line(capsys)
 
 
 def test_sweep_on_a_full_disk_keeps_what_was_written(sweep: Path, tmp_path: Path) -> None:
