@@ -108,7 +108,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
         "velocity_states": int(uses_velocity_states(options, log)),
         "association": ASSOCIATIONS.index(options.association),
     }
-    params |= defaults.OF_FILTER.get(options.filter, {})
+    if options.observation == "direction":
+        params |= defaults.DIRECTION_ONLY.get(options.filter, {})
     params |= _robot_params(log.robot, log.odometry.kind)
     if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
