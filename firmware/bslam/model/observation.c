@@ -6,11 +6,15 @@ static const bslam_real_t DISTANCE_MIN_M = BSLAM_R(1e-3);
 
 bslam_sensor_t bslam_sensor_at(const bslam_pose_t *pose, const bslam_pose_t *mount)
 {
-    bslam_real_t s;
-    bslam_real_t c;
-    bslam_sin_cos(pose->theta_rad, &s, &c);
-    const bslam_real_t forward_x = c * mount->x_m - s * mount->y_m;
-    const bslam_real_t forward_y = s * mount->x_m + c * mount->y_m;
+    bslam_real_t forward_x = 0;
+    bslam_real_t forward_y = 0;
+    if (mount->x_m != 0 || mount->y_m != 0) {  // a sensor above the axle's middle is where the robot is
+        bslam_real_t s;
+        bslam_real_t c;
+        bslam_sin_cos(pose->theta_rad, &s, &c);
+        forward_x = c * mount->x_m - s * mount->y_m;
+        forward_y = s * mount->x_m + c * mount->y_m;
+    }
     const bslam_sensor_t sensor = {
         .pose = {.x_m = pose->x_m + forward_x,
                  .y_m = pose->y_m + forward_y,
