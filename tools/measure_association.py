@@ -9,7 +9,8 @@ Two ablations of `svm` stand beside the methods: `untrained`, machines that are 
 `--photographs`: simulated sightings whose signatures are of ETH-80's photographs, an object a beacon
 (tools/training/eth80.py). `--classes`, of a camera's sightings: as `seen`, `none`, or `usual`, what the
 beacon is called most often on the drive, with the distance that it would have had as that: what evidence over
-frames could reach at best. `--set` changes a parameter of `svm` and its ablations.
+frames could reach at best. `--score`: what the detector is less sure of is left out where identity is not
+told. `--set` changes a parameter of `svm` and its ablations.
 `--looks` prints how alike simulated signatures are to a camera's instead: top-1 of LinearSVC, C = 10, by
 views a beacon, on the given worlds (the camera's: tools/measure_learner.py).
 `.venv/bin/python tools/measure_association.py pairs lookalikes --sigma 0.6,1.0 --seeds 100:110`
@@ -29,7 +30,7 @@ from scipy import stats
 from sklearn.svm import LinearSVC
 
 from bslam.experiment.batch import make_jobs, run_batch
-from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
+from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD, Threshold
 from bslam.experiment.options import Number, RunOptions
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import Log, Sightings
@@ -37,7 +38,6 @@ from bslam.world.kinds import KINDS
 from bslam.world.simulate import load_scenario, simulate
 from training.eth80 import PhotographedSource
 
-CAMERA_STORE = Path("out") / "camera"
 ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
     "untrained": (("learn_budget", 0),),
     "position": (("looks_weight", 0.0),),
@@ -101,8 +101,8 @@ def source_of(
     if arguments.photographs:
         return PhotographedSource(*drive)
     if arguments.sensor == "camera":
-        threshold = TOLD_THRESHOLD if method == "known" else UNTOLD_THRESHOLD
-        return ClassedSource(*drive, arguments.rig, CAMERA_STORE, threshold, arguments.classes)
+        threshold = TOLD_THRESHOLD if method == "known" else Threshold(arguments.score, arguments.score)
+        return ClassedSource(*drive, arguments.rig, arguments.store, threshold, arguments.classes)
     return ScenarioSource(*drive)
 
 
@@ -193,6 +193,8 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--sensor", choices=("simulated", "camera"), default="simulated")
     parser.add_argument("--rig", default="three60")
+    parser.add_argument("--store", type=Path, default=Path("out") / "camera", metavar="DIR")
+    parser.add_argument("--score", type=float, default=UNTOLD_THRESHOLD.whole, help="a camera's, at least")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("out") / "association")
     parser.add_argument("--looks", action="store_true")

@@ -1,0 +1,192 @@
+"""What wrong associations are made of where images are all that is known, and how few any rule could leave.
+
+Runs `svm` over rendered drives. The first table says what became of the sightings that were matched wrongly:
+clutter with a false beacon that it had started itself, clutter with a beacon, a beacon with another one.
+
+The second is a bound. Each thing in the map at the end of a drive that was seen from ten places, a decimetre
+of way apart, has what a rule could go by: from how many places it was seen, how sure the detector was of it
+in the median, how large it is beside its kind, which the true path tells, and its kind. A judge that sees all
+of this after the drive, and is taught with the truth of these very drives, says what is a beacon. What it
+gets wrong, no rule of that form gets right while it drives.
+`.venv/bin/python tools/measure_false.py --seeds 1000:1020`
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.tree import DecisionTreeClassifier
+
+from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
+from bslam.experiment.ledger import CLUTTER, Ledger
+from bslam.experiment.runner import run_log
+from bslam.experiment.truth import truth_at
+from bslam.log import Log
+from bslam.rig import load_rig
+from bslam.world.simulate import load_scenario
+from camera_drives import arguments
+from measure_association import options_of
+
+PLACE_M = 0.1
+LEAST_PLACES = 10
+JUDGES = {"places": [0], "score": [1], "size": [2], "all three and the kind": [0, 1, 2, 3]}
+DEPTH = 3  # of a judge's tree: with one question it is a threshold
+
+
+@dataclass
+class Thing:
+    """A beacon of the map, false or not."""
+
+    identity: int
+    rows: list[int] = field(default_factory=list)  # of the log's sightings: those matched with it
+
+
+class Books:
+    """Which sightings went to which beacon of the map, and what the wrong ones were: a `Watcher`."""
+
+    def __init__(self) -> None:
+        self.wrong: Counter[str] = Counter()
+        self.sightings = 0
+        self._rows: defaultdict[int, list[int]] = defaultdict(list)
+        self._slam: Any = None
+        self._ledger = Ledger(self._uids)
+
+    def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
+        """Keeps hold of the filter."""
+        del time_us, pose
+        self._slam = slam
+
+    def frame(
+        self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
+    ) -> None:
+        """Enters a frame."""
+        del time_us, columns
+        first = self.sightings
+        self.sightings += len(true_id)
+        if accounts is None:
+            return
+        for row, (identity, account) in enumerate(zip(true_id, accounts, strict=True), first):
+            if account.result in ("matched", "new"):
+                self._rows[account.beacon_uid].append(row)
+            if account.result == "matched":
+                self._judge(identity, self._ledger.identity(account.beacon_uid))
+        self._ledger.book(true_id, [True] * len(true_id), accounts)
+
+    def things(self) -> list[Thing]:
+        """What is in the map."""
+        return [Thing(self._ledger.identity(uid), self._rows[uid]) for uid in self._uids()]
+
+    def _judge(self, identity: int, matched: int) -> None:
+        if identity == CLUTTER:
+            self.wrong["clutter, its own beacon" if matched == CLUTTER else "clutter, a beacon"] += 1
+        elif matched != identity:
+            self.wrong["a beacon, false one" if matched == CLUTTER else "a beacon, another"] += 1
+
+    def _uids(self) -> list[int]:
+        return [] if self._slam is None else [one.uid for one in self._slam.beacons()]
+
+
+def size_error(log: Log, rows: NDArray[np.int64]) -> float:
+    """By what part a thing's distances are too long, the median; 0 where its directions tell no place."""
+    assert log.truth is not None
+    poses = truth_at(log.truth, log.sightings.time_us[rows])[0]
+    mount_m = complex(log.robot.sensor_x_m, log.robot.sensor_y_m) * np.exp(1j * poses[:, 2])
+    eye_m = poses[:, :2] + np.stack([mount_m.real, mount_m.imag], axis=1)
+    angle_rad = poses[:, 2] + log.sightings.bearing_rad[rows]
+    normal = np.stack([-np.sin(angle_rad), np.cos(angle_rad)], axis=1)
+    inverse = normal.T @ normal
+    if np.linalg.cond(inverse) > 1e3:
+        return 0.0
+    place_m = np.linalg.solve(inverse, normal.T @ np.sum(normal * eye_m, axis=1))
+    factor = log.sightings.range_m[rows] / np.hypot(*(place_m - eye_m).T)
+    return float(np.nanmedian(factor)) - 1.0 if np.isfinite(factor).any() else 0.0
+
+
+def features(log: Log, score: NDArray[np.float64], thing: Thing) -> list[float]:
+    """Places, score, size, kind."""
+    assert log.truth is not None and log.sightings.beacon_class is not None
+    rows = np.array(thing.rows)
+    poses = truth_at(log.truth, log.truth.time_us)[0]
+    way_m = np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T))
+    at_m = np.interp(log.sightings.time_us[rows], log.truth.time_us, way_m)
+    places = len(np.unique((at_m / PLACE_M).astype(np.int64)))
+    kind = float(np.bincount(log.sightings.beacon_class[rows]).argmax())
+    return [float(places), float(np.median(score[rows])), abs(size_error(log, rows)), kind]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What is known of a drive afterwards."""
+
+    books: Books
+    things: list[Thing]  # seen from enough places
+    features: NDArray[np.float64]  # (things, 4)
+    true_ids: set[int]  # of beacons that were seen at all often
+
+
+def drive_of(words: argparse.Namespace, seed: int) -> Drive:
+    scenario, rig, store = load_scenario(words.scenario), load_rig(words.rig), CameraStore(words.store)
+    log = camera_log(scenario, seed, words.sigma, "speedometer", rig, store, UNTOLD_THRESHOLD)
+    score = store.drive(scenario, seed, rig).surer_than(UNTOLD_THRESHOLD).seen["score"]
+    books = Books()
+    run_log(log, options_of("svm", "camera", words.sigma, seed), watcher=books)
+    found = [(one, features(log, score, one)) for one in books.things()]
+    often = [(one, row) for one, row in found if row[0] >= LEAST_PLACES]
+    table = np.array([row for _, row in often]).reshape(-1, 4)
+    counts = Counter(log.sightings.beacon_id.tolist())
+    true_ids = {one for one, count in counts.items() if one != CLUTTER and count >= 4}
+    return Drive(books, [one for one, _ in often], table, true_ids)
+
+
+def are_beacons(drive: Drive) -> NDArray[np.bool_]:
+    """Of its things, which are beacons: of several with one identity, the one seen most."""
+    most = {one.identity: one for one in sorted(drive.things, key=lambda one: len(one.rows))}
+    return np.array([one.identity != CLUTTER and most[one.identity] is one for one in drive.things], bool)
+
+
+def print_wrong(drives: Sequence[Drive]) -> None:
+    total = sum(one.books.sightings for one in drives)
+    print(f"\n{total} sightings, matched wrongly:\n\n| sighting, matched with | % | drives |\n|---|---|---|")
+    for name in ("clutter, its own beacon", "clutter, a beacon", "a beacon, false one", "a beacon, another"):
+        counts = [one.books.wrong[name] for one in drives]
+        print(f"| {name} | {100.0 * sum(counts) / total:.3f} | {sum(count > 0 for count in counts)} |")
+
+
+def print_bound(drives: Sequence[Drive]) -> None:
+    truth = [are_beacons(one) for one in drives]
+    total = sum(one.books.sightings for one in drives)
+    all_features, all_truth = np.concatenate([one.features for one in drives]), np.concatenate(truth)
+    unseen = sum(len(one.true_ids) - int(np.sum(there)) for one, there in zip(drives, truth, strict=True))
+    print(
+        f"\n{np.sum(all_truth)} beacons, {np.sum(~all_truth)} others seen from {LEAST_PLACES} places; "
+        f"{unseen} beacons seen from fewer, or not in the map\n\n"
+        "| a judge taught with the truth, by | beacons lost | others kept | exact drives | wrong % |\n"
+        "|---|---|---|---|---|"
+    )
+    for name, columns in JUDGES.items():
+        tree = DecisionTreeClassifier(max_depth=1 if len(columns) == 1 else DEPTH, random_state=0)
+        tree.fit(all_features[:, columns], all_truth)
+        exact = lost = kept = wrong = 0
+        for one, there in zip(drives, truth, strict=True):
+            said = tree.predict(one.features[:, columns])
+            exact += int(np.all(said == there)) and int(np.sum(there)) == len(one.true_ids)
+            lost, kept = lost + int(np.sum(there & ~said)), kept + int(np.sum(~there & said))
+            wrong += sum(len(one.things[false].rows) for false in np.flatnonzero(~there & said))
+        print(f"| {name} | {lost} | {kept} | {exact} of {len(drives)} | {100.0 * wrong / total:.2f} |")
+
+
+def main() -> None:
+    words = arguments(__doc__, range(1000, 1020))
+    drives = [drive_of(words, seed) for seed in words.seeds]
+    print_wrong(drives)
+    print_bound(drives)
+
+
+if __name__ == "__main__":
+    main()
