@@ -6,7 +6,8 @@ FUZZ_TARGETS := link map model image api drive session
 FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c
 FUZZ_APP := $(APP_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_APP) $(FUZZ_HELPERS)
-FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"sizes.h"' -DSESSION_VISION=1 -DSESSION_MAP_BYTES=4096
+FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"sizes.h"' -DSESSION_VISION=1 -DSESSION_TURNS=1 \
+    -DSESSION_MAP_BYTES=4096
 FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) $(FUZZ_DEFINES) $(SANITIZE) -g -MMD -MP
 
 CLANG := clang-19

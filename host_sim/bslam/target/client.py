@@ -12,7 +12,6 @@ from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report, Wi
 from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
-ATTEMPTS = 5
 _MEANING = {
     "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
@@ -54,13 +53,13 @@ class Client:
         """Send a message and wait for its answer. Raises TargetError if none comes, or the robot restarts."""
         self._sequence = (self._sequence + 1) % (1 << 16)
         data = encode(Frame(message, self._sequence, time_us, payload))
-        for attempt in range(ATTEMPTS):
+        for attempt in range(self._line.attempts):
             self.repeats += attempt > 0
             self._line.write(data)
             frame = self._answer(message)
             if frame is not None:
                 return self._checked(message, frame)
-        raise TargetError(f"no answer to {message.name} after {ATTEMPTS} attempts")
+        raise TargetError(f"no answer to {message.name} after {self._line.attempts} attempts")
 
     def _answer(self, message: Message) -> Frame | None:
         """The answer to the last message; None if it did not come in time."""

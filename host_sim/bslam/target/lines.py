@@ -25,6 +25,7 @@ ICOUNT = "shift=7,sleep=off"
 NS_PER_INSTRUCTION = 128
 """QEMU's clock under ICOUNT: an instruction takes that long, more than a tick, so that ticks count them."""
 START_TIMEOUT_S = 30.0
+ATTEMPTS = 5
 
 
 class TargetError(RuntimeError):
@@ -41,6 +42,10 @@ class Line(Protocol):
     @property
     def ns_per_instruction(self) -> int | None:
         """How long an instruction takes on the target's clock, if that is fixed."""
+
+    @property
+    def attempts(self) -> int:
+        """How often a message is sent before the robot is taken for gone."""
 
     def write(self, data: bytes) -> None:
         """Sends all of it."""
@@ -128,6 +133,7 @@ class QemuLine:
     """An image in QEMU, its serial line on a socket of ours. The same instructions at every run."""
 
     ns_per_instruction: int | None = NS_PER_INSTRUCTION
+    attempts = 60  # a computer with much to do lets its emulator wait
 
     def __init__(self, name: str, *more: str) -> None:
         """`name` as in --target: BOARD, BOARD/PROGRAM, each with :FILM; `more` arguments for QEMU."""
@@ -235,6 +241,7 @@ class ProcessLine:
     """A program that speaks the link on its standard input and output: the application on this computer."""
 
     ns_per_instruction: int | None = None
+    attempts = ATTEMPTS
 
     def __init__(self, program: Path) -> None:
         if not program.is_file():
@@ -281,6 +288,7 @@ class SerialLine:
     """A serial device, a robot at its other end."""
 
     ns_per_instruction: int | None = None
+    attempts = ATTEMPTS
     BAUD = 115200
 
     def __init__(self, device: str) -> None:

@@ -175,7 +175,7 @@ class BadLine:
     def __init__(self, seed, rate, line):
         self.random, self.rate, self.line = random.Random(seed), rate, line
         self.spoilt = 0
-        self.ns_per_instruction = None
+        self.ns_per_instruction, self.attempts = None, 40
         self.description = line.description
 
     def spoil(self, data):
@@ -220,7 +220,6 @@ def test_a_run_over_the_link_is_the_run_on_the_host(log, words):
 
 def test_a_run_over_a_bad_line_is_still_the_run_on_the_host(log, monkeypatch, robot_line):
     monkeypatch.setattr(client, "ANSWER_TIMEOUT_S", 0.05)
-    monkeypatch.setattr(client, "ATTEMPTS", 40)
     lines = []
 
     def factory(params, beacons):
