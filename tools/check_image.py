@@ -28,8 +28,8 @@ CALLED_BY_POINTER = (
     ),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
-    (r"read_head|kept_|port_(save|load)", r"(erase|write|read)$"),
-    (r"bslam_passage_|variance_at", r"take_piece|read_memory"),
+    (r"read_head|kept_|port_(save|load)|look_at|flush|read_map|bslam_slots_", r"(erase|write|read)$"),
+    (r"bslam_passage_|variance_at", r"take_piece|write_piece|read_memory|read_map"),
 )
 """Callers, and whom they may call through a pointer."""
 

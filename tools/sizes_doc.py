@@ -97,7 +97,7 @@ def image_sections(path: Path) -> tuple[int, int]:
         if len(words) == 3 and words[1].isdigit():
             sizes[words[0]] = int(words[1])
     rom = sizes[".text"] + sizes[".note.gnu.build-id"] + sizes[".ARM.exidx"] + sizes[".data"]
-    return rom, sizes[".data"] + sizes[".bss"]
+    return rom, sizes[".data"] + sizes[".bss"] + sizes[".noinit"]
 
 
 def stack_of(path: Path, functions: Sequence[str]) -> dict[str, int]:

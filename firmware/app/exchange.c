@@ -288,6 +288,16 @@ static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
+static void apply_map_save(session_t *session, bslam_link_reader_t *reader)
+{
+    if (is_whole(session, reader)) {
+        const bslam_flash_t *flash = port_map_flash();
+        bslam_map_fault_t fault;
+        const bool saved = flash != NULL && bslam_slots_save(flash, &session->slam, &fault) == BSLAM_OK;
+        session->last_status = saved ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+    }
+}
+
 static void apply_map_write(session_t *session, bslam_link_reader_t *reader)
 {
     const uint32_t at = bslam_link_get_u32(reader);
@@ -541,6 +551,7 @@ static const exchange_t exchanges[] = {
     {SESSION_MAP_READ, apply_nothing, answer_map_read},
     {SESSION_MAP_WRITE, apply_map_write, answer_nothing},
     {SESSION_MAP_LOAD, apply_map_load, answer_map_load},
+    {SESSION_MAP_SAVE, apply_map_save, answer_nothing},
 #if SESSION_VISION
     {SESSION_CAMERA, apply_camera, answer_nothing},
     {SESSION_IMAGE, apply_image, answer_nothing},

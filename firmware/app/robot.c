@@ -3,7 +3,7 @@
 #include "app/session.h"
 #include "port/port.h"
 
-static session_t session;
+PORT_KEPT static session_t session;
 
 static void take_bytes(void)
 {

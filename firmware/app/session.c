@@ -2,7 +2,14 @@
 
 #include "app/exchange.h"
 #include "app/stored.h"
+#include "bslam/store/crc32.h"
 #include "port/port.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/// No reset takes longer.
+static const bslam_real_t RESTART_S = 1;
 
 void session_send(session_t *session, bslam_link_writer_t *out)
 {
@@ -32,6 +39,15 @@ static void answer(session_t *session, const exchange_t *exchange)
     session_send(session, &out);
 }
 
+/// In the map that was saved; false: there is none, or nothing that would find the robot in it.
+static bool enter_saved_map(session_t *session)
+{
+    const bslam_flash_t *flash = port_map_flash();
+    bslam_map_fault_t fault;
+    return flash != NULL && session->watch.recovers &&
+           bslam_slots_load(flash, &session->slam, BSLAM_MAP_LIVING, &fault) == BSLAM_OK;
+}
+
 bool session_is_good(session_t *session, int64_t time_us)
 {
     if (watch_is_good(&session->watch, &session->slam, time_us)) {
@@ -40,6 +56,7 @@ bool session_is_good(session_t *session, int64_t time_us)
     int bad_id;
     const uint8_t status = session_start_over(session, &bad_id);
     (void)status;  // the parameters were good before
+    (void)enter_saved_map(session);
     watch_end_step(&session->watch, &session->slam, time_us);
     return false;
 }
@@ -154,16 +171,62 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
     return session_start_over(session, &bad_id);
 }
 
+/// Of this image and no other: what is kept has its addresses.
+static uint32_t image_mark(void)
+{
+    return ~bslam_crc32_add(BSLAM_CRC32_START, port_build_id(), PORT_BUILD_ID_BYTES);
+}
+
+static bool is_kept(session_t *session)
+{
+    return session->mark == image_mark() && watch_is_kept(&session->watch, &session->slam);
+}
+
+/// Time stamps and the counters of wheels begin anew, and the robot may have rolled on meanwhile.
+static uint8_t go_on(session_t *session)
+{
+    const bslam_params_t *params = &session->slam.params;
+    const bslam_real_t way_sd_m = params->gap_speed_sd_mps * RESTART_S;
+    const bslam_real_t turn_sd_rad = params->gap_turn_sd_radps * RESTART_S;
+    session->params = *params;
+    session->uses_looks = session->slam.looks != NULL;
+    watch_go_on(&session->watch, port_time_us());
+    return (uint8_t)bslam_slam_resume_odometry(&session->slam, way_sd_m < 30 ? way_sd_m : 30,
+                                               turn_sd_rad < 3 ? turn_sd_rad : 3);
+}
+
+static session_start_t start_cold(session_t *session, bool has_eyes, uint8_t *status)
+{
+    *status = start_with_params(session, has_eyes);
+    watch_init(&session->watch, true, true);
+    if (*status == BSLAM_OK && enter_saved_map(session)) {
+        return SESSION_STARTED_IN_MAP;
+    }
+    watch_init(&session->watch, false, false);
+    return SESSION_STARTED_EMPTY;
+}
+
 void session_init(session_t *session)
 {
-    *session = (session_t){0};
+    const bool kept = is_kept(session);
+    const size_t keeps = kept ? offsetof(session_t, carried) : 0;
+    memset((uint8_t *)session + keeps, 0, sizeof *session - keeps);
     const bool has_eyes = open_eyes(session) > 0;
-    const uint8_t status = start_with_params(session, has_eyes);
+    uint8_t status = BSLAM_OK;
+    session_start_t start = SESSION_WENT_ON;
+    if (kept) {
+        status = go_on(session);
+    } else {
+        start = start_cold(session, has_eyes, &status);
+    }
+    session->mark = image_mark();
+    watch_end_step(&session->watch, &session->slam, port_time_us());
     bslam_link_writer_t out;
     // A delimiter first: whatever the line had before the start is no part of this frame.
     const uint8_t delimiter = 0;
     port_write(&delimiter, 1);
     session_begin(session, &out, SESSION_READY, 0, port_time_us());
     bslam_link_put_u8(&out, status);
+    bslam_link_put_u8(&out, (uint8_t)start);
     session_send(session, &out);
 }

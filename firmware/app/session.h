@@ -45,6 +45,7 @@ typedef enum session_message {
     SESSION_MAP_READ = 0x18,    ///< asks for bytes of the map as a blob
     SESSION_MAP_WRITE = 0x19,   ///< bytes of a map
     SESSION_MAP_LOAD = 0x1a,    ///< takes the map that was written in place of its own
+    SESSION_MAP_SAVE = 0x1b,    ///< keeps the map over a restart
     SESSION_CAMERA = 0x11,      ///< what a camera is; this and the next four: only with SESSION_VISION
     SESSION_IMAGE = 0x12,       ///< starts a picture
     SESSION_PIXELS = 0x13,      ///< the next bytes of it
@@ -64,6 +65,13 @@ typedef enum session_report {
 /// A flag of SESSION_ODOMETRY and SESSION_POSE: a gyro's rate goes with the reading.
 #define SESSION_HAS_GYRO 1u
 
+/// What a robot has after start-up, as SESSION_READY says.
+typedef enum session_start {
+    SESSION_STARTED_EMPTY = 0,
+    SESSION_STARTED_IN_MAP,  ///< in the saved map, where it does not know its place yet
+    SESSION_WENT_ON          ///< its memory outlasted the reset: all that it knew
+} session_start_t;
+
 /// Statuses of the link itself; those of the library are below, from 0 up.
 typedef enum session_status {
     SESSION_E_NO_SESSION = 0x40,  ///< no SESSION_HELLO came since the robot started
@@ -74,23 +82,26 @@ typedef enum session_status {
     SESSION_E_SMOOTHER = 0x45     ///< the image has no smoother
 } session_status_t;
 
-/// All members are the session's own.
+/// All members are the session's own. In memory that outlasts a reset (PORT_KEPT) the filter does so, too.
 typedef struct session {
     bslam_slam_t slam;
 #if SESSION_LOOKS
     bslam_looks_t looks;
-    float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
-    bslam_sample_t seeds[BSLAM_SEEDS_MAX];
-    int32_t seed_count;
 #endif
 #if SESSION_SMOOTHER
     bslam_smoother_t smoother;
 #endif
+    watch_t watch;
+    uint32_t mark;  ///< that the members above are this image's; those below start anew with the program
+    carried_t carried;
+#if SESSION_LOOKS
+    float signatures[BSLAM_SIGHTINGS_MAX][BSLAM_SAMPLE_FEATURES];
+    bslam_sample_t seeds[BSLAM_SEEDS_MAX];
+    int32_t seed_count;
+#endif
 #if SESSION_VISION
     seeing_t seeing;
 #endif
-    watch_t watch;
-    carried_t carried;
     bslam_params_t params;  ///< as set, for the next reset
     bslam_link_parser_t parser;
     uint32_t id;  ///< the host's number of this session
@@ -116,8 +127,12 @@ typedef struct session {
     uint8_t out[BSLAM_LINK_FRAME_MAX];
 } session_t;
 
-/// Starts with an empty map, with the parameters that were saved or else the defaults, and reports that the
-/// robot is ready.
+/// Goes on after a reset where the filter's memory is guarded and as it was when it was last sealed: the map
+/// and the pose, this one as doubtful as a second without odometry makes it. Otherwise starts with the
+/// parameters that were saved or else the defaults, in the map that was saved or else an empty one; in a
+/// saved map with recovery and guard. Reports that the robot is ready, and with what.
+///
+/// *session: all zero, or what a reset left of it, which may be anything.
 void session_init(session_t *session);
 
 /// Takes a byte that came over the link; applies and answers the message that it completes.

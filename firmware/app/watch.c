@@ -26,6 +26,17 @@ static void note(watch_t *watch, watch_trouble_t trouble, int64_t time_us)
     watch->trouble_us = time_us;
 }
 
+bool watch_is_kept(watch_t *watch, const bslam_slam_t *slam)
+{
+    return watch->guards && bslam_guard_check(&watch->guard, slam) == BSLAM_OK;
+}
+
+void watch_go_on(watch_t *watch, int64_t time_us)
+{
+    watch_restart(watch);
+    note(watch, WATCH_RESTARTED, time_us);
+}
+
 bool watch_is_good(watch_t *watch, const bslam_slam_t *slam, int64_t time_us)
 {
     if (!watch->guards || !watch->guard.is_sealed || bslam_guard_check(&watch->guard, slam) == BSLAM_OK) {

@@ -12,7 +12,8 @@ typedef enum watch_trouble {
     WATCH_LOST,     ///< the robot was not where the filter had it
     WATCH_FOUND,    ///< and found itself again
     WATCH_CORRUPT,  ///< the memory was no longer what it was: the filter started over
-    WATCH_INSANE    ///< a variance is negative, or the state not finite: it goes on, and is not to be trusted
+    WATCH_INSANE,   ///< a variance is negative, or the state not finite: it goes on, and is not to be trusted
+    WATCH_RESTARTED  ///< the program started anew; the memory was good, so that the filter goes on
 } watch_trouble_t;
 
 /// All members are the watch's own.
@@ -31,6 +32,12 @@ void watch_init(watch_t *watch, bool recovers, bool guards);
 
 /// The filter starts over: what is known against its pose is forgotten, counts stay.
 void watch_restart(watch_t *watch);
+
+/// After a reset: whether the state is guarded, and as it was when it was last sealed.
+bool watch_is_kept(watch_t *watch, const bslam_slam_t *slam);
+
+/// After a reset, with a state that was kept.
+void watch_go_on(watch_t *watch, int64_t time_us);
 
 /// False: the state is not as it was when it was last sealed. Counted and noted.
 bool watch_is_good(watch_t *watch, const bslam_slam_t *slam, int64_t time_us);

@@ -32,3 +32,8 @@ ABSENT const struct bslam_flash *port_flash(void)
 {
     return NULL;
 }
+
+ABSENT const struct bslam_flash *port_map_flash(void)
+{
+    return NULL;
+}

@@ -26,6 +26,13 @@ int64_t port_time_us(void);
 uint32_t port_ticks(void);
 uint32_t port_ticks_hz(void);
 
+/// Of a variable: it outlasts a reset, since the start-up code of a board leaves it as it is.
+#if defined(__unix__)
+#define PORT_KEPT
+#else
+#define PORT_KEPT __attribute__((noinit))
+#endif
+
 /// PORT_BUILD_ID_BYTES bytes that no other image has.
 #define PORT_BUILD_ID_BYTES 20
 const uint8_t *port_build_id(void);
@@ -70,5 +77,8 @@ const struct bslam_flash *port_flash(void);
 /// board has no memory for that, it failed, or nothing was ever kept. port/kept.c has both for every board.
 bool port_save(const uint8_t *bytes, size_t count);
 bool port_load(uint8_t *bytes, size_t count);
+
+/// Two areas of flash for a map (bslam/store/slots.h); NULL: the board keeps none.
+const struct bslam_flash *port_map_flash(void);
 
 #endif

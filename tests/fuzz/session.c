@@ -86,6 +86,11 @@ bool port_gyro(float *rate_radps)
     return has_gyro;
 }
 
+const struct bslam_flash *port_map_flash(void)
+{
+    return NULL;
+}
+
 const struct bslam_camera *port_cameras(int *count)
 {
     *count = own_cameras;
@@ -300,6 +305,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     stored = 0;
     own_camera = fuzz_camera(BSLAM_LENS_PINHOLE);
     own_cameras = (choice & 4u) != 0 ? 1 : 0;
+    memset(&session, 0, sizeof session);
     session_init(&session);
     require_good_answers(1);
     if ((choice & 1u) != 0) {
@@ -310,7 +316,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
     }
     if ((choice & 2u) != 0) {
-        session_init(&session);  // a restart: with what was stored
+        session_init(&session);  // a restart: with what was stored, or guarded
     }
     fuzz_require_sound(&session.slam);
     return 0;

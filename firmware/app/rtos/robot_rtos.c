@@ -17,7 +17,7 @@
 #define ROBOT_PRIORITY 1
 #define BODY_PRIORITY 2
 
-static session_t session;
+PORT_KEPT static session_t session;
 static QueueHandle_t readings;
 
 static void read_body(void *unused)

@@ -1,5 +1,5 @@
-/// What the micro:bit keeps: the last two pages of the nRF51822's flash. Nordic's nRF51 reference manual,
-/// chapter "NVMC". QEMU's board has them.
+/// What the micro:bit keeps: parameters in the last two pages of the nRF51822's flash, a map in the four
+/// before. Nordic's nRF51 reference manual, chapter "NVMC". QEMU's board has them.
 #include "port/kept.h"
 
 #include <string.h>
@@ -16,11 +16,19 @@
 #define CONFIG_ERASE 2u
 
 #define PAGE_BYTES 0x400u
-#define FIRST_ADDRESS 0x3f800u
 
-static uint32_t place(int slot, uint32_t at)
+/// Two slots, one after the other.
+typedef struct area {
+    uint32_t first;
+    uint32_t slot_bytes;
+} area_t;
+
+static const area_t params_area = {0x3f800u, PAGE_BYTES};
+static const area_t map_area = {0x3e800u, 2 * PAGE_BYTES};
+
+static uint32_t place(const area_t *area, int slot, uint32_t at)
 {
-    return FIRST_ADDRESS + (uint32_t)slot * PAGE_BYTES + at;
+    return area->first + (uint32_t)slot * area->slot_bytes + at;
 }
 
 static void configure(uint32_t config)
@@ -32,21 +40,24 @@ static void configure(uint32_t config)
 
 static bool erase(void *context, int slot)
 {
-    (void)context;
+    const area_t *area = context;
     configure(CONFIG_ERASE);
-    NVMC_ERASEPAGE = place(slot, 0);
+    for (uint32_t at = 0; at < area->slot_bytes; at += PAGE_BYTES) {
+        NVMC_ERASEPAGE = place(area, slot, at);
+        while (NVMC_READY == 0) {
+        }
+    }
     configure(CONFIG_READ);
     return true;
 }
 
 static bool write(void *context, int slot, uint32_t at, const void *bytes, uint32_t count)
 {
-    (void)context;
     configure(CONFIG_WRITE);
     for (uint32_t i = 0; i < count; i += sizeof(uint32_t)) {
         uint32_t word;
         memcpy(&word, (const uint8_t *)bytes + i, sizeof word);
-        REGISTER(place(slot, at + i)) = word;
+        REGISTER(place(context, slot, at + i)) = word;
         while (NVMC_READY == 0) {
         }
     }
@@ -56,14 +67,19 @@ static bool write(void *context, int slot, uint32_t at, const void *bytes, uint3
 
 static bool read(void *context, int slot, uint32_t at, void *bytes, uint32_t count)
 {
-    (void)context;
-    memcpy(bytes, (const void *)place(slot, at), count);
+    memcpy(bytes, (const void *)place(context, slot, at), count);
     return true;
 }
 
-static const bslam_flash_t flash = {.erase = erase, .write = write, .read = read, .slot_bytes = PAGE_BYTES};
+static const bslam_flash_t params_flash = {erase, write, read, (void *)&params_area, PAGE_BYTES};
+static const bslam_flash_t map_flash = {erase, write, read, (void *)&map_area, 2 * PAGE_BYTES};
 
 const bslam_flash_t *port_flash(void)
 {
-    return &flash;
+    return &params_flash;
+}
+
+const bslam_flash_t *port_map_flash(void)
+{
+    return &map_flash;
 }

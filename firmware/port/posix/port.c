@@ -3,11 +3,13 @@
 /// its robot.
 #define _POSIX_C_SOURCE 200809L
 
+#include "bslam/store/slots.h"
 #include "port/film.h"
 
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <time.h>
@@ -100,6 +102,48 @@ bool port_load(uint8_t *bytes, size_t count)
     const char *path = getenv("BSLAM_STORE");
     const int file = path != NULL ? open(path, O_RDONLY) : -1;
     return file >= 0 && read(file, bytes, count) == (ssize_t)count && close(file) == 0;
+}
+
+// ---- flash for a map: the file that the environment variable BSLAM_MAP names
+// -------------------------------
+
+#define SLOT_BYTES 65536
+
+static int map_file = -1;
+
+static off_t place(int slot, uint32_t at)
+{
+    return (off_t)slot * SLOT_BYTES + (off_t)at;
+}
+
+static bool erase(void *context, int slot)
+{
+    (void)context;
+    uint8_t blank[SLOT_BYTES];
+    memset(blank, 0xff, sizeof blank);
+    return pwrite(map_file, blank, sizeof blank, place(slot, 0)) == (ssize_t)sizeof blank;
+}
+
+static bool write_flash(void *context, int slot, uint32_t at, const void *bytes, uint32_t count)
+{
+    (void)context;
+    return pwrite(map_file, bytes, count, place(slot, at)) == (ssize_t)count;
+}
+
+static bool read_flash(void *context, int slot, uint32_t at, void *bytes, uint32_t count)
+{
+    (void)context;
+    return pread(map_file, bytes, count, place(slot, at)) == (ssize_t)count;
+}
+
+const bslam_flash_t *port_map_flash(void)
+{
+    static const bslam_flash_t flash = {erase, write_flash, read_flash, NULL, SLOT_BYTES};
+    const char *path = getenv("BSLAM_MAP");
+    if (path != NULL && map_file < 0) {
+        map_file = open(path, O_RDWR | O_CREAT, 0644);
+    }
+    return map_file >= 0 ? &flash : NULL;
 }
 
 void port_exit(int status)

@@ -1,5 +1,6 @@
-/// What the STM32F405 keeps: sectors 10 and 11, the last 256 KB of its flash. ST's RM0090, section 3. An
-/// erase takes the core up to two seconds, in which nothing runs: save at a standstill.
+/// What the STM32F405 keeps: parameters in sectors 10 and 11, the last 256 KB of its flash, a map in sectors
+/// 8 and 9 before them. ST's RM0090, section 3. An erase takes the core up to two seconds, in which nothing
+/// runs: save at a standstill.
 ///
 /// QEMU's flash cannot be written: what is kept is read back there, and found missing.
 #include "port/kept.h"
@@ -25,13 +26,20 @@
 #define ACR_DATA_CACHE (1u << 10)
 #define ACR_DATA_CACHE_RESET (1u << 12)
 
-#define FIRST_SECTOR 10
 #define SECTOR_BYTES 0x20000u
-#define FIRST_ADDRESS 0x080c0000u
 
-static uint32_t place(int slot, uint32_t at)
+/// Two slots, a sector each.
+typedef struct area {
+    int first_sector;
+    uint32_t first_address;
+} area_t;
+
+static const area_t params_area = {10, 0x080c0000u};
+static const area_t map_area = {8, 0x08080000u};
+
+static uint32_t place(const area_t *area, int slot, uint32_t at)
 {
-    return FIRST_ADDRESS + (uint32_t)slot * SECTOR_BYTES + at;
+    return area->first_address + (uint32_t)slot * SECTOR_BYTES + at;
 }
 
 static void unlock(uint32_t what)
@@ -54,9 +62,9 @@ static bool lock(void)
 
 static bool erase(void *context, int slot)
 {
-    (void)context;
+    const area_t *area = context;
     port_watchdog();
-    const uint32_t what = CR_ERASE_SECTOR | CR_SECTOR(FIRST_SECTOR + slot) | CR_WORDS;
+    const uint32_t what = CR_ERASE_SECTOR | CR_SECTOR(area->first_sector + slot) | CR_WORDS;
     unlock(what);
     FLASH_CR = what | CR_START;
     const bool good = lock();
@@ -69,12 +77,11 @@ static bool erase(void *context, int slot)
 
 static bool write(void *context, int slot, uint32_t at, const void *bytes, uint32_t count)
 {
-    (void)context;
     unlock(CR_PROGRAM | CR_WORDS);
     for (uint32_t i = 0; i < count; i += sizeof(uint32_t)) {
         uint32_t word;
         memcpy(&word, (const uint8_t *)bytes + i, sizeof word);
-        REGISTER(place(slot, at + i)) = word;
+        REGISTER(place(context, slot, at + i)) = word;
         while ((FLASH_SR & SR_BUSY) != 0) {
         }
     }
@@ -83,14 +90,19 @@ static bool write(void *context, int slot, uint32_t at, const void *bytes, uint3
 
 static bool read(void *context, int slot, uint32_t at, void *bytes, uint32_t count)
 {
-    (void)context;
-    memcpy(bytes, (const void *)place(slot, at), count);
+    memcpy(bytes, (const void *)place(context, slot, at), count);
     return true;
 }
 
-static const bslam_flash_t flash = {.erase = erase, .write = write, .read = read, .slot_bytes = SECTOR_BYTES};
+static const bslam_flash_t params_flash = {erase, write, read, (void *)&params_area, SECTOR_BYTES};
+static const bslam_flash_t map_flash = {erase, write, read, (void *)&map_area, SECTOR_BYTES};
 
 const bslam_flash_t *port_flash(void)
 {
-    return &flash;
+    return &params_flash;
+}
+
+const bslam_flash_t *port_map_flash(void)
+{
+    return &map_flash;
 }

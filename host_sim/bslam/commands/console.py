@@ -34,6 +34,7 @@ EXAMPLES = """examples:
   bslam console serial:/dev/ttyUSB0 --record drive.mcap --reset
   bslam console serial:/dev/ttyUSB0 --set wheelbase_m=0.31 --save --reset
   bslam console serial:/dev/ttyUSB0 --set-pose 1.5,0,1.57,0.1,0.05
+  bslam console serial:/dev/ttyUSB0 --keep-map
   bslam console serial:/dev/ttyUSB0 --save-map flat.bslam
   bslam console serial:/dev/ttyUSB0 --reset --map flat.bslam --set-pose 1.5,0,1.57,0.1,0.05
   bslam console qemu:mps2_an386 --drive paper_room --record drive.mcap
@@ -61,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y,HEADING,SD,SD",
         help="tell it where it is in its map: m, m, rad, and how sure that is: m, rad",
     )
+    group.add_argument("--keep-map", action="store_true", help="the robot keeps its map over a restart")
     group.add_argument("--save-map", type=Path, metavar="FILE", help="write its map as it is, FILE.bslam")
     group.add_argument("--drive", metavar="LOG", help="feed it: a scenario, or a log folder")
     group.add_argument("--seed", type=int, default=0, metavar="N", help="of the scenario (default: 0)")
@@ -163,6 +165,9 @@ def _change(slam: RemoteSlam, arguments: argparse.Namespace) -> None:
     if arguments.save:
         slam.save_params()
         print("the robot keeps its parameters")
+    if arguments.keep_map:
+        slam.keep_map()
+        print("the robot keeps its map")
     if arguments.save_map is not None:
         arguments.save_map.write_bytes(slam.save_map())
         print(f"its map is in {arguments.save_map}")

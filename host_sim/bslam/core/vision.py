@@ -163,6 +163,21 @@ class FrontEnd:
         `moved`: the robot moved since this camera's picture before. BslamError for another shape, dtype or
         camera than allowed.
         """
+        self._stream(rgb, rgb.shape[0], camera)
+        self._library.ensure(self._library.lib.bslam_vision_end(self._vision, moved), "the end of a frame")
+        return Seeing(tuple(self._candidates()), self._last_reason(), self._turn())
+
+    def see_part(self, rgb: Picture, rows: int, camera: int = 0) -> tuple[str, str]:
+        """The same of a picture of which only the upper rows come: with which status it is refused, and why
+        nothing is seen.
+        """
+        self._stream(rgb, rows, camera)
+        lib = self._library.lib
+        status = lib.bslam_vision_end(self._vision, True)
+        return self._library.ffi.string(lib.bslam_status_name(status)).decode(), self._last_reason()
+
+    def _stream(self, rgb: Picture, rows: int, camera: int) -> None:
+        """Begins a frame, and gives its upper rows."""
         lib = self._library.lib
         self._check_picture(rgb, camera)
         height, width = rgb.shape[:2]
@@ -170,13 +185,13 @@ class FrontEnd:
         begun = lib.bslam_vision_begin(self._vision, camera, pixels_are, width, height)
         self._library.ensure(begun, f"a frame of {width}x{height} for camera {camera}")
         pixels = self._library.pixels(rgb)
-        for row in range(height):
+        for row in range(rows):
             self._library.ensure(
                 lib.bslam_vision_row(self._vision, pixels + row * rgb.strides[0]), f"row {row}"
             )
-        self._library.ensure(lib.bslam_vision_end(self._vision, moved), "the end of a frame")
-        reason = self._reason(lib.bslam_vision_reason(self._vision))
-        return Seeing(tuple(self._candidates()), reason, self._turn())
+
+    def _last_reason(self) -> str:
+        return self._reason(self._library.lib.bslam_vision_reason(self._vision))
 
     def _turn(self) -> Turn | None:
         found = self._library.ffi.new("bslam_turn_t *")

@@ -44,6 +44,7 @@ class Message(IntEnum):
     MAP_READ = 0x18
     MAP_WRITE = 0x19
     MAP_LOAD = 0x1A
+    MAP_SAVE = 0x1B
 
 
 class Report(IntEnum):
@@ -407,8 +408,19 @@ def read_beacons(body: bytes) -> tuple[int, list[RawBeacon]]:
 
 STATES = ("following", "doubting", "lost")
 """`bslam_recovery_state_t`."""
-TROUBLES = ("none", "lost", "found", "corrupt", "insane")
+STARTS = (
+    "what it knew is lost",
+    "it is somewhere in the map that it kept",
+    "it goes on with what it knew",
+)
+"""`session_start_t`."""
+TROUBLES = ("none", "lost", "found", "corrupt", "insane", "restarted")
 """`watch_trouble_t`."""
+
+
+def read_start(payload: bytes) -> str:
+    """Of READY: what the robot has."""
+    return STARTS[payload[1]]
 
 
 @dataclass(frozen=True)

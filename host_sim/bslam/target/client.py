@@ -29,6 +29,10 @@ class Answer:
     body: bytes
 
 
+def _started_anew(ready: Frame) -> TargetError:
+    return TargetError(f"the target started anew: {messages.read_start(ready.payload)}")
+
+
 class Client:
     """The host's side of the link. A message is applied once, however often its frame or answer is lost."""
 
@@ -67,7 +71,7 @@ class Client:
             while self._frames:
                 frame = self._frames.popleft()
                 if frame.type == Report.READY and self._open:
-                    raise TargetError("the target started anew: what it knew is lost")
+                    raise _started_anew(frame)
                 self._keep_report(frame)
                 if frame.type == message | ANSWER and frame.sequence == self._sequence:
                     return frame
@@ -85,7 +89,7 @@ class Client:
         while self._frames and timeout_s is not None:
             frame = self._frames.popleft()
             if frame.type == Report.READY:
-                raise TargetError("the target started anew: what it knew is lost")
+                raise _started_anew(frame)
             self._keep_report(frame)
         reports = list(self._reports)
         self._reports.clear()

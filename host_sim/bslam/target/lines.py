@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import select
@@ -213,13 +214,24 @@ class QemuLine:
         return first or _receive(self._socket, timeout_s, self._gone)
 
     def restart(self) -> None:
-        """Press the board's reset button: RAM is as it was at the start, flash is kept."""
+        """Press the board's reset button: the program starts anew, RAM and flash are as they were."""
+        self.monitor("system_reset", until=b'"RESET"')
+
+    def monitor(self, command: str, until: bytes = b'"return": "', **words: str) -> str:
+        """A command to the emulator itself (QMP); what it said up to the end of its answer."""
+        asked = json.dumps({"execute": command, "arguments": words})
         with socket.socket(socket.AF_UNIX) as monitor:
             monitor.connect(str(Path(self._folder.name) / "line.qmp"))
-            monitor.sendall(b'{"execute": "qmp_capabilities"} {"execute": "system_reset"}')
+            monitor.sendall(b'{"execute": "qmp_capabilities"} ' + asked.encode())
             said = b""
-            while b'"RESET"' not in said:
+            while until not in said or not said.endswith(b"\n"):
                 said += _receive(monitor, START_TIMEOUT_S, self._gone)
+        return said.decode()
+
+    @property
+    def process_id(self) -> int:
+        """Of the emulator."""
+        return self._process.pid
 
     def _gone(self) -> str:
         self._process.kill()

@@ -344,6 +344,10 @@ class RemoteSlam:
         """Have the robot keep the parameters as set over a restart. Raises TargetError if it cannot."""
         self._client.ask(Message.PARAM_SAVE)
 
+    def keep_map(self) -> None:
+        """Have the robot keep its map as it is over a restart. Raises TargetError if it cannot."""
+        self._client.ask(Message.MAP_SAVE)
+
     def reports(self, timeout_s: float | None) -> list[Told]:
         """What the robot told of itself since the last call, awaited so long (None: only what it had told
         before its last answer).

@@ -1,12 +1,17 @@
-"""Parameters in a board's flash: kept over a reset in QEMU, as far as QEMU has the flash."""
+"""What a board keeps over a reset in QEMU: parameters and a map in its flash, its state in guarded RAM."""
 
 import binascii
+import contextlib
+import re
 import struct
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bslam.core.slam import Slam
+from bslam.experiment.faults.promise import PARAMS, Course
 from bslam.link.frames import crc16
 from bslam.target.lines import QemuLine, TargetError
 from bslam.target.remote import RemoteSlam
@@ -48,3 +53,61 @@ def test_the_stm32f405_loads_the_newer_of_its_sectors_and_says_that_qemu_s_canno
         assert robot.params["wheelbase_m"] == pytest.approx(0.35)
         with pytest.raises(TargetError, match="STORE"):
             robot.save_params()
+
+
+SESSION_PARAMS = 16  # bytes into the session: amid the parameters, which are guarded
+
+
+def damage(line):
+    """Flips a bit in the RAM of a running board."""
+    image = Path(__file__).parents[3] / "build/microbit/robot.elf"
+    names = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
+    session = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" session"))
+    said = line.monitor("human-monitor-command", **{"command-line": f"gpa2hva {session + SESSION_PARAMS:#x}"})
+    place = int(re.search(r"is (0x[0-9a-f]+)", said)[1], 16)
+    with Path(f"/proc/{line.process_id}/mem").open("r+b", buffering=0) as memory:
+        memory.seek(place)
+        byte = memory.read(1)[0]
+        memory.seek(place)
+        memory.write(bytes((byte ^ 4,)))
+
+
+def restarted(line, robot, says):
+    """Press the reset button, and go on with what the board has then."""
+    line.restart()
+    with pytest.raises(TargetError, match=says):
+        robot.update()
+    return RemoteSlam(line, None, 6)
+
+
+def test_a_reset_in_mid_run_costs_a_guarded_board_nothing_and_another_all():
+    with contextlib.closing(QemuLine("microbit")) as line:
+        course = Course(RemoteSlam(line, PARAMS, 6))
+        course.slam.sightings(0, [], [], [], [])
+        course.drive(10)
+        assert restarted(line, course.slam, "what it knew is lost").beacons() == []
+        _restart_a_guarded_one(line)
+
+
+def _restart_a_guarded_one(line):
+    course = Course(RemoteSlam(line, PARAMS, 6, recovery=True, guard=True))
+    course.slam.sightings(0, [], [], [], [])
+    course.drive(25)
+    blob, pose = course.slam.save_map(), course.slam.pose()
+    before_m = course.sd_m()
+    course.slam.keep_map()
+    course.slam = restarted(line, course.slam, "goes on with what it knew")
+    assert course.slam.save_map() == blob
+    assert course.slam.pose() == pose and not course.slam.is_lost
+    assert course.sd_m() > before_m + 0.1, "nobody knows how far it rolled"
+    health = course.slam.health()
+    assert (health.trouble, health.guards, health.recovers, health.corrupt) == ("restarted", True, True, 0)
+    course.drive(25)
+    assert course.error_m() < 0.02 and course.slam.health().insane == 0
+
+    damage(line)
+    course.slam = restarted(line, course.slam, "somewhere in the map that it kept")
+    assert course.slam.is_lost and course.slam.save_map() == blob
+    course.drive(25)
+    assert not course.slam.is_lost and course.error_m() < 0.05
+    assert (course.slam.health().state, course.slam.health().found) == ("following", 1)

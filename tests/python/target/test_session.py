@@ -149,6 +149,31 @@ def test_a_bit_that_flips_in_a_robot_s_memory_is_noticed_where_it_is_guarded(rob
         assert robot.health().corrupt == int(guard)
 
 
+def test_a_robot_starts_in_the_map_that_it_kept_and_falls_back_to_it(robot_line, log, tmp_path, monkeypatch):
+    monkeypatch.setenv("BSLAM_MAP", str(tmp_path / "flash"))
+    with RemoteSlam(robot_line(), {"association": 0}, 6, recovery=True) as robot:
+        drive(robot, log, 0, 100)
+        robot.keep_map()
+        blob = robot.save_map()
+    with RemoteSlam(robot_line(), None, 6) as robot:
+        assert robot.is_lost and robot.save_map() == blob
+        health = robot.health()
+        assert (health.recovers, health.guards, health.trouble) == (True, True, "none")
+    line = robot_line()
+    with RemoteSlam(line, {"association": 0}, 6, recovery=True, guard=True) as robot:
+        drive(robot, log, 0, 40)
+        flip_a_bit(line)
+        with pytest.raises(CoreError, match="BSLAM_E_STATE"):
+            robot.odometry("wheels", 2_000_000, 0.0, 0.0)
+        assert robot.is_lost and robot.save_map() == blob
+        assert robot.health().trouble == "corrupt"
+
+
+def test_a_robot_that_keeps_no_map_says_so(robot_line):
+    with RemoteSlam(robot_line(), {}, 6) as robot, pytest.raises(TargetError, match="STORE"):
+        robot.keep_map()
+
+
 def same(one, other):
     """Two traces agree to the bit in everything but where and how fast."""
     assert (one.pose == other.pose).all()

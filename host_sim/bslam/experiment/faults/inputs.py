@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 
+import numpy as np
 from cobs import cobs
 
 from bslam.core.keeping import force_beacon, force_motion
+from bslam.core.learner import SIGNATURE_SIZE
 from bslam.core.slam import Slam
+from bslam.errors import BslamError
 from bslam.experiment.faults.promise import (
     PARAMS,
     STEP_US,
@@ -46,6 +50,54 @@ def _number_in_sighting(value: float, protected: bool) -> Measured:
         status = ""
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
+
+
+def _is_refused(call: Callable[[], object]) -> bool:
+    """By the core, or before it comes there."""
+    try:
+        return bool(refusal(call))
+    except BslamError:
+        return True
+
+
+def _number_elsewhere(value: float, protected: bool) -> Measured:
+    """In every other input that is a number."""
+    course = started(25)
+    slam, time_us = course.slam, 26 * STEP_US
+    signature = np.full((1, SIGNATURE_SIZE), value, np.float32)
+    calls = {
+        "gyro": lambda: slam.odometry("wheels", time_us, 0.01, 0.01, value),
+        "signature": lambda: slam.sightings(time_us, [0.1], [2.0], [-1], [True], signature=signature),
+        "pose": lambda: slam.set_pose(value, 0.0, 0.0, 0.1, 0.1),
+        "doubt": lambda: slam.resume_odometry(value, 0.1),
+        "known beacon": lambda: slam.add_known_beacon(77, value, 1.0),
+        "parameter": lambda: Slam(PARAMS | {"gate_d2": value}),
+    }
+    before = state_of(slam)
+    taken = [name for name, call in calls.items() if not (protected and _is_refused(call))]
+    if not protected:
+        force_motion(slam, 0.04, value)
+    same = state_of(slam) == before
+    text = f"{len(calls) - len(taken)} of {len(calls)} refused, state {'same' if same else 'changed'}"
+    return Measured(not taken and same, text)
+
+
+def _denormal_odometry(protected: bool) -> Measured:
+    """Travel so small is none; only an interval so small would do harm, and time is whole microseconds."""
+    course = started(velocity_states=1)
+    before = course.slam.pose()
+    if protected:
+        status = refusal(lambda: course.slam.odometry("wheels", 51 * STEP_US, 1e-40, -1e-40))
+        plain = started(velocity_states=1).slam
+        plain.odometry("wheels", 51 * STEP_US, 0.0, 0.0)
+        off_m = math.dist(plain.pose()[:2], course.slam.pose()[:2])
+    else:
+        force_motion(course.slam, 1e-40, 0.01)
+        status, off_m = "", math.dist(before[:2], course.slam.pose()[:2])
+    finite = all(map(math.isfinite, (*course.slam.pose(), *course.slam.pose_covariance_lower())))
+    state = "finite" if finite else "not finite"
+    text = f"{status or 'taken'}, {off_m:.1e} m beside no travel, state {state}"
+    return Measured(finite and off_m < 1e-6, text)
 
 
 def _no_time(step_us: int, protected: bool) -> Measured:
@@ -257,6 +309,21 @@ def input_faults() -> list[Fault]:
             )
         )
     rows += [
+        *(
+            Fault(
+                f"{word} in any other input",
+                "refused, state unchanged",
+                check,
+                partial(_number_elsewhere, value),
+            )
+            for word, value in (("NaN", math.nan), ("infinity", math.inf))
+        ),
+        Fault(
+            "denormal in odometry",
+            "as no travel, state finite",
+            "time in whole microseconds",
+            _denormal_odometry,
+        ),
         Fault("dt zero", "refused, state unchanged", clock, partial(_no_time, 0)),
         Fault("dt negative", "refused, state unchanged", clock, partial(_no_time, -STEP_US)),
         Fault("dt too long", "refused; after resuming, as doubtful as told", clock, _too_long),

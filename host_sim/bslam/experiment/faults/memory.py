@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from bslam.core.keeping import Flash, Guard, memory_of, offset_of
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.experiment.faults.promise import PARAMS, STEP_US, Course, Fault, Measured, started, state_of
+from bslam.maps.blob import KeptMap, parse
+from bslam.maps.merge import merge
 from bslam.modelfile import FORMAT, VERSION, read_recogniser
 
 
@@ -160,15 +163,27 @@ def _bad_map(protected: bool) -> Measured:
     )
 
 
-def _warm_restart(protected: bool) -> Measured:
-    """The program starts again, the memory is as it was: good, or not."""
+def _restart_in_good_memory(protected: bool) -> Measured:
+    """The program starts again, and the memory is as it was; unprotected: the start-up code clears it."""
+    course = started()
+    guard = Guard(course.slam)
+    guard.seal()
+    memory = memory_of(course.slam)
+    if not protected:
+        memory[:] = bytes(len(memory))
+    good = guard.is_good()
+    if not good:
+        return Measured(False, "the memory is empty: all is lost")
+    course.slam.resume_odometry(0.2, 0.5)
+    course.drive(25)
+    return Measured(course.error_m() < 0.05, f"taken up: error {course.error_m():.3f} m 1 s later")
+
+
+def _restart_in_bad_memory(protected: bool) -> Measured:
+    """The program starts again, and a bit of the memory has flipped."""
     course = started()
     flash, guard = Flash(course.slam), Guard(course.slam)
     flash.save(course.slam)
-    guard.seal()
-    good = guard.is_good()
-    course.drive(25)
-    went_on = course.error_m()
     guard.seal()
     memory_of(course.slam)[offset_of(course.slam, "ekf", "mean") + 4 + 3] ^= 0x40
     if protected and not guard.is_good():
@@ -180,10 +195,40 @@ def _warm_restart(protected: bool) -> Measured:
     else:
         fresh, loaded = course, False
         fresh.drive(1, look=False)
-    kept = good and loaded and max(went_on, fresh.error_m()) < 0.05
     return Measured(
-        kept, f"good memory: error {went_on:.3f} m; bad: map loaded {loaded}, error {fresh.error_m():.3g} m"
+        loaded and fresh.error_m() < 0.05, f"map loaded {loaded}, error {fresh.error_m():.3g} m 1 s later"
     )
+
+
+_SQUARE = ((2.0, 2.0), (2.0, -2.0), (-2.0, 2.0), (-2.0, -2.0))
+
+
+def _map_of(labels: list[int], places: tuple[tuple[float, float], ...]) -> KeptMap:
+    slam = Slam(PARAMS)
+    for step in range(10):
+        slam.odometry("wheels", step * STEP_US, 0.0, 0.0)
+        bearings = [math.atan2(y, x) for x, y in places]
+        slam.sightings(
+            step * STEP_US, bearings, [math.hypot(*at) for at in places], labels, [True] * len(labels)
+        )
+    return parse(slam.save_map())
+
+
+def _nameless(kept: KeptMap) -> KeptMap:
+    return replace(kept, beacons=tuple(replace(one, label=-1) for one in kept.beacons))
+
+
+def _bad_merge(protected: bool) -> Measured:
+    """Maps of two rooms in which four things stand alike, by which one fits on the other."""
+    uneven = (*_SQUARE[:3], (-3.0, -1.0))
+    here, there = _map_of([0, 1, 2, 3], uneven), _map_of([4, 5, 6, 7], uneven)
+    if not protected:
+        here, there = _nameless(here), _nameless(there)
+    try:
+        merged = merge(here, there)
+    except BslamError as error:
+        return Measured(True, f"refused: {str(error).split(';')[0]}")
+    return Measured(False, f"{len(merged.shared)} beacons of one room taken for those of another")
 
 
 def _full_store(protected: bool) -> Measured:
@@ -280,10 +325,17 @@ def memory_faults(cut_every: int) -> list[Fault]:
         ),
         Fault("malformed model", "refused whole", "the check of every key", _bad_model),
         Fault("malformed map", "refused whole, state unchanged", "CRC and length", _bad_map),
+        Fault("maps of two places merged", "refused with the reason", "identities of beacons", _bad_merge),
         Fault(
-            "watchdog, warm restart",
-            "goes on if the memory is good, else from the saved map",
+            "watchdog: memory good",
+            "goes on where it was",
+            "memory that outlasts a reset",
+            _restart_in_good_memory,
+        ),
+        Fault(
+            "watchdog: memory bad",
+            "goes on from the saved map",
             "the guard",
-            _warm_restart,
+            _restart_in_bad_memory,
         ),
     ]
