@@ -57,7 +57,8 @@ $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 # An image whose stack is too small, for `bslam faults`: tools/check_image.py refuses it.
 build/microbit/shallow.elf: build/microbit/robot.elf
 	@$(BOARD_CC_microbit) $(IMAGE_LINK) $(call LIBC_FOR,m0plus) -Wl,--defsym=STACK=512 \
-	    -T firmware/port/microbit/memory.ld build/microbit/firmware/app/robot.o $(BOARD_OBJECTS_microbit) -lm -o $@
+	    -T firmware/port/microbit/memory.ld build/microbit/firmware/app/robot.o $(BOARD_OBJECTS_microbit) \
+	    -lm -o $@
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
