@@ -122,6 +122,17 @@ static void assert_odometry_refused(bslam_slam_t *slam, bslam_odometry_reading_t
     assert_unchanged(slam, &before);
 }
 
+/// Parameters of a refusal's test: of the filter that its state names, or of the one that needs none.
+static bslam_params_t refusing_params(void **state)
+{
+    bslam_params_t params = unit_params();
+    if (*state != NULL) {
+        params.filter = *(const int32_t *)*state;
+        params.velocity_states = 1;
+    }
+    return params;
+}
+
 /// A robot that has driven and mapped a little, at 400 ms.
 static bslam_slam_t running(bslam_params_t params)
 {
@@ -149,7 +160,7 @@ static void test_init_bad_parameter_is_refused_and_changes_nothing(void **state)
 
 static void test_odometry_every_refusal_changes_nothing(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(refusing_params(state));
     const int64_t next_us = 11 * STEP_US;
     assert_odometry_refused(&slam, wheels(10 * STEP_US, 0, 0), BSLAM_E_TIME);
     assert_odometry_refused(&slam, wheels(0, 0, 0), BSLAM_E_TIME);
@@ -182,7 +193,7 @@ static void test_odometry_without_noise_for_velocity_states_is_refused_and_chang
 
 static void test_sightings_wrong_count_is_refused_and_changes_nothing(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(refusing_params(state));
     bslam_sighting_t many[BSLAM_SIGHTINGS_MAX + 1];
     for (int i = 0; i < COUNT_OF(many); i++) {
         many[i] = unit_polar(0.1 * i, 3, i);
@@ -197,7 +208,7 @@ static void test_sightings_wrong_count_is_refused_and_changes_nothing(void **sta
 
 static void test_sightings_wrong_time_is_refused_and_changes_nothing(void **state)
 {
-    bslam_params_t params = unit_params();
+    bslam_params_t params = refusing_params(state);
     params.ahead_max_us = 200000;
     bslam_slam_t slam = running(params);
     const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
@@ -214,7 +225,7 @@ static void test_sightings_wrong_time_is_refused_and_changes_nothing(void **stat
 
 static void test_sightings_older_than_the_history_are_refused_and_change_nothing(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(refusing_params(state));
     const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
     drive_circle(&slam, 0, BSLAM_HISTORY_MAX + 5);
     const int64_t newest_us = (int64_t)(BSLAM_HISTORY_MAX + 4) * STEP_US;
@@ -247,7 +258,7 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
         {0, 3, -2, BSLAM_E_RANGE},
         {0, 3, INT32_MIN, BSLAM_E_RANGE},
     };
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(refusing_params(state));
     for (int i = 0; i < COUNT_OF(cases); i++) {
         bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(-0.8, 3, 2), unit_polar(0, 5, 9)};
         seen[2] = unit_polar(cases[i].bearing_rad, cases[i].range_m, cases[i].label);
@@ -297,7 +308,7 @@ static void test_sightings_at_the_limits_of_their_fields_are_taken(void **state)
 
 static void test_add_known_beacon_every_refusal_changes_nothing(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(refusing_params(state));
     const struct {
         int32_t label;
         double x_m;
@@ -332,7 +343,7 @@ static void test_add_known_beacon_to_a_full_map_is_refused_and_changes_nothing(v
 
 static void test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(refusing_params(state));
     bslam_slam_t before;
     memcpy(&before, &slam, sizeof before);
     assert_int_equal(bslam_slam_remove_beacon(&slam, 3), BSLAM_E_NO_BEACON);
@@ -1266,6 +1277,7 @@ static void test_sightings_of_a_lost_robot_are_deferred_until_it_has_a_pose(void
 
 int main(void)
 {
+    static int32_t similarity = BSLAM_FILTER_SIMILARITY;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_init_bad_parameter_is_refused_and_changes_nothing),
         cmocka_unit_test(test_odometry_every_refusal_changes_nothing),
@@ -1278,6 +1290,15 @@ int main(void)
         cmocka_unit_test(test_add_known_beacon_every_refusal_changes_nothing),
         cmocka_unit_test(test_add_known_beacon_to_a_full_map_is_refused_and_changes_nothing),
         cmocka_unit_test(test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing),
+        cmocka_unit_test_prestate(test_odometry_every_refusal_changes_nothing, &similarity),
+        cmocka_unit_test_prestate(test_sightings_wrong_count_is_refused_and_changes_nothing, &similarity),
+        cmocka_unit_test_prestate(test_sightings_wrong_time_is_refused_and_changes_nothing, &similarity),
+        cmocka_unit_test_prestate(test_sightings_older_than_the_history_are_refused_and_change_nothing,
+                                  &similarity),
+        cmocka_unit_test_prestate(test_sightings_bad_sighting_is_named_and_changes_nothing, &similarity),
+        cmocka_unit_test_prestate(test_add_known_beacon_every_refusal_changes_nothing, &similarity),
+        cmocka_unit_test_prestate(test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing,
+                                  &similarity),
 
         cmocka_unit_test(test_sightings_new_and_matched_are_accounted_for),
         cmocka_unit_test(test_sightings_rejected_say_why),
