@@ -162,11 +162,12 @@ def combinations(entries: Sequence[Mapping[str, Any]]) -> str:
 def _parameters(entry: Mapping[str, Any], entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Those that differ from run to run, but for what the other words say already."""
     own = entry.get("parameters", {})
+    ours = [one["parameters"] for one in entries if one.get("parameters")]  # a user's own has none
     told = ("association", "filter", "left_speed_sd_mps", "right_speed_sd_mps")
     return [
         f"{key} {own[key]}"
         for key in sorted(own)
-        if key not in told and len({one.get("parameters", {}).get(key) for one in entries}) > 1
+        if key not in told and len({one.get(key) for one in ours}) > 1
     ]
 
 
