@@ -205,6 +205,9 @@ def _say(
     rows[0] += ["mapped", "of", "wrong", "us/step", ""]
     rows += [_row(line) for line in lines]
     print(table_of(rows))
+    bounds_m = [line["bound_error_m"] for line in lines if "bound_error_m" in line]
+    if bounds_m:
+        print(f"bound, a filter linearised at the truth: {100.0 * bounds_m[0]:.2f} cm")
     told = [line["method"] for line in lines if line["method"] in TOLD]
     if options.association != "known" and told:
         print(f"association {options.association}: {' and '.join(told)}: given the identities")

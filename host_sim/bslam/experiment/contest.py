@@ -233,6 +233,7 @@ _FIGURES: Final = {
     "position_error_mean_m": ("position_error_m", "mean"),
     "position_error_max_m": ("position_error_m", "max"),
     "position_error_last_50s_m": ("position_error_last_50s_m",),
+    "bound_error_m": ("bound_error_m",),
     "nees_mean": ("nees_mean",),
     "map_rmse_m": ("map_rmse_m",),
     "beacons_mapped": ("beacons_mapped",),

@@ -138,3 +138,11 @@ def test_full_disk_is_named_by_its_file_and_what_fits_is_kept(scene, made):
     assert "long_seed0.dead_reckoning.estimate.tum: cannot be written: " in error
     assert error in result.stderr
     assert sorted(path.name for path in (scene / "out").iterdir()) == ["compare.json", "summary.json"]
+
+
+def test_drives_in_direction_only_have_the_bound_below_the_table(tmp_path, capsys):
+    words = ["compare", "paper_room", "--observation", "direction", "--only", "bslam,dead_reckoning"]
+    assert main([*words, "--association", "known", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    bound_m = lines_of(tmp_path)["bslam"]["bound_error_m"]
+    assert bound_m == lines_of(tmp_path)["dead_reckoning"]["bound_error_m"] > 0.0
+    assert f"bound, a filter linearised at the truth: {100.0 * bound_m:.2f} cm" in capsys.readouterr().out
