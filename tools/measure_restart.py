@@ -12,14 +12,19 @@ after the first frame that shows two beacons of the map:
 The error is that against the truth, and that in the map's own frame: the kept map's confirmed beacons that
 stand within a metre of the true ones are laid on these first, as a robot that goes by its map needs no other
 frame. A frame is that of one camera. What is not near in the map's frame, five seconds after two beacons, is
-told with what there was to go by. Takes drives as
+told with what there was to go by.
+
+Two references say what the restart itself loses: with --association known whoever is seen is told, in the
+first drive and after power-on; with --kept-after N the first drive is shorter. Takes drives as
 `bslam tables --sensor camera` keeps them (out/camera; rendered if they are not there, a minute each):
 
     .venv/bin/python tools/measure_restart.py --seeds 1000:1020
+    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --association known
 """
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Collection
@@ -42,7 +47,6 @@ from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 from camera_drives import arguments
 
-KEPT_AFTER = 3000  # steps
 SWITCHED_ON_AT = (3200, 3800, 4400)  # steps
 DRIVEN_US = 5_000_000
 NEAR_M, ELSEWHERE_M = 0.2, 1.0
@@ -125,9 +129,9 @@ class _Losses:
         self.lost.append(slam.is_lost)
 
 
-def restarts(log: Log, options: RunOptions, folder: Path) -> list[Restart]:
-    """Keeps a map of a drive; then each robot that is switched on in it."""
-    start = part(log, 0, KEPT_AFTER)
+def restarts(log: Log, options: RunOptions, kept_after: int, folder: Path) -> list[Restart]:
+    """Keeps a map of the first steps of a drive; then each robot that is switched on in it."""
+    start = part(log, 0, kept_after)
     kept = run_log(start, options)
     assert kept.kept_map is not None
     path = folder / f"kept{SUFFIX}"
@@ -159,25 +163,39 @@ def _restart(log: Log, options: RunOptions, to_truth: Rigid, mapped: set[int], t
     return Restart(trace.time_us, np.array(losses.lost), error_m, aligned_m, power_us, view_us, views, text)
 
 
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--association", choices=("svm", "known"), default="svm", help="default: svm")
+    parser.add_argument(
+        "--kept-after",
+        type=int,
+        choices=range(1, SWITCHED_ON_AT[0]),
+        default=3000,
+        metavar="STEPS",
+        help=f"when the map is kept, before {SWITCHED_ON_AT[0]} (default: 3000)",
+    )
+
+
 def main() -> int:
     """Measures and prints."""
-    args = arguments(__doc__, range(1000, 1020))
+    args = arguments(__doc__, range(1000, 1020), _add_arguments)
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association="svm", sigma_mps=args.sigma, recovery=True)
+    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery=True)
     counts: dict[tuple[str, bool], Counter[str]] = {
         (since, aligned): Counter() for since in SINCE for aligned in (False, True)
     }
     for seed in args.seeds:
         log = camera_log(scenario, seed, args.sigma, None, rig, store)
         with tempfile.TemporaryDirectory() as folder:
-            for first, robot in zip(SWITCHED_ON_AT, restarts(log, options, Path(folder)), strict=True):
+            robots = restarts(log, options, args.kept_after, Path(folder))
+            for first, robot in zip(SWITCHED_ON_AT, robots, strict=True):
                 for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
                     for aligned in (False, True):
                         counts[since, aligned][robot.outcome(since_us, aligned)] += 1
                 outcome = robot.outcome(robot.view_us, True)
                 if outcome != "near":
                     print(f"seed {seed}, step {first}: {outcome}; {robot.why()}", flush=True)
-    print(f"{args.scenario}, {rig.name}, seeds {args.seeds.start}:{args.seeds.stop}, sigma {args.sigma}")
+    seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
+    print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}, {args.association}")
     for (since, aligned), count in counts.items():
         figures = ", ".join(f"{count[one]} {one}" for one in OUTCOMES)
         frame = "in the map's frame" if aligned else "against the truth"
