@@ -36,6 +36,13 @@ def test_find_pitch_where_nothing_is_seen_is_refused():
         find_pitch([np.full((240, 320, 3), 128, np.uint8)] * 3, LEVEL)
 
 
+def test_find_pitch_from_a_moment_of_a_drive_is_refused_for_it_has_no_error_bar():
+    moment = drive(math.radians(3.0), 29)[-1]
+    grey = np.full((240, 320, 3), 128, np.uint8)
+    with pytest.raises(BslamError, match=r"what is seen does not agree on a pitch: .* known to inf"):
+        find_pitch([moment] * 14 + [grey] * 130, LEVEL)
+
+
 def test_load_drive_takes_pictures_in_order_and_refuses_none(tmp_path):
     for name, grey in (("b.png", 20), ("a.png", 10)):
         Image.fromarray(np.full((240, 320, 3), grey, np.uint8)).save(tmp_path / name)
