@@ -19,8 +19,10 @@ APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records ca
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
-# A square root needs no errno. The stack that each function takes is for tools/check_image.py.
-IMAGE_FLAGS := -O2 -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
+# How hard the compiler tries: make -B IMAGE_LEVEL=-O3 ... asks what another level costs. A square root needs
+# no errno. The stack that each function takes is for tools/check_image.py.
+IMAGE_LEVEL := -O2
+IMAGE_FLAGS := $(IMAGE_LEVEL) -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
     -DBSLAM_PARAM_MEANINGS=0
 
 IMAGE_LINK := -nostartfiles -Wl,--gc-sections -Wl,--build-id=sha1 \
