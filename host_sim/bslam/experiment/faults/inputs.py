@@ -284,46 +284,33 @@ def _other_version(protected: bool) -> Measured:
     return Measured(good + others == 0, f"{good + others} frames of version {VERSION + 1} taken")
 
 
+def _number_faults() -> list[Fault]:
+    """Numbers that are none, wherever one goes in."""
+    inject = {
+        "in odometry": _number_in_odometry,
+        "in a sighting": _number_in_sighting,
+        "in any other input": _number_elsewhere,
+    }
+    promise, check = "refused, state unchanged", "the check at the boundary"
+    rows = [
+        Fault(f"{word} {where}", promise, check, partial(one, value))
+        for word, value in (("NaN", math.nan), ("infinity", math.inf))
+        for where, one in inject.items()
+    ]
+    none, whole = "as no travel, state finite", "time in whole microseconds"
+    return [
+        *rows,
+        Fault("denormal in a sighting", promise, check, partial(_number_in_sighting, 1e-40)),
+        Fault("denormal in odometry", none, whole, _denormal_odometry),
+    ]
+
+
 def input_faults() -> list[Fault]:
     """The rows of numbers, time, encoders, odometry, frames and the line."""
-    check = "the check at the boundary"
     clock = "the check of the time stamp"
     crc = "the link's CRC and version"
-    rows = []
-    for word, value in (("NaN", math.nan), ("infinity", math.inf), ("denormal", 1e-40)):
-        if word != "denormal":
-            rows.append(
-                Fault(
-                    f"{word} in odometry",
-                    "refused, state unchanged",
-                    check,
-                    partial(_number_in_odometry, value),
-                )
-            )
-        rows.append(
-            Fault(
-                f"{word} in a sighting",
-                "refused, state unchanged",
-                check,
-                partial(_number_in_sighting, value),
-            )
-        )
-    rows += [
-        *(
-            Fault(
-                f"{word} in any other input",
-                "refused, state unchanged",
-                check,
-                partial(_number_elsewhere, value),
-            )
-            for word, value in (("NaN", math.nan), ("infinity", math.inf))
-        ),
-        Fault(
-            "denormal in odometry",
-            "as no travel, state finite",
-            "time in whole microseconds",
-            _denormal_odometry,
-        ),
+    return [
+        *_number_faults(),
         Fault("dt zero", "refused, state unchanged", clock, partial(_no_time, 0)),
         Fault("dt negative", "refused, state unchanged", clock, partial(_no_time, -STEP_US)),
         Fault("dt too long", "refused; after resuming, as doubtful as told", clock, _too_long),
@@ -348,4 +335,3 @@ def input_faults() -> list[Fault]:
         Fault("line: flood", "bounded memory, the next frame is whole", "the longest frame", _flood),
         Fault("line: other version", "dropped", crc, _other_version),
     ]
-    return rows
