@@ -24,7 +24,7 @@ from bslam.core.vision import FrontEnd
 from bslam.rig import load_rig
 from bslam.world.camera import BeaconLook, Renderer, Scene, dress, free_pose
 from bslam.world.scenario import load_scenario
-from measure_outline import is_counted, rough_box
+from measure_outline import HIDDEN_MAX, is_counted, rough_box
 from training.eth80 import WALL_GREY, Picture, View, archive_path, read_photographs
 from training.fit import choose_cost, fit, one_vs_rest
 
@@ -106,7 +106,7 @@ def take_signatures(scene: Scene, seed: int, light: int, views: int) -> Signatur
                 frame = renderer.render((x_m, y_m, theta_rad + turn_rad), time_s)
                 front_end.see(frame.rgb)
                 time_s += 0.2
-            for seen in filter(is_counted, frame.seen):
+            for seen in (one for one in frame.seen if is_counted(one, (0.0, HIDDEN_MAX))):
                 signature = front_end.signature(rough_box(seen, frame, JITTER_PX, random))
                 if signature is not None and len(taken[seen.beacon_id]) < views:
                     taken[seen.beacon_id].append(signature)
