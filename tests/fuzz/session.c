@@ -106,12 +106,23 @@ static void require_good_answers(uint32_t most)
     fuzz_require(counters->frames <= most);
 }
 
+/// Whether a reading waits for its picture: what ends the wait has it reported before it is answered itself.
+static uint32_t reports_due(void)
+{
+#if SESSION_TURNS
+    return session.seeing.turning.is_waiting ? 1 : 0;
+#else
+    return 0;
+#endif
+}
+
 static void take(uint8_t byte)
 {
+    const uint32_t due = reports_due();
     const uint32_t asked = session.parser.counters.frames;
     const uint32_t answered = answers.counters.frames;
     session_take(&session, byte);
-    require_good_answers(answered + (session.parser.counters.frames - asked));
+    require_good_answers(answered + due + (session.parser.counters.frames - asked));
 }
 
 /// Payload bytes of a message that is as long as it should be, where that is a fixed number.
