@@ -52,7 +52,7 @@
 #error "BSLAM_HISTORY_MAX is 1 to 1024"
 #endif
 
-/// Nodes that the smoother keeps, one for four frames, so 250 are 40 s of 25 frames/s; 48 bytes each in
+/// Nodes that the smoother keeps, one for three frames, so 250 are 30 s of 25 frames/s; 48 bytes each in
 /// float.
 #ifndef BSLAM_SMOOTHER_NODES_MAX
 #define BSLAM_SMOOTHER_NODES_MAX 250

@@ -18,10 +18,14 @@ enum { UP_COST = 8, BACK_COST = 12 };
 /// Places move no farther at once, as a share of the distance from the robot: beyond that the model is far
 /// from linear, and a beacon must not jump to the robot.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
-/// The logarithm of 4.5 m, and its standard deviation: 2.7 to 7.4 m.
-static const bslam_real_t LN_GUESS_M = BSLAM_R(1.504);
+/// The logarithm of 5.5 m, and its standard deviation: 3.3 to 9 m. Rather too far than too near: directions
+/// are the more linear the farther a beacon is.
+static const bslam_real_t LN_GUESS_M = BSLAM_R(1.7);
 static const bslam_real_t GUESS_SD_LN = BSLAM_R(0.5);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
+/// No beacon is linearised about a place nearer than this to where the robot is: with 1 / distance in its
+/// Jacobian, one that is thought too near and is driven at throws the path metres off.
+static const bslam_real_t NEAR_MIN_M = BSLAM_R(1.0);
 /// How exactly the map is given to the robot alone, (1 mm)².
 static const bslam_real_t PIN_VARIANCE = BSLAM_R(1e-6);
 /// What the way back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
@@ -133,6 +137,18 @@ static bslam_real_t share_of_step(const bslam_ekf_t *run, int at)
     return way_m > most_m ? most_m / way_m : 1;
 }
 
+/// Where a point is linearised about: where it is, or behind that where the robot is too near.
+static void keep_off(const bslam_ekf_t *run, bslam_real_t place[2])
+{
+    const bslam_real_t dx = place[0] - run->mean[BSLAM_STATE_X];
+    const bslam_real_t dy = place[1] - run->mean[BSLAM_STATE_Y];
+    const bslam_real_t distance_m = bslam_sqrt(dx * dx + dy * dy);
+    if (distance_m > RANGE_MIN_M && distance_m < NEAR_MIN_M) {
+        place[0] += dx * (NEAR_MIN_M / distance_m - 1);
+        place[1] += dy * (NEAR_MIN_M / distance_m - 1);
+    }
+}
+
 /// The filter of now takes its correction, or as much of it, all values alike, as no beacon refuses. The map
 /// that comes of it is linearised about from then on.
 static void end_forth(bslam_smoother_t *smoother)
@@ -155,6 +171,11 @@ static void end_forth(bslam_smoother_t *smoother)
     bslam_ekf_correct(run, &smoother->model);
     for (int i = run->base_dim; i < run->dim; i++) {
         smoother->place[i] = run->mean[i];
+    }
+    for (int b = 0; b < run->beacon_count; b++) {
+        if (run->beacons[b].kind == BSLAM_BEACON_POINT) {
+            keep_off(run, &smoother->place[run->beacons[b].at]);
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 ///
 /// A filter linearises each sighting once, at what it holds true then. In direction only that is wrong: a
 /// beacon's distance is not known for half a minute, and a wrong one enters every Jacobian. So the last
-/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of four frames) are kept with what was read and seen
+/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames) are kept with what was read and seen
 /// there, and the filter as it was before them, the *base*. A cycle is
 ///
 ///     forth   from the base through all nodes, linear about their poses and the beacons' places: ends as the
@@ -23,7 +23,7 @@
 #include "bslam/ekf/ekf.h"
 
 /// Frames of a node.
-#define BSLAM_SMOOTHER_FRAMES 4
+#define BSLAM_SMOOTHER_FRAMES 3
 /// Nodes of one of the parts in which the way back is gone.
 #define BSLAM_SMOOTHER_PART 20
 #define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
