@@ -60,6 +60,48 @@ static void move_correction(const moving_t *state, const bslam_transition_t *tra
     memcpy(state->correction, moved, sizeof moved);
 }
 
+/// Where size is asked for, the general way serves the pose alone, too.
+#ifdef __OPTIMIZE_SIZE__
+enum { IS_SMALL = 1 };
+#else
+enum { IS_SMALL = 0 };
+#endif
+
+/// The robot's block of F P Fᵀ where it has nothing but its pose: theta moves x and y.
+static void move_pose_block(bslam_real_t *p, bslam_real_t x_theta, bslam_real_t y_theta)
+{
+    bslam_real_t *y_row = p + bslam_symmat_row(1), *theta_row = p + bslam_symmat_row(2);
+    const bslam_real_t x_before = theta_row[0], y_before = theta_row[1];
+    theta_row[0] += x_theta * theta_row[2];
+    theta_row[1] += y_theta * theta_row[2];
+    p[0] += x_theta * (x_before + theta_row[0]);
+    y_row[0] += x_theta * y_before + y_theta * theta_row[0];
+    y_row[1] += y_theta * (y_before + theta_row[1]);
+}
+
+/// The same with two further values.
+static void move_robot_block(bslam_real_t *p, int base, const bslam_transition_t *transition)
+{
+    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
+    for (int j = 0; j < base; j++) {
+        bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
+        for (int i = 0; i < base; i++) {
+            column[i] = bslam_symmat_get(p, i, j);
+        }
+        for (int i = 0; i < POSE_DIM; i++) {
+            moved[i][j] = row_times(transition, i, base, column);
+        }
+    }
+    for (int i = 0; i < POSE_DIM; i++) {
+        for (int j = 0; j <= i; j++) {
+            bslam_symmat_set(p, i, j, row_times(transition, j, base, moved[i]));
+        }
+        for (int j = POSE_DIM; j < base; j++) {
+            bslam_symmat_set(p, i, j, moved[i][j]);
+        }
+    }
+}
+
 /// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows. Touches those rows only: O(n).
 static void move_covariance(const moving_t *state, const bslam_transition_t *transition)
 {
@@ -70,23 +112,11 @@ static void move_covariance(const moving_t *state, const bslam_transition_t *tra
     if (state->noted != NULL) {
         *state->noted = *transition;
     }
-    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
-    for (int j = 0; j < base; j++) {
-        bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
-        for (int i = 0; i < base; i++) {
-            column[i] = bslam_symmat_get(state->covariance, i, j);
-        }
-        for (int i = 0; i < POSE_DIM; i++) {
-            moved[i][j] = row_times(transition, i, base, column);
-        }
-    }
-    for (int i = 0; i < POSE_DIM; i++) {
-        for (int j = 0; j <= i; j++) {
-            bslam_symmat_set(state->covariance, i, j, row_times(transition, j, base, moved[i]));
-        }
-        for (int j = POSE_DIM; j < base; j++) {
-            bslam_symmat_set(state->covariance, i, j, moved[i][j]);
-        }
+    if (!IS_SMALL && base == POSE_DIM) {
+        move_pose_block(state->covariance, transition->by[0][BSLAM_STATE_THETA],
+                        transition->by[1][BSLAM_STATE_THETA]);
+    } else {
+        move_robot_block(state->covariance, base, transition);
     }
     const bslam_transition_t f = *transition;
     const bool extended = base > POSE_DIM;

@@ -128,5 +128,5 @@ void bslam_ekf_scale_covariance(bslam_ekf_t *ekf)
         {.row_factors = change, .scale = 0, .columns = column},
         {.row_factors = change, .scale = 0, .columns = column},
     };
-    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
+    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, 2);
 }

@@ -15,8 +15,9 @@ static const bslam_real_t ROUNDINGS = 8 * BSLAM_REAL_EPSILON;
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
+    const bslam_real_t *others = vector + row->at;
     for (int k = 0; k < row->dim; k++) {
-        sum += row->other[k] * vector[row->at + k];
+        sum += row->other[k] * others[k];
     }
     return sum;
 }
@@ -212,10 +213,10 @@ bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t 
 
 // ---- gain and down-date -----------------------------------------------------------------------------------
 
-/// The waiting down-dates as terms of one pass; places without one add nothing.
-static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t terms[BSLAM_PENDING_MAX])
+/// The first `count` waiting down-dates as terms of a pass; places without one add nothing.
+static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t *terms, int count)
 {
-    for (int p = 0; p < BSLAM_PENDING_MAX; p++) {
+    for (int p = 0; p < count; p++) {
         const bool waits = p < ekf->pending_count;
         terms[p].row_factors = ekf->pending[waits ? p : 0];
         terms[p].columns = ekf->pending[waits ? p : 0];
@@ -228,8 +229,8 @@ static void flush(bslam_ekf_t *ekf)
 {
     if (ekf->pending_count > 0) {
         bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-        fill_terms(ekf, terms);
-        bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
+        fill_terms(ekf, terms, BSLAM_PENDING_MAX);
+        bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, ekf->pending_count);
         ekf->pending_count = 0;
     }
 }
@@ -268,22 +269,47 @@ static void accept_column(bslam_ekf_t *ekf, gain_t gain)
     ekf->pending_count++;
 }
 
+/// The range's column becomes that of the range given the bearing, and both go into the correction. Four at
+/// once, which the compiler takes together; what stands behind n up to the next multiple of four is written,
+/// too. Where size is asked for, one at once.
+static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *restrict by_bearing,
+                         bslam_real_t *restrict by_range, int n, const gain_t gains[2], bslam_real_t share)
+{
+    const bslam_real_t by = gains[0].step, to = gains[1].step;
+    int i = 0;
+#ifndef __OPTIMIZE_SIZE__
+    for (; i < n; i += 4) {
+        const bslam_real_t a = by_bearing[i], own_a = by_range[i] - share * a;
+        const bslam_real_t b = by_bearing[i + 1], own_b = by_range[i + 1] - share * b;
+        const bslam_real_t c = by_bearing[i + 2], own_c = by_range[i + 2] - share * c;
+        const bslam_real_t d = by_bearing[i + 3], own_d = by_range[i + 3] - share * d;
+        by_range[i] = own_a;
+        by_range[i + 1] = own_b;
+        by_range[i + 2] = own_c;
+        by_range[i + 3] = own_d;
+        correction[i] = correction[i] + by * a + to * own_a;
+        correction[i + 1] = correction[i + 1] + by * b + to * own_b;
+        correction[i + 2] = correction[i + 2] + by * c + to * own_c;
+        correction[i + 3] = correction[i + 3] + by * d + to * own_d;
+    }
+#endif
+    for (; i < n; i++) {
+        const bslam_real_t of_bearing = by_bearing[i], own = by_range[i] - share * of_bearing;
+        by_range[i] = own;
+        correction[i] = correction[i] + by * of_bearing + to * own;
+    }
+}
+
 /// The same for the columns of a bearing and a range in the next two slots; the range's less `share` of the
 /// bearing's first, which makes it that of the range given the bearing.
 static void accept_two(bslam_ekf_t *ekf, gain_t bearing, gain_t range, bslam_real_t share)
 {
-    bslam_real_t *restrict by_range = ekf->pending[ekf->pending_count + 1];
-    const bslam_real_t *restrict by_bearing = ekf->pending[ekf->pending_count];
-    bslam_real_t *restrict correction = ekf->correction;
+    const int at = ekf->pending_count;
     begin_correction(ekf);
-    for (int i = 0; i < ekf->dim; i++) {
-        const bslam_real_t of_bearing = by_bearing[i];
-        const bslam_real_t own = by_range[i] - share * of_bearing;
-        by_range[i] = own;
-        correction[i] = correction[i] + bearing.step * of_bearing + range.step * own;
-    }
-    ekf->pending_scale[ekf->pending_count] = bearing.scale;
-    ekf->pending_scale[ekf->pending_count + 1] = range.scale;
+    const gain_t gains[2] = {bearing, range};
+    take_columns(ekf->correction, ekf->pending[at], ekf->pending[at + 1], ekf->dim, gains, share);
+    ekf->pending_scale[at] = bearing.scale;
+    ekf->pending_scale[at + 1] = range.scale;
     ekf->pending_count += 2;
 }
 
@@ -433,11 +459,12 @@ static void transport_covariance(bslam_ekf_t *ekf)
     add_pending(ekf, &theta_row, mirror);
     const bslam_real_t half_variance = mirror[BSLAM_STATE_THETA] / 2;
     bslam_ekf_add_scaled(mirror, half_variance, shift, ekf->dim);
-    bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-    fill_terms(ekf, terms);
-    terms[2] = (bslam_symmat_term_t){.row_factors = shift, .scale = 1, .columns = mirror};
-    terms[3] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
-    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms);
+    bslam_symmat_term_t terms[BSLAM_PENDING_MAX] = {
+        {.row_factors = shift, .scale = 1, .columns = mirror},
+        {.row_factors = mirror, .scale = 1, .columns = shift},
+    };
+    fill_terms(ekf, terms + 2, BSLAM_PENDING_MAX - 2);
+    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, 2 + ekf->pending_count);
     ekf->pending_count = 0;
 }
 

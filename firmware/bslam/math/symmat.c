@@ -77,11 +77,11 @@ COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool
     for (int k = 0; k < BSLAM_ROW_OTHERS_MAX; k++) {
         rows[k] = m + bslam_symmat_row(k < count ? first + k : 0);
     }
+    // The first rows lie four apart.
+    const bslam_real_t head[3][3] = {{m[0], m[4], m[8]}, {m[4], m[5], m[9]}, {m[8], m[9], m[10]}};
     for (int i = 0; i < 3; i++) {
-        const bslam_real_t line[3] = {bslam_symmat_get(m, i, 0), bslam_symmat_get(m, i, 1),
-                                      bslam_symmat_get(m, i, 2)};
         read_others(rows, count, i, others);
-        put(&lanes, two, count, i, line, others);
+        put(&lanes, two, count, i, head[i], others);
     }
     const bslam_real_t *line = m + bslam_symmat_row(3);
     for (int i = 3; i < first; i++) {
@@ -91,7 +91,7 @@ COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool
     }
     for (int i = first; i < first + count; i++) {
         for (int k = 0; k < count; k++) {
-            others[k] = bslam_symmat_get(m, i, first + k);
+            others[k] = first + k <= i ? line[first + k] : rows[k][i];
         }
         put(&lanes, two, count, i, line, others);
         line += bslam_symmat_filled(i);
@@ -184,7 +184,8 @@ void bslam_symmat_multiply(const bslam_real_t *m, int n, const bslam_real_t *vec
 
 /// Four rows from i on, a multiple of four, so that all are filled up to the same length. With vector
 /// instructions four columns of a row are one step. The same bits as below: each element has the same sum.
-static void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_term_t terms[4])
+COPIED void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_term_t terms[4],
+                          const int count)
 {
     const bslam_real_t *restrict c0 = terms[0].columns;
     const bslam_real_t *restrict c1 = terms[1].columns;
@@ -194,6 +195,15 @@ static void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_
     for (int k = i; k < filled; k++, row += filled) {
         const bslam_real_t f0 = terms[0].scale * terms[0].row_factors[k];
         const bslam_real_t f1 = terms[1].scale * terms[1].row_factors[k];
+        if (count == 2) {
+            for (int j = 0; j < filled; j += 4) {
+                row[j] += f0 * c0[j] + f1 * c1[j];
+                row[j + 1] += f0 * c0[j + 1] + f1 * c1[j + 1];
+                row[j + 2] += f0 * c0[j + 2] + f1 * c1[j + 2];
+                row[j + 3] += f0 * c0[j + 3] + f1 * c1[j + 3];
+            }
+            continue;
+        }
         const bslam_real_t f2 = terms[2].scale * terms[2].row_factors[k];
         const bslam_real_t f3 = terms[3].scale * terms[3].row_factors[k];
         for (int j = 0; j < filled; j += 4) {
@@ -226,30 +236,36 @@ typedef struct column {
     bslam_real_t a, b, c, d;
 } column_t;
 
-static inline void add_element(const bslam_real_t by[4], column_t column, bslam_real_t *element)
+static inline void add_element(const bslam_real_t by[4], column_t column, const int count,
+                               bslam_real_t *element)
 {
-    *element += by[0] * column.a + by[1] * column.b + by[2] * column.c + by[3] * column.d;
+    bslam_real_t sum = by[0] * column.a + by[1] * column.b;
+    if (count > 2) {
+        sum = sum + by[2] * column.c + by[3] * column.d;
+    }
+    *element += sum;
 }
 
 /// One column of the rows from `k` on of four of the same length: what the terms have there is read once.
-static inline void add_column(const factors_t *f, const int k, column_t column, bslam_real_t *r0,
-                              bslam_real_t *r1, bslam_real_t *r2, bslam_real_t *r3)
+static inline void add_column(const factors_t *f, const int count, const int k, column_t column,
+                              bslam_real_t *r0, bslam_real_t *r1, bslam_real_t *r2, bslam_real_t *r3)
 {
     if (k < 1) {
-        add_element(f->by[0], column, r0);
+        add_element(f->by[0], column, count, r0);
     }
     if (k < 2) {
-        add_element(f->by[1], column, r1);
+        add_element(f->by[1], column, count, r1);
     }
     if (k < 3) {
-        add_element(f->by[2], column, r2);
+        add_element(f->by[2], column, count, r2);
     }
-    add_element(f->by[3], column, r3);
+    add_element(f->by[3], column, count, r3);
 }
 
 /// Four rows from i on, a multiple of four, so that all are filled up to the same length. On a Cortex-M4F the
 /// factors stay in registers.
-static void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_term_t terms[4])
+COPIED void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_term_t terms[4],
+                          const int count)
 {
     const int filled = i + 4;
     bslam_real_t *restrict r1 = r0 + filled;
@@ -265,31 +281,43 @@ static void add_four_rows(bslam_real_t *restrict r0, int i, const bslam_symmat_t
     fill_factors(&terms[2], 2, i, &f);
     fill_factors(&terms[3], 3, i, &f);
     for (const bslam_real_t *end = c0 + i; c0 != end; c0 += 4, c1 += 4, c2 += 4, c3 += 4) {
-        add_column(&f, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
-        add_column(&f, 0, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
-        add_column(&f, 0, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
-        add_column(&f, 0, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
+        add_column(&f, count, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
+        add_column(&f, count, 0, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
+        add_column(&f, count, 0, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
+        add_column(&f, count, 0, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
         r0 += 4;
         r1 += 4;
         r2 += 4;
         r3 += 4;
     }
     // On the diagonal what is above it is no part of the matrix.
-    add_column(&f, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
-    add_column(&f, 1, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
-    add_column(&f, 2, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
-    add_column(&f, 3, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
+    add_column(&f, count, 0, (column_t){c0[0], c1[0], c2[0], c3[0]}, r0, r1, r2, r3);
+    add_column(&f, count, 1, (column_t){c0[1], c1[1], c2[1], c3[1]}, r0 + 1, r1 + 1, r2 + 1, r3 + 1);
+    add_column(&f, count, 2, (column_t){c0[2], c1[2], c2[2], c3[2]}, r0 + 2, r1 + 2, r2 + 2, r3 + 2);
+    add_column(&f, count, 3, (column_t){c0[3], c1[3], c2[3], c3[3]}, r0 + 3, r1 + 3, r2 + 3, r3 + 3);
 }
 
 #endif
 
-void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4])
+COPIED void add_rows(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4], const int count)
 {
     bslam_real_t *row = m;
     for (int i = 0; i < n; i += 4) {
-        add_four_rows(row, i, terms);
+        add_four_rows(row, i, terms, count);
         row += 4 * (i + 4);
     }
+}
+
+void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4], int count)
+{
+#ifndef __OPTIMIZE_SIZE__
+    if (count <= 2) {
+        add_rows(m, n, terms, 2);
+        return;
+    }
+#endif
+    (void)count;
+    add_rows(m, n, terms, 4);
 }
 
 // ---- the rest

@@ -86,10 +86,11 @@ typedef struct bslam_symmat_term {
     const bslam_real_t *columns;      ///< [BSLAM_SYMMAT_PADDED(n)]
 } bslam_symmat_term_t;
 
-/// m += the sum of four terms, in one pass over the triangle. The sum must be symmetric (pairs of terms may
+/// m += the sum of four terms, of which those behind the first `count` have scale 0, in one pass over the
+/// triangle. The sum must be symmetric (pairs of terms may
 /// be each other's mirror image). This is where a filter step spends its time: 4 multiply-adds an element.
 /// The rows behind n up to a multiple of four, which are no part of the matrix, change too. O(4 n^2 / 2).
-void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t terms[4]);
+void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t terms[4], int count);
 
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count);

@@ -214,6 +214,11 @@ def _say(
     print(
         f"files in {arguments.out}: compare.json, compare.png, summary.json, NAME.estimate.tum, NAME.map.csv"
     )
+    _say_failures(result)
+    return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
+
+
+def _say_failures(result: ContestResult) -> None:
     for bout, outcome in result.outcomes:
         if outcome.failed:
             print(f"{bout.job.name} failed: {outcome.entry['error']}", file=sys.stderr)
@@ -221,7 +226,6 @@ def _say(
                 print(outcome.crash, file=sys.stderr)
     if result.interrupted:
         print("stopped: what was finished is kept", file=sys.stderr)
-    return 1 if result.interrupted or any(line["failed"] for line in lines) else 0
 
 
 def _row(line: dict[str, Any]) -> list[str]:

@@ -214,26 +214,27 @@ static void test_column_and_multiply_are_the_naive_ones(void **state)
     }
 }
 
-/// Two vectors u, v: u uᵀ and v vᵀ with scales of either sign, and u vᵀ + v uᵀ as two mirrored terms.
-static void test_add_rank4_is_the_naive_sum(void **state)
+/// Two vectors u, v: u vᵀ + v uᵀ as two mirrored terms, and u uᵀ and v vᵀ with scales of either sign, or 0.
+static void test_add_rank4_is_the_naive_sum_of_as_many_terms(void **state)
 {
     unit_random_t random = {3};
-    for (int n = 1; n <= SIZE_MAX_TESTED; n++) {
-        pair_t pair = new_random_pair(&random, n);
-        bslam_real_t *u = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
-        bslam_real_t *v = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
-        const double scale_u = unit_random(&random, -1, 1);
-        const double scale_v = unit_random(&random, -1, 1);
+    for (int n = 1; n <= 2 * SIZE_MAX_TESTED; n++) {
+        const int size = (n + 1) / 2, count = n % 2 == 0 ? 4 : 2;
+        pair_t pair = new_random_pair(&random, size);
+        bslam_real_t *u = new_random_vector(&random, BSLAM_SYMMAT_PADDED(size));
+        bslam_real_t *v = new_random_vector(&random, BSLAM_SYMMAT_PADDED(size));
+        const double scale_u = count == 4 ? unit_random(&random, -1, 1) : 0;
+        const double scale_v = count == 4 ? unit_random(&random, -1, 1) : 0;
         const bslam_symmat_term_t terms[4] = {
-            {u, real(scale_u), u}, {v, real(scale_v), v}, {u, 1, v}, {v, 1, u}};
-        for (int i = 0; i < n; i++) {
-            for (int j = 0; j < n; j++) {
+            {u, 1, v}, {v, 1, u}, {u, real(scale_u), u}, {v, real(scale_v), v}};
+        for (int i = 0; i < size; i++) {
+            for (int j = 0; j < size; j++) {
                 const double ui = (double)u[i], uj = (double)u[j], vi = (double)v[i], vj = (double)v[j];
                 pair.naive[i][j] +=
-                    (double)terms[0].scale * ui * uj + (double)terms[1].scale * vi * vj + ui * vj + vi * uj;
+                    (double)terms[2].scale * ui * uj + (double)terms[3].scale * vi * vj + ui * vj + vi * uj;
             }
         }
-        bslam_symmat_add_rank4(pair.m, n, terms);
+        bslam_symmat_add_rank4(pair.m, size, terms, count);
         // Nine roundings of partial sums below 5.
         assert_pair_agrees(&pair, 45 * UNIT_ROUNDING);
         free(u);
@@ -250,7 +251,7 @@ static void test_add_rank4_with_zero_scales_changes_no_bit(void **state)
     bslam_real_t *u = new_random_vector(&random, BSLAM_SYMMAT_PADDED(n));
     const bslam_symmat_term_t nothing = {u, 0, u};
     const bslam_symmat_term_t terms[4] = {nothing, nothing, nothing, nothing};
-    bslam_symmat_add_rank4(pair.m, n, terms);
+    bslam_symmat_add_rank4(pair.m, n, terms, 4);
     assert_pair_agrees(&pair, 0);
     free(u);
     free(pair.m);
@@ -379,7 +380,7 @@ int main(void)
 
         cmocka_unit_test(test_times_is_the_naive_product_for_one_row_and_for_two),
         cmocka_unit_test(test_column_and_multiply_are_the_naive_ones),
-        cmocka_unit_test(test_add_rank4_is_the_naive_sum),
+        cmocka_unit_test(test_add_rank4_is_the_naive_sum_of_as_many_terms),
         cmocka_unit_test(test_add_rank4_with_zero_scales_changes_no_bit),
 
         cmocka_unit_test(test_remove_every_stretch_of_every_size_is_the_naive_removal),
