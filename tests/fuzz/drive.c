@@ -73,10 +73,15 @@ static int look(const world_t *world, bslam_sighting_t seen[BSLAM_SIGHTINGS_MAX]
 
 // ---- what must hold ---------------------------------------------------------------------------------------
 
-/// Whether some values of two filters' means are the same.
+/// Whether some values of two filters' means are the same number; 0 and -0 are.
 static bool same_mean(const bslam_ekf_t *a, const bslam_ekf_t *b, int from, int to)
 {
-    return memcmp(&a->mean[from], &b->mean[from], (size_t)(to - from) * sizeof a->mean[0]) == 0;
+    for (int i = from; i < to; i++) {
+        if (a->mean[i] != b->mean[i]) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /// `unseeing` is the filter that had a frame without sightings instead. A smoother goes on with what it has
