@@ -459,12 +459,12 @@ static void transport_covariance(bslam_ekf_t *ekf)
     add_pending(ekf, &theta_row, mirror);
     const bslam_real_t half_variance = mirror[BSLAM_STATE_THETA] / 2;
     bslam_ekf_add_scaled(mirror, half_variance, shift, ekf->dim);
-    bslam_symmat_term_t terms[BSLAM_PENDING_MAX] = {
-        {.row_factors = shift, .scale = 1, .columns = mirror},
-        {.row_factors = mirror, .scale = 1, .columns = shift},
-    };
-    fill_terms(ekf, terms + 2, BSLAM_PENDING_MAX - 2);
-    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, 2 + ekf->pending_count);
+    bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
+    const int behind = ekf->pending_count > 0 ? 2 : 0;
+    fill_terms(ekf, terms, BSLAM_PENDING_MAX);
+    terms[behind] = (bslam_symmat_term_t){.row_factors = shift, .scale = 1, .columns = mirror};
+    terms[behind + 1] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
+    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, behind + 2);
     ekf->pending_count = 0;
 }
 
