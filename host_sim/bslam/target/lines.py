@@ -157,7 +157,11 @@ class QemuLine:
         self._folder = tempfile.TemporaryDirectory(prefix="bslam-")
         self._first = b""
         self._socket, self._process = self._start(machines[board])
-        self._first = self._wait_for_start()
+        try:
+            self._first = self._wait_for_start()
+        except BaseException:
+            self.close()
+            raise
 
     def _start(self, machine: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
         path = str(Path(self._folder.name) / "line")
