@@ -563,7 +563,7 @@ static const exchange_t exchanges[] = {
 
 bool exchange_changes(const exchange_t *exchange)
 {
-    return exchange->apply != apply_nothing;
+    return exchange->apply != apply_nothing && exchange->type != SESSION_HELLO;
 }
 
 const exchange_t *exchange_find(uint8_t type)

@@ -19,7 +19,8 @@ typedef struct exchange {
 /// NULL: there is no such message.
 const exchange_t *exchange_find(uint8_t type);
 
-/// False: a message of this kind only asks.
+/// False: a message of this kind only asks, or greets: it leaves the filter as it is, also one with a reading
+/// that waits.
 bool exchange_changes(const exchange_t *exchange);
 
 /// Starts over with the parameters as they were set and an empty map. The status of the library or the link,

@@ -1,7 +1,7 @@
 """Pictures over the link: the robot's own front end sees what the host's sees, to the bit."""
 
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,10 +14,20 @@ from bslam.core.slam import Slam
 from bslam.core.vision import FrontEnd
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
-from bslam.link.messages import CameraRecord, LookReport, PoseReport
+from bslam.link.messages import (
+    CameraRecord,
+    LookReport,
+    Message,
+    PoseReport,
+    Report,
+    Wishes,
+    hello,
+    read_pose_report,
+)
 from bslam.recording import load
 from bslam.recording.entries import Frame
 from bslam.rig import load_rig
+from bslam.target.client import Client
 from bslam.target.film import write_film
 from bslam.target.lines import ProcessLine, open_line
 from bslam.target.remote import RemoteSlam
@@ -211,6 +221,22 @@ def test_its_pictures_tell_how_fast_it_turns_as_on_the_host(camera, tmp_path, mo
     rates = found[0][1:]
     assert rates == pytest.approx(expected[1:], rel=1e-4)  # but for what the wheels say of the speed
     assert np.mean(rates) == pytest.approx(2 * np.pi / CLOSE / 0.04, rel=0.01)
+
+
+def test_a_host_that_greets_while_a_reading_waits_for_its_picture_takes_no_rate_from_it(
+    camera, tmp_path, monkeypatch
+):
+    make_film(tmp_path / "close", "paper_room", 0, camera, CLOSE, CLOSE)
+    monkeypatch.setenv("BSLAM_FILM", str(tmp_path / "close"))
+    wishes, told = Wishes(as_it_is=True), []
+    client, end_s = Client(ProcessLine(ROBOT), wishes), time.monotonic() + 60.0
+    with closing(client):
+        while len(told) < 20:
+            assert time.monotonic() < end_s, f"no more than {len(told)} readings in a minute"
+            client.ask(Message.HELLO, hello(1, wishes))
+            frames = [frame for frame in client.listen(None) if frame.type == Report.POSE]
+            told += [read_pose_report(frame.payload).gyro_radps for frame in frames]
+    assert told[0] is None and None not in told[1:]
 
 
 @pytest.mark.parametrize("target", ["process", "qemu:stm32f405"])
