@@ -441,13 +441,12 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
     forget_old(recovery, slam, time_us);
     bslam_fix_t fix;
     bool use = false;
+    bool is_found = false;
     if (slam->is_lost) {
         if (recovery->memory_count == 0) {
             bslam_slam_lose_pose(slam);  // odometry's doubt begins anew with the first clue
         }
-        if (seek(recovery, slam, time_us, &mount, sightings, count, who, &fix)) {
-            be_found(recovery, slam, &fix);
-        }
+        is_found = seek(recovery, slam, time_us, &mount, sightings, count, who, &fix);
     } else if (!bslam_is_findable(slam)) {
         use = true;
     } else {
@@ -467,5 +466,8 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
     }
     recovery->counters.withheld += use ? 0u : 1u;
     bslam_slam_close_frame(slam, time_us, sightings, count, &mount, use);
+    if (is_found) {  // behind it: of a lost robot's frame the map stays as it is
+        be_found(recovery, slam, &fix);
+    }
     return BSLAM_OK;
 }

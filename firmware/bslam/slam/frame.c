@@ -324,11 +324,13 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         if (slam->looks != NULL && !slam->is_frozen && slam->params.association == BSLAM_ASSOCIATION_SVM) {
             slam->learning->learn(slam, time_us, sightings, count);
         }
-        tidy_map(slam, time_us, mount);
     } else {
         for (int i = 0; i < count; i++) {
             fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
         }
+    }
+    if (!slam->is_lost) {  // time passes in a withheld frame, too: it leaves what one without sightings does
+        tidy_map(slam, time_us, mount);
     }
     if (slam->smoother != NULL) {
         slam->smoothing->frame(slam->smoother, &slam->params, &slam->ekf);

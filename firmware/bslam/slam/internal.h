@@ -31,7 +31,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_
                                                       const bslam_sighting_t *sightings, int count,
                                                       bslam_pose_t *mount);
 
-/// Works the frame off, or, if it is not to be used or the robot is lost, accounts for its sightings only.
+/// Works the frame off. If it is not to be used, it leaves what one without sightings does, but for the
+/// accounts; where the robot is lost, the map stays as it is.
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use);
 

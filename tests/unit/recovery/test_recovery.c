@@ -200,6 +200,56 @@ static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
     assert_at(0, 0, 0);
 }
 
+/// The beacon is provisional, and its time is up with the next frame.
+static void end_time_of(bslam_beacon_t *beacon)
+{
+    slam.params.confirm_window_us = (int32_t)now_us;
+    beacon->first_seen_us = 0;
+    beacon->confirmed = false;
+    beacon->gated = 1;
+}
+
+/// What time alone does goes on: a provisional beacon whose time is up leaves, upon which the smoother begins
+/// its cycle anew.
+static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
+{
+    static bslam_smoother_t smoother;
+    static bslam_slam_t unseeing;
+    static bslam_smoother_t its_smoother;
+    slam.params.filter = BSLAM_FILTER_SMOOTHER;
+    bslam_slam_attach_smoother(&slam, &smoother);
+    look_on(40, 0, 0, 0, BEACONS);
+    end_time_of(&slam.ekf.beacons[2]);
+    unseeing = slam;
+    its_smoother = smoother;
+    unseeing.smoother = &its_smoother;
+    for (int k = 0; k < 24; k++) {
+        look_from(1, 2, -1, 1);
+        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+        assert_int_equal(bslam_slam_odometry(&unseeing, &still), BSLAM_OK);
+        assert_int_equal(bslam_slam_sightings(&unseeing, now_us, NULL, 0), BSLAM_OK);
+        assert_memory_equal(unseeing.ekf.mean, slam.ekf.mean, sizeof slam.ekf.mean);
+        assert_memory_equal(unseeing.ekf.covariance, slam.ekf.covariance, sizeof slam.ekf.covariance);
+    }
+    assert_int_equal(recovery.counters.withheld, 24);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS - 1);
+}
+
+/// A provisional beacon's time may be over when the robot is found again: it leaves with the frame after.
+static void test_recovery_of_a_robot_that_is_found_leaves_the_map_as_it_was(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(8, 1, 2, 2.5, BEACONS);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
+    end_time_of(&slam.ekf.beacons[3]);
+    while (recovery.counters.found == 0) {
+        look_on(1, 1, 2, 2.5, 3);
+        assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+    }
+    look_on(1, 1, 2, 2.5, 3);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS - 1);
+}
+
 // ---- by looks ---------------------------------------------------------------------------------------------
 
 static bslam_looks_t looks;
@@ -291,6 +341,8 @@ int main(void)
         cmocka_unit_test_setup(test_recovery_in_a_map_of_one_beacon_is_never_lost, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),
+        cmocka_unit_test_setup(test_recovery_withholds_a_frame_as_if_nothing_was_seen, setup),
+        cmocka_unit_test_setup(test_recovery_of_a_robot_that_is_found_leaves_the_map_as_it_was, setup),
         cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_either_may_be_seen, setup),
         cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_passed_over,
                                setup),
