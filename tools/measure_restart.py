@@ -14,12 +14,14 @@ stand within a metre of the true ones are laid on these first, as a robot that g
 frame. A frame is that of one camera. What is not near in the map's frame, five seconds after two beacons, is
 told with what there was to go by.
 
-Two references say what the restart itself loses: with --association known whoever is seen is told, in the
-first drive and after power-on; with --kept-after N the first drive is shorter. Takes drives as
-`bslam tables --sensor camera` keeps them (out/camera; rendered if they are not there, a minute each):
+References say what the restart itself loses. With --association known whoever is seen is told, in the first
+drive and after power-on; with --kept-after N the first drive is shorter. With --start told the robot is told
+at power-on exactly where it stands in the map's frame, with --start running it never was switched off:
+whoever has to find itself knows less than either. Takes drives as `bslam tables --sensor camera` keeps
+them (out/camera; rendered if they are not there, a minute each):
 
     .venv/bin/python tools/measure_restart.py --seeds 1000:1020
-    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --association known
+    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --association known --start told
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -35,11 +37,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.builds import SIZE_CLASSES
+from bslam.core.slam import Slam
 from bslam.experiment.align import Rigid, fit_rigid
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.metrics import map_pairs
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
+from bslam.experiment.options import Number, RunOptions
+from bslam.experiment.runner import SlamFactory, run_log, uses_looks
+from bslam.experiment.trace import Trace
 from bslam.experiment.truth import truth_at
 from bslam.log import Log, Sightings
 from bslam.maps.blob import SUFFIX
@@ -53,6 +58,8 @@ NEAR_M, ELSEWHERE_M = 0.2, 1.0
 NEEDED = 2  # beacons of the map in one frame
 OUTCOMES = ("near", "off", "elsewhere", "lost")
 SINCE = ("power-on", "two beacons in view")
+STARTS = ("lost", "told", "running")
+TOLD_SD_M, TOLD_SD_RAD = 0.01, 0.01
 
 
 @dataclass(frozen=True)
@@ -129,8 +136,18 @@ class _Losses:
         self.lost.append(slam.is_lost)
 
 
-def restarts(log: Log, options: RunOptions, kept_after: int, folder: Path) -> list[Restart]:
-    """Keeps a map of the first steps of a drive; then each robot that is switched on in it."""
+@dataclass(frozen=True)
+class Kept:
+    """A map that is kept, and what it is judged by."""
+
+    path: Path
+    to_truth: Rigid  # from its own frame
+    mapped: set[int]  # the beacons in it
+    text: str
+
+
+def keep(log: Log, options: RunOptions, kept_after: int, folder: Path) -> Kept:
+    """Keeps a map of the first steps of a drive."""
     start = part(log, 0, kept_after)
     kept = run_log(start, options)
     assert kept.kept_map is not None
@@ -138,33 +155,63 @@ def restarts(log: Log, options: RunOptions, kept_after: int, folder: Path) -> li
     path.write_bytes(kept.kept_map)
     mapped_m, true_m = map_pairs(start, kept)
     right = np.hypot(*(mapped_m - true_m).T) < ELSEWHERE_M
-    to_truth = fit_rigid(mapped_m[right], true_m[right])
     confirmed = [one.true_id for one in kept.beacons if one.confirmed]
     mapped = {one for one in confirmed if one is not None and one >= 0}
     text = f"map of {len(confirmed)}, {len(mapped)} beacons in it, {right.sum()} within a metre"
-    options = replace(options, kept_map=str(path))
-    return [_restart(part(log, first, None), options, to_truth, mapped, text) for first in SWITCHED_ON_AT]
+    return Kept(path, fit_rigid(mapped_m[right], true_m[right]), mapped, text)
 
 
-def _restart(log: Log, options: RunOptions, to_truth: Rigid, mapped: set[int], text: str) -> Restart:
-    """Runs the filter in the kept map of the options."""
-    losses = _Losses()
-    trace = run_log(log, options, watcher=losses)
+def restarts(log: Log, options: RunOptions, kept: Kept, start: str) -> list[Restart]:
+    """Each robot that is switched on in a kept map. start: one of STARTS."""
+    if start == "running":
+        losses = _Losses()
+        trace = run_log(log, options, watcher=losses)
+        return [_restart(part(log, first, None), trace, losses, kept) for first in SWITCHED_ON_AT]
+    options = replace(options, kept_map=str(kept.path))
+    robots = []
+    for first in SWITCHED_ON_AT:
+        rest, losses = part(log, first, None), _Losses()
+        make = _told(rest, options, kept) if start == "told" else None
+        robots.append(_restart(rest, run_log(rest, options, make, losses), losses, kept))
+    return robots
+
+
+def _told(log: Log, options: RunOptions, kept: Kept) -> SlamFactory:
+    """Makes a robot that is told where it is switched on in the kept map."""
     assert log.truth is not None
-    true_m = truth_at(log.truth, trace.time_us)[0][:, :2]
-    place_m = trace.pose[:, :2]
-    error_m, aligned_m = (np.hypot(*(one - true_m).T) for one in (place_m, to_truth.points(place_m)))
+    truth = truth_at(log.truth, log.odometry.time_us[:1])[0]
+    x_m, y_m, theta_rad = kept.to_truth.inverse().poses(truth)[0].tolist()
+
+    def make(params: Mapping[str, Number], beacons: int) -> Slam:
+        most = min(beacons, SIZE_CLASSES[-1])
+        slam = Slam(params, beacons_max=most, looks=uses_looks(options), seeds=log.seeds, recovery=True)
+        slam.load_map(kept.path.read_bytes())
+        slam.set_pose(x_m, y_m, theta_rad, TOLD_SD_M, TOLD_SD_RAD)
+        return slam
+
+    return make
+
+
+def _restart(log: Log, trace: Trace, losses: _Losses, kept: Kept) -> Restart:
+    """One that drives this part of a log, of a trace that ends with it."""
+    assert log.truth is not None
+    steps = slice(len(trace.time_us) - len(log.odometry.time_us), None)
+    time_us, place_m = trace.time_us[steps], trace.pose[steps, :2]
+    true_m = truth_at(log.truth, time_us)[0][:, :2]
+    error_m, aligned_m = (np.hypot(*(one - true_m).T) for one in (place_m, kept.to_truth.points(place_m)))
     seen, power_us = log.sightings, int(log.odometry.time_us[0])
-    view_us = in_view_us(seen, mapped, power_us)
-    until_us = trace.time_us[-1] if view_us is None else view_us + DRIVEN_US
+    view_us = in_view_us(seen, kept.mapped, power_us)
+    until_us = time_us[-1] if view_us is None else view_us + DRIVEN_US
     views = Counter(
-        seen.beacon_id[(seen.time_us <= until_us) & np.isin(seen.beacon_id, list(mapped))].tolist()
+        seen.beacon_id[(seen.time_us <= until_us) & np.isin(seen.beacon_id, list(kept.mapped))].tolist()
     )
-    return Restart(trace.time_us, np.array(losses.lost), error_m, aligned_m, power_us, view_us, views, text)
+    lost = np.array(losses.lost)[steps]
+    return Restart(time_us, lost, error_m, aligned_m, power_us, view_us, views, kept.text)
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--association", choices=("svm", "known"), default="svm", help="default: svm")
+    parser.add_argument("--start", choices=STARTS, default="lost", help="default: lost")
     parser.add_argument(
         "--kept-after",
         type=int,
@@ -186,7 +233,8 @@ def main() -> int:
     for seed in args.seeds:
         log = camera_log(scenario, seed, args.sigma, None, rig, store)
         with tempfile.TemporaryDirectory() as folder:
-            robots = restarts(log, options, args.kept_after, Path(folder))
+            kept = keep(log, options, args.kept_after, Path(folder))
+            robots = restarts(log, options, kept, args.start)
             for first, robot in zip(SWITCHED_ON_AT, robots, strict=True):
                 for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
                     for aligned in (False, True):
@@ -195,7 +243,7 @@ def main() -> int:
                 if outcome != "near":
                     print(f"seed {seed}, step {first}: {outcome}; {robot.why()}", flush=True)
     seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
-    print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}, {args.association}")
+    print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}, {args.association}, {args.start}")
     for (since, aligned), count in counts.items():
         figures = ", ".join(f"{count[one]} {one}" for one in OUTCOMES)
         frame = "in the map's frame" if aligned else "against the truth"
