@@ -10,6 +10,8 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from bslam.core.vision import BeaconModel, DetectorModel
 from training.built_in import built_in_detector
 from training.detector_export import beacons_header
@@ -85,9 +87,12 @@ def main() -> int:
     for lens in RIGS:
         if options.lens in (None, lens):
             worlds = options.worlds or PLANS[lens].worlds
-            detectors[lens], notes[lens] = train(
-                options.folder, lens, worlds, options.validation, options.processes
-            )
+            # BLAS shares the sums of a product out among the cores: another number of cores adds in another
+            # order, and the fits would end in other bits.
+            with threadpool_limits(1):
+                detectors[lens], notes[lens] = train(
+                    options.folder, lens, worlds, options.validation, options.processes
+                )
         else:
             detectors[lens], notes[lens] = built_in_detector(lens), note_of(HEADER, lens)
         print(f"{lens}: {notes[lens]}", flush=True)
