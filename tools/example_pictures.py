@@ -44,7 +44,7 @@ def take(folder: Path, world: int, count: int, seed: int, least: int = PICTURES_
     """
     folder.mkdir(parents=True, exist_ok=True)
     scene = make_world(world, "test")
-    renderer = Renderer(scene, load_rig("three60").cameras[1], [world, seed])
+    renderer = Renderer(scene, load_rig("three60").cameras[0], [world, seed])
     random = np.random.default_rng([world, seed])
     views: dict[str, list[Seen]] = {}
     while len(views) < count:

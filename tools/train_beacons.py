@@ -36,13 +36,22 @@ SEED_WEIGHT = 0.22
 """What a generic seed counts, against a box, where the reject margin is chosen: all 64 as much as the other
 things in twenty pictures. At 1 the margin is for a room full of strangers, and too high."""
 
+BESIDE = ("none", "elsewhere")
+"""Rows of the confusion matrix below the objects': what the front end found besides in the pictures, and the
+generic seeds, which are things of other rooms. The first is also its last column."""
 
-def confusion(labels: NDArray[np.integer], values: NDArray[np.floating], margin: float) -> NDArray[np.int64]:
-    """Counts (objects + 1, objects + 1): row what it is, column what it is taken for; the last is "none"."""
+
+def confusion(
+    labels: NDArray[np.integer],
+    values: NDArray[np.floating],
+    margin: float,
+    generic: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """Counts (objects + 2, objects + 1): row what it is, BESIDE last; column what it is taken for or none."""
     objects = values.shape[1]
     taken_for = np.where(values.max(axis=1) >= margin, values.argmax(axis=1), objects)
-    counts = np.zeros((objects + 1, objects + 1), dtype=np.int64)
-    np.add.at(counts, (np.where(labels == NONE, objects, labels), taken_for), 1)
+    counts = np.zeros((objects + len(BESIDE), objects + 1), dtype=np.int64)
+    np.add.at(counts, (np.where(labels == NONE, objects + generic, labels), taken_for), 1)
     return counts
 
 
@@ -58,7 +67,8 @@ def train(
     labels, values = samples.labels[samples.counts], held_out[samples.counts]
     right = values.argmax(axis=1) == labels
     objects = int(np.sum(labels != NONE))
-    weights = np.where(samples.generic[samples.counts], SEED_WEIGHT, 1.0)
+    generic = samples.generic[samples.counts]
+    weights = np.where(generic, SEED_WEIGHT, 1.0)
     least = math.ceil(LEAST_RECOGNISED * objects)
     margin = reject_margin(values.max(axis=1), right, precision, least, weights)
     if margin is None:
@@ -66,7 +76,7 @@ def train(
             f"{folder.path}: on pictures left out only {right.sum()} of {objects} objects get their own "
             "name; allowed: at least half, by more pictures, or objects that look less alike"
         )
-    counts = confusion(labels, values, margin)
+    counts = confusion(labels, values, margin, generic)
     machine = fit.fit(samples.signatures, targets, cost, balanced=True)
     notes = {
         "training set": f"{len(folder.pictures)} pictures, {sum(samples.boxes.values())} boxes, "
@@ -117,30 +127,34 @@ def reject_margin(
 
 def figures(counts: NDArray[np.int64]) -> str:
     """What the matrix says, in a sentence."""
-    right, named = int(np.trace(counts[:-1, :-1])), int(counts[:, :-1].sum())
-    objects, others = int(counts[:-1].sum()), int(counts[-1].sum())
+    own, elsewhere = counts[:-1], counts[-1]
+    right, named = int(np.trace(own)) - int(own[-1, -1]), int(own[:, :-1].sum())
+    objects, others = int(own[:-1].sum()), int(own[-1].sum())
     return (
         f"on pictures left out {right} of {objects} objects recognised, {named - right} of {named} names "
-        f"wrong, {int(counts[-1, -1])} of {others} other things rejected"
+        f"wrong, {int(own[-1, -1])} of {others} other things rejected, and {int(elsewhere[-1])} of "
+        f"{int(elsewhere.sum())} things of other rooms"
     )
 
 
 def reached(counts: NDArray[np.int64]) -> float:
-    """The share of right names among all."""
-    return float(np.trace(counts[:-1, :-1]) / max(int(counts[:, :-1].sum()), 1))
+    """The share of right names among all, by the weights that the reject margin was chosen with."""
+    named = counts[:, :-1].sum(axis=1)
+    right = int(np.trace(counts[:-2, :-1]))
+    return float(right / max(named[:-1].sum() + SEED_WEIGHT * named[-1], 1.0))
 
 
 def draw_confusion(path: Path, counts: NDArray[np.int64], names: list[str]) -> None:
-    """The matrix as a picture: shares of a row as colour, counts as numbers."""
+    """The matrix as a picture: shares of a row as colour, counts as numbers. `names` are the rows'."""
     size = 2.0 + 0.6 * len(names)
-    figure = Figure(figsize=(size + 1.0, size), layout="constrained")
+    figure = Figure(figsize=(size + 0.4, size), layout="constrained")
     axes = figure.subplots()
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
     for (row, column), count in np.ndenumerate(counts):
         colour = "white" if shares[row, column] > 0.5 else "black"
         axes.text(column, row, str(count or ""), ha="center", va="center", color=colour)
-    axes.set_xticks(range(len(names)), names, rotation=45, ha="right")
+    axes.set_xticks(range(len(names) - 1), names[:-1], rotation=45, ha="right")
     axes.set_yticks(range(len(names)), names)
     axes.set_xlabel("taken for")
     axes.set_ylabel("is")
@@ -149,14 +163,14 @@ def draw_confusion(path: Path, counts: NDArray[np.int64], names: list[str]) -> N
 
 
 def report(samples: Samples, counts: NDArray[np.int64], names: list[str]) -> str:
-    """The matrix and what became of the boxes, as text."""
+    """The matrix and what became of the boxes, as text. `names` are the matrix' rows."""
     width = max(len(name) for name in names)
     lines = ["confusion on pictures left out (row: what it is, column: what it is taken for):"]
-    lines.append(" " * (width + 2) + "  ".join(f"{name[:8]:>8}" for name in names))
+    lines.append(" " * (width + 2) + "  ".join(f"{name[:8]:>8}" for name in names[:-1]))
     for name, row in zip(names, counts, strict=True):
         lines.append(f"  {name:<{width}}" + "  ".join(f"{count:>8}" for count in row))
     lines.append("boxes, and how many of them the front end found by itself:")
-    for name in names[:-1]:
+    for name in names[: -len(BESIDE)]:
         lines.append(f"  {name:<{width}}  {samples.found[name]} of {samples.boxes[name]}")
     lines += [f"not used, {reason}: {picture}" for picture, reason in samples.useless.items()]
     return "\n".join(lines)
@@ -169,7 +183,7 @@ def run(folder_path: Path, out: Path, precision: float, rig: str | None) -> None
     recogniser, machine, counts = train(folder, samples, precision)
     header = export.recogniser_header(recogniser, out.stem)
     check_header(header, f"bslam_{out.stem}.svm", samples.signatures, machine)
-    names = [*(one.name for one in folder.objects), "none"]
+    names = [*(one.name for one in folder.objects), *BESIDE]
     export.write_header(out, header)
     write_recogniser(out.with_suffix(".json"), recogniser)
     draw_confusion(out.with_suffix(".png"), counts, names)

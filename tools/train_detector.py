@@ -37,7 +37,7 @@ class Plan:
     halves: bool  # each frame is looked at once, not twice: a wide one shows thrice as many beacons
 
 
-PLANS = {"pinhole": Plan(528, 4, 200_000, False), "wide": Plan(376, 6, 80_000, True)}
+PLANS = {"pinhole": Plan(1056, 4, 200_000, False), "wide": Plan(900, 6, 80_000, True)}
 
 
 def train(folder: Path, lens: str, worlds: int, validation: int, processes: int) -> tuple[DetectorModel, str]:

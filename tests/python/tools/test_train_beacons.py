@@ -197,6 +197,7 @@ def test_other_things_are_rejected(tmp_path):
         replace(folder, objects=objects), replace(collected, labels=labels), precision=0.9
     )[2]
     assert counts[2].sum() > 20 and counts[2, 2] > 0.9 * counts[2].sum()
+    assert counts[3].sum() >= 64
     assert counts[0, 0] + counts[1, 1] > 0.8 * counts[:2].sum()
 
 
@@ -207,7 +208,7 @@ def test_one_object_alone_is_told_from_the_generic_seeds(rows, tmp_path):
     folder = read_folder(tmp_path)
     counts = train_beacons.train(folder, samples.collect(folder), precision=0.9)[2]
     assert counts[0, 0] >= 0.8 * counts[0].sum()
-    assert counts[1].sum() >= 64 and counts[1, 1] >= 0.9 * counts[1].sum()
+    assert counts[2].sum() >= 64 and counts[2, 1] >= 0.9 * counts[2].sum()
 
 
 # --- what is refused ----------------------------------------------------------------------------------------
