@@ -16,6 +16,11 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
     const bslam_real_t *others = vector + row->at;
+#ifndef __OPTIMIZE_SIZE__
+    if (row->dim == 2) {  // a beacon that is a point
+        return sum + row->other[0] * others[0] + row->other[1] * others[1];
+    }
+#endif
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
     }

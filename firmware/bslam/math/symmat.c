@@ -1,5 +1,7 @@
 #include "bslam/math/symmat.h"
 
+#include <string.h>
+
 extern inline size_t bslam_symmat_row(int i);
 extern inline size_t bslam_symmat_at(int i, int j);
 extern inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j);
@@ -14,6 +16,110 @@ extern inline size_t bslam_symmat_filled(int i);
 #endif
 
 // ---- products ---------------------------------------------------------------------------------------------
+
+/// One row or two that look at the same places, and where what they make of a line goes.
+typedef struct lanes {
+    bslam_row_t a, b;
+    bslam_real_t *out_a, *out_b;
+} lanes_t;
+
+/// What stands behind the n-th value, up to a multiple of four.
+static inline void clear_tails(const lanes_t *lanes, const bool two, int n)
+{
+    for (int i = n; i % 4 != 0; i++) {
+        lanes->out_a[i] = 0;
+        if (two) {
+            lanes->out_b[i] = 0;
+        }
+    }
+}
+
+#if defined(__GNUC__) && !defined(__OPTIMIZE_SIZE__) && !BSLAM_REAL_DOUBLE && \
+    (defined(__SSE2__) || defined(__ARM_NEON))
+#define FOUR_WIDE 1
+#else
+#define FOUR_WIDE 0
+#endif
+#if FOUR_WIDE
+
+/// Of four lines a value each, on processors that take four at once. Compilers do not see by themselves that
+/// this is worth the gathering of columns. The same bits as below: each element has the same sum.
+typedef bslam_real_t four_t __attribute__((vector_size(4 * sizeof(bslam_real_t))));
+
+/// What four lines, one behind the other and of the same length, have in a column.
+static inline four_t column_of(const bslam_real_t *line, size_t length)
+{
+    return (four_t){line[0], line[length], line[2 * length], line[3 * length]};
+}
+
+/// The same where the diagonal crosses: the first `above` of them, 1 to 3, have it in the column's own row,
+/// by symmetry.
+static inline four_t column_across(const bslam_real_t *line, size_t length, const bslam_real_t *row,
+                                   int above)
+{
+    const bslam_real_t *second = above > 1 ? row + 1 : line + length;
+    const bslam_real_t *third = above > 2 ? row + 2 : line + 2 * length;
+    return (four_t){row[0], *second, *third, line[3 * length]};
+}
+
+static inline four_t read_four(const bslam_real_t *from)
+{
+    four_t found;
+    memcpy(&found, from, sizeof found);
+    return found;
+}
+
+/// row · each of the lines; out has four.
+static inline void put_four(const bslam_row_t *row, const int count, const four_t base[3],
+                            const four_t others[BSLAM_ROW_OTHERS_MAX], bslam_real_t *out)
+{
+    four_t sum = row->base[0] * base[0] + row->base[1] * base[1] + row->base[2] * base[2];
+    if (count > 0) {
+        four_t rest = row->other[0] * others[0];
+        for (int k = 1; k < count; k++) {
+            rest += row->other[k] * others[k];
+        }
+        sum += rest;
+    }
+    memcpy(out, &sum, sizeof sum);
+}
+
+/// One pass over what one row or two look at. Whether there are two, and their count of others, the compiler
+/// knows.
+COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool two, const int count)
+{
+    const lanes_t lanes = *given;
+    const bslam_real_t *line = m;
+    for (int i = 0; i < n; i += 4) {
+        const size_t length = bslam_symmat_filled(i);
+        four_t base[3] = {column_of(line, length), column_of(line + 1, length), column_of(line + 2, length)};
+        if (i == 0) {
+            base[1][0] = m[4];
+            base[2][0] = m[8];
+            base[2][1] = m[9];
+        }
+        four_t others[BSLAM_ROW_OTHERS_MAX];
+        for (int k = 0; k < count; k++) {
+            const int column = lanes.a.at + k;
+            const bslam_real_t *row = m + bslam_symmat_row(column);
+            if (i + 3 <= column) {
+                others[k] = read_four(row + i);
+            } else if (i > column) {
+                others[k] = column_of(line + column, length);
+            } else {
+                others[k] = column_across(line + column, length, row + i, column - i + 1);
+            }
+        }
+        put_four(&lanes.a, count, base, others, lanes.out_a + i);
+        if (two) {
+            put_four(&lanes.b, count, base, others, lanes.out_b + i);
+        }
+        line += 4 * length;
+    }
+    clear_tails(&lanes, two, n);
+}
+
+#else
 
 /// row · a line of the matrix: its columns 0 to 2, and those where the row's others stand. The compiler knows
 /// their count: no test is left.
@@ -46,12 +152,6 @@ static inline void read_others(const bslam_real_t *const from[BSLAM_ROW_OTHERS_M
     others[2] = count > 2 ? from[2][i] : 0;
     others[3] = count > 3 ? from[3][i] : 0;
 }
-
-/// One row or two that look at the same places, and where what they make of a line goes.
-typedef struct lanes {
-    bslam_row_t a, b;
-    bslam_real_t *out_a, *out_b;
-} lanes_t;
 
 /// Whether there are two, and their count of others, the compiler knows.
 COPIED void put(const lanes_t *lanes, const bool two, const int count, int i, const bslam_real_t *line,
@@ -100,13 +200,10 @@ COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool
         put(&lanes, two, count, i, line, line + first);
         line += bslam_symmat_filled(i);
     }
-    for (int i = n; i % 4 != 0; i++) {
-        lanes.out_a[i] = 0;
-        if (two) {
-            lanes.out_b[i] = 0;
-        }
-    }
+    clear_tails(&lanes, two, n);
 }
+
+#endif
 
 /// As times, for any count.
 COPIED void times_any(const bslam_real_t *m, int n, const lanes_t *lanes, const bool two)
@@ -180,10 +277,58 @@ void bslam_symmat_multiply(const bslam_real_t *m, int n, const bslam_real_t *vec
 
 // ---- the sum of terms -------------------------------------------------------------------------------------
 
-#if defined(__SSE2__) || defined(__ARM_NEON) || defined(__OPTIMIZE_SIZE__)
+#if FOUR_WIDE
 
-/// Four rows from i on, a multiple of four, so that all are filled up to the same length. With vector
-/// instructions four columns of a row are one step. The same bits as below: each element has the same sum.
+/// row_factors[i] of a term, four times.
+static inline four_t factor_of(const bslam_symmat_term_t *term, int i)
+{
+    const bslam_real_t factor = term->scale * term->row_factors[i];
+    return (four_t){factor, factor, factor, factor};
+}
+
+static inline void add_to(bslam_real_t *row, four_t sum)
+{
+    sum = read_four(row) + sum;
+    memcpy(row, &sum, sizeof sum);
+}
+
+/// Rows i and i + 1, of the same length: what the terms have in a column is read once for both.
+COPIED void add_two_rows(bslam_real_t *restrict row, size_t length, int i, const bslam_symmat_term_t terms[4],
+                         const int count)
+{
+    const bslam_real_t *restrict c0 = terms[0].columns, *restrict c1 = terms[1].columns;
+    const bslam_real_t *restrict c2 = terms[2].columns, *restrict c3 = terms[3].columns;
+    const four_t f0 = factor_of(&terms[0], i), g0 = factor_of(&terms[0], i + 1);
+    const four_t f1 = factor_of(&terms[1], i), g1 = factor_of(&terms[1], i + 1);
+    if (count == 2) {
+        for (size_t j = 0; j < length; j += 4) {
+            const four_t a = read_four(c0 + j), b = read_four(c1 + j);
+            add_to(row + j, f0 * a + f1 * b);
+            add_to(row + length + j, g0 * a + g1 * b);
+        }
+        return;
+    }
+    const four_t f2 = factor_of(&terms[2], i), g2 = factor_of(&terms[2], i + 1);
+    const four_t f3 = factor_of(&terms[3], i), g3 = factor_of(&terms[3], i + 1);
+    for (size_t j = 0; j < length; j += 4) {
+        const four_t a = read_four(c0 + j), b = read_four(c1 + j);
+        const four_t c = read_four(c2 + j), d = read_four(c3 + j);
+        add_to(row + j, f0 * a + f1 * b + f2 * c + f3 * d);
+        add_to(row + length + j, g0 * a + g1 * b + g2 * c + g3 * d);
+    }
+}
+
+/// Four rows from i on, a multiple of four, so that all are filled up to the same length.
+COPIED void add_four_rows(bslam_real_t *row, int i, const bslam_symmat_term_t terms[4], const int count)
+{
+    const size_t length = bslam_symmat_filled(i);
+    add_two_rows(row, length, i, terms, count);
+    add_two_rows(row + 2 * length, length, i + 2, terms, count);
+}
+
+#elif defined(__OPTIMIZE_SIZE__)
+
+/// The same in few bytes.
 COPIED void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_term_t terms[4],
                           const int count)
 {
@@ -191,12 +336,12 @@ COPIED void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_
     const bslam_real_t *restrict c1 = terms[1].columns;
     const bslam_real_t *restrict c2 = terms[2].columns;
     const bslam_real_t *restrict c3 = terms[3].columns;
-    const int filled = i + 4;
-    for (int k = i; k < filled; k++, row += filled) {
+    const size_t filled = (size_t)i + 4;
+    for (size_t k = (size_t)i; k < filled; k++, row += filled) {
         const bslam_real_t f0 = terms[0].scale * terms[0].row_factors[k];
         const bslam_real_t f1 = terms[1].scale * terms[1].row_factors[k];
         if (count == 2) {
-            for (int j = 0; j < filled; j += 4) {
+            for (size_t j = 0; j < filled; j += 4) {
                 row[j] += f0 * c0[j] + f1 * c1[j];
                 row[j + 1] += f0 * c0[j + 1] + f1 * c1[j + 1];
                 row[j + 2] += f0 * c0[j + 2] + f1 * c1[j + 2];
@@ -206,7 +351,7 @@ COPIED void add_four_rows(bslam_real_t *restrict row, int i, const bslam_symmat_
         }
         const bslam_real_t f2 = terms[2].scale * terms[2].row_factors[k];
         const bslam_real_t f3 = terms[3].scale * terms[3].row_factors[k];
-        for (int j = 0; j < filled; j += 4) {
+        for (size_t j = 0; j < filled; j += 4) {
             row[j] += f0 * c0[j] + f1 * c1[j] + f2 * c2[j] + f3 * c3[j];
             row[j + 1] += f0 * c0[j + 1] + f1 * c1[j + 1] + f2 * c2[j + 1] + f3 * c3[j + 1];
             row[j + 2] += f0 * c0[j + 2] + f1 * c1[j + 2] + f2 * c2[j + 2] + f3 * c3[j + 2];

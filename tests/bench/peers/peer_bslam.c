@@ -10,7 +10,7 @@
 typedef struct step {
     bslam_odometry_reading_t wheels;
     int count;
-    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
+    const bslam_sighting_t *sightings;
 } step_t;
 
 static bslam_slam_t slam;
@@ -34,21 +34,32 @@ static void set(bslam_params_t *params, const char *name, size_t length, double 
     fail(name);
 }
 
+static void *room(size_t count, size_t size)
+{
+    void *memory = calloc(count > 0 ? count : 1, size);
+    if (memory == NULL) {
+        fail("no memory for the drive");
+    }
+    return memory;
+}
+
 static step_t step_of(const bench_step_t *from)
 {
     if (from->count > BSLAM_SIGHTINGS_MAX) {
         fail("more sightings in a step than it takes");
     }
+    bslam_sighting_t *sightings = room((size_t)from->count, sizeof *sightings);
     step_t step = {.wheels = {.time_us = from->time_us,
                               .source = BSLAM_ODOMETRY_WHEELS,
                               .left_m = (bslam_real_t)from->left_m,
                               .right_m = (bslam_real_t)from->right_m},
-                   .count = from->count};
+                   .count = from->count,
+                   .sightings = sightings};
     for (int i = 0; i < from->count; i++) {
-        step.sightings[i] = (bslam_sighting_t){.bearing_rad = (bslam_real_t)from->sightings[i].bearing_rad,
-                                               .range_m = (bslam_real_t)from->sightings[i].range_m,
-                                               .has_range = true,
-                                               .label = from->sightings[i].label};
+        sightings[i] = (bslam_sighting_t){.bearing_rad = (bslam_real_t)from->sightings[i].bearing_rad,
+                                          .range_m = (bslam_real_t)from->sightings[i].range_m,
+                                          .has_range = true,
+                                          .label = from->sightings[i].label};
     }
     return step;
 }
@@ -75,10 +86,7 @@ void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count
     if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
         fail("a parameter is refused");
     }
-    own_steps = calloc((size_t)count, sizeof *own_steps);
-    if (own_steps == NULL) {
-        fail("no memory for the drive");
-    }
+    own_steps = room((size_t)count, sizeof *own_steps);
     for (int number = 0; number < count; number++) {
         own_steps[number] = step_of(&steps[number]);
     }
