@@ -83,14 +83,22 @@ train: setup ## train the beacon detectors on rendered worlds, write firmware/mo
 
 # --- Testing ------------------------------------------------------------------------------------------------
 
-.PHONY: test pytest
+# Two halves of about the same length, one for each core, and the longest first: the rest goes beside them.
+PYTEST_HALF := tests/python/experiment
+
+.PHONY: test pytest pytest-half pytest-rest
 test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak, firmware in QEMU, pytest
-	@$(MAKE) --no-print-directory --keep-going --jobs=2 lint unit replay soak-short check-sizes pytest \
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 pytest lint unit replay soak-short check-sizes \
 	    || { echo "make test: FAILED, see above" >&2; exit 1; }
 	@echo "make test: all passed (lint, C unit tests, fuzz inputs, a short soak, firmware and its sizes, pytest)"
 
-pytest: images ## the Python tests only
-	@$(PYTHON) -m pytest --quiet
+pytest: pytest-half pytest-rest ## the Python tests only
+
+pytest-half: images
+	@$(PYTHON) -m pytest --quiet $(PYTEST_HALF)
+
+pytest-rest: images
+	@$(PYTHON) -m pytest --quiet $(PYTEST_HALF:%=--ignore=%)
 
 # What of it: PROOF="--only soak mcdc", PROOF="--quick".
 PROOF :=

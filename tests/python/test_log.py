@@ -143,7 +143,7 @@ def test_write_then_read_keeps_the_gyro_and_where_it_said_nothing(tmp_path: Path
 finite = st.floats(-1e6, 1e6)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     travel=st.lists(st.tuples(finite, finite), min_size=1, max_size=20),
     sightings=st.lists(

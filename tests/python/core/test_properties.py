@@ -257,7 +257,7 @@ WARM = {
 
 @REALS
 @given(wanted=ANY_CALL)
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=400)
 def test_any_call_is_taken_or_refused_without_a_trace(real: str, wanted: tuple) -> None:  # type: ignore[type-arg]
     slam = instance.copy_of(WARM[real])
     call(slam, wanted)
@@ -268,7 +268,7 @@ def test_any_call_is_taken_or_refused_without_a_trace(real: str, wanted: tuple) 
 
 @REALS
 @given(calls=st.lists(ANY_CALL, max_size=30))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 def test_any_calls_in_a_row_leave_a_finite_state(real: str, calls: list[tuple]) -> None:  # type: ignore[type-arg]
     slam = instance.copy_of(WARM[real])
     for wanted in calls:

@@ -1,6 +1,7 @@
 """Pictures over the link: the robot's own front end sees what the host's sees, to the bit."""
 
 import time
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +38,7 @@ from bslam.world.camera.worlds import dress
 from bslam.world.simulate import load_scenario, true_drive
 from make_film import STEP_US, camera_record, make_film, smaller, turn_ticks
 
+SILENCE_S = 60.0
 ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"
 STEPS = (240, 300, 330, 420, 570)
 
@@ -161,20 +163,27 @@ def feed(slam, told):
     slam.odometry("ticks", told.time_us, report.left_ticks, report.right_ticks, report.gyro_radps)
 
 
+def gather(count: int, more: Callable[[], list]) -> list:
+    """The first so many that more() brings; a robot that brings none for a minute has failed."""
+    found: list = []
+    end_s = time.monotonic() + SILENCE_S
+    while len(found) < count:
+        assert time.monotonic() < end_s, f"{len(found)} of {count}, and no more in a minute"
+        new = more()
+        end_s = time.monotonic() + SILENCE_S if new else end_s
+        found += new
+    return found[:count]
+
+
 def readings_of(robot, count):
     """The first reports of readings, in order."""
-    told, end_s = [], time.monotonic() + 60.0
-    while len(told) < count:
-        assert time.monotonic() < end_s, f"no more than {len(told)} readings in a minute"
-        told += [one for one in robot.reports(5.0) if isinstance(one.report, PoseReport)]
-    return told[:count]
+    return gather(count, lambda: [one for one in robot.reports(5.0) if isinstance(one.report, PoseReport)])
 
 
 def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_eyes):
     robot, camera, shots = own_eyes
-    told, params = [], robot.host_params
-    while len(told) < (TURN + SHOTS) * 3 // 2:
-        told += robot.reports(5.0)
+    params = robot.host_params
+    told = gather((TURN + SHOTS) * 3 // 2, lambda: robot.reports(5.0))
     assert robot.reports_lost == 0
     here, eyes = Slam(params, beacons_max=80, looks=params["association"] == 3), FrontEnd([camera])
     looks, count = 0, 0
@@ -228,14 +237,15 @@ def test_a_host_that_greets_while_a_reading_waits_for_its_picture_takes_no_rate_
 ):
     make_film(tmp_path / "close", "paper_room", 0, camera, CLOSE, CLOSE)
     monkeypatch.setenv("BSLAM_FILM", str(tmp_path / "close"))
-    wishes, told = Wishes(as_it_is=True), []
-    client, end_s = Client(ProcessLine(ROBOT), wishes), time.monotonic() + 60.0
-    with closing(client):
-        while len(told) < 20:
-            assert time.monotonic() < end_s, f"no more than {len(told)} readings in a minute"
+    wishes = Wishes(as_it_is=True)
+    with closing(Client(ProcessLine(ROBOT), wishes)) as client:
+
+        def greet():
             client.ask(Message.HELLO, hello(1, wishes))
             frames = [frame for frame in client.listen(None) if frame.type == Report.POSE]
-            told += [read_pose_report(frame.payload).gyro_radps for frame in frames]
+            return [read_pose_report(frame.payload).gyro_radps for frame in frames]
+
+        told = gather(20, greet)
     assert told[0] is None and None not in told[1:]
 
 
@@ -278,6 +288,7 @@ def test_a_camera_whose_pixels_are_doubled_is_doubled_over_the_link():
     assert count > 0 and differing > 0
 
 
+@pytest.mark.usefixtures("robots_clock")
 def test_its_console_recording_replays_to_the_same_bits(film, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("BSLAM_FILM", str(film))
     path = tmp_path / "seen.mcap"

@@ -465,6 +465,7 @@ def test_a_robot_s_own_readings_are_reported_and_lost_ones_are_counted(robot_lin
     assert robot.reports_lost == 2
 
 
+@pytest.mark.usefixtures("robots_clock")
 def test_a_console_s_recording_replays_to_the_same_bits(tmp_path, moving, capsys):
     path = tmp_path / "drive.mcap"
     words = ["console", f"process:{ROBOT}", "--seconds", "1.2", "--record", str(path), "--reset"]
@@ -476,6 +477,7 @@ def test_a_console_s_recording_replays_to_the_same_bits(tmp_path, moving, capsys
     assert "states are the recorded ones to the bit" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("robots_clock")
 def test_a_recording_of_a_robot_that_has_moved_says_what_it_lacks(robot_line, tmp_path, moving, monkeypatch):
     from bslam.commands import console
 
