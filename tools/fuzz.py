@@ -3,6 +3,7 @@
 Examples:
     tools/fuzz.py                          until every goal is met, in slices of five minutes
     tools/fuzz.py --seconds 120 --targets map api
+    tools/fuzz.py --each 60                a minute of each target, whatever ran before, then as above
     tools/fuzz.py --table                  what ran so far
     tools/fuzz.py --keep                   writes the smallest inputs that reach what all reach to
                                            tests/fuzz/corpus
@@ -10,8 +11,8 @@ Examples:
 `make fuzz` builds the programs and calls this. The ledger (tests/fuzz/ledger.csv) has a line a slice: when,
 of which commit and sources, target, libFuzzer's seed, executions, seconds, crashes. It is kept with the
 sources: the sum is met by all slices together; the goal of each target, and no crash, by those on the sources
-as they are. Exit status 0: no crash, and the goals met or the time over; 1: a crash, the input that caused it
-is named; 2: bad arguments, programs not built.
+as they are. The last line of the table tells how many this call ran. Exit status 0: no crash, and the goals
+met or the time over; 1: a crash, the input that caused it is named; 2: bad arguments, programs not built.
 """
 
 import argparse
@@ -150,8 +151,10 @@ def missing(ledger: list[Slice], target: str) -> int:
     return max(need[target], 0)
 
 
-def print_table() -> bool:
-    """What ran, against the goals; true if they are met and nothing crashed on the sources as they are."""
+def print_table(before: int) -> bool:
+    """What ran, against the goals; true if they are met and nothing crashed on the sources as they are.
+    `before`: how many slices the ledger had when this call began.
+    """
     ledger = read_ledger()
     now = source_hash()
     heads = ("executions", "on these sources", "seconds", "crashes", "kept")
@@ -169,7 +172,11 @@ def print_table() -> bool:
     crashes = sum(line.crashes for line in ledger if line.sources == now)
     mended = sum(line.crashes for line in ledger) - crashes
     reached = not any(missing(ledger, target) for target in TARGETS)
-    print(f"fuzz: {total:,} executions of {GOAL_ALL:,}, {crashes} crashes ({mended} on earlier sources)")
+    here = sum(line.executions for line in ledger[before:])
+    print(
+        f"fuzz: {total:,} executions of {GOAL_ALL:,}, {here:,} of them now, "
+        f"{crashes} crashes ({mended} on earlier sources)"
+    )
     return reached and crashes == 0
 
 
@@ -194,7 +201,7 @@ def unpack(target: str) -> None:
 
 
 def keep() -> None:
-    """Reduces what was found to inputs that reach all of it."""
+    """Reduces what was found to inputs that reach all of it, and those that broke a property once."""
     count = size = 0
     CORPUS.mkdir(parents=True, exist_ok=True)
     for target in TARGETS:
@@ -204,11 +211,19 @@ def keep() -> None:
         fresh.mkdir(parents=True)
         command = [str(PROGRAMS / target), "-merge=1", "-set_cover_merge=1", str(fresh)]
         subprocess.run([*command, str(OUT / "corpus" / target)], cwd=ROOT, capture_output=True, check=True)
-        inputs = sorted(path.read_bytes() for path in fresh.iterdir())
+        broke = (OUT / "crashes").glob(f"{target}-*")
+        inputs = sorted({path.read_bytes() for path in (*fresh.iterdir(), *broke)})
         (CORPUS / f"{target}.bin").write_bytes(b"".join(len(d).to_bytes(2, "little") + d for d in inputs))
         count += len(inputs)
         size += sum(len(data) + 2 for data in inputs)
     print(f"fuzz: {count} inputs kept, {size:,} bytes of at most {KEPT_BYTES:,}")
+
+
+def run_next(target: str, seconds: float, runs: int) -> bool:
+    """The next slice, and a line about it; false: a crash."""
+    line = run_slice(target, len(read_ledger()) + 1, max(1, round(seconds)), runs)
+    print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
+    return line.crashes == 0
 
 
 def campaign(targets: list[str], seconds: float) -> bool:
@@ -223,10 +238,7 @@ def campaign(targets: list[str], seconds: float) -> bool:
             return True
         spent = {t: sum(line.seconds for line in ledger if line.target == t) for t in waiting}
         target = min(waiting, key=lambda name: (name == FILLER, spent[name]))
-        left = max(1, round(min(SLICE_S, end - time.monotonic())))
-        line = run_slice(target, len(ledger) + 1, left, need[target])
-        print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
-        if line.crashes:
+        if not run_next(target, min(SLICE_S, end - time.monotonic()), need[target]):
             return False
     return True
 
@@ -237,6 +249,9 @@ def main(argv: list[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
+    parser.add_argument(
+        "--each", type=float, default=0.0, metavar="S", help="first each target so long, whatever ran before"
+    )
     parser.add_argument("--targets", nargs="+", choices=TARGETS, default=list(TARGETS), metavar="TARGET")
     parser.add_argument("--table", action="store_true", help="print what ran, run nothing")
     parser.add_argument("--built", action="store_true", help="for make: the programs are of these sources")
@@ -253,8 +268,12 @@ def main(argv: list[str] | None = None) -> int:
     if options.keep:
         keep()
         return 0
-    clean = options.table or campaign(options.targets, options.seconds)
-    met = print_table()
+    before = len(read_ledger())
+    clean = options.table or (
+        all(run_next(target, options.each, GOAL_EACH) for target in options.targets if options.each > 0)
+        and campaign(options.targets, options.seconds)
+    )
+    met = print_table(before)
     return 0 if clean and (met or options.seconds < float("inf")) else 1
 
 

@@ -54,3 +54,27 @@ def test_programs_of_other_sources_are_not_run(
             fuzz.BUILT_OF.write_text(built_of)
         assert main(["--seconds", "1"]) == 2
         assert "`make fuzz` does it" in capsys.readouterr().err
+
+
+def test_each_target_runs_here_though_its_goal_was_met_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ran = []
+
+    def run(target: str, seed: int, seconds: int, runs: int) -> Slice:
+        ran.append((target, seconds))
+        line = Slice("when", "commit", "now", target, seed, 7, seconds, 0)
+        fuzz.write_down(line)
+        return line
+
+    monkeypatch.setattr(fuzz, "run_slice", run)
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    fuzz.BUILT_OF.write_text("now")
+    for line in slices("now", GOAL_ALL):
+        fuzz.write_down(line)
+    assert main([]) == 0
+    assert ran == []
+    assert "0 of them now, 0 crashes" in capsys.readouterr().out
+    assert main(["--each", "5"]) == 0
+    assert ran == [(target, 5) for target in TARGETS]
+    assert f"{7 * len(TARGETS)} of them now, 0 crashes" in capsys.readouterr().out
