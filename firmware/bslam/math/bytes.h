@@ -154,6 +154,23 @@ static inline uint32_t bslam_halves(int32_t low, int32_t high)
     return (uint16_t)low | (uint32_t)high << 16;
 }
 
+/// Each half of a less that of b, at least 0.
+static inline uint32_t bslam_halves_less(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __uqsub16(a, b);
+#else
+    const uint32_t low_a = a & 0xFFFFU, low_b = b & 0xFFFFU, high_a = a >> 16, high_b = b >> 16;
+    return (low_a > low_b ? low_a - low_b : 0) | (high_a > high_b ? high_a - high_b : 0) << 16;
+#endif
+}
+
+/// The other half first.
+static inline uint32_t bslam_halves_turned(uint32_t halves)
+{
+    return halves >> 16 | halves << 16;
+}
+
 /// The sum and the products of the lower halves of a and b, and of the upper ones, as signed numbers.
 static inline int32_t bslam_halves_dot(uint32_t a, uint32_t b, int32_t sum)
 {

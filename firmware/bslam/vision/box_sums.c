@@ -61,28 +61,6 @@ static area_t strip_of(const bslam_proposal_t *box, bslam_side_t side)
     }
 }
 
-bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
-{
-    bslam_sums_t sums = {0};
-    const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, strip_of(box, side));
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        const int32_t start = row * view->frame->columns, end = start + rows.right;
-        sums.cells += rows.right - rows.left;
-        for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t frequent = view->frequent[i];
-            sums.light += tones->light[i];
-            sums.reddish += tones->reddish[i];
-            sums.bluish += tones->bluish[i];
-            sums.spread += tones->spread[i];
-            sums.value += view->values[i];
-            sums.wall += frequent & 255;
-            sums.floor += frequent >> 8;
-        }
-    }
-    return sums;
-}
-
 static bslam_zone_sums_t zone_of(const bslam_sums_t *sums)
 {
     return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
@@ -204,14 +182,6 @@ static inline void add_texture(const bslam_view_t *view, int32_t i, uint32_t mas
     sums->likely = bslam_bytes_sum(bslam_bytes_above(value, SIGNED_ZERO), sums->likely);
 }
 
-/// Two cells, to a half of walls and of floors each.
-static inline void add_frequent(const bslam_view_t *view, int32_t i, uint32_t *walls, uint32_t *floors)
-{
-    const uint32_t both = bslam_word_at(view->frequent + i);
-    *walls = bslam_bytes_add_even(*walls, both);
-    *floors = bslam_bytes_add_odd(*floors, both);
-}
-
 static void merge_tones(bslam_sums_t *into, const bslam_sums_t *from)
 {
     into->cells += from->cells;
@@ -221,6 +191,75 @@ static void merge_tones(bslam_sums_t *into, const bslam_sums_t *from)
     into->light_sq += from->light_sq;
     into->reddish_sq += from->reddish_sq;
     into->bluish_sq += from->bluish_sq;
+}
+
+/// Two cells, to a half of walls and of floors each.
+static inline void add_frequent(const bslam_view_t *view, int32_t i, uint32_t *walls, uint32_t *floors)
+{
+    const uint32_t both = bslam_word_at(view->frequent + i);
+    *walls = bslam_bytes_add_even(*walls, both);
+    *floors = bslam_bytes_add_odd(*floors, both);
+}
+
+/// The cells of a row's last word: `count` of them, 1 to 3.
+static inline void add_frequent_of(const bslam_view_t *view, int32_t i, int32_t count, uint32_t *walls,
+                                   uint32_t *floors)
+{
+    const uint32_t both = bslam_word_at(view->frequent + i) & (count == 1 ? 0xFFFFU : ALL_BYTES);
+    *walls = bslam_bytes_add_even(*walls, both);
+    *floors = bslam_bytes_add_odd(*floors, both);
+    if (count > 2) {
+        *walls += view->frequent[i + 2] & 255U;
+        *floors += view->frequent[i + 2] >> 8;
+    }
+}
+
+/// Sums of a strip's cells: of bytes; those that stand for signed numbers are 128 more.
+typedef struct strip_sums {
+    uint32_t light, reddish, bluish, spread, value;
+    uint32_t walls, floors;  ///< in halves, which a strip does not fill
+} strip_sums_t;
+
+static inline void add_strip(const bslam_view_t *view, int32_t i, uint32_t mask, strip_sums_t *sums)
+{
+    const bslam_tones_t *tones = view->tones;
+    sums->light = bslam_bytes_sum(bslam_word_at(tones->light + i) & mask, sums->light);
+    sums->reddish = bslam_bytes_sum((bslam_word_at(tones->reddish + i) ^ SIGNED_ZERO) & mask, sums->reddish);
+    sums->bluish = bslam_bytes_sum((bslam_word_at(tones->bluish + i) ^ SIGNED_ZERO) & mask, sums->bluish);
+    sums->spread = bslam_bytes_sum(bslam_word_at(tones->spread + i) & mask, sums->spread);
+    sums->value = bslam_bytes_sum((bslam_word_at(view->values + i) ^ SIGNED_ZERO) & mask, sums->value);
+}
+
+bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
+{
+    strip_sums_t sums = {0};
+    const rows_t rows = rows_of(view, strip_of(box, side));
+    const int32_t width = rows.right - rows.left, last = width & ~(BSLAM_WORD_BYTES - 1);
+    const uint32_t mask = mask_of(width - last);
+    int32_t cells = 0;
+    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
+        int32_t i = row * view->frame->columns + rows.left;
+        for (const int32_t end = i + last; i < end; i += BSLAM_WORD_BYTES) {
+            add_strip(view, i, ALL_BYTES, &sums);
+            add_frequent(view, i, &sums.walls, &sums.floors);
+            add_frequent(view, i + 2, &sums.walls, &sums.floors);
+        }
+        if (mask != 0) {
+            add_strip(view, i, mask, &sums);
+            add_frequent_of(view, i, width - last, &sums.walls, &sums.floors);
+        }
+        cells += width;
+    }
+    return (bslam_sums_t){
+        .cells = cells,
+        .light = (int32_t)sums.light,
+        .reddish = (int32_t)sums.reddish - 128 * cells,
+        .bluish = (int32_t)sums.bluish - 128 * cells,
+        .spread = (int32_t)sums.spread,
+        .value = (int32_t)sums.value - 128 * cells,
+        .wall = (int32_t)halves_sum(sums.walls),
+        .floor = (int32_t)halves_sum(sums.floors),
+    };
 }
 
 /// Adds the texture and the values of an area's cells.
@@ -240,10 +279,7 @@ static void add_texture_of(const bslam_view_t *view, const rows_t *rows, texture
         }
         if (mask != 0) {
             add_texture(view, i, mask, &all);
-        }
-        for (; i < end; i++) {
-            all.wall += view->frequent[i] & 255U;
-            all.floor += view->frequent[i] >> 8;
+            add_frequent_of(view, i, end - i, &walls, &floors);
         }
     }
     all.wall += halves_sum(walls);
@@ -304,6 +340,28 @@ void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
 #else
 
 // --- By columns
+
+bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
+{
+    bslam_sums_t sums = {0};
+    const bslam_tones_t *tones = view->tones;
+    const rows_t rows = rows_of(view, strip_of(box, side));
+    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
+        const int32_t start = row * view->frame->columns, end = start + rows.right;
+        sums.cells += rows.right - rows.left;
+        for (int32_t i = start + rows.left; i < end; i++) {
+            const int32_t frequent = view->frequent[i];
+            sums.light += tones->light[i];
+            sums.reddish += tones->reddish[i];
+            sums.bluish += tones->bluish[i];
+            sums.spread += tones->spread[i];
+            sums.value += view->values[i];
+            sums.wall += frequent & 255;
+            sums.floor += frequent >> 8;
+        }
+    }
+    return sums;
+}
 
 static void merge(bslam_sums_t *into, const bslam_sums_t *from)
 {

@@ -205,15 +205,14 @@ static void fill_lights(const bslam_background_t *background, const int16_t *w, 
         terms[light] = (bslam_light_terms_t){
             .value = w[0] * brighter + w[1] * magnitude(brighter),
             .distances = bslam_bytes_least(apart, FOUR * DISTANCE_MAX) + FOUR * DISTANCE_ZERO,
-            .bin = bslam_light_bin(light) << 6,
             .above_floor = w[21] * least(brighter, 0) - w[20] * DISTANCE_ZERO,
         };
     }
 }
 
 /// The same for a chroma: `tones` are those of floor, wall and ceiling and grey, 128 more than the chroma;
-/// weight that of the distance from the wall's; its bins are `step` apart.
-static void fill_chromas(uint32_t tones, int32_t weight, int32_t step, bslam_chroma_terms_t *terms)
+/// weight that of the distance from the wall's.
+static void fill_chromas(uint32_t tones, int32_t weight, bslam_chroma_terms_t *terms)
 {
     for (int32_t chroma = -128; chroma < 128; chroma++) {
         const uint32_t apart = bslam_bytes_apart((uint32_t)(chroma + 128) * FOUR, tones);
@@ -221,12 +220,13 @@ static void fill_chromas(uint32_t tones, int32_t weight, int32_t step, bslam_chr
         terms[(uint8_t)chroma] = (bslam_chroma_terms_t){
             .value = weight * least(bslam_byte_of(apart, TO_WALL), CHROMA_MAX),
             .distances = bslam_bytes_least(twice, FOUR * DISTANCE_MAX),
-            .bin = bslam_chroma_bin(chroma) * step,
         };
     }
 }
 
-/// Tables of all that depends on one channel of a tone.
+#define NO_TONE 0xFFFFFFFFU
+
+/// Tables of all that depends on one channel of a tone; no tone's sum is kept.
 static void fill_channels(const bslam_background_t *background, const int16_t *w,
                           bslam_channel_tables_t *tables)
 {
@@ -234,9 +234,12 @@ static void fill_channels(const bslam_background_t *background, const int16_t *w
     const bslam_tone_t floor = background->tone[BSLAM_ZONE_FLOOR];
     const bslam_tone_t ceiling = background->tone[BSLAM_ZONE_CEILING];
     fill_lights(background, w, tables->light);
-    fill_chromas(word_of(floor.reddish, wall.reddish, ceiling.reddish, 0) ^ FOUR * 128, w[2], 8,
+    fill_chromas(word_of(floor.reddish, wall.reddish, ceiling.reddish, 0) ^ FOUR * 128, w[2],
                  tables->reddish);
-    fill_chromas(word_of(floor.bluish, wall.bluish, ceiling.bluish, 0) ^ FOUR * 128, w[3], 1, tables->bluish);
+    fill_chromas(word_of(floor.bluish, wall.bluish, ceiling.bluish, 0) ^ FOUR * 128, w[3], tables->bluish);
+    for (int32_t i = 0; i < BSLAM_TONES_KEPT; i++) {
+        tables->kept[i].tone = NO_TONE;
+    }
 }
 
 /// What textures weigh, and their words.
@@ -272,9 +275,37 @@ static void sum_texture(const bslam_view_t *view, const int16_t *w, int32_t firs
     }
 }
 
+/// What the machine looks at tones with.
+typedef struct tone_machine {
+    const bslam_cell_tables_t *bins;
+    const int16_t *weights;
+    bslam_channel_tables_t *channels;
+} tone_machine_t;
+
+/// Not to be inlined: most tones are kept, and the loop over the cells has the registers then.
+__attribute__((noinline)) static void sum_tone(const tone_machine_t *machine, uint32_t tone,
+                                               bslam_tone_sum_t *sum)
+{
+    const int16_t *w = machine->weights;
+    const int32_t light = bslam_byte_of(tone, 0), reddish = bslam_byte_of(tone, 1);
+    const int32_t bluish = bslam_byte_of(tone, 2);
+    const bslam_light_terms_t *a = &machine->channels->light[light];
+    const bslam_chroma_terms_t *b = &machine->channels->reddish[reddish];
+    const bslam_chroma_terms_t *c = &machine->channels->bluish[bluish];
+    const uint32_t distances = bslam_bytes_plus(a->distances, bslam_bytes_plus(b->distances, c->distances));
+    const uint32_t nearer = bslam_bytes_least(distances, distances >> 8);
+    const int32_t nearest = bslam_byte_of(bslam_bytes_least(nearer, nearer >> 8), 0);
+    const int32_t bin = bslam_tone_bin((bslam_tone_t){(uint8_t)light, (int8_t)reddish, (int8_t)bluish, 0});
+    const int32_t values = a->value + b->value + c->value + machine->bins->sums[bin];
+    sum->tone = tone;
+    sum->sum = bslam_halves_dot(bslam_bytes_even(distances), bslam_halves(w[4], w[5]), values) +
+               w[6] * nearest + w[15] * bslam_byte_of(distances, 3);
+    sum->above_floor = a->above_floor + w[20] * bslam_byte_of(distances, TO_WALL);
+    sum->frequent = machine->bins->frequent[bin];
+}
+
 /// Values of a row's cells: by their tones, and the sums of the rest.
-static void decide_row(const bslam_view_t *view, const bslam_cell_tables_t *bins,
-                       const bslam_channel_tables_t *channels, const int16_t *w, int32_t row,
+static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, int32_t row,
                        const int32_t *restrict sums, uint16_t *restrict frequent, int8_t *restrict values)
 {
     const int32_t first = row * view->frame->columns;
@@ -282,24 +313,16 @@ static void decide_row(const bslam_view_t *view, const bslam_cell_tables_t *bins
     const uint8_t *reddish = (const uint8_t *)view->tones->reddish + first;
     const uint8_t *bluish = (const uint8_t *)view->tones->bluish + first;
     const int16_t *floor_row = view->floor_line->row;
-    const uint32_t by_distance = bslam_halves(w[4], w[5]);
-    const int32_t by_nearest = w[6], by_colour = w[15], by_wall = w[20];
+    bslam_tone_sum_t *kept = machine->channels->kept;
     const int32_t columns = view->frame->columns;
     for (int32_t i = 0; i < columns; i++) {
-        const bslam_light_terms_t *a = &channels->light[lights[i]];
-        const bslam_chroma_terms_t *b = &channels->reddish[reddish[i]], *c = &channels->bluish[bluish[i]];
-        const uint32_t distances =
-            bslam_bytes_plus(a->distances, bslam_bytes_plus(b->distances, c->distances));
-        const uint32_t nearer = bslam_bytes_least(distances, distances >> 8);
-        const int32_t bin = a->bin + b->bin + c->bin;
-        int32_t sum = sums[i] + a->value + b->value + c->value + bins->sums[bin];
-        sum = bslam_halves_dot(bslam_bytes_even(distances), by_distance, sum);
-        sum += by_nearest * bslam_byte_of(bslam_bytes_least(nearer, nearer >> 8), 0) +
-               by_colour * bslam_byte_of(distances, 3);
-        if (floor_row[i] >= row) {
-            sum += a->above_floor + by_wall * bslam_byte_of(distances, TO_WALL);
+        const uint32_t tone = lights[i] | (uint32_t)reddish[i] << 8 | (uint32_t)bluish[i] << 16;
+        bslam_tone_sum_t *known = &kept[(tone ^ tone >> 5 ^ tone >> 10) % BSLAM_TONES_KEPT];
+        if (known->tone != tone) {
+            sum_tone(machine, tone, known);
         }
-        frequent[i] = bins->frequent[bin];
+        const int32_t sum = sums[i] + known->sum + (floor_row[i] >= row ? known->above_floor : 0);
+        frequent[i] = (uint16_t)known->frequent;
         values[i] = (int8_t)most(clamp(sum / (1 << BSLAM_CELL_WEIGHT_SHIFT), -128, 127), -127);
     }
 }
@@ -314,6 +337,7 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
     const int32_t bias = machine->bias - DISTANCE_ZERO * (w[4] + w[5] + w[6] + w[15]);
     int32_t places[2 * ROWS_MAX + 1];  // what the place above the floor adds, from -ROWS_MAX rows on
     int32_t sums[BSLAM_COLUMNS_MAX + BSLAM_WORD_BYTES];
+    const tone_machine_t tones = {.bins = tables, .weights = w, .channels = channels};
     fill_bins(view->background, w, tables);
     fill_channels(view->background, w, channels);
     for (int32_t above = -ROWS_MAX; above <= ROWS_MAX; above++) {
@@ -324,6 +348,6 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
         const int32_t of_row = bias + w[18] * up + w[19] * most(up, 0);
         const int32_t first = row * columns;
         sum_texture(view, w, first, places + ROWS_MAX - row, of_row, sums);
-        decide_row(view, tables, channels, w, row, sums, frequent + first, values + first);
+        decide_row(view, &tones, row, sums, frequent + first, values + first);
     }
 }

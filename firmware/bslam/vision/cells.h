@@ -42,26 +42,34 @@ typedef struct bslam_cell_tables {
     uint16_t frequent[BSLAM_TONE_BINS];
 } bslam_cell_tables_t;
 
-/// Scratch: what each channel of a tone adds. A multiple of 16 bytes each, which costs a core less to find.
+/// Scratch: what each channel of a tone adds.
 #define BSLAM_LIGHTS 194
 typedef struct bslam_light_terms {
     int32_t value;
-    uint32_t distances;  ///< from tones of the room (cells.c), a byte each
-    int32_t bin;
+    uint32_t distances;   ///< from tones of the room (cells.c), a byte each
     int32_t above_floor;  ///< of a cell that is not below the floor line
 } bslam_light_terms_t;
 
 typedef struct bslam_chroma_terms {
     int32_t value;
     uint32_t distances;
-    int32_t bin;
-    int32_t unused;
 } bslam_chroma_terms_t;
 
+/// What a tone adds up to.
+typedef struct bslam_tone_sum {
+    uint32_t tone;  ///< light, reddish and bluish, a byte each; no tone has a fourth
+    int32_t sum;
+    int32_t above_floor;
+    uint32_t frequent;
+} bslam_tone_sum_t;
+
+/// Tones whose sums are kept, each in one place: most cells of a room have one of a few hundred tones.
+#define BSLAM_TONES_KEPT 256
 typedef struct bslam_channel_tables {
     bslam_light_terms_t light[BSLAM_LIGHTS];
     bslam_chroma_terms_t reddish[256];  ///< [(uint8_t)reddish]
     bslam_chroma_terms_t bluish[256];
+    bslam_tone_sum_t kept[BSLAM_TONES_KEPT];
 } bslam_channel_tables_t;
 
 /// What is made of a frame's cells, [rows][columns].

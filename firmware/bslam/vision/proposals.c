@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bslam/math/bytes.h"
+#include "bslam/vision/snap.h"
 
 /// What cells a segmentation joins.
 typedef enum source {
@@ -38,9 +39,6 @@ _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one num
 #define SIDE_MIN 2
 /// Wider than this part of the frame, it is a wall.
 #define SIDE_MAX_PERCENT 75
-/// A cell's step counts so much at most along an edge; above the other it is clearly one.
-#define EDGE_STEP_MAX 60
-#define EDGE_STEP_MIN 8
 #define SNAP_SIDE_MIN 6
 /// How often a box is snapped: a side may move by so many cells.
 #define SNAPS 2
@@ -56,11 +54,6 @@ static int32_t least(int32_t a, int32_t b)
 static int32_t most(int32_t a, int32_t b)
 {
     return a > b ? a : b;
-}
-
-static int32_t clamp(int32_t value, int32_t low, int32_t high)
-{
-    return most(low, least(value, high));
 }
 
 static int32_t root_of(bslam_run_t *runs, int32_t run)
@@ -205,176 +198,12 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
     int32_t sum = 0, clear = 0;
     for (int32_t i = 0; i < end - first; i++) {
         const int32_t here = step[i * stride];
-        sum += least(here, EDGE_STEP_MAX);
-        clear += here > EDGE_STEP_MIN ? 1 : 0;
+        sum += least(here, BSLAM_EDGE_STEP_MAX);
+        clear += here > BSLAM_EDGE_STEP_MIN ? 1 : 0;
     }
     edge.step = (float)sum / (float)(end - first);
     edge.share = (float)clear / (float)(end - first);
     return edge;
-}
-
-/// Lines of cells around a side that it may snap to, and those with one on either side.
-enum { SNAP_LINES = 5 };
-/// Cells summed at a time, a constant, so that a compiler can use vector instructions.
-enum { STEPS_AT_ONCE = 8 };
-
-#if BSLAM_HAS_BYTES
-
-#define LIMITS (EDGE_STEP_MAX * 0x01010101U)
-
-/// Sums down STEPS_AT_ONCE columns, each step limited.
-static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t all[STEPS_AT_ONCE])
-{
-    uint32_t even[2] = {0}, odd[2] = {0};
-    for (; rows > 0; rows--, steps += columns) {
-        const uint32_t first = bslam_bytes_least(bslam_word_at(steps), LIMITS);
-        const uint32_t second = bslam_bytes_least(bslam_word_at(steps + BSLAM_WORD_BYTES), LIMITS);
-        even[0] = bslam_bytes_add_even(even[0], first);
-        odd[0] = bslam_bytes_add_odd(odd[0], first);
-        even[1] = bslam_bytes_add_even(even[1], second);
-        odd[1] = bslam_bytes_add_odd(odd[1], second);
-    }
-    for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
-        const uint32_t halves = k % 2 == 0 ? even[k / 4] : odd[k / 4];
-        all[k] = (uint16_t)(k % 4 < 2 ? halves : halves >> 16);
-    }
-}
-
-static uint16_t sum_row(const uint8_t *steps, int32_t count)
-{
-    uint32_t sum = 0;
-    int32_t i = 0;
-    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
-        sum = bslam_bytes_sum(bslam_bytes_least(bslam_word_at(steps + i), LIMITS), sum);
-    }
-    for (; i < count; i++) {
-        sum += (uint32_t)least(steps[i], EDGE_STEP_MAX);
-    }
-    return (uint16_t)sum;
-}
-
-#else
-
-static uint8_t limited(uint8_t step)
-{
-    return step < EDGE_STEP_MAX ? step : EDGE_STEP_MAX;
-}
-
-/// Sums down STEPS_AT_ONCE columns, each step limited.
-static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t all[STEPS_AT_ONCE])
-{
-    memset(all, 0, STEPS_AT_ONCE * sizeof all[0]);
-    for (; rows > 0; rows--, steps += columns) {
-        for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
-            all[k] = (uint16_t)(all[k] + limited(steps[k]));
-        }
-    }
-}
-
-static uint16_t sum_row(const uint8_t *steps, int32_t count)
-{
-    uint16_t all[STEPS_AT_ONCE] = {0};
-    int32_t sum = 0;
-    int32_t i = 0;
-    for (; i + STEPS_AT_ONCE <= count; i += STEPS_AT_ONCE) {
-        for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
-            all[k] = (uint16_t)(all[k] + limited(steps[i + k]));
-        }
-    }
-    for (; i < count; i++) {
-        sum += limited(steps[i]);
-    }
-    for (int32_t k = 0; k < STEPS_AT_ONCE; k++) {
-        sum += all[k];
-    }
-    return (uint16_t)sum;
-}
-
-#endif
-
-/// Sums of the steps across SNAP_LINES columns from `line` on; what a sum takes from beyond the frame is not
-/// read.
-static void sum_columns(const bslam_view_t *view, const bslam_proposal_t *box, int32_t line,
-                        uint16_t sums[SNAP_LINES])
-{
-    const int32_t columns = view->frame->columns;
-    const int32_t start = most(line, 0);
-    uint16_t all[STEPS_AT_ONCE];
-    sum_down(view->step_x + box->top * columns + start, columns, box->bottom - box->top, all);
-    for (int32_t i = 0; i < SNAP_LINES; i++) {
-        sums[i] = line + i >= 0 && line + i < columns ? all[line + i - start] : 0;
-    }
-}
-
-/// Mean steps, as bslam_edge_along gives them, of SNAP_LINES lines of cells from `line` on.
-static void steps_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
-                        int32_t line, float steps[SNAP_LINES])
-{
-    const bool upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
-    const int32_t cells = upright ? box->bottom - box->top : box->right - box->left;
-    const int32_t columns = view->frame->columns;
-    uint16_t sums[SNAP_LINES] = {0};
-    if (upright) {
-        sum_columns(view, box, line, sums);
-    }
-    for (int32_t i = 0; i < SNAP_LINES; i++) {
-        if (!upright && line + i >= 0 && line + i < view->frame->rows) {
-            sums[i] = sum_row(view->step_y + (line + i) * columns + box->left, cells);
-        }
-        steps[i] = (float)sums[i] / (float)cells;
-    }
-}
-
-/// Where an edge lies between the cells `line` - 1 and `line` + 1, in cells from `line`: the top of a
-/// parabola.
-static float peak_of(float before, float here, float after)
-{
-    const float bend = 2 * here - before - after;
-    const float shift = bend > 1e-3f ? 0.5f * (after - before) / bend : 0.0f;
-    return shift < -0.5f ? -0.5f : shift > 0.5f ? 0.5f : shift;
-}
-
-/// The line of cells at `line`, or the next one outside, that has the stronger edge; the next one inside only
-/// where both have none, since what is inside has edges of its own. *shift is where in it, in cells.
-static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
-                         int32_t line, float *shift)
-{
-    const int32_t outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
-    float steps[SNAP_LINES];
-    steps_along(view, box, side, line - 2, steps);
-    int32_t best = steps[2 + outside] > steps[2] ? 2 + outside : 2;
-    if (steps[best] < (float)EDGE_STEP_MIN && steps[2 - outside] > steps[best]) {
-        best = 2 - outside;
-    }
-    *shift = peak_of(steps[best - 1], steps[best], steps[best + 1]);
-    return line - 2 + best;
-}
-
-static bslam_proposal_t snapped(const bslam_view_t *view, const bslam_proposal_t *rough)
-{
-    const int32_t lines[BSLAM_SIDES] = {rough->left, rough->right - 1, rough->top, rough->bottom - 1};
-    const int32_t ends[BSLAM_SIDES] = {view->frame->columns, view->frame->columns, view->frame->rows,
-                                       view->frame->rows};
-    int32_t cells[BSLAM_SIDES];
-    bslam_real_t edges_px[BSLAM_SIDES];
-    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
-        float shift = 0;
-        const int32_t line = snap_side(view, rough, (bslam_side_t)side, lines[side], &shift);
-        cells[side] = clamp(line, 0, ends[side] - 1);
-        edges_px[side] = ((bslam_real_t)cells[side] + (bslam_real_t)shift) * BSLAM_CELL_PX + BSLAM_R(1.5);
-    }
-    bslam_proposal_t box = *rough;
-    if (cells[BSLAM_SIDE_RIGHT] <= cells[BSLAM_SIDE_LEFT] ||
-        cells[BSLAM_SIDE_BOTTOM] <= cells[BSLAM_SIDE_TOP]) {
-        return box;
-    }
-    box.left = (int16_t)cells[BSLAM_SIDE_LEFT];
-    box.right = (int16_t)(cells[BSLAM_SIDE_RIGHT] + 1);
-    box.top = (int16_t)cells[BSLAM_SIDE_TOP];
-    box.bottom = (int16_t)(cells[BSLAM_SIDE_BOTTOM] + 1);
-    box.box = (bslam_box_t){edges_px[BSLAM_SIDE_LEFT], edges_px[BSLAM_SIDE_TOP], edges_px[BSLAM_SIDE_RIGHT],
-                            edges_px[BSLAM_SIDE_BOTTOM]};
-    return box;
 }
 
 void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
@@ -387,7 +216,7 @@ void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
     bool moves = !small;
     for (int32_t i = 0; i < SNAPS && moves; i++) {
         const bslam_proposal_t before = box;
-        box = snapped(view, &before);
+        box = bslam_snapped(view, &before);
         moves = box.left != before.left || box.top != before.top || box.right != before.right ||
                 box.bottom != before.bottom;
     }

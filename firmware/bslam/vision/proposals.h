@@ -63,6 +63,10 @@ typedef enum bslam_side {
     BSLAM_SIDES = 4
 } bslam_side_t;
 
+/// A cell's step counts so much at most along an edge; above the other it is clearly one.
+#define BSLAM_EDGE_STEP_MAX 60
+#define BSLAM_EDGE_STEP_MIN 8
+
 /// How the colour steps across a line of cells.
 typedef struct bslam_edge {
     float step;   ///< mean over the line; a cell counts 60 at most

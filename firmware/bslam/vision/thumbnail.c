@@ -69,58 +69,56 @@ static inline uint16_t mean_565(uint32_t quad)
     return (uint16_t)(mean | mean >> 16);
 }
 
-/// The lower row of two, and the upper half of a row of cells: sums of 2x2 pixels, and their means.
-static void sum_quads(uint32_t *restrict quads, uint16_t *restrict half, const uint32_t *restrict upper,
-                      const uint8_t *restrict pixels, int32_t pairs)
+/// Adds a pair of the lower row to the one above; the mean of the four.
+static inline uint16_t finish_quad(uint32_t *sum, const uint8_t *pair)
 {
-    for (int32_t i = 0; i < pairs; i += 2) {
-        quads[i] = upper[i] + pair_sum(pixels + 4 * i);
-        quads[i + 1] = upper[i + 1] + pair_sum(pixels + 4 * i + 4);
-        half[i] = mean_565(quads[i]);
-        half[i + 1] = mean_565(quads[i + 1]);
+    *sum += pair_sum(pair);
+    return mean_565(*sum);
+}
+
+/// The lower row of two: to the sums of the upper row's pairs, which become those of 2x2 pixels; their means.
+static void sum_quads(uint32_t *restrict sums, uint16_t *restrict half, const uint8_t *restrict pixels,
+                      int32_t pairs)
+{
+    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
+        half[i] = finish_quad(sums + i, pixels + 4 * i);
+        half[i + 1] = finish_quad(sums + i + 1, pixels + 4 * i + 4);
+        half[i + 2] = finish_quad(sums + i + 2, pixels + 4 * i + 8);
+        half[i + 3] = finish_quad(sums + i + 3, pixels + 4 * i + 12);
     }
 }
 
 /// Brightness of a 2x2 sum, 0 to 376: green counts twice as much as red, because it has a bit more.
-static inline int32_t luma(uint32_t quad)
+static inline uint32_t luma(uint32_t quad)
 {
-    return (int32_t)((quad >> RED_SHIFT & 127) + (quad >> GREEN_SHIFT));
+    return (quad >> RED_SHIFT & 127) + (quad >> GREEN_SHIFT);
 }
 
-typedef struct range {
-    int32_t low, high;
-} range_t;
-
-static inline range_t range_of(int32_t a, int32_t b)
+/// The largest luma of four quarters less the smallest, at most 255: of two at a time, in halves of a word.
+static inline uint8_t spread_of(const uint32_t above[2], const uint32_t below[2])
 {
-    return a < b ? (range_t){a, b} : (range_t){b, a};
+    const uint32_t uppers = luma(above[0]) | luma(above[1]) << 16;
+    const uint32_t lowers = luma(below[0]) | luma(below[1]) << 16;
+    const uint32_t less = bslam_halves_less(uppers, lowers);
+    const uint32_t highs = lowers + less, lows = uppers - less;
+    const uint32_t other_high = bslam_halves_turned(highs), other_low = bslam_halves_turned(lows);
+    const uint32_t high = other_high + bslam_halves_less(highs, other_high);
+    const uint32_t low = lows - bslam_halves_less(lows, other_low);
+    const int32_t spread = (int32_t)((high - low) & 0xFFFFU);
+    return (uint8_t)(spread < 0 ? 0 : spread < 255 ? spread : 255);
 }
 
-/// A cell from its four quarters.
-static inline void fill_cell(bslam_cells_t *cells, int32_t i, const uint32_t above[2], uint32_t left,
-                             uint32_t right)
+/// A row of cells, from cell `first` on, from the sums of their quarters.
+static void fill_cells(bslam_cells_t *cells, int32_t first, const bslam_row_sums_t *sums, int32_t pairs)
 {
-    const uint32_t sum = above[0] + above[1] + left + right;
-    const range_t uppers = range_of(luma(above[0]), luma(above[1]));
-    const range_t lowers = range_of(luma(left), luma(right));
-    const int32_t high = uppers.high > lowers.high ? uppers.high : lowers.high;
-    const int32_t spread = high - (uppers.low < lowers.low ? uppers.low : lowers.low);
-    cells->red[i] = (uint8_t)(sum >> (RED_SHIFT + 1));
-    cells->green[i] = (uint8_t)(sum >> (GREEN_SHIFT + 2));
-    cells->blue[i] = (uint8_t)((sum & 511) >> 1);
-    cells->spread[i] = (uint8_t)(spread < 255 ? spread : 255);
-}
-
-/// The last row of a row of cells, which begins at cell `first`.
-static void finish_cells(bslam_cells_t *cells, uint16_t *restrict half, const bslam_row_sums_t *sums,
-                         const uint8_t *restrict pixels, int32_t pairs, int32_t first)
-{
-    for (int32_t i = 0; i < pairs; i += 2) {
-        const uint32_t left = sums->pairs[i] + pair_sum(pixels + 4 * i);
-        const uint32_t right = sums->pairs[i + 1] + pair_sum(pixels + 4 * i + 4);
-        half[i] = mean_565(left);
-        half[i + 1] = mean_565(right);
-        fill_cell(cells, first + i / 2, sums->upper_quads + i, left, right);
+    const uint32_t *above = sums->upper, *below = sums->lower;
+    const int32_t end = first + pairs / 2;
+    for (int32_t i = first; i < end; i++, above += 2, below += 2) {
+        const uint32_t sum = above[0] + above[1] + below[0] + below[1];
+        cells->red[i] = (uint8_t)(sum >> (RED_SHIFT + 1));
+        cells->green[i] = (uint8_t)(sum >> (GREEN_SHIFT + 2));
+        cells->blue[i] = (uint8_t)(sum >> 1);
+        cells->spread[i] = spread_of(above, below);
     }
 }
 
@@ -138,12 +136,14 @@ bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_
         packed = (const uint8_t *)sums->packed;
     }
     uint16_t *half = t->half + row / 2 * pairs;
+    uint32_t *quads = row % BSLAM_CELL_PX < 2 ? sums->upper : sums->lower;
     if (row % 2 == 0) {
-        sum_pairs(sums->pairs, packed, pairs);
-    } else if (row % BSLAM_CELL_PX == 1) {
-        sum_quads(sums->upper_quads, half, sums->pairs, packed, pairs);
+        sum_pairs(quads, packed, pairs);
     } else {
-        finish_cells(&t->cells, half, sums, packed, pairs, row / BSLAM_CELL_PX * (pairs / 2));
+        sum_quads(quads, half, packed, pairs);
+    }
+    if (row % BSLAM_CELL_PX == BSLAM_CELL_PX - 1) {
+        fill_cells(&t->cells, row / BSLAM_CELL_PX * (pairs / 2), sums, pairs);
     }
     t->rows_seen++;
     return BSLAM_OK;

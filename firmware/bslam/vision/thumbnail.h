@@ -19,9 +19,9 @@ typedef enum bslam_pixel_format {
 
 /// What is summed of a row of cells until it is finished. Scratch of a frame that streams in.
 typedef struct bslam_row_sums {
-    uint32_t pairs[BSLAM_IMAGE_WIDTH_MAX / 2];        ///< of an upper row of two
-    uint32_t upper_quads[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of 2x2 pixels, of an upper half of a row of cells
-    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];  ///< a row that came with 8 bits a channel, or is stretched
+    uint32_t upper[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of 2x2 pixels of its upper half,
+    uint32_t lower[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of its lower one; of pairs, after the upper row of two
+    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];     ///< a row that came with 8 bits a channel, or is stretched
 } bslam_row_sums_t;
 
 typedef struct bslam_thumbnail {

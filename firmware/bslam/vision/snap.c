@@ -1,0 +1,208 @@
+#include "bslam/vision/snap.h"
+
+#include <string.h>
+
+#include "bslam/math/bytes.h"
+
+/// Lines of cells about a side, in their order from inside: the side's own, those that it may snap to, one on
+/// either side of each.
+enum { SNAP_LINES = 5, OWN = 2, INNER = OWN - 1, OUTER = OWN + 1 };
+
+static int32_t clamp(int32_t value, int32_t low, int32_t high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+#if BSLAM_HAS_BYTES
+
+#define LIMITS (BSLAM_EDGE_STEP_MAX * 0x01010101U)
+
+/// Columns of cells summed at a time.
+enum { COLUMNS_AT_ONCE = BSLAM_WORD_BYTES };
+
+/// Sums down the columns, each step limited.
+static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t sums[COLUMNS_AT_ONCE])
+{
+    uint32_t even = 0, odd = 0;
+    for (; rows > 0; rows--, steps += columns) {
+        const uint32_t four = bslam_bytes_least(bslam_word_at(steps), LIMITS);
+        even = bslam_bytes_add_even(even, four);
+        odd = bslam_bytes_add_odd(odd, four);
+    }
+    for (int32_t k = 0; k < COLUMNS_AT_ONCE; k++) {
+        const uint32_t halves = k % 2 == 0 ? even : odd;
+        sums[k] = (uint16_t)(k < 2 ? halves : halves >> 16);
+    }
+}
+
+static uint16_t sum_row(const uint8_t *steps, int32_t count)
+{
+    uint32_t sum = 0;
+    int32_t i = 0;
+    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
+        sum = bslam_bytes_sum(bslam_bytes_least(bslam_word_at(steps + i), LIMITS), sum);
+    }
+    for (; i < count; i++) {
+        sum += steps[i] < BSLAM_EDGE_STEP_MAX ? steps[i] : BSLAM_EDGE_STEP_MAX;
+    }
+    return (uint16_t)sum;
+}
+
+#else
+
+/// Columns of cells summed at a time, a constant, so that a compiler can use vector instructions.
+enum { COLUMNS_AT_ONCE = 8 };
+
+static uint8_t limited(uint8_t step)
+{
+    return step < BSLAM_EDGE_STEP_MAX ? step : BSLAM_EDGE_STEP_MAX;
+}
+
+/// Sums down the columns, each step limited.
+static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t sums[COLUMNS_AT_ONCE])
+{
+    memset(sums, 0, COLUMNS_AT_ONCE * sizeof sums[0]);
+    for (; rows > 0; rows--, steps += columns) {
+        for (int32_t k = 0; k < COLUMNS_AT_ONCE; k++) {
+            sums[k] = (uint16_t)(sums[k] + limited(steps[k]));
+        }
+    }
+}
+
+static uint16_t sum_row(const uint8_t *steps, int32_t count)
+{
+    uint16_t all[COLUMNS_AT_ONCE] = {0};
+    int32_t sum = 0;
+    int32_t i = 0;
+    for (; i + COLUMNS_AT_ONCE <= count; i += COLUMNS_AT_ONCE) {
+        for (int32_t k = 0; k < COLUMNS_AT_ONCE; k++) {
+            all[k] = (uint16_t)(all[k] + limited(steps[i + k]));
+        }
+    }
+    for (; i < count; i++) {
+        sum += limited(steps[i]);
+    }
+    for (int32_t k = 0; k < COLUMNS_AT_ONCE; k++) {
+        sum += all[k];
+    }
+    return (uint16_t)sum;
+}
+
+#endif
+
+/// A side of a box, and the mean steps of the lines of cells about it, as bslam_edge_along gives them, as far
+/// as they were asked for.
+typedef struct near {
+    const bslam_view_t *view;
+    const bslam_proposal_t *box;
+    int32_t line;     ///< the side's own
+    int32_t outside;  ///< 1 or -1: where the next line outside is
+    bool is_upright;
+    float steps[SNAP_LINES];
+} near_t;
+
+static int32_t line_of(const near_t *near, int32_t i)
+{
+    return near->line + near->outside * (i - OWN);
+}
+
+static bool is_in_frame(const near_t *near, int32_t i)
+{
+    const bslam_frame_t *frame = near->view->frame;
+    const int32_t line = line_of(near, i);
+    return line >= 0 && line < (near->is_upright ? frame->columns : frame->rows);
+}
+
+/// Fills in lines [first, first + 4) of an upright side; what a sum takes from beyond the frame is not read.
+static void fill_columns(near_t *near, int32_t first)
+{
+    const bslam_proposal_t *box = near->box;
+    const int32_t columns = near->view->frame->columns, cells = box->bottom - box->top;
+    const int32_t lowest = line_of(near, near->outside > 0 ? first : first + 3);
+    const int32_t start = lowest > 0 ? lowest : 0;
+    uint16_t sums[COLUMNS_AT_ONCE];
+    sum_down(near->view->step_x + box->top * columns + start, columns, cells, sums);
+    for (int32_t i = first; i < first + 4; i++) {
+        near->steps[i] = is_in_frame(near, i) ? (float)sums[line_of(near, i) - start] / (float)cells : 0.0f;
+    }
+}
+
+static void fill_row(near_t *near, int32_t i)
+{
+    const bslam_proposal_t *box = near->box;
+    const int32_t cells = box->right - box->left;
+    const uint8_t *row = near->view->step_y + line_of(near, i) * near->view->frame->columns;
+    near->steps[i] = is_in_frame(near, i) ? (float)sum_row(row + box->left, cells) / (float)cells : 0.0f;
+}
+
+/// Of an upright side four columns cost as much as one, and the innermost is seldom asked for.
+static void fill(near_t *near, int32_t i)
+{
+    if (!near->is_upright) {
+        fill_row(near, i);
+    } else if (i == 0) {
+        fill_columns(near, 0);
+    }
+}
+
+/// Where an edge lies between the cells `line` - 1 and `line` + 1, in cells from `line`: the top of a
+/// parabola.
+static float peak_of(float before, float here, float after)
+{
+    const float bend = 2 * here - before - after;
+    const float shift = bend > 1e-3f ? 0.5f * (after - before) / bend : 0.0f;
+    return shift < -0.5f ? -0.5f : shift > 0.5f ? 0.5f : shift;
+}
+
+/// The line of cells that the side snaps to. *shift is where in it, in cells.
+static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+                         int32_t line, float *shift)
+{
+    near_t near = {.view = view, .box = box, .line = line};
+    near.outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
+    near.is_upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    if (near.is_upright) {
+        fill_columns(&near, INNER);
+    }
+    const float *steps = near.steps;
+    fill(&near, OWN);
+    fill(&near, OUTER);
+    fill(&near, INNER);
+    int32_t best = steps[OUTER] > steps[OWN] ? OUTER : OWN;
+    if (steps[best] < (float)BSLAM_EDGE_STEP_MIN && steps[INNER] > steps[best]) {
+        best = INNER;
+    }
+    if (best != OWN) {
+        fill(&near, best + best - OWN);
+    }
+    const float before = steps[best - near.outside], after = steps[best + near.outside];
+    *shift = peak_of(before, steps[best], after);
+    return line_of(&near, best);
+}
+
+bslam_proposal_t bslam_snapped(const bslam_view_t *view, const bslam_proposal_t *rough)
+{
+    const int32_t lines[BSLAM_SIDES] = {rough->left, rough->right - 1, rough->top, rough->bottom - 1};
+    const int32_t ends[BSLAM_SIDES] = {view->frame->columns, view->frame->columns, view->frame->rows,
+                                       view->frame->rows};
+    int32_t cells[BSLAM_SIDES];
+    bslam_real_t edges_px[BSLAM_SIDES];
+    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
+        float shift = 0;
+        const int32_t line = snap_side(view, rough, (bslam_side_t)side, lines[side], &shift);
+        cells[side] = clamp(line, 0, ends[side] - 1);
+        edges_px[side] = ((bslam_real_t)cells[side] + (bslam_real_t)shift) * BSLAM_CELL_PX + BSLAM_R(1.5);
+    }
+    bslam_proposal_t box = *rough;
+    if (cells[BSLAM_SIDE_RIGHT] <= cells[BSLAM_SIDE_LEFT] ||
+        cells[BSLAM_SIDE_BOTTOM] <= cells[BSLAM_SIDE_TOP]) {
+        return box;
+    }
+    box.left = (int16_t)cells[BSLAM_SIDE_LEFT];
+    box.right = (int16_t)(cells[BSLAM_SIDE_RIGHT] + 1);
+    box.top = (int16_t)cells[BSLAM_SIDE_TOP];
+    box.bottom = (int16_t)(cells[BSLAM_SIDE_BOTTOM] + 1);
+    box.box = (bslam_box_t){edges_px[BSLAM_SIDE_LEFT], edges_px[BSLAM_SIDE_TOP], edges_px[BSLAM_SIDE_RIGHT],
+                            edges_px[BSLAM_SIDE_BOTTOM]};
+    return box;
+}
