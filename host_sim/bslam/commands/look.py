@@ -30,6 +30,7 @@ and a contact sheet into --out. Green boxes: on a beacon of the simulated room, 
 --model; red: on none; yellow: there is nothing to compare with."""
 
 _SHEET = "contact_sheet.png"
+_FRAMES = 12
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="of a simulated drive (default: 0)")
     parser.add_argument(
-        "--frames", type=positive_count, default=12, metavar="N", help="frames to show (default: 12)"
+        "--frames",
+        type=positive_count,
+        metavar="N",
+        help="frames to show (default: all pictures of a folder, 12 of anything else)",
     )
     parser.add_argument(
         "--every", type=_seconds, default=5.0, metavar="S", help="seconds between them (default: 5)"
@@ -64,11 +68,12 @@ def execute(arguments: argparse.Namespace) -> int:
     recogniser = None if arguments.model is None else read_recogniser(arguments.model, SIGNATURE_SIZE)
     source = _open(arguments)
     front_end = FrontEnd(source.cameras, recogniser=recogniser)
-    pictures = []
+    pictures, reasons = [], Counter[str]()
     for shot in source.shots:
         seeing = front_end.see(shot.rgb, shot.camera, shot.moved)
         if not shot.shown:
             continue
+        reasons[seeing.reason] += 1
         marks = [_mark(one, shot) for one in seeing.candidates]
         caption = f"{shot.name}: {_outcome(seeing)}"
         pictures.append(annotate(shot.rgb, marks, caption))
@@ -80,7 +85,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if not pictures:
         raise BslamError(f"{arguments.source}: ends before {arguments.every:g} s; allowed: a shorter --every")
     write_atomically(arguments.out / _SHEET, png(contact_sheet(pictures)))
-    print(_counts(front_end.counts()))
+    print(_counts(reasons))
     if source.caution:
         print(source.caution)
     print(f"files in {arguments.out}: NN_*.png, {_SHEET}")
@@ -92,11 +97,12 @@ def _open(arguments: argparse.Namespace) -> Source:
     rig = None if arguments.rig is None else load_rig(arguments.rig)
     if path.is_dir():
         return folder(path, rig)
+    frames = arguments.frames or _FRAMES
     if path.suffix.lower() in VIDEOS:
-        return video(path, rig, arguments.frames, arguments.every)
+        return video(path, rig, frames, arguments.every)
     scenario = load_scenario(arguments.source)
     rig = rig or load_rig("three60")
-    return simulated(scenario, arguments.seed, rig, arguments.frames, arguments.every)
+    return simulated(scenario, arguments.seed, rig, frames, arguments.every)
 
 
 def _mark(candidate: Candidate, shot: Shot) -> Mark:
@@ -151,9 +157,9 @@ _REASONS = {
 }
 
 
-def _counts(counts: dict[str, int]) -> str:
-    words = Counter({reason: count for reason, count in counts.items() if count}).most_common()
-    return f"frames looked at, by what came of them: {', '.join(f'{n} {reason}' for reason, n in words)}"
+def _counts(reasons: Counter[str]) -> str:
+    words = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
+    return f"frames shown, by what came of them: {words}"
 
 
 def _seconds(text: str) -> float:

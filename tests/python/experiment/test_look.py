@@ -53,9 +53,6 @@ def seen(monkeypatch):
             state.looked.append((rgb.shape, camera, moved))
             return state.seeing
 
-        def counts(self):
-            return {state.seeing.reason: len(state.looked), "flat": 0}
-
     monkeypatch.setattr(look, "FrontEnd", FrontEnd)
     return state
 
@@ -91,7 +88,7 @@ def test_look_at_a_drive_takes_the_cameras_in_turn(seen, drive, tmp_path, capsys
     assert len(pictures) == 5 and pictures[-1] == "contact_sheet.png"
     printed = capsys.readouterr().out
     assert printed.count("a good frame, nothing seen") == 4
-    assert "20 nothing" in printed
+    assert "what came of them: 4 nothing" in printed
 
 
 def test_look_at_a_drive_green_is_a_beacon_and_red_is_none(seen, drive, tmp_path, monkeypatch):
@@ -110,9 +107,20 @@ def test_look_at_a_folder_learns_the_room_first(seen, pictures, tmp_path, capsys
     assert len(seen.looked) == 6 and {shape for shape, _, _ in seen.looked} == {(240, 320, 3)}
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == ["01_a.png", "02_b.png", "03_c_d.png", "contact_sheet.png"]
-    assert (
-        "no --rig: directions and distances are those of a camera 60 degrees wide" in capsys.readouterr().out
-    )
+    printed = capsys.readouterr().out
+    assert "no --rig: directions and distances are those of a camera 60 degrees wide" in printed
+    assert "frames shown, by what came of them: 3 nothing\n" in printed
+
+
+def test_look_shows_all_pictures_of_a_folder_unless_told_how_many(seen, tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for index in range(14):
+        Image.new("RGB", (320, 240), (90, 120, 150)).save(folder / f"{index:02}.png")
+    for words, shown in (([], 14), (["--frames", "3"], 3)):
+        out = tmp_path / f"out{shown}"
+        assert main(["look", str(folder), *words, "--out", str(out)]) == 0
+        assert len(list(out.glob("[0-9]*.png"))) == shown
 
 
 def test_look_with_a_rig_uses_its_camera_and_has_no_caution(seen, pictures, tmp_path, capsys):
