@@ -71,6 +71,43 @@ def test_see_picture_of_one_colour_shows_nothing_and_says_why(
     assert front_end.counts()[reason] == 1
 
 
+ROWS, COLUMNS = np.mgrid[:240, :320].astype(float)
+
+
+def grey(random: np.random.Generator) -> np.ndarray:
+    return random.normal(120.0, 3.0, (240, 320))
+
+
+def half_lost(random: np.random.Generator, level: float) -> np.ndarray:
+    lost = random.uniform(20.0, 220.0) < ROWS
+    return np.where(lost, level, grey(random))
+
+
+MADE_UP = {
+    "noise": lambda random: random.uniform(0.0, 255.0, (240, 320)),
+    "soft noise": lambda random: random.normal(120.0, random.uniform(2.0, 30.0), (240, 320)),
+    "gradient": lambda random: 60.0 + COLUMNS * random.uniform(0.0, 0.3) + ROWS * random.uniform(0.0, 0.3),
+    "stripes": lambda random: np.where(COLUMNS // random.integers(2, 40) % 2, 200.0, 60.0),
+    "bands": lambda random: np.where(ROWS // random.integers(2, 40) % 2, 200.0, 60.0),
+    "board": lambda random: np.where((COLUMNS // 20 + ROWS // random.integers(2, 40)) % 2, 200.0, 60.0),
+    "cut short": lambda random: half_lost(random, 0.0),
+    "half overexposed": lambda random: half_lost(random, 255.0),
+    "half covered": lambda random: np.where(random.uniform(80, 240) < COLUMNS, 0.0, grey(random)),
+}
+
+
+@pytest.mark.parametrize("rig", ["three60", "wide180"])
+@pytest.mark.parametrize("kind", MADE_UP)
+def test_see_picture_that_shows_nothing_makes_no_sighting_up(rig: str, kind: str) -> None:
+    """With the trained detectors, at their own thresholds; each picture twice, the room known and not."""
+    random, front_end = np.random.default_rng(3), FrontEnd(load_rig(rig).cameras[:1])
+    for _ in range(3):
+        values = np.clip(MADE_UP[kind](random), 0.0, 255.0).astype(np.uint8)
+        picture = np.ascontiguousarray(np.repeat(values[:, :, None], 3, axis=2))
+        for _ in range(2):
+            assert front_end.see(picture).candidates == ()
+
+
 def test_see_packed_picture_is_as_the_unpacked_one(camera: Camera) -> None:
     random = np.random.default_rng(0)
     packed = random.integers(0, 2**16, (240, 320), dtype=np.uint16)
