@@ -200,11 +200,11 @@ def unpack(target: str) -> None:
         (corpus / hashlib.sha1(data, usedforsecurity=False).hexdigest()).write_bytes(data)
 
 
-def keep() -> None:
+def keep(targets: list[str]) -> None:
     """Reduces what was found to inputs that reach all of it, and those that broke a property once."""
     count = size = 0
     CORPUS.mkdir(parents=True, exist_ok=True)
-    for target in TARGETS:
+    for target in targets:
         unpack(target)
         fresh = OUT / "kept" / target
         shutil.rmtree(fresh, ignore_errors=True)
@@ -266,7 +266,7 @@ def main(argv: list[str] | None = None) -> int:
         return 2
     OUT.mkdir(parents=True, exist_ok=True)
     if options.keep:
-        keep()
+        keep(options.targets)
         return 0
     before = len(read_ledger())
     clean = options.table or (

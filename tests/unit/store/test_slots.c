@@ -111,6 +111,7 @@ static void test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new(void *
     flash.left = takes;
     save(&new_slam, BSLAM_OK);
     assert_true(loads_new());
+    print_message("power cuts: at each of %u bytes, 0 mixed\n", takes);
 }
 
 /// Power fails in a save, and again in the next one. Slots as small as the maps allow, to have few bytes.
