@@ -21,14 +21,14 @@ static const bslam_real_t WAY_SD = BSLAM_R(0.15);
 static const bslam_real_t DOUBT_FACTOR = BSLAM_R(1.5);
 static const bslam_real_t DOUBT_M = BSLAM_R(0.05);
 static const bslam_real_t DOUBT_RAD = BSLAM_R(0.03);
-static const bslam_real_t DOUBT_POSITION_MAX_M = BSLAM_R(1.5);
+static const bslam_real_t DOUBT_POSITION_MAX_M = BSLAM_R(1.0);
 static const bslam_real_t DOUBT_HEADING_MAX_RAD = BSLAM_R(0.6);
 
 enum {
     EVIDENCE_SEVERAL = 8,  ///< frames that contradict, less those that agree, until the robot is lost,
     EVIDENCE_ONE = 25,     ///< if all show the same beacon, or with those that say neither, once several did
     SILENT_ONE = 8,  ///< frames in which nothing is recognised, which end a doubt that one beacon raised
-    CLUE_AGE_US = 3000000,  ///< odometry carries a clue so long
+    CLUE_AGE_US = 5000000,  ///< odometry carries a clue so long
     FIX_AGE_US = 1000000,
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
     CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
@@ -99,7 +99,8 @@ static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memo
     const bslam_pose_t to_now = bslam_pose_inverse(&now);
     const bslam_pose_t robot = bslam_pose_compose(&to_now, &memory->robot);
     const bslam_sighting_t *sighting = &memory->sighting;
-    bslam_clue_t clue = {.sensor = bslam_pose_compose(&robot, &memory->mount),
+    bslam_clue_t clue = {.beacon = beacon,
+                         .sensor = bslam_pose_compose(&robot, &memory->mount),
                          .bearing_rad = sighting->bearing_rad,
                          .has_range = sighting->has_range};
     bslam_ekf_beacon_position(ekf, beacon, &clue.x_m, &clue.y_m);
@@ -303,11 +304,13 @@ static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_
 
 // ---- finding ----------------------------------------------------------------------------------------------
 
-static bslam_memory_t *memory_for(bslam_recovery_t *recovery, uint32_t uid)
+/// Of each beacon the newest with a distance is kept, and the newest without: that is a rough one at a
+/// frame's edge, often, which is no match for the other.
+static bslam_memory_t *memory_for(bslam_recovery_t *recovery, uint32_t uid, bool has_range)
 {
     int oldest = 0;
     for (int m = 0; m < recovery->memory_count; m++) {
-        if (recovery->memories[m].uid == uid) {
+        if (recovery->memories[m].uid == uid && recovery->memories[m].sighting.has_range == has_range) {
             return &recovery->memories[m];
         }
         oldest = recovery->memories[m].time_us < recovery->memories[oldest].time_us ? m : oldest;
@@ -338,7 +341,7 @@ static void forget_all(bslam_recovery_t *recovery)
     recovery->has_fix = false;
 }
 
-/// Keeps the newest sighting of each recognised beacon. True if there is one.
+/// Keeps the newest sightings of each recognised beacon. True if there is one.
 static bool remember(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
                      const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count, const int *who)
 {
@@ -346,7 +349,8 @@ static bool remember(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64
     for (int i = 0; i < count; i++) {
         if (who[i] >= 0) {
             const uint32_t uid = slam->ekf.beacons[who[i]].uid;
-            *memory_for(recovery, uid) = memorise(slam, time_us, mount, &sightings[i], uid);
+            *memory_for(recovery, uid, sightings[i].has_range) =
+                memorise(slam, time_us, mount, &sightings[i], uid);
             any = true;
         }
     }
@@ -372,7 +376,7 @@ static bool is_same(const bslam_recovery_t *recovery, const bslam_pose_t *robot,
 /// Clues that a fix has beyond those that any pose could have met.
 static bool is_verified(const bslam_fix_t *fix)
 {
-    return fix->agreeing > (fix->with_range >= 2 ? 2 : 3);
+    return fix->beacons > (fix->with_range >= 2 ? 2 : 3);
 }
 
 static bool is_clear(const bslam_fix_t *fix)

@@ -32,7 +32,7 @@ typedef struct bslam_recovery_counters {
     uint32_t found;          ///< times
 } bslam_recovery_counters_t;
 
-/// A recognised beacon, when and from where it was seen last. Private.
+/// A recognised beacon, when and from where it was seen last, with a distance or without. Private.
 typedef struct bslam_memory {
     uint32_t uid;
     int64_t time_us;

@@ -66,14 +66,27 @@ static int agreeing_clue(const bslam_clue_t *clues, int first, int end, const bs
 /// Agreement of all sightings with a pose.
 typedef struct vote {
     int32_t agreeing;
-    int32_t with_range;
+    int32_t beacons;
+    int32_t with_range;  ///< beacons
     bslam_real_t distance2;
     uint32_t who;  ///< a bit for each clue by which one agrees
 } vote_t;
 
+/// Whether a clue shows what a clue before it does that agrees, too; with_range: one that has a distance.
+static bool is_again(const bslam_clue_t *clues, uint32_t who, int i, bool with_range)
+{
+    for (int j = 0; j < i; j++) {
+        const bool agrees = (who >> (unsigned)j & 1u) != 0;
+        if (agrees && clues[j].beacon == clues[i].beacon && (clues[j].has_range || !with_range)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static vote_t vote_on(const bslam_clue_t *clues, int count, const bslam_pose_t *pose)
 {
-    vote_t vote = {0, 0, 0, 0};
+    vote_t vote = {0};
     int end;
     for (int first = 0; first < count; first = end) {
         end = next_sighting(clues, count, first);
@@ -81,7 +94,8 @@ static vote_t vote_on(const bslam_clue_t *clues, int count, const bslam_pose_t *
         const int i = agreeing_clue(clues, first, end, pose, &residual);
         if (i >= 0) {
             vote.agreeing++;
-            vote.with_range += clues[i].has_range ? 1 : 0;
+            vote.beacons += is_again(clues, vote.who, i, false) ? 0 : 1;
+            vote.with_range += !clues[i].has_range || is_again(clues, vote.who, i, true) ? 0 : 1;
             vote.distance2 += residual.distance2;
             vote.who |= 1u << (unsigned)i;
         }
@@ -91,6 +105,9 @@ static vote_t vote_on(const bslam_clue_t *clues, int count, const bslam_pose_t *
 
 static bool is_better(const vote_t *a, const vote_t *b)
 {
+    if (a->beacons != b->beacons) {
+        return a->beacons > b->beacons;
+    }
     return a->agreeing > b->agreeing || (a->agreeing == b->agreeing && a->distance2 < b->distance2);
 }
 
@@ -285,7 +302,7 @@ static void try_pose(search_t *search, const bslam_pose_t *pose)
     const bool is_best = is_better(&vote, &search->vote);
     const vote_t second = is_best ? search->vote : vote;
     if (is_best) {
-        search->rival = search->rival.who == vote.who ? (vote_t){0, 0, 0, 0} : search->rival;
+        search->rival = search->rival.who == vote.who ? (vote_t){0} : search->rival;
         search->vote = vote;
         search->best = *pose;
     }
@@ -305,8 +322,8 @@ static void try_all(search_t *search)
                 try_pose(search, &pose);
             }
             for (int c = next_sighting(clues, count, b); c < count; c++) {
-                const bool any_range = clues[a].has_range || clues[b].has_range || clues[c].has_range;
-                if (!any_range && pose_of_three(&clues[a], &clues[b], &clues[c], &pose)) {
+                const int ranges = clues[a].has_range + clues[b].has_range + clues[c].has_range;
+                if (ranges < WITH_RANGE_MIN && pose_of_three(&clues[a], &clues[b], &clues[c], &pose)) {
                     try_pose(search, &pose);
                 }
             }
@@ -317,13 +334,13 @@ static void try_all(search_t *search)
 /// Whether no pose by other beacons is about as good.
 static bool is_told(const search_t *search)
 {
-    return search->rival.agreeing < search->vote.agreeing ||
+    return search->rival.beacons < search->vote.beacons || search->rival.agreeing < search->vote.agreeing ||
            search->rival.distance2 > search->vote.distance2 + TOLD_D2;
 }
 
 static bool is_enough(const vote_t *vote)
 {
-    return vote->agreeing >= WITHOUT_RANGE_MIN || vote->with_range >= WITH_RANGE_MIN;
+    return vote->beacons >= WITHOUT_RANGE_MIN || vote->with_range >= WITH_RANGE_MIN;
 }
 
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
@@ -339,6 +356,7 @@ bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
         return false;
     }
     found.agreeing = vote.agreeing;
+    found.beacons = vote.beacons;
     found.with_range = vote.with_range;
     found.dissenting = -vote.agreeing;
     for (int i = 0; i < count; i++) {

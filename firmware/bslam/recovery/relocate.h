@@ -1,7 +1,7 @@
 /// Where a robot is that knows nothing but which beacons it sees: a pose from clues. MATH "Relocalisation".
 ///
-/// Two beacons with distance give a pose, three in direction only. Every such choice of the clues is tried;
-/// the pose that most clues agree with is refined by all that do. Pure: nothing is kept.
+/// Two beacons with distance give a pose, three directions if fewer have one. Every such choice of the clues
+/// is tried; the pose that most beacons agree with is refined by all that do. Pure: nothing is kept.
 #ifndef BSLAM_RECOVERY_RELOCATE_H
 #define BSLAM_RECOVERY_RELOCATE_H
 
@@ -13,7 +13,8 @@
 /// A beacon that was recognised, as seen from where the robot is now. A sighting that shows one of several
 /// beacons is a clue for each of them, one behind the other.
 typedef struct bslam_clue {
-    bslam_real_t x_m;  ///< the beacon in the map
+    int32_t beacon;    ///< its place in the map: who was seen more than once is one beacon
+    bslam_real_t x_m;  ///< where it is in the map
     bslam_real_t y_m;
     bslam_pose_t sensor;  ///< where the sensor was, in the robot's present frame
     bslam_real_t bearing_rad;
@@ -30,11 +31,12 @@ typedef struct bslam_fix {
     bslam_real_t position_sd_m;  ///< along the longer axis
     bslam_real_t heading_sd_rad;
     int32_t agreeing;    ///< sightings that fit it
-    int32_t with_range;  ///< of them with a distance
+    int32_t beacons;     ///< that they show
+    int32_t with_range;  ///< of these with a distance
     int32_t dissenting;  ///< sightings that do not
 } bslam_fix_t;
 
-/// The pose that most sightings of `count` <= BSLAM_CLUES_MAX clues agree with. False, and *fix unchanged:
+/// The pose that most beacons of `count` <= BSLAM_CLUES_MAX clues agree with. False, and *fix unchanged:
 /// fewer than two with distance agree on any, nor three without, or as many agree on another pose by taking
 /// a sighting for another beacon. O(count³), or O(count⁴) without distances.
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix);

@@ -14,6 +14,7 @@ static bslam_slam_t slam;
 static bslam_recovery_t recovery;
 static int64_t now_us;
 static double stretch = 1;  // by which all distances are measured too long
+static int cut = -1;        // the beacon that is seen in direction only
 
 static int setup(void **state)
 {
@@ -35,6 +36,7 @@ static void look_from(double x, double y, double theta, int count)
         const double dx = beacons[i][0] - x;
         const double dy = beacons[i][1] - y;
         seen[i] = unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), stretch * hypot(dx, dy), i);
+        seen[i].has_range = i != cut;
     }
     now_us += STEP_US;
     const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
@@ -128,6 +130,19 @@ static void test_recovery_by_two_beacons_takes_time(void **state)
     look_on(8, 1, 2, -1, 2);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
     look_on(2, 1, 2, -1, 2);  // the frames of the doubt count
+    assert_int_equal(recovery.counters.found, 1);
+    assert_at(1, 2, -1);
+}
+
+/// By turns one of two beacons is seen in direction only, as at the edge of a frame.
+static void test_recovery_by_two_beacons_that_are_never_seen_whole_together(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    for (int k = 0; k < 40; k++) {
+        cut = k % 2;
+        look_from(1, 2, -1, 2);
+    }
+    cut = -1;
     assert_int_equal(recovery.counters.found, 1);
     assert_at(1, 2, -1);
 }
@@ -334,6 +349,7 @@ int main(void)
                                setup),
         cmocka_unit_test_setup(test_recovery_goes_by_the_beacons_own_scales, setup),
         cmocka_unit_test_setup(test_recovery_by_two_beacons_takes_time, setup),
+        cmocka_unit_test_setup(test_recovery_by_two_beacons_that_are_never_seen_whole_together, setup),
         cmocka_unit_test_setup(test_recovery_counts_no_clue_from_before_a_frame_that_was_used, setup),
         cmocka_unit_test_setup(
             test_recovery_by_one_beacon_that_is_elsewhere_gets_lost_in_a_second_and_learns_nothing, setup),

@@ -11,7 +11,8 @@ static bslam_clue_t clue_of(int i, double x, double y, double theta, bool has_ra
 {
     const double dx = beacons[i][0] - x;
     const double dy = beacons[i][1] - y;
-    return (bslam_clue_t){.x_m = real(beacons[i][0]),
+    return (bslam_clue_t){.beacon = i,
+                          .x_m = real(beacons[i][0]),
                           .y_m = real(beacons[i][1]),
                           .bearing_rad = real(atan2(dy, dx) - theta),
                           .range_m = real(hypot(dx, dy)),
@@ -74,18 +75,36 @@ static void test_relocate_by_clues_from_along_the_way(void **state)
     assert_found(clues, 3, 1 + cos(0.2), 3 + sin(0.2), 0.7, 3);
 }
 
-/// One distance among directions is no pair with distances, and no three without.
-static void test_relocate_does_not_mix_a_distance_with_directions(void **state)
+static void test_relocate_by_three_directions_of_which_any_have_a_distance(void **state)
 {
-    bslam_fix_t fix;
-    for (int with = 0; with < 3; with++) {
-        const bslam_clue_t clues[] = {clue_of(0, 1, 3, 0, with == 0), clue_of(1, 1, 3, 0, with == 1),
-                                      clue_of(3, 1, 3, 0, with == 2)};
-        assert_false(bslam_relocate(clues, 3, &fix));
+    for (int with = 0; with < 8; with++) {
+        const bslam_clue_t clues[] = {clue_of(0, 1.5, 3, 0, (with & 1) != 0),
+                                      clue_of(1, 1.5, 3, 0, (with & 2) != 0),
+                                      clue_of(3, 1.5, 3, 0, (with & 4) != 0)};
+        assert_found(clues, 3, 1.5, 3, 0, 3);
     }
-    const bslam_clue_t clues[] = {clue_of(0, 1, 3, 0, true), clue_of(1, 1, 3, 0, false),
-                                  clue_of(3, 1, 3, 0, true)};
-    assert_found(clues, 3, 1, 3, 0, 3);
+}
+
+/// Two of the three sightings show the same beacon: that is two beacons, whatever the order.
+static void test_relocate_takes_a_beacon_that_is_seen_twice_for_one(void **state)
+{
+    const bslam_clue_t with = clue_of(0, 1, 3, 0, true);
+    const bslam_clue_t without = clue_of(0, 1, 3, 0, false);
+    const bslam_clue_t other = clue_of(1, 1, 3, 0, true);
+    const bslam_clue_t orders[][3] = {{with, without, other}, {without, with, other}, {other, without, with}};
+    for (int k = 0; k < COUNT_OF(orders); k++) {
+        assert_found(orders[k], 3, 1, 3, 0, 3);
+        bslam_fix_t fix;
+        assert_true(bslam_relocate(orders[k], 3, &fix));
+        assert_int_equal(fix.beacons, 2);
+        assert_int_equal(fix.with_range, 2);
+    }
+    bslam_fix_t fix = {.agreeing = 77};
+    const bslam_clue_t directions[] = {without, clue_of(1, 1, 3, 0, false), without};
+    const bslam_clue_t distances[] = {with, with, clue_of(1, 1, 3, 0, false)};
+    assert_false(bslam_relocate(directions, 3, &fix));
+    assert_false(bslam_relocate(distances, 3, &fix));
+    assert_int_equal(fix.agreeing, 77);
 }
 
 /// Where two of three beacons are in one line with the robot, or all on one circle with it, directions do not
@@ -102,7 +121,7 @@ static void test_relocate_by_directions_that_do_not_tell_finds_nothing(void **st
         bslam_clue_t clues[3];
         bslam_fix_t fix = {.agreeing = 77};
         for (int i = 0; i < 3; i++) {
-            clues[i] = clue_of(0, 0, 0, 0, false);
+            clues[i] = clue_of(i, 0, 0, 0, false);
             clues[i].x_m = real(lines[k][i][0]);
             clues[i].y_m = real(lines[k][i][1]);
             clues[i].bearing_rad = real(atan2(lines[k][i][1], lines[k][i][0]));
@@ -115,9 +134,9 @@ static void test_relocate_by_directions_that_do_not_tell_finds_nothing(void **st
 /// The robot stands on a beacon: nothing tells its direction, and a clue of it agrees with nothing.
 static void test_relocate_on_a_beacon_leaves_its_direction_out(void **state)
 {
-    const bslam_clue_t ahead = {.x_m = 4, .range_m = 4, .has_range = true};
+    const bslam_clue_t ahead = {.beacon = 1, .x_m = 4, .range_m = 4, .has_range = true};
     const bslam_clue_t behind = {
-        .x_m = -4, .bearing_rad = BSLAM_R(3.14159265), .range_m = 4, .has_range = true};
+        .beacon = 2, .x_m = -4, .bearing_rad = BSLAM_R(3.14159265), .range_m = 4, .has_range = true};
     const bslam_clue_t here = {.bearing_rad = BSLAM_R(0.3)};
     bslam_clue_t clues[] = {ahead, behind, here};
     for (int i = 0; i < 3; i++) {
@@ -152,6 +171,7 @@ static void test_relocate_tells_by_geometry_which_of_two_is_seen(void **state)
 {
     bslam_clue_t clues[] = {clue_of(0, 1, 3, 0.5, true), clue_of(1, 1, 3, 0.5, true),
                             clue_of(1, 1, 3, 0.5, true)};
+    clues[2].beacon = 3;
     clues[2].x_m = real(beacons[3][0]);
     clues[2].y_m = real(beacons[3][1]);
     clues[2].is_other = true;
@@ -191,6 +211,7 @@ static void test_relocate_of_two_that_agree_the_nearest_is_seen(void **state)
         }
         clues[5] = clues[4];
         clues[5].is_other = true;
+        clues[5].beacon = 5;
         clues[5 - asked_first].y_m += real(0.19);  // seen 3.8 deviations from there
         bslam_fix_t fix;
         assert_true(bslam_relocate(clues, 6, &fix));
@@ -221,7 +242,8 @@ int main(void)
         cmocka_unit_test(test_relocate_by_three_directions),
         cmocka_unit_test(test_relocate_leaves_out_a_clue_that_does_not_fit),
         cmocka_unit_test(test_relocate_by_clues_from_along_the_way),
-        cmocka_unit_test(test_relocate_does_not_mix_a_distance_with_directions),
+        cmocka_unit_test(test_relocate_by_three_directions_of_which_any_have_a_distance),
+        cmocka_unit_test(test_relocate_takes_a_beacon_that_is_seen_twice_for_one),
         cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),
         cmocka_unit_test(test_relocate_on_a_beacon_leaves_its_direction_out),
         cmocka_unit_test(test_relocate_by_places_beyond_numbers_finds_nothing),
