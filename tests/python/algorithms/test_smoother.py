@@ -6,10 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bslam.algorithms.causal_map import CausalMap
 from bslam.algorithms.noise import motion_covariance, range_sd_m
 from bslam.algorithms.smoother import _ARC_SD_M, Smoother, _Problem
 from bslam.core.slam import Slam
+from bslam.experiment.options import RunOptions
+from bslam.experiment.rival import run_algorithm
+from bslam.log import first_steps
 from bslam.motion import move_on_arc
+from bslam.world.simulate import load_scenario, simulate
 
 STEP_S = 0.04
 PLACES = np.array([[2.0, 1.0], [3.0, -1.5], [-1.0, 2.0]])
@@ -210,3 +215,13 @@ def test_drive_without_noise_is_recovered():
     smoother.solve()
     np.testing.assert_allclose(smoother.poses, true, atol=1e-6)
     np.testing.assert_allclose(smoother.beacons, PLACES, atol=1e-6)
+
+
+
+def test_poor_start_lets_no_beacon_fly_off():
+    log = first_steps(simulate(load_scenario("paper_room"), 1000, sigma_mps=1.0), 1000)
+    poses = run_algorithm(
+        log, RunOptions(association="known"), lambda setup: CausalMap(setup, 100), lambda _step: None
+    ).pose
+    assert log.truth is not None
+    assert math.hypot(*(poses[1000, :2] - [log.truth.x_m[1000], log.truth.y_m[1000]])) < 0.3
