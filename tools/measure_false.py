@@ -5,9 +5,10 @@ clutter with a false beacon that it had started itself, clutter with a beacon, a
 
 The second is a bound. Each thing in the map at the end of a drive that was seen from ten places, a decimetre
 of way apart, has what a rule could go by: from how many places it was seen, how sure the detector was of it
-in the median, how large it is beside its kind, which the true path tells, and its kind. A judge that sees all
-of this after the drive, and is taught with the truth of these very drives, says what is a beacon. What it
-gets wrong, no rule of that form gets right while it drives.
+in the median, how large it is beside its kind, which the true path tells, how far off its sightings were from
+where the filter expected them (the mean of D^2 over the gate), and its kind. A judge that sees all of this
+after the drive, and is taught with the truth of these very drives, says what is a beacon. What it gets wrong,
+no rule of that form gets right while it drives. `--set` changes a parameter.
 `.venv/bin/python tools/measure_false.py --seeds 1000:1020`
 """
 
@@ -31,11 +32,11 @@ from bslam.log import Log
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 from camera_drives import arguments
-from measure_association import options_of
+from measure_association import change, options_of
 
 PLACE_M = 0.1
 LEAST_PLACES = 10
-JUDGES = {"places": [0], "score": [1], "size": [2], "all three and the kind": [0, 1, 2, 3]}
+JUDGES = {"places": [0], "score": [1], "size": [2], "offsets": [3], "all and the kind": [0, 1, 2, 3, 4]}
 DEPTH = 3  # of a judge's tree: with one question it is a threshold
 
 
@@ -45,6 +46,7 @@ class Thing:
 
     identity: int
     rows: list[int] = field(default_factory=list)  # of the log's sightings: those matched with it
+    test_ratio: list[float] = field(default_factory=list)  # of those but the first: how far off each was
 
 
 class Books:
@@ -54,6 +56,7 @@ class Books:
         self.wrong: Counter[str] = Counter()
         self.sightings = 0
         self._rows: defaultdict[int, list[int]] = defaultdict(list)
+        self._test_ratio: defaultdict[int, list[float]] = defaultdict(list)
         self._slam: Any = None
         self._ledger = Ledger(self._uids)
 
@@ -75,12 +78,15 @@ class Books:
             if account.result in ("matched", "new"):
                 self._rows[account.beacon_uid].append(row)
             if account.result == "matched":
+                self._test_ratio[account.beacon_uid].append(account.test_ratio)
                 self._judge(identity, self._ledger.identity(account.beacon_uid))
         self._ledger.book(true_id, [True] * len(true_id), accounts)
 
     def things(self) -> list[Thing]:
         """What is in the map."""
-        return [Thing(self._ledger.identity(uid), self._rows[uid]) for uid in self._uids()]
+        return [
+            Thing(self._ledger.identity(uid), self._rows[uid], self._test_ratio[uid]) for uid in self._uids()
+        ]
 
     def _judge(self, identity: int, matched: int) -> None:
         if identity == CLUTTER:
@@ -109,7 +115,7 @@ def size_error(log: Log, rows: NDArray[np.int64]) -> float:
 
 
 def features(log: Log, score: NDArray[np.float64], thing: Thing) -> list[float]:
-    """Places, score, size, kind."""
+    """Places, score, size, offsets, kind."""
     assert log.truth is not None and log.sightings.beacon_class is not None
     rows = np.array(thing.rows)
     poses = truth_at(log.truth, log.truth.time_us)[0]
@@ -117,7 +123,8 @@ def features(log: Log, score: NDArray[np.float64], thing: Thing) -> list[float]:
     at_m = np.interp(log.sightings.time_us[rows], log.truth.time_us, way_m)
     places = len(np.unique((at_m / PLACE_M).astype(np.int64)))
     kind = float(np.bincount(log.sightings.beacon_class[rows]).argmax())
-    return [float(places), float(np.median(score[rows])), abs(size_error(log, rows)), kind]
+    offset = float(np.mean(thing.test_ratio)) if thing.test_ratio else 0.0
+    return [float(places), float(np.median(score[rows])), abs(size_error(log, rows)), offset, kind]
 
 
 @dataclass(frozen=True)
@@ -126,7 +133,7 @@ class Drive:
 
     books: Books
     things: list[Thing]  # seen from enough places
-    features: NDArray[np.float64]  # (things, 4)
+    features: NDArray[np.float64]  # (things, 5)
     true_ids: set[int]  # of beacons that were seen at all often
 
 
@@ -135,10 +142,10 @@ def drive_of(words: argparse.Namespace, seed: int) -> Drive:
     log = camera_log(scenario, seed, words.sigma, "speedometer", rig, store, UNTOLD_THRESHOLD)
     score = store.drive(scenario, seed, rig).surer_than(UNTOLD_THRESHOLD).seen["score"]
     books = Books()
-    run_log(log, options_of("svm", "camera", words.sigma, seed), watcher=books)
+    run_log(log, options_of("svm", "camera", words.sigma, seed, words.changes), watcher=books)
     found = [(one, features(log, score, one)) for one in books.things()]
     often = [(one, row) for one, row in found if row[0] >= LEAST_PLACES]
-    table = np.array([row for _, row in often]).reshape(-1, 4)
+    table = np.array([row for _, row in often]).reshape(-1, 5)
     counts = Counter(log.sightings.beacon_id.tolist())
     true_ids = {one for one, count in counts.items() if one != CLUTTER and count >= 4}
     return Drive(books, [one for one, _ in often], table, true_ids)
@@ -181,8 +188,14 @@ def print_bound(drives: Sequence[Drive]) -> None:
         print(f"| {name} | {lost} | {kept} | {exact} of {len(drives)} | {100.0 * wrong / total:.2f} |")
 
 
+def add_changes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", dest="changes", action="append", default=[], type=change, metavar="NAME=VALUE"
+    )
+
+
 def main() -> None:
-    words = arguments(__doc__, range(1000, 1020))
+    words = arguments(__doc__, range(1000, 1020), add_changes)
     drives = [drive_of(words, seed) for seed in words.seeds]
     print_wrong(drives)
     print_bound(drives)

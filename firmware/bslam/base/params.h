@@ -143,6 +143,8 @@
     INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
     REAL(confirm_way_m, 0.0, 0.0, 100.0, \
          "of which one counts when the robot has gone this far since the last that did") \
+    REAL(confirm_d2, 1e6, 1e-3, 1e6, \
+         "and against it beyond this squared Mahalanobis distance; it leaves with as many against as for") \
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none")
 // clang-format on

@@ -65,7 +65,7 @@ typedef struct bslam_beacon {
     uint32_t gated;      ///< sightings taken for it that its gate rejected
     uint32_t way_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
     uint32_t view_um;    ///< the same when it was last counted in views
-    uint16_t views;      ///< sightings far enough apart to count towards its confirmation
+    uint16_t views;      ///< sightings far apart that count towards its confirmation, less those against
     bool confirmed;
     uint8_t beacon_class;
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows

@@ -49,15 +49,19 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
 }
 
 /// A sighting counts towards a beacon's confirmation if the robot has gone far enough since the last that
-/// did.
-static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon)
+/// did, and against it if it is too far off: what is not of the size that it is taken for is not, seen from
+/// the next place, where it was.
+static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
 {
-    const uint32_t least_um = (uint32_t)(slam->params.confirm_way_m * MICROMETRES_PER_M);
+    const bslam_params_t *params = &slam->params;
+    const uint32_t least_um = (uint32_t)(params->confirm_way_m * MICROMETRES_PER_M);
     if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
         beacon->view_um = slam->way_um;
-        beacon->views++;
-        beacon->confirmed = beacon->views >= slam->params.confirm_sightings;
-        slam->confirmed_now = slam->confirmed_now || beacon->confirmed;
+        beacon->views = (uint16_t)(distance2 <= params->confirm_d2 ? beacon->views + 1 : beacon->views - 1);
+        if (beacon->views >= params->confirm_sightings) {
+            beacon->confirmed = true;
+            slam->confirmed_now = true;
+        }
     }
 }
 
@@ -100,7 +104,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     beacon->sightings++;
     beacon->way_um = slam->way_um;
     beacon->last_seen_us = time_us;
-    count_view(slam, beacon);
+    count_view(slam, beacon, fusion.distance2);
 }
 
 /// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
@@ -227,12 +231,18 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
-/// A provisional beacon leaves when its time is up. Where its identity was told, leaving the view early is no
-/// reason against it: it leaves if sightings contradicted it.
+/// A provisional beacon leaves when its time is up, or as much spoke against it as for it. Where its identity
+/// was told, leaving the view early is no reason against it: it leaves if sightings contradicted it.
 static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
 {
     const int64_t window_us = params->confirm_window_us;
-    if (window_us == 0 || beacon->confirmed || time_us - beacon->first_seen_us <= window_us) {
+    if (beacon->confirmed) {
+        return false;
+    }
+    if (beacon->views == 0) {
+        return true;
+    }
+    if (window_us == 0 || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
     return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;

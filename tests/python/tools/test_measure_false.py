@@ -14,6 +14,7 @@ class Account:
     result: str
     beacon_uid: int
     reason: str = "none"
+    test_ratio: float = 0.0
 
 
 def books_of(*frames):
@@ -30,7 +31,7 @@ def books_of(*frames):
 def test_each_wrong_match_is_told_by_what_met_what():
     books = books_of(
         [(7, Account("new", 1)), (-1, Account("new", 2)), (8, Account("new", 3))],
-        [(7, Account("matched", 1)), (-1, Account("matched", 2)), (8, Account("matched", 1))],
+        [(7, Account("matched", 1, test_ratio=0.2)), (-1, Account("matched", 2)), (8, Account("matched", 1))],
         [(-1, Account("matched", 3)), (7, Account("matched", 2)), (-1, Account("rejected", 0))],
     )
     assert books.wrong == {
@@ -45,6 +46,7 @@ def test_each_wrong_match_is_told_by_what_met_what():
         (-1, [1, 4, 7]),
         (8, [2, 6]),
     ]
+    assert books.things()[0].test_ratio == [0.2, 0.0]
 
 
 def test_the_size_of_a_thing_is_told_by_how_it_moves_across_the_view():
@@ -69,14 +71,14 @@ def drive_of(*rows):
 
 
 def test_of_two_with_one_identity_the_one_seen_more_is_the_beacon():
-    row = [20.0, 1.0, 0.0, 1.0]
+    row = [20.0, 1.0, 0.0, 0.1, 1.0]
     assert are_beacons(drive_of((4, 9, row), (4, 12, row), (-1, 30, row))).tolist() == [False, True, False]
 
 
 def test_the_judge_gets_right_what_a_threshold_parts_and_no_more(capsys):
     drives = [
-        drive_of((1, 40, [50.0, 2.0, 0.01, 1.0]), (-1, 10, [50.0, 0.3, 0.4, 6.0])),
-        drive_of((1, 40, [60.0, 1.8, 0.02, 1.0]), (-1, 10, [60.0, 0.4, 0.5, 6.0])),
+        drive_of((1, 40, [50.0, 2.0, 0.01, 0.1, 1.0]), (-1, 10, [50.0, 0.3, 0.4, 0.1, 6.0])),
+        drive_of((1, 40, [60.0, 1.8, 0.02, 0.2, 1.0]), (-1, 10, [60.0, 0.4, 0.5, 0.2, 6.0])),
     ]
     print_wrong(drives)
     print_bound(drives)

@@ -624,6 +624,42 @@ static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_
     assert_true(beacon(&slam, 0).confirmed);
 }
 
+static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.confirm_sightings = 3;
+    params.confirm_d2 = 1;
+    bslam_slam_t slam = started(params);
+    const bslam_real_t seen_m[] = {4, 4, BSLAM_R(4.5), BSLAM_R(4.1)};
+    int64_t time_us = 0;
+    for (int i = 0; i < 4; i++, time_us += STEP_US) {  // for, for, against, for: two
+        see_one(&slam, time_us, unit_polar(0, seen_m[i], 1));
+        assert_false(beacon(&slam, 0).confirmed);
+        drive(&slam, time_us + STEP_US, 0, 0);
+    }
+    see_one(&slam, time_us, unit_polar(0, BSLAM_R(4.1), 1));
+    assert_true(beacon(&slam, 0).confirmed);
+    drive(&slam, time_us + STEP_US, 0, 0);
+    see_one(&slam, time_us + STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
+    assert_true(beacon(&slam, 0).confirmed);
+    assert_int_equal(bslam_slam_counters(&slam)->gated, 0);
+}
+
+static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it(void **state)
+{
+    bslam_params_t params = unit_params();
+    params.confirm_d2 = 1;
+    bslam_slam_t slam = started(params);
+    see_one(&slam, 0, unit_polar(0, 4, 1));
+    drive(&slam, STEP_US, 0, 0);
+    see_one(&slam, STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
+    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
+    drive(&slam, 2 * STEP_US, 0, 0);
+    see_one(&slam, 2 * STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
+    assert_int_equal(beacon(&slam, 0).uid, 1);
+}
+
 static void test_sightings_one_sighting_confirms_where_that_is_asked(void **state)
 {
     bslam_params_t params = unit_params();
@@ -1314,6 +1350,8 @@ int main(void)
 
         cmocka_unit_test(test_sightings_beacon_is_confirmed_by_its_number_of_sightings),
         cmocka_unit_test(test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts),
+        cmocka_unit_test(test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon),
+        cmocka_unit_test(test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it),
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
         cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),
