@@ -30,7 +30,6 @@ CAMERA: Final[dict[str, int | float]] = {
 CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
     "confirm_sightings": 20,
     "confirm_way_m": 0.1,
-    "confirm_d2": 1.0,
     "confirm_window_us": 0,
     "double_sd_m": 0.3,
 }
