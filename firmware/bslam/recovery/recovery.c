@@ -21,14 +21,17 @@ static const bslam_real_t WAY_SD = BSLAM_R(0.15);
 static const bslam_real_t DOUBT_FACTOR = BSLAM_R(1.5);
 static const bslam_real_t DOUBT_M = BSLAM_R(0.05);
 static const bslam_real_t DOUBT_RAD = BSLAM_R(0.03);
-static const bslam_real_t DOUBT_POSITION_MAX_M = BSLAM_R(1.0);
+static const bslam_real_t DOUBT_POSITION_MAX_M = BSLAM_R(1.5);
+// By distances a better fix comes soon: so far one is waited for.
+static const bslam_real_t BY_RANGES_MAX_M = BSLAM_R(1.0);
 static const bslam_real_t DOUBT_HEADING_MAX_RAD = BSLAM_R(0.6);
 
 enum {
     EVIDENCE_SEVERAL = 8,  ///< frames that contradict, less those that agree, until the robot is lost,
     EVIDENCE_ONE = 25,     ///< if all show the same beacon, or with those that say neither, once several did
     SILENT_ONE = 8,  ///< frames in which nothing is recognised, which end a doubt that one beacon raised
-    CLUE_AGE_US = 5000000,  ///< odometry carries a clue so long
+    CLUE_AGE_US = 5000000,       ///< odometry carries a clue so long,
+    DIRECTION_AGE_US = 3000000,  ///< or this, for three directions give a pose as if taken from here
     FIX_AGE_US = 1000000,
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
     CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
@@ -325,9 +328,10 @@ static void forget_old(bslam_recovery_t *recovery, const bslam_slam_t *slam, int
 {
     int kept = 0;
     for (int m = 0; m < recovery->memory_count; m++) {
-        const bool is_there = place_of(&slam->ekf, recovery->memories[m].uid) >= 0;
-        if (is_there && time_us - recovery->memories[m].time_us <= CLUE_AGE_US) {
-            recovery->memories[kept] = recovery->memories[m];
+        const bslam_memory_t *memory = &recovery->memories[m];
+        const int64_t age_us = memory->sighting.has_range ? CLUE_AGE_US : DIRECTION_AGE_US;
+        if (place_of(&slam->ekf, memory->uid) >= 0 && time_us - memory->time_us <= age_us) {
+            recovery->memories[kept] = *memory;
             kept++;
         }
     }
@@ -381,7 +385,8 @@ static bool is_verified(const bslam_fix_t *fix)
 
 static bool is_clear(const bslam_fix_t *fix)
 {
-    return fix->agreeing > 2 * fix->dissenting && fix->position_sd_m <= DOUBT_POSITION_MAX_M &&
+    const bslam_real_t most_m = fix->with_range >= 2 ? BY_RANGES_MAX_M : DOUBT_POSITION_MAX_M;
+    return fix->agreeing > 2 * fix->dissenting && fix->position_sd_m <= most_m &&
            fix->heading_sd_rad <= DOUBT_HEADING_MAX_RAD;
 }
 
