@@ -106,15 +106,24 @@ static int16_t ahead(const session_t *session)
     return (int16_t)(uint16_t)(session->parser.header.sequence - session->last_sequence);
 }
 
+/// A greeting is taken with any number, but that of the present session only once: a replayed one would let
+/// in all of the session's older messages.
+static bool starts_session(const session_t *session)
+{
+    bslam_link_reader_t reader = bslam_link_payload(&session->parser);
+    return !session->open ||
+           (session->parser.header.type == SESSION_HELLO && bslam_link_get_u32(&reader) != session->id);
+}
+
 static void take_message(session_t *session)
 {
     const exchange_t *exchange = exchange_find(session->parser.header.type);
-    const bool starts = session->parser.header.type == SESSION_HELLO;
-    if (session->open && !starts && ahead(session) < 0) {
+    const bool starts = starts_session(session);
+    if (!starts && ahead(session) < 0) {
         session->replayed++;
         return;
     }
-    if (session->open && !starts && ahead(session) == 0) {
+    if (!starts && ahead(session) == 0) {
         session->repeated++;
     } else {
         if (exchange != NULL && exchange_changes(exchange)) {

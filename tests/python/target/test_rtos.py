@@ -31,7 +31,12 @@ def test_without_the_kernel_it_says_where_to_get_it(words, says):
     assert says in done.stderr
 
 
-@pytest.mark.skipif(not KERNEL, reason="not shown here: FREERTOS_KERNEL names no kernel (docs/PORTING.md)")
+@pytest.mark.skipif(
+    not KERNEL,
+    reason="no FreeRTOS kernel, and no package has one: git clone --branch V11.2.0 --depth 1"
+    " https://github.com/FreeRTOS/FreeRTOS-Kernel ../FreeRTOS-Kernel, then"
+    " FREERTOS_KERNEL=../FreeRTOS-Kernel make test",
+)
 def test_on_freertos_the_robot_drives_sees_and_replays_to_the_same_bits(tmp_path, capsys):
     built = make_rtos(f"FREERTOS_KERNEL={KERNEL}")
     assert built.returncode == 0, built.stderr
