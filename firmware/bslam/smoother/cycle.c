@@ -33,16 +33,18 @@ static const bslam_real_t DOUBT_MIN = BSLAM_R(1e-6);
 
 // ---- along the nodes --------------------------------------------------------------------------------------
 
-static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smoother_seen_t *seen)
+/// `range`: NULL without one.
+static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smoother_seen_t *direction,
+                                    const bslam_smoother_seen_t *range)
 {
-    bslam_sighting_t sighting = {.bearing_rad = seen->bearing * BSLAM_SMOOTHER_BEARING_RAD,
-                                 .range_m = seen->range * BSLAM_SMOOTHER_RANGE_M,
-                                 .bearing_sd_rad = seen->bearing_sd * BSLAM_SMOOTHER_SD_RAD,
-                                 .has_range = seen->ranges > 0,
+    bslam_sighting_t sighting = {.bearing_rad = bslam_smoother_bearing_rad(direction),
+                                 .bearing_sd_rad = bslam_smoother_sd_rad(direction),
+                                 .has_range = range != NULL,
                                  .label = BSLAM_LABEL_NONE};
-    if (sighting.has_range && seen->ranges != BSLAM_SMOOTHER_FIRST) {
+    if (range != NULL && range->weight != BSLAM_SMOOTHER_FIRST) {
+        sighting.range_m = range->value * BSLAM_SMOOTHER_RANGE_M;
         const bslam_real_t variance = bslam_range_variance_m2(model, &sighting, sighting.range_m);
-        sighting.range_sd_m = bslam_sqrt(variance / seen->ranges);
+        sighting.range_sd_m = bslam_sqrt(variance / range->weight);
     }
     return sighting;
 }
@@ -51,7 +53,7 @@ static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smo
 /// saw it, not of a place in the map: where the robot is may be doubtful, too.
 static bslam_status_t guess_range(bslam_innovation_t *innovation)
 {
-    const bslam_real_t range_m = -innovation->range_m;  // what is predicted, seen->range being 0
+    const bslam_real_t range_m = -innovation->range_m;  // what is predicted, the sighting's being 0
     const bslam_real_t sd_m = GUESS_SD_LN * range_m;
     if (!(range_m > RANGE_MIN_M)) {
         return BSLAM_E_SINGULAR;
@@ -61,29 +63,38 @@ static bslam_status_t guess_range(bslam_innovation_t *innovation)
     return BSLAM_OK;
 }
 
+/// What was seen of a beacon, into a filter. False if it cannot be used.
+static bool take_seen(const bslam_params_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
+                      const bslam_smoother_seen_t *range)
+{
+    const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
+    const bslam_sighting_t sighting = sighting_of(model, direction, range);
+    bslam_innovation_t innovation;
+    bslam_fusion_t unused;
+    bslam_status_t status =
+        bslam_ekf_innovation(ekf, model, &mount, &sighting, direction->beacon, &innovation);
+    if (status == BSLAM_OK && range != NULL && range->weight == BSLAM_SMOOTHER_FIRST) {
+        status = guess_range(&innovation);
+    }
+    return status == BSLAM_OK && bslam_ekf_fuse(ekf, model, &innovation, &unused) == BSLAM_OK;
+}
+
 /// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
 static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
                       int first_seen)
 {
-    const bslam_params_t *model = &smoother->model;
-    const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
     if (node->motion.dt_s > 0) {
-        bslam_ekf_measure_speeds(ekf, model, &node->motion);
+        bslam_ekf_measure_speeds(ekf, &smoother->model, &node->motion);
     }
     for (int k = 0; k < node->seen; k++) {
-        const bslam_smoother_seen_t *seen = bslam_smoother_seen(smoother, first_seen + k);
-        const bslam_sighting_t sighting = sighting_of(model, seen);
-        bslam_innovation_t innovation;
-        bslam_fusion_t unused;
-        bslam_status_t status =
-            bslam_ekf_innovation(ekf, model, &mount, &sighting, seen->beacon, &innovation);
-        if (status == BSLAM_OK && seen->ranges == BSLAM_SMOOTHER_FIRST) {
-            status = guess_range(&innovation);
+        const bslam_smoother_seen_t *direction = bslam_smoother_seen(smoother, first_seen + k);
+        const bslam_smoother_seen_t *range = NULL;
+        if (k + 1 < node->seen &&
+            bslam_smoother_seen(smoother, first_seen + k + 1)->beacon == BSLAM_SMOOTHER_RANGE) {
+            k++;
+            range = bslam_smoother_seen(smoother, first_seen + k);
         }
-        if (status == BSLAM_OK) {
-            status = bslam_ekf_fuse(ekf, model, &innovation, &unused);
-        }
-        smoother->left_out += status == BSLAM_OK ? 0u : 1u;
+        smoother->left_out += take_seen(&smoother->model, ekf, direction, range) ? 0u : 1u;
     }
     bslam_ekf_settle(ekf);
 }

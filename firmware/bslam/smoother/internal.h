@@ -5,7 +5,7 @@
 #include "bslam/smoother/smoother.h"
 
 #define BSLAM_SMOOTHER_BEARING_RAD BSLAM_R(9.58737992e-5)  ///< of a bslam_smoother_seen_t's units
-#define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-5)
+#define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-6)
 #define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
 
 /// Node k, counted from the oldest.
@@ -14,10 +14,21 @@ static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoot
     return &smoother->nodes[(smoother->first_node + k) % BSLAM_SMOOTHER_NODES_MAX];
 }
 
-/// Beacon seen k, counted from the oldest.
+/// Direction or distance k, counted from the oldest.
 static inline bslam_smoother_seen_t *bslam_smoother_seen(bslam_smoother_t *smoother, int k)
 {
     return &smoother->seen[(smoother->first_seen + k) % BSLAM_SMOOTHER_SEEN_MAX];
+}
+
+static inline bslam_real_t bslam_smoother_bearing_rad(const bslam_smoother_seen_t *direction)
+{
+    return (int16_t)direction->value * BSLAM_SMOOTHER_BEARING_RAD;
+}
+
+static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *direction)
+{
+    return (bslam_real_t)((16 + (direction->weight & 15)) << (direction->weight >> 4)) *
+           BSLAM_SMOOTHER_SD_RAD;
 }
 
 /// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the

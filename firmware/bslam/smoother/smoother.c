@@ -71,13 +71,37 @@ static int32_t units(bslam_real_t value)
     return (int32_t)(value < UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5)) : UNITS_MAX);
 }
 
-/// What a bslam_smoother_seen_t says of distances.
-static uint8_t ranges_of(const bslam_smoother_line_t *line, bool in_reach)
+static bslam_real_t mean_range_m(const bslam_smoother_line_t *line)
 {
-    if (line->ranges > 0) {
-        return (uint8_t)(in_reach ? line->ranges : 0);
+    return line->range_m / (bslam_real_t)line->ranges;
+}
+
+/// There is more to say of the beacon than its direction.
+static bool has_range(const bslam_smoother_line_t *line)
+{
+    return line->ranges > 0 ? mean_range_m(line) < UNITS_MAX * BSLAM_SMOOTHER_RANGE_M : line->is_first;
+}
+
+static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
+{
+    const bslam_smoother_seen_t range = {
+        .value = (uint16_t)(line->ranges > 0 ? units(mean_range_m(line) / BSLAM_SMOOTHER_RANGE_M) : 0),
+        .weight = (uint8_t)(line->ranges > 0 ? line->ranges : BSLAM_SMOOTHER_FIRST),
+        .beacon = BSLAM_SMOOTHER_RANGE,
+    };
+    return range;
+}
+
+/// A standard deviation as a bslam_smoother_seen_t has it.
+static uint8_t weight_of(bslam_real_t sd_rad)
+{
+    bslam_real_t mantissa = sd_rad / BSLAM_SMOOTHER_SD_RAD;
+    int exponent = 0;
+    for (; mantissa >= BSLAM_R(31.5) && exponent < 15; exponent++) {
+        mantissa /= 2;
     }
-    return line->is_first ? BSLAM_SMOOTHER_FIRST : 0;
+    const int32_t low = units(mantissa) - 16;
+    return (uint8_t)(exponent * 16 + (low < 0 ? 0 : (low > 15 ? 15 : low)));
 }
 
 /// The line through a beacon's bearings, at the block's middle. Its slope is about that of the turn.
@@ -94,26 +118,30 @@ static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
     const bslam_real_t sloped = s2 + 1 / (SLOPE_SD_RADPS * SLOPE_SD_RADPS);
     const bslam_real_t determinant = s0 * sloped - s1 * s1;
     const bslam_real_t bearing_rad = line->first_rad + (sloped * y - s1 * ty) / determinant;
-    const bslam_real_t range_m = line->ranges > 0 ? line->range_m / (bslam_real_t)line->ranges : 0;
-    const bool in_reach = range_m < UNITS_MAX * BSLAM_SMOOTHER_RANGE_M;
-    const bslam_smoother_seen_t seen = {
+    const bslam_smoother_seen_t direction = {
         // Half a turn to the left is half a turn to the right.
-        .bearing = (int16_t)(uint16_t)units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
-        .bearing_sd = (uint16_t)units(bslam_sqrt(sloped / determinant) / BSLAM_SMOOTHER_SD_RAD + 1),
-        .range = (uint16_t)(in_reach ? units(range_m / BSLAM_SMOOTHER_RANGE_M) : 0),
+        .value = (uint16_t)units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
+        .weight = weight_of(bslam_sqrt(sloped / determinant)),
         .beacon = (uint8_t)beacon,
-        .ranges = ranges_of(line, in_reach),
     };
-    return seen;
+    return direction;
 }
 
-static int lines_of_block(const bslam_smoother_t *smoother)
+/// How many directions and distances the open block has.
+static int seen_of_block(const bslam_smoother_t *smoother)
 {
     int count = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
-        count += smoother->lines[b].count > 0 ? 1 : 0;
+        const bslam_smoother_line_t *line = &smoother->lines[b];
+        count += line->count > 0 ? 1 + (has_range(line) ? 1 : 0) : 0;
     }
     return count;
+}
+
+static void push_seen(bslam_smoother_t *smoother, bslam_smoother_seen_t seen)
+{
+    *bslam_smoother_seen(smoother, smoother->seen_count) = seen;
+    smoother->seen_count++;
 }
 
 static void make_room(bslam_smoother_t *smoother, int seen)
@@ -132,16 +160,19 @@ static void make_room(bslam_smoother_t *smoother, int seen)
 /// The open block becomes a node.
 static void close_block(bslam_smoother_t *smoother)
 {
-    const int seen = lines_of_block(smoother);
+    const int seen = seen_of_block(smoother);
     make_room(smoother, seen);
     bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->node_count);
     memcpy(node->at, smoother->middle, sizeof node->at);
     node->motion = smoother->to_middle;
     node->seen = (int16_t)seen;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
-        if (smoother->lines[b].count > 0) {
-            *bslam_smoother_seen(smoother, smoother->seen_count) = fit(smoother, b);
-            smoother->seen_count++;
+        const bslam_smoother_line_t *line = &smoother->lines[b];
+        if (line->count > 0) {
+            push_seen(smoother, fit(smoother, b));
+        }
+        if (line->count > 0 && has_range(line)) {
+            push_seen(smoother, range_of(line));
         }
     }
     smoother->node_count++;
@@ -228,16 +259,20 @@ static void forget_seen(bslam_smoother_t *smoother, int index)
 {
     int from = 0;
     int to = 0;
+    bool is_gone = false;  // the direction last met
     for (int n = 0; n < smoother->node_count; n++) {
         bslam_smoother_node_t *node = bslam_smoother_node(smoother, n);
         const int end = from + node->seen;
         for (; from < end; from++) {
             bslam_smoother_seen_t seen = *bslam_smoother_seen(smoother, from);
-            if (seen.beacon == index) {
+            is_gone = seen.beacon == BSLAM_SMOOTHER_RANGE ? is_gone : seen.beacon == index;
+            if (is_gone) {
                 node->seen--;
                 continue;
             }
-            seen.beacon = (uint8_t)(seen.beacon > index ? seen.beacon - 1 : seen.beacon);
+            if (seen.beacon != BSLAM_SMOOTHER_RANGE && seen.beacon > index) {
+                seen.beacon--;
+            }
             *bslam_smoother_seen(smoother, to) = seen;
             to++;
         }

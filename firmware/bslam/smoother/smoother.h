@@ -30,20 +30,23 @@
 
 /// In place of a number of distances: none, and nothing was known of the beacon before.
 #define BSLAM_SMOOTHER_FIRST 255
+/// In place of a beacon: this is the distance that belongs to the direction before it.
+#define BSLAM_SMOOTHER_RANGE 255
 
-/// What was seen of a beacon around a node, brought to its moment, in 8 bytes.
+/// What was seen of a beacon around a node, brought to its moment: its direction, and behind that, if there
+/// is more to say than that it was seen again, its distance. 4 bytes each, for most have none.
 typedef struct bslam_smoother_seen {
-    int16_t bearing;      ///< in 1/65536 of a turn: 0.1 mrad
-    uint16_t bearing_sd;  ///< in 10 urad, 0.65 rad at most
-    uint16_t range;       ///< in 5 mm, 327 m at most
-    uint8_t beacon;       ///< its place in the map
-    uint8_t ranges;       ///< that `range` is the mean of; 0: none, or too far; or BSLAM_SMOOTHER_FIRST
+    uint16_t
+        value;  ///< bearing as an int16_t in 1/65536 of a turn: 0.1 mrad; or range in 5 mm, 327 m at most
+    uint8_t weight;  ///< sd of the bearing, (16 + low half) 2^(high half) urad: within 3 %, 1 rad at most; or
+                     ///< how many distances `value` is the mean of, or BSLAM_SMOOTHER_FIRST
+    uint8_t beacon;  ///< its place in the map, or BSLAM_SMOOTHER_RANGE
 } bslam_smoother_seen_t;
 
 typedef struct bslam_smoother_node {
     bslam_real_t at[BSLAM_ROBOT_DIM_MAX];  ///< the robot's values: where its models are linearised
     bslam_motion_t motion;                 ///< odometry since the node before, or since the base
-    int16_t seen;                          ///< beacons
+    int16_t seen;                          ///< directions and distances
 } bslam_smoother_node_t;
 
 /// Sums over the sightings of a beacon in the open block, for a line of bearing over time.

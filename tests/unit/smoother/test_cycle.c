@@ -169,7 +169,7 @@ static void add_seen(int k, int first_seen, bool map_is_known)
     for (int s = 0; s < node->seen; s++) {
         const bslam_smoother_seen_t *seen = bslam_smoother_seen(&smoother, first_seen + s);
         const dense_t rows = twin_rows(&there, &mount, seen->beacon);
-        const double sd_rad = seen->bearing_sd * (double)BSLAM_SMOOTHER_SD_RAD;
+        const double sd_rad = (double)bslam_smoother_sd_rad(seen);
         double range_m;
         double bearing_rad;
         double h[DIM];
@@ -177,7 +177,7 @@ static void add_seen(int k, int first_seen, bool map_is_known)
         for (int i = 0; i < DIM; i++) {
             h[i] = map_is_known && i >= BASE ? 0 : rows.at[1][i];
         }
-        const double measured_rad = seen->bearing * (double)BSLAM_SMOOTHER_BEARING_RAD;
+        const double measured_rad = (double)bslam_smoother_bearing_rad(seen);
         const double left_rad = unit_angle_between(measured_rad, bearing_rad);
         assert_true(fabs(left_rad) < 6 * sd_rad);  // beyond what the poses are doubtful by, Huber's rule acts
         add_measurement(k + 1, h, left_rad, sd_rad * sd_rad);
