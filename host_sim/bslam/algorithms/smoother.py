@@ -112,8 +112,8 @@ class Smoother:
     def solve(self) -> int:
         """Iterate until nothing changes; the number of iterations. ArithmeticError if that never is."""
         problem = _Problem(self._p, self._steps, self._seen, self._priors)
-        # A distance that a poor start predicts far too long would hardly weigh, and let its beacon fly off: the
-        # measured ones weigh first.
+        # A distance that a poor start predicts far too long would hardly weigh, and let its beacon fly off:
+        # the measured ones weigh first.
         near = self._settle(problem, self.poses, self.beacons, problem.first_weights)
         self._poses, self._beacons, more = self._settle(problem, near[0], near[1], problem.weights)
         return near[2] + more

@@ -217,7 +217,6 @@ def test_drive_without_noise_is_recovered():
     np.testing.assert_allclose(smoother.beacons, PLACES, atol=1e-6)
 
 
-
 def test_poor_start_lets_no_beacon_fly_off():
     log = first_steps(simulate(load_scenario("paper_room"), 1000, sigma_mps=1.0), 1000)
     poses = run_algorithm(
