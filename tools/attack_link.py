@@ -100,13 +100,25 @@ class AttackedLine:
                 return of_another_version(data, self.random.choice([0, 2, 255])) + data
 
 
-def drive(log: Log, line: AttackedLine | None) -> Noting:
-    """The log's drive by this host, or by the robot at the other end."""
-    made: list[Noting] = []
+def drive_there(log: Log, line: AttackedLine) -> tuple[Noting, dict[str, Any]]:
+    """The log's drive by the robot at the other end, and the parameters with which a host does the same."""
+    made: list[tuple[Noting, RemoteSlam]] = []
 
     def factory(params: Any, beacons: int) -> Noting:
-        slam = Slam(params, beacons_max=beacons) if line is None else connected(line, params, beacons)
-        made.append(Noting(slam))
+        slam = connected(line, params, beacons)
+        made.append((Noting(slam), slam))
+        return made[0][0]
+
+    run_log(log, RunOptions(), factory)
+    return made[0][0], made[0][1].host_params
+
+
+def drive_here(log: Log, params: dict[str, Any]) -> Noting:
+    """The same by this host, which remembers no more of the way than the robot does."""
+    made: list[Noting] = []
+
+    def factory(_: Any, beacons: int) -> Noting:
+        made.append(Noting(Slam(params, beacons_max=beacons)))
         return made[0]
 
     run_log(log, RunOptions(), factory)
@@ -137,7 +149,8 @@ def attack(options: argparse.Namespace) -> int:
     try:
         while time.monotonic() - started < 60 * options.minutes:
             log = first_steps(simulate(load_scenario("paper_room"), options.seed + drives), options.steps)
-            here, there = drive(log, None), drive(log, line)
+            there, params = drive_there(log, line)
+            here = drive_here(log, params)
             place = first_difference(here.notes, there.notes)
             wanted, found = here.counters(), there.counters()
             alike = place is None and wanted == found
