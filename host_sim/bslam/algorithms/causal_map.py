@@ -11,9 +11,12 @@ from bslam.algorithms.protocol import Landmark, Setup, Sighting
 from bslam.algorithms.smoother import Smoother
 from bslam.motion import Pose, move_on_arc
 
+_START_STEPS = 25
+"""For no longer does a solution start from odometry alone: one that starts far off may settle elsewhere."""
+
 
 class CausalMap:
-    """Maximum a posteriori of the whole drive so far, solved anew to convergence at every n-th step.
+    """Maximum a posteriori of the whole drive so far, solved anew to convergence at every n-th step at least.
 
     Under the very model that bslam's filter has, velocity states included. Between those steps the pose
     goes on by odometry, so it is comparable at those steps only. A sighting that was taken between two
@@ -71,7 +74,7 @@ class CausalMap:
 
     def pose(self) -> Pose:
         """See `Algorithm`."""
-        if self._smoother.steps % self._every == 0:
+        if self._smoother.steps % min(self._every, _START_STEPS) == 0:
             self._solve()
         x_m, y_m, theta_rad = self._smoother.last_pose
         return x_m, y_m, math.remainder(theta_rad, math.tau)

@@ -12,7 +12,7 @@ Poses couple with their neighbours only: their normal equations are a band, beac
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -112,24 +112,16 @@ class Smoother:
     def solve(self) -> int:
         """Iterate until nothing changes; the number of iterations. ArithmeticError if that never is."""
         problem = _Problem(self._p, self._steps, self._seen, self._priors)
-        # A distance that a poor start predicts far too long would hardly weigh, and let its beacon fly off:
-        # the measured ones weigh first.
-        near = self._settle(problem, self.poses, self.beacons, problem.first_weights)
-        self._poses, self._beacons, more = self._settle(problem, near[0], near[1], problem.weights)
-        return near[2] + more
-
-    def _settle(
-        self, problem: _Problem, poses: Array, beacons: Array, weigh: Callable[[Array, Array], Array]
-    ) -> tuple[Array, Array, int]:
-        """Poses and beacons once nothing changes, and after how many iterations."""
+        poses, beacons = self.poses, self.beacons
         for iteration in range(1, _ITERATIONS_MAX + 1):
-            weights = weigh(poses, beacons)
+            weights = problem.weights(poses, beacons)
             cost, normal = problem.linearise(poses, beacons, weights)
             trial = problem.lower(poses, beacons, *normal.solve(), weights, cost)
             largest = max(np.abs(trial[0] - poses).max(), np.abs(trial[1] - beacons).max(initial=0.0))
             poses, beacons = trial
             if largest < _SETTLED or cost - problem.cost(*trial, weights) < _SETTLED_COST * cost:
-                return poses, beacons, iteration
+                self._poses, self._beacons = poses, beacons
+                return iteration
         raise ArithmeticError(f"{self.steps} poses have not settled in {_ITERATIONS_MAX} iterations")
 
     def _mount(self, theta_rad: Array) -> Array:
@@ -210,13 +202,7 @@ class _Problem:
 
     def weights(self, poses: Array, beacons: Array) -> Array:
         """1 / sd of (bearing, range) of each sighting, (m, 2), with the predicted distances; no range: 0."""
-        return self._weights(self._look(poses, beacons)[0][:, 1])
-
-    def first_weights(self, _poses: Array, _beacons: Array) -> Array:
-        """The same with the measured distances."""
-        return self._weights(np.where(self._has_range, self._range_m, 1.0))  # which weighs nothing there
-
-    def _weights(self, range_m: Array) -> Array:
+        range_m = self._look(poses, beacons)[0][:, 1]
         bearing = np.full(len(range_m), 1.0 / self._p["bearing_sd_rad"])
         return np.column_stack([bearing, np.where(self._has_range, 1.0 / range_sd_m(self._p, range_m), 0.0)])
 
