@@ -209,6 +209,7 @@ class QemuLine:
 
     def write(self, data: bytes) -> None:
         try:
+            self._socket.settimeout(START_TIMEOUT_S)  # not the last read's: an emulator may be slow
             self._socket.sendall(data)
         except OSError as error:
             raise TargetError(self._gone()) from error
