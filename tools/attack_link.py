@@ -7,7 +7,7 @@ of all states, covariance and machines included, is the host's to the bit, and s
 was applied. What was refused is in the robot's own counters.
 
     .venv/bin/python tools/attack_link.py                       a process of this computer, ten minutes
-    .venv/bin/python tools/attack_link.py qemu:mps2_an386       an emulated board
+    .venv/bin/python tools/attack_link.py qemu:mps2_an386 --timeout 1       an emulated board, which is slow
 
 Exit status 0: all drives are the host's, and each kind of damage was counted. 1: not so.
 """

@@ -118,12 +118,15 @@ def other_proofs(quick: bool) -> list[Proof]:
     wide = [*bits, "--rig", "wide180"]
     smoothed = [*bits, "--association", "known", "--observation", "direction", "--filter", "smoother"]
     sweep = [PYTHON, "tools/kill_sweep.py", "--runs", str(runs)]
+    minutes = 1 if quick else 10
+    attack = [PYTHON, "tools/attack_link.py", "--minutes", str(minutes)]
     return [
         Proof("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),
         Proof("cores", "library for every core", "builds", LAST_LINE, ["make", "firmware-all"], 1),
         Proof("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, steps / 500),
         Proof("bits180", "the same, wide180", "on every board", LAST_LINE, wide, steps / 500),
         Proof("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed, steps / 500),
+        Proof("link", f"the link, {minutes} min attacked", "all the host's", LAST_LINE, attack, minutes),
         Proof("sweep", f"{runs} runs, killed three times", "0 lost", LAST_LINE, sweep, runs / 100),
     ]
 
