@@ -4,7 +4,8 @@ Walks through rendered worlds; of every whole object of 150 px or more that is s
 from its front and at most a tenth hidden, takes the error of direction and of distance. `--boxes rough`
 (default) measures the true box with each edge moved by up to `--jitter` px, evenly; `--boxes detected` what
 the detector finds of it. Columns: n; of how many percent it is measured; rms and 1.4826 median |error|; mean
-square of error over standard deviation, and percent beyond three of these; percent marked as hidden. A
+square of error over standard deviation, and percent beyond three of these; percent marked as hidden. The
+same follows for what bears no mark (hidden, part, cut off): the others are told to have rough directions. A
 distance by the height of a kind that it is not does not count. `--hidden 0.25:0.9` asks for objects of which
 that share is hidden, in place of whole ones. `--correlation` prints besides how alike an object's errors are
 in two frames of a walk, by how far the robot moved between them.
@@ -49,6 +50,7 @@ ERROR = np.dtype(
         ("range", np.float64),  # error, a fraction of the distance; NaN: not measured
         ("range_sd", np.float64),
         ("marked", np.bool_),  # as half hidden
+        ("plain", np.bool_),  # no mark at all: the direction is told as a good one
     ]
 )
 Errors = NDArray[np.void]
@@ -137,8 +139,9 @@ def errors_of_world(seed: int, rig: str, style: str, hidden: Hidden, jitter_px: 
                 distance = candidate.range_m / seen.range_m - 1.0
                 distance_sd = candidate.range_sd_m / seen.range_m
             row = (seed, step, seen.beacon_id, seen.kind, seen.range_m, (x_m, y_m))
-            marked = candidate is not None and "hidden" in candidate.marks
-            rows.append((*row, bearing, bearing_sd, distance, distance_sd, marked))
+            marks = candidate.marks if candidate is not None else frozenset()
+            told = (bearing, bearing_sd, distance, distance_sd)
+            rows.append((*row, *told, "hidden" in marks, not marks))
     return np.array(rows, ERROR)
 
 
@@ -171,11 +174,17 @@ def print_line(name: str, errors: Errors) -> None:
     )
 
 
+def print_distances(errors: Errors) -> None:
+    for low, high in DISTANCES_M:
+        print_line(f"{low}-{high} m", errors[(errors["distance_m"] >= low) & (errors["distance_m"] < high)])
+
+
 def print_tables(errors: Errors) -> None:
     print("                   n   direction, deg                  distance, %                    marked,")
     print("                       has    rms median (e/sd)2 >3sd   has    rms median (e/sd)2 >3sd     %")
-    for low, high in DISTANCES_M:
-        print_line(f"{low}-{high} m", errors[(errors["distance_m"] >= low) & (errors["distance_m"] < high)])
+    print_distances(errors)
+    print("without a mark:")
+    print_distances(errors[errors["plain"]])
     middle = errors[(errors["distance_m"] >= 2.5) & (errors["distance_m"] < 7.0)]
     print_line("2.5-7 m", middle)
     for kind in sorted(set(middle["kind"].tolist())):
