@@ -13,6 +13,13 @@
 #define HALF_OF_FOUR (2U | 2U << RED_SHIFT | 2U << GREEN_SHIFT)
 /// Pixel pairs in a step of the loop over a row.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
+/// Before the loop over a step: a core without vectors takes its pairs one after the other, without a loop;
+/// any other takes them at once, which a compiler sees in a loop alone.
+#if BSLAM_HAS_BYTES
+#define A_STEP_IN_LINE _Pragma("GCC unroll 4")
+#else
+#define A_STEP_IN_LINE
+#endif
 
 static bool size_is_allowed(int32_t size_px, int32_t size_max_px, int32_t step_px)
 {
@@ -51,17 +58,6 @@ static inline uint32_t pair_sum(const uint8_t *pair)
     return (word & SPREAD_MASK) + ((word >> 16 | word << 16) & SPREAD_MASK);
 }
 
-/// The upper row of two: sums of its pairs.
-static void sum_pairs(uint32_t *restrict sums, const uint8_t *restrict pixels, int32_t pairs)
-{
-    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
-        sums[i] = pair_sum(pixels + 4 * i);
-        sums[i + 1] = pair_sum(pixels + 4 * i + 4);
-        sums[i + 2] = pair_sum(pixels + 4 * i + 8);
-        sums[i + 3] = pair_sum(pixels + 4 * i + 12);
-    }
-}
-
 /// The mean of 2x2 pixels in RGB565 from their sum.
 static inline uint16_t mean_565(uint32_t quad)
 {
@@ -69,11 +65,15 @@ static inline uint16_t mean_565(uint32_t quad)
     return (uint16_t)(mean | mean >> 16);
 }
 
-/// Adds a pair of the lower row to the one above; the mean of the four.
-static inline uint16_t finish_quad(uint32_t *sum, const uint8_t *pair)
+/// The upper row of two: sums of its pairs.
+static void sum_pairs(uint32_t *restrict sums, const uint8_t *restrict pixels, int32_t pairs)
 {
-    *sum += pair_sum(pair);
-    return mean_565(*sum);
+    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
+        A_STEP_IN_LINE
+        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
+            sums[i + k] = pair_sum(pixels + 4 * (i + k));
+        }
+    }
 }
 
 /// The lower row of two: to the sums of the upper row's pairs, which become those of 2x2 pixels; their means.
@@ -81,10 +81,14 @@ static void sum_quads(uint32_t *restrict sums, uint16_t *restrict half, const ui
                       int32_t pairs)
 {
     for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
-        half[i] = finish_quad(sums + i, pixels + 4 * i);
-        half[i + 1] = finish_quad(sums + i + 1, pixels + 4 * i + 4);
-        half[i + 2] = finish_quad(sums + i + 2, pixels + 4 * i + 8);
-        half[i + 3] = finish_quad(sums + i + 3, pixels + 4 * i + 12);
+        A_STEP_IN_LINE
+        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
+            sums[i + k] += pair_sum(pixels + 4 * (i + k));
+        }
+        A_STEP_IN_LINE
+        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
+            half[i + k] = mean_565(sums[i + k]);
+        }
     }
 }
 
@@ -108,17 +112,66 @@ static inline uint8_t spread_of(const uint32_t above[2], const uint32_t below[2]
     return (uint8_t)(spread < 0 ? 0 : spread < 255 ? spread : 255);
 }
 
+static inline void fill_cell(bslam_cells_t *cells, int32_t i, const uint32_t *above, const uint32_t *below)
+{
+    const uint32_t sum = above[0] + above[1] + below[0] + below[1];
+    cells->red[i] = (uint8_t)(sum >> (RED_SHIFT + 1));
+    cells->green[i] = (uint8_t)(sum >> (GREEN_SHIFT + 2));
+    cells->blue[i] = (uint8_t)(sum >> 1);
+    cells->spread[i] = spread_of(above, below);
+}
+
+#if !BSLAM_HAS_BYTES
+#define CELLS_AT_ONCE 4
+
+static inline int32_t most(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static inline int32_t least(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+/// fill_cell() for several in a row.
+static void fill_four(bslam_cells_t *cells, int32_t i, const uint32_t *restrict above,
+                      const uint32_t *restrict below)
+{
+    uint32_t sum[CELLS_AT_ONCE];
+    int32_t spread[CELLS_AT_ONCE];
+    for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
+        const uint32_t a = above[2 * k], b = above[2 * k + 1], c = below[2 * k], d = below[2 * k + 1];
+        const int32_t of_a = (int32_t)luma(a), of_b = (int32_t)luma(b), of_c = (int32_t)luma(c);
+        const int32_t of_d = (int32_t)luma(d);
+        sum[k] = a + b + c + d;
+        spread[k] = least(
+            most(most(of_a, of_b), most(of_c, of_d)) - least(least(of_a, of_b), least(of_c, of_d)), 255);
+    }
+    for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
+        cells->red[i + k] = (uint8_t)(sum[k] >> (RED_SHIFT + 1));
+        cells->green[i + k] = (uint8_t)(sum[k] >> (GREEN_SHIFT + 2));
+        cells->blue[i + k] = (uint8_t)(sum[k] >> 1);
+        cells->spread[i + k] = (uint8_t)spread[k];
+    }
+}
+#endif
+
 /// A row of cells, from cell `first` on, from the sums of their quarters.
 static void fill_cells(bslam_cells_t *cells, int32_t first, const bslam_row_sums_t *sums, int32_t pairs)
 {
     const uint32_t *above = sums->upper, *below = sums->lower;
     const int32_t end = first + pairs / 2;
-    for (int32_t i = first; i < end; i++, above += 2, below += 2) {
-        const uint32_t sum = above[0] + above[1] + below[0] + below[1];
-        cells->red[i] = (uint8_t)(sum >> (RED_SHIFT + 1));
-        cells->green[i] = (uint8_t)(sum >> (GREEN_SHIFT + 2));
-        cells->blue[i] = (uint8_t)(sum >> 1);
-        cells->spread[i] = spread_of(above, below);
+    int32_t i = first;
+#if !BSLAM_HAS_BYTES
+    for (; i + CELLS_AT_ONCE <= end; i += CELLS_AT_ONCE) {
+        fill_four(cells, i, above, below);
+        above += 2 * CELLS_AT_ONCE;
+        below += 2 * CELLS_AT_ONCE;
+    }
+#endif
+    for (; i < end; i++, above += 2, below += 2) {
+        fill_cell(cells, i, above, below);
     }
 }
 

@@ -2,7 +2,7 @@
 
 #include "bslam/vision/thumbnail.h"
 
-#define WIDTH 32
+#define WIDTH 40  // ten cells: of those taken four at a time two are left
 #define HEIGHT 32
 
 static bslam_thumbnail_t thumbnail;
