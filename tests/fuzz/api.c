@@ -21,14 +21,18 @@ static robot_t before;
 static uint8_t blob[BLOB_MAX];
 static uint32_t blob_size;
 
-/// What a refused call may have touched: counters, the sighting at fault, and after a jump the tick
-/// reference.
+/// What a refused call may have touched: counters, the sighting at fault, after a jump the tick reference; a
+/// load leaves zeros where the covariance's memory holds nothing.
 static void require_unchanged(bslam_status_t status)
 {
     before.slam.counters = robot.slam.counters;
     before.slam.bad_sighting = robot.slam.bad_sighting;
     if (status == BSLAM_E_JUMP) {
         before.slam.odometry = robot.slam.odometry;
+    }
+    if (status == BSLAM_E_MAP) {
+        fuzz_clear_unused(&before.slam);
+        fuzz_clear_unused(&robot.slam);
     }
     fuzz_require(memcmp(&robot, &before, sizeof robot) == 0);
 }

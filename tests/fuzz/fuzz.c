@@ -83,6 +83,13 @@ void fuzz_require_sound(const bslam_slam_t *slam)
                  counters->sightings);
 }
 
+void fuzz_clear_unused(bslam_slam_t *slam)
+{
+    bslam_real_t *m = slam->ekf.covariance;
+    const size_t used = bslam_symmat_row(slam->ekf.dim);
+    memset(m + used, 0, (BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - used) * sizeof *m);
+}
+
 // ---- a map ------------------------------------------------------------------------------------------------
 
 void fuzz_make_map(bslam_slam_t *slam, bslam_looks_t *looks)

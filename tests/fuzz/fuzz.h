@@ -56,6 +56,9 @@ void fuzz_begin(void);
 /// places of beacons fit each other; pose, map and accounts can be read.
 void fuzz_require_sound(const bslam_slam_t *slam);
 
+/// Behind the rows in use the covariance's memory holds nothing: makes zeros of it.
+void fuzz_clear_unused(bslam_slam_t *slam);
+
 /// A pipeline that has a map of three beacons, one of them in direction only, and, where looks are given,
 /// machines that know them. Always the same.
 void fuzz_make_map(bslam_slam_t *slam, bslam_looks_t *looks);

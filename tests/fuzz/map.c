@@ -34,6 +34,7 @@ static void prepare(void)
     fuzz_make_map(&start.slam, NULL);
     good_size[0] = write_map(&start.slam, good[0]);
     fuzz_make_map(&start.slam, &start.looks);
+    fuzz_clear_unused(&start.slam);  // as a load leaves it
     good_size[1] = write_map(&start.slam, good[1]);
 }
 
@@ -81,13 +82,18 @@ static void go_on(bslam_slam_t *slam)
     fuzz_require_sound(slam);
 }
 
-/// A map that was taken is written as one that would be taken.
+/// A map that was taken is written as one that is taken, beside itself.
 static void write_again(const bslam_slam_t *slam)
 {
+    static robot_t other;
     uint8_t blob[BLOB_MAX];
     const uint32_t size = write_map(slam, blob);
     const bslam_map_source_t source = bslam_map_from_memory(blob, size);
     fuzz_require(bslam_map_check(&source) == BSLAM_MAP_FINE);
+    bslam_map_fault_t fault;
+    memcpy(&other.slam, slam, sizeof other.slam);
+    other.slam.looks = NULL;
+    fuzz_require(bslam_map_load(&other.slam, &source, BSLAM_MAP_LIVING, &fault) == BSLAM_OK);
 }
 
 static void load(const uint8_t *blob, uint32_t size, bslam_map_mode_t mode, bool with_looks)
@@ -100,7 +106,11 @@ static void load(const uint8_t *blob, uint32_t size, bslam_map_mode_t mode, bool
     bslam_map_fault_t fault;
     const bslam_map_fault_t expected = bslam_map_check(&source);
     const bslam_status_t status = bslam_map_load(&robot.slam, &source, mode, &fault);
-    fuzz_require(fault == expected && (status == BSLAM_OK) == (fault == BSLAM_MAP_FINE));
+    // That the covariance is one as a whole only the load can tell. What else is wrong one may find first,
+    // the other after that: by pairs a row is held against what stands behind it.
+    fuzz_require(fault == expected || fault == BSLAM_MAP_COVARIANCE ||
+                 (expected == BSLAM_MAP_COVARIANCE && fault != BSLAM_MAP_FINE));
+    fuzz_require((status == BSLAM_OK) == (fault == BSLAM_MAP_FINE));
     if (status != BSLAM_OK) {
         robot.slam.looks = before->looks;
         fuzz_require(memcmp(&robot, &start, sizeof robot) == 0);

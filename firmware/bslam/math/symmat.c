@@ -481,6 +481,33 @@ void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count)
     }
 }
 
+bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise)
+{
+    bslam_real_t *own = factor + bslam_symmat_row(i);
+    const bslam_real_t variance = own[i];
+    bslam_real_t pivot = variance + raise * variance;
+    const bslam_real_t *other = factor;
+    for (int j = 0; j < i; j++) {
+        bslam_real_t sum = own[j];
+        for (int k = 0; k < j; k++) {
+            sum -= own[k] * other[k];
+        }
+        if (other[j] > 0) {
+            own[j] = sum / other[j];
+            pivot -= own[j] * own[j];
+        } else if (sum != 0) {  // with what has no variance
+            return false;
+        }
+        other += bslam_symmat_filled(j);
+    }
+    const bool is_zero = variance == 0 && pivot == 0;
+    if (!bslam_in_range(variance, 0, BSLAM_R(1e30)) || !(pivot > 0 || is_zero)) {
+        return false;
+    }
+    own[i] = bslam_sqrt(pivot);
+    return true;
+}
+
 bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratch)
 {
 #if BSLAM_REAL_DOUBLE
@@ -488,26 +515,12 @@ bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratc
 #else
     const bslam_real_t tolerance = 1e-7f;
 #endif
+    memcpy(scratch, m, bslam_symmat_row(n) * sizeof *m);
     for (int i = 0; i < n; i++) {
-        bslam_real_t *li = scratch + bslam_symmat_row(i);
-        for (int j = 0; j <= i; j++) {
-            const bslam_real_t *lj = scratch + bslam_symmat_row(j);
-            bslam_real_t sum = bslam_symmat_get(m, i, j);
-            for (int k = 0; k < j; k++) {
-                sum -= li[k] * lj[k];
-            }
-            if (i == j) {
-                const bslam_real_t diagonal = bslam_symmat_get(m, i, i);
-                // Rounding leaves a pivot within the tolerance of zero where the matrix is singular, as it is
-                // while a new beacon's anchor still equals the robot's position.
-                if (!bslam_in_range(diagonal, 0, BSLAM_R(1e30)) ||
-                    !(sum >= -tolerance * (bslam_real_t)n * diagonal)) {
-                    return false;
-                }
-                li[i] = sum > tolerance * diagonal ? bslam_sqrt(sum) : 0;
-            } else {
-                li[j] = lj[j] > 0 ? sum / lj[j] : 0;
-            }
+        // Rounding leaves it a little short where it is singular, as it is while a new beacon's anchor still
+        // equals the robot's position.
+        if (!bslam_symmat_factor_row(scratch, i, tolerance * (bslam_real_t)n)) {
+            return false;
         }
     }
     return true;

@@ -95,9 +95,14 @@ void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t te
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count);
 
-/// True if the n x n matrix is positive definite to working precision: Cholesky with a relative pivot
-/// tolerance. scratch has BSLAM_SYMMAT_LENGTH(n) elements. O(n^3 / 6): for tests and health checks, not for
-/// the control loop.
+/// One row of a Cholesky factorisation in place: row i of the array, a covariance's, becomes row i of the
+/// factor, which the rows before are already. raise: diagonal elements count as larger by this part, so that
+/// with n / 10^7 (float) a singular matrix passes in spite of rounding. False: with the rows before, it is no
+/// positive semidefinite matrix, raised so; the row then holds nothing. O(i^2 / 2).
+bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise);
+
+/// True if the n x n matrix is positive semidefinite to working precision: bslam_symmat_factor_row of each.
+/// scratch has BSLAM_SYMMAT_LENGTH(n) elements. O(n^3 / 6): for tests.
 bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratch);
 
 #endif

@@ -12,8 +12,12 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-// A covariance that was rounded to float32 may show a correlation a little beyond 1.
-static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.001);
+// Rounding may leave a covariance short of positive semidefinite by a part of its variances: by 3e-5 where a
+// run by directions alone went astray, while those of all others were clear of it by 2e-5. One that lacks no
+// more than this is taken with its variances larger by as much: as one that is whole.
+static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
+// By pairs the same, as a squared correlation; a little more, so that rounding refuses nothing that goes.
+static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_WAY_UM = 1000000000u;
@@ -22,7 +26,7 @@ const char *bslam_map_fault_name(bslam_map_fault_t fault)
 {
     static const char *const names[BSLAM_MAP_FAULT_COUNT] = {
         "fine",    "truncated", "too long",   "no map",  "other byte order", "other version", "bad crc",
-        "beacons", "machines",  "not finite", "content", "covariance",       "unreadable",
+        "beacons", "machines",  "not finite", "content", "covariance",       "unreadable",    "no room",
     };
     return (unsigned)fault < (unsigned)BSLAM_MAP_FAULT_COUNT ? names[fault] : "unknown fault";
 }
@@ -133,7 +137,21 @@ static void move_record(bslam_passage_t *passage, record_t *record)
 typedef struct target {
     bslam_slam_t *slam;
     bslam_map_mode_t mode;
+    bslam_real_t raise;  ///< of variances, as a part of them
 } target_t;
+
+/// Where a covariance can be factored, to see that it is one.
+typedef struct room {
+    bslam_real_t *factor;
+    size_t length;
+    bslam_real_t raise;  ///< as the target would
+} room_t;
+
+/// Of a covariance of so many values.
+static bool has_room(const room_t *room, uint32_t values)
+{
+    return bslam_symmat_row((int)values) <= room->length;
+}
 
 /// A frozen map has no use for a beacon whose distance is not known.
 static bool is_taken(const target_t *target, const bslam_beacon_t *beacon)
@@ -208,33 +226,65 @@ static bslam_real_t variance_at(bslam_passage_t *passage, uint32_t covariance_at
                                                 (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
 }
 
-/// The state values of the beacons, and the lower triangle of their covariance, row by row.
-static void read_values(bslam_passage_t *passage, const header_t *header, const target_t *target)
+/// Without room for more: no variance is negative, no two values are correlated beyond 1.
+static void check_pairs(bslam_passage_t *passage, uint32_t values)
 {
-    bslam_ekf_t *ekf = target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
-    const int base = ekf != NULL ? ekf->base_dim : 0;
-    for (uint32_t i = 0; i < header->values; i++) {
-        const bslam_real_t value = bslam_passage_real(passage, 0);
-        if (ekf != NULL) {
-            ekf->mean[base + (int)i] = value;
-        }
-    }
     const uint32_t covariance_at = passage->at;
-    for (uint32_t i = 0; i < header->values && passage->fault == BSLAM_MAP_FINE; i++) {
+    for (uint32_t i = 0; i < values && passage->fault == BSLAM_MAP_FINE; i++) {
         const bslam_real_t own = variance_at(passage, covariance_at, i);
-        for (int k = 0; k < base; k++) {
-            bslam_symmat_set(ekf->covariance, base + (int)i, k, 0);
-        }
         for (uint32_t j = 0; j <= i; j++) {
             const bslam_real_t value = bslam_passage_real(passage, 0);
-            if (ekf != NULL) {
-                bslam_symmat_set(ekf->covariance, base + (int)i, base + (int)j, value);
-            } else {
-                const bslam_real_t other = j == i ? 1 : variance_at(passage, covariance_at, j);
-                const bool fits = j == i ? value >= 0 : value * value <= CORRELATION2_MAX * own * other;
-                bslam_passage_require(passage, fits, BSLAM_MAP_COVARIANCE);
-            }
+            const bslam_real_t other = j == i ? 1 : variance_at(passage, covariance_at, j);
+            const bool fits = j == i ? value >= 0 : value * value <= CORRELATION2_MAX * own * other;
+            bslam_passage_require(passage, fits, BSLAM_MAP_COVARIANCE);
         }
+    }
+}
+
+/// All values together: that the covariance is positive semidefinite.
+static void check_whole(bslam_passage_t *passage, uint32_t values, const room_t *room)
+{
+    for (int i = 0; i < (int)values && passage->fault == BSLAM_MAP_FINE; i++) {
+        for (int j = 0; j <= i; j++) {
+            bslam_symmat_set(room->factor, i, j, bslam_passage_real(passage, 0));
+        }
+        bslam_passage_require(passage, bslam_symmat_factor_row(room->factor, i, room->raise),
+                              BSLAM_MAP_COVARIANCE);
+    }
+}
+
+static void take_covariance(bslam_passage_t *passage, uint32_t values, const target_t *target)
+{
+    bslam_ekf_t *ekf = &target->slam->ekf;
+    const int base = ekf->base_dim;
+    for (int i = base; i < base + (int)values; i++) {
+        for (int k = 0; k < base; k++) {
+            bslam_symmat_set(ekf->covariance, i, k, 0);
+        }
+        for (int j = base; j <= i; j++) {
+            const bslam_real_t value = bslam_passage_real(passage, 0);
+            bslam_symmat_set(ekf->covariance, i, j, j == i ? value + target->raise * value : value);
+        }
+    }
+}
+
+/// The state values of the beacons, and the lower triangle of their covariance, row by row.
+static void read_values(bslam_passage_t *passage, const header_t *header, const target_t *target,
+                        const room_t *room)
+{
+    const bool is_taken = target != NULL && target->mode == BSLAM_MAP_LIVING;
+    for (uint32_t i = 0; i < header->values; i++) {
+        const bslam_real_t value = bslam_passage_real(passage, 0);
+        if (is_taken) {
+            target->slam->ekf.mean[target->slam->ekf.base_dim + (int)i] = value;
+        }
+    }
+    if (is_taken) {
+        take_covariance(passage, header->values, target);
+    } else if (room != NULL && has_room(room, header->values)) {
+        check_whole(passage, header->values, room);
+    } else {
+        check_pairs(passage, header->values);
     }
 }
 
@@ -339,7 +389,7 @@ bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t 
     return passage.fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
 }
 
-static void read_all(bslam_passage_t *passage, const target_t *target)
+static void read_all(bslam_passage_t *passage, const target_t *target, const room_t *room)
 {
     header_t header = {0};
     move_header(passage, &header);
@@ -347,12 +397,13 @@ static void read_all(bslam_passage_t *passage, const target_t *target)
         target->slam->ekf.next_uid = header.next_uid;
     }
     read_beacons(passage, &header, target);
-    read_values(passage, &header, target);
+    read_values(passage, &header, target, room);
     const bool learns = target != NULL && target->slam->looks != NULL;
     bslam_map_read_machines(passage, header.machines, learns ? &target->slam->looks->learner : NULL);
     const uint32_t body = passage->at;
     (void)bslam_passage_whole(passage, 0, CRC_BYTES);
     bslam_passage_require(passage, body + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_passage_require(passage, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
 }
 
 /// The frame of a blob: it begins as a map, is as long as it says, and its CRC is right. All else is looked
@@ -383,29 +434,42 @@ static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
     return passage.fault;
 }
 
-bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
+static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room)
 {
     const bslam_map_fault_t fault = check_frame(source);
     if (fault != BSLAM_MAP_FINE) {
         return fault;
     }
     bslam_passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&passage, NULL);
+    read_all(&passage, NULL, room);
     return passage.fault;
+}
+
+bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
+{
+    return check(source, NULL);
 }
 
 bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source, bslam_map_mode_t mode,
                               bslam_map_fault_t *fault)
 {
-    *fault = bslam_map_check(source);
+    // Behind the rows of its own covariance the pipeline's memory holds nothing.
+    const size_t own = bslam_symmat_row(slam->ekf.dim);
+    room_t room = {slam->ekf.covariance + own, BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - own, 0};
+    *fault = check(source, &room);
+    if (*fault == BSLAM_MAP_COVARIANCE) {
+        room.raise = SHORTFALL_MAX;
+        *fault = check(source, &room);
+    }
+    memset(room.factor, 0, room.length * sizeof *room.factor);
     if (*fault != BSLAM_MAP_FINE) {
         return BSLAM_E_MAP;
     }
     bslam_slam_forget_map(slam);
     slam->is_frozen = mode == BSLAM_MAP_FROZEN;
-    const target_t target = {slam, mode};
+    const target_t target = {slam, mode, room.raise};
     bslam_passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&passage, &target);
+    read_all(&passage, &target, NULL);
     *fault = passage.fault;
     if (*fault != BSLAM_MAP_FINE) {
         bslam_slam_forget_map(slam);

@@ -26,8 +26,9 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_MACHINES,    ///< machines, samples or rivals beyond what this build holds; other signatures
     BSLAM_MAP_NOT_FINITE,  ///< a NaN, an infinity, or beyond 1e12
     BSLAM_MAP_CONTENT,     ///< a field that contradicts others, or outside its range
-    BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1
+    BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1, values that cannot be so together
     BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, the sink cannot be written
+    BSLAM_MAP_NO_ROOM,     ///< to look at its covariance beside the robot's own map: forget that first
     BSLAM_MAP_FAULT_COUNT
 } bslam_map_fault_t;
 
@@ -69,14 +70,21 @@ uint32_t bslam_map_size(const bslam_slam_t *slam);
 BSLAM_MUST_CHECK bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t *sink,
                                                 bslam_map_fault_t *fault);
 
-/// What bslam_map_load would say to this blob, whatever the state of the pipeline. O(n² + machines).
+/// What bslam_map_load would say to this blob, but for what takes a pipeline's memory: of the covariance it
+/// looks at pairs of values only, not whether all of them go together. O(n² + machines).
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source);
 
 /// Takes the map in place of the pipeline's own. The robot is lost in it (bslam_slam_lose_pose): give it a
 /// pose (bslam_slam_set_pose) or let it find one (recovery/recovery.h). Parameters, clock and counters stay.
 /// BSLAM_E_MAP with *fault: refused, nothing has changed (but if a source that was whole when it was checked
 /// can no longer be read, there is no map). Machines are taken where looks are attached.
-/// O(n² + machines), twice.
+///
+/// Whether the covariance is one is found where the pipeline keeps its own, behind the rows in use: they hold
+/// nothing, and zeros after. There is room for what the robot can hold if it has no map, and beside a map for
+/// less: as many points as it has points. Else BSLAM_MAP_NO_ROOM: bslam_slam_forget_map, and load again. One
+/// that rounding has left short of positive semidefinite by up to 0.1 % of its variances is taken with
+/// variances larger by 0.1 %.
+/// O(n³ / 6 + machines); beside it O(n² + machines), twice.
 BSLAM_MUST_CHECK bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source,
                                                bslam_map_mode_t mode, bslam_map_fault_t *fault);
 

@@ -163,11 +163,14 @@ bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam, 
 {
     slot_t slots[BSLAM_SLOTS];
     look(flash, slots);
-    slot_t *slot = slots[0].fault == BSLAM_MAP_FINE ? &slots[0] : &slots[1];
-    if (slot->fault != BSLAM_MAP_FINE) {
-        *fault = slots[0].fault;
-        return BSLAM_E_MAP;
+    bslam_status_t status = BSLAM_E_MAP;
+    // One that looks whole may be refused yet: for its covariance, or because it can no longer be read.
+    for (int s = 0; s < BSLAM_SLOTS && status != BSLAM_OK; s++) {
+        const bslam_map_source_t source = source_of(&slots[s]);
+        if (slots[s].fault == BSLAM_MAP_FINE) {
+            status = bslam_map_load(slam, &source, mode, &slots[s].fault);
+        }
     }
-    const bslam_map_source_t source = source_of(slot);
-    return bslam_map_load(slam, &source, mode, fault);
+    *fault = status == BSLAM_OK ? BSLAM_MAP_FINE : slots[0].fault;
+    return status;
 }

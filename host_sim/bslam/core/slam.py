@@ -340,7 +340,7 @@ class Slam:
         self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
 
     def map_fault(self, blob: bytes) -> str:
-        """What `load_map` would say of a blob: "fine", "bad crc", ..."""
+        """What `load_map` would say of a blob, by pairs of its covariance: "fine", "bad crc", ..."""
         source = self._source(blob)
         return self._raw.text(self._lib.bslam_map_fault_name(self._lib.bslam_map_check(source[0])))
 

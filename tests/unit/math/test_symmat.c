@@ -344,6 +344,55 @@ static void test_is_positive_matrix_with_a_negative_eigenvalue_is_not(void **sta
     }
 }
 
+static void test_is_positive_three_values_that_fit_by_pairs_only_are_not(void **state)
+{
+    // Each two of them may move against each other, all three may not.
+    bslam_real_t *m = new_array(BSLAM_SYMMAT_LENGTH(3));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j <= i; j++) {
+            bslam_symmat_set(m, i, j, j == i ? 1 : real(-0.49));
+        }
+    }
+    assert_true(is_positive(m, 3));
+    bslam_symmat_set(m, 2, 0, real(-0.53));
+    assert_false(is_positive(m, 3));
+    free(m);
+}
+
+static void test_is_positive_value_of_no_variance_goes_with_no_other(void **state)
+{
+    for (int known = 0; known < 3; known++) {
+        bslam_real_t *m = new_array(BSLAM_SYMMAT_LENGTH(3));
+        for (int i = 0; i < 3; i++) {
+            bslam_symmat_set(m, i, i, i == known ? 0 : 1);
+        }
+        assert_true(is_positive(m, 3));
+        bslam_symmat_set(m, known, (known + 1) % 3, real(1e-3));
+        assert_false(is_positive(m, 3));
+        free(m);
+    }
+}
+
+static void test_factor_row_raises_the_diagonal_by_as_much_as_it_is_told(void **state)
+{
+    // Both values are the same to 0.05 %: one direction has a variance of -0.0005.
+    const bslam_real_t values[3] = {1, real(1.0005), 1};
+    bslam_real_t *m = new_array(BSLAM_SYMMAT_LENGTH(2));
+    for (int turn = 0; turn < 2; turn++) {
+        const bslam_real_t raise = turn == 0 ? real(4e-4) : real(6e-4);
+        bslam_symmat_set(m, 0, 0, values[0]);
+        bslam_symmat_set(m, 1, 0, values[1]);
+        bslam_symmat_set(m, 1, 1, values[2]);
+        assert_true(bslam_symmat_factor_row(m, 0, raise));
+        assert_near(bslam_symmat_get(m, 0, 0), sqrt(1 + (double)raise), 1e-6);
+        assert_true(bslam_symmat_factor_row(m, 1, raise) == (turn == 1));
+    }
+    const double below = (double)values[1] / sqrt(1 + 6e-4);
+    assert_near(bslam_symmat_get(m, 1, 0), below, 1e-6);
+    assert_near(bslam_symmat_get(m, 1, 1), sqrt(1 + 6e-4 - below * below), 1e-4);
+    free(m);
+}
+
 static void test_is_positive_matrix_with_a_bad_element_is_not(void **state)
 {
     static const double bad[] = {NAN, INFINITY, -INFINITY, -1};
@@ -389,6 +438,9 @@ int main(void)
         cmocka_unit_test(test_is_positive_matrix_with_a_repeated_row_is),
         cmocka_unit_test(test_is_positive_zero_matrix_is),
         cmocka_unit_test(test_is_positive_matrix_with_a_negative_eigenvalue_is_not),
+        cmocka_unit_test(test_is_positive_three_values_that_fit_by_pairs_only_are_not),
+        cmocka_unit_test(test_is_positive_value_of_no_variance_goes_with_no_other),
+        cmocka_unit_test(test_factor_row_raises_the_diagonal_by_as_much_as_it_is_told),
         cmocka_unit_test(test_is_positive_matrix_with_a_bad_element_is_not),
         cmocka_unit_test(test_is_positive_nan_off_the_diagonal_is_not),
     };

@@ -66,15 +66,14 @@ static void seal(void)
     put_u32(size - 4, ~bslam_crc32_add(BSLAM_CRC32_START, bytes, size - 4));
 }
 
-/// Refused for this, by check and by load, in both modes; nothing of the running state has changed.
-static void assert_refused(bslam_map_fault_t expected)
+/// Refused for this by load, in both modes; nothing of the running state has changed.
+static void assert_load_refuses(bslam_map_fault_t expected)
 {
     static bslam_slam_t before;
     static bslam_looks_t looks_before;
     memcpy(&before, &slam, sizeof slam);
     memcpy(&looks_before, &looks, sizeof looks);
     const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
-    assert_int_equal(bslam_map_check(&source), expected);
     for (int mode = BSLAM_MAP_LIVING; mode <= BSLAM_MAP_FROZEN; mode++) {
         bslam_map_fault_t fault = BSLAM_MAP_FINE;
         assert_int_equal(bslam_map_load(&slam, &source, (bslam_map_mode_t)mode, &fault), BSLAM_E_MAP);
@@ -82,6 +81,19 @@ static void assert_refused(bslam_map_fault_t expected)
         assert_memory_equal(&slam, &before, sizeof slam);
         assert_memory_equal(&looks, &looks_before, sizeof looks);
     }
+}
+
+static bslam_map_fault_t check(void)
+{
+    const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
+    return bslam_map_check(&source);
+}
+
+/// By check, too.
+static void assert_refused(bslam_map_fault_t expected)
+{
+    assert_int_equal(check(), expected);
+    assert_load_refuses(expected);
 }
 
 static void load(bslam_map_mode_t mode)
@@ -381,6 +393,115 @@ static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
     assert_int_equal(other_looks.learner.machines[0].rivals, rivals);
 }
 
+// ---- the covariance as a whole ----------------------------------------------------------------------------
+
+/// Puts a covariance into the blob of which the first three values go together by these correlations, and all
+/// others by none.
+static void put_correlations(float second_first, float third_first, float third_second)
+{
+    const uint32_t p = covariance_at();
+    const int values = slam.ekf.dim - slam.ekf.base_dim;
+    uint32_t at = p;
+    for (int i = 0; i < values; i++) {
+        for (int j = 0; j <= i; j++) {
+            put_float(at, j == i ? 0.25f : 0.0f);
+            at += 4;
+        }
+    }
+    put_float(p + 4, 0.25f * second_first);
+    put_float(p + 12, 0.25f * third_first);
+    put_float(p + 16, 0.25f * third_second);
+    seal();
+}
+
+static void test_map_load_of_values_that_fit_by_pairs_only_is_refused(void **state)
+{
+    put_correlations(-0.9f, -0.9f, -0.9f);
+    assert_int_equal(check(), BSLAM_MAP_FINE);  // which has no room for more
+    assert_load_refuses(BSLAM_MAP_COVARIANCE);
+    put_correlations(-0.49f, -0.49f, -0.49f);
+    load(BSLAM_MAP_LIVING);
+}
+
+/// Rounding may leave it a little short of a covariance: what is taken is one.
+static void test_map_load_of_a_covariance_short_by_rounding_raises_its_variances(void **state)
+{
+    put_correlations(-0.5f, -0.5f, -0.5004f);  // the least eigenvalue is 0.00013 of a variance below 0
+    assert_int_equal(check(), BSLAM_MAP_FINE);
+    load(BSLAM_MAP_LIVING);
+    const int base = other.ekf.base_dim;
+    for (int i = base; i < other.ekf.dim; i++) {
+        assert_near(bslam_symmat_get(other.ekf.covariance, i, i), 0.25 * 1.001, 1e-6);
+    }
+    assert_near(bslam_symmat_get(other.ekf.covariance, base + 2, base + 1), 0.25 * -0.5004, 1e-7);
+    size = kept_write(&other, bytes);
+    load(BSLAM_MAP_LIVING);  // and saved it is whole: nothing is raised again
+    assert_near(bslam_symmat_get(other.ekf.covariance, base, base), 0.25 * 1.001, 1e-6);
+    size = kept_write(&slam, bytes);
+    put_correlations(-0.5f, -0.5f, -0.505f);  // 0.0017 is more than that
+    assert_load_refuses(BSLAM_MAP_COVARIANCE);
+}
+
+/// A beacon whose place is known to the last bit, as the first ray's origin is.
+static void test_map_load_of_a_value_without_variance_asks_that_it_goes_with_no_other(void **state)
+{
+    put_correlations(0, 0.5f, 0);
+    put_float(covariance_at() + 8, 0);
+    seal();
+    load(BSLAM_MAP_LIVING);
+    assert_true(bslam_symmat_get(other.ekf.covariance, other.ekf.base_dim + 1, other.ekf.base_dim + 1) == 0);
+    put_correlations(0, 0.5f, 1e-3f);
+    put_float(covariance_at() + 8, 0);
+    seal();
+    assert_refused(BSLAM_MAP_COVARIANCE);
+}
+
+/// Twenty beacons, six of them with four values each: more than the robot's memory holds twice.
+static void make_largest_map(void)
+{
+    bslam_params_t params = kept_params();
+    params.association = 0;
+    params.confirm_sightings = 1;
+    int bad_id;
+    slam.looks = NULL;
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        const double bearing_rad = -3 + 6.0 * b / BSLAM_BEACONS_MAX;
+        const bslam_sighting_t seen =
+            b < BSLAM_RAYS_MAX ? unit_direction(bearing_rad, b) : unit_polar(bearing_rad, 3, b);
+        for (int time = 1; time < 30; time++) {
+            const int64_t now_us = 40000 * (30 * b + time);
+            const bslam_odometry_reading_t reading = {.source = BSLAM_ODOMETRY_WHEELS,
+                                                      .time_us = now_us,
+                                                      .left_m = real(1e-4),
+                                                      .right_m = real(1e-4)};
+            assert_int_equal(bslam_slam_odometry(&slam, &reading), BSLAM_OK);
+            assert_int_equal(bslam_slam_sightings(&slam, now_us, &seen, 1), BSLAM_OK);
+        }
+    }
+    kept_clear_unused(&slam);
+}
+
+static void test_map_load_beside_a_map_that_leaves_no_room_asks_to_forget_it(void **state)
+{
+    make_largest_map();
+    assert_int_equal(slam.ekf.dim, slam.ekf.base_dim + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX);
+    size = kept_write(&slam, bytes);
+    load(BSLAM_MAP_LIVING);
+    assert_int_equal(check(), BSLAM_MAP_FINE);
+    assert_load_refuses(BSLAM_MAP_NO_ROOM);
+    put_u32(size - 8, 0xbf800000);  // what else is wrong is said first
+    seal();
+    assert_refused(BSLAM_MAP_COVARIANCE);
+    size = kept_write(&slam, bytes);
+    bslam_slam_forget_map(&slam);
+    const bslam_map_source_t source = bslam_map_from_memory(bytes, size);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_OK);
+}
+
+// ---- sources that fail ------------------------------------------------------------------------------------
+
 /// Bytes of a map from a source that fails for good after so many reads.
 static int reads_left;
 
@@ -392,15 +513,34 @@ static bool read_while_it_lasts(const void *context, uint32_t at, void *to, uint
     return reads_left >= 0;
 }
 
+/// How often a load reads until it has looked at all of it, and how often in all.
+typedef struct reads {
+    int looked;
+    int all;
+} reads_t;
+
+static reads_t count_reads(void)
+{
+    const bslam_map_source_t source = {read_while_it_lasts, bytes, size};
+    bslam_map_fault_t fault;
+    reads_left = INT32_MAX;
+    assert_int_equal(bslam_map_load(&other, &source, BSLAM_MAP_LIVING, &fault), BSLAM_OK);
+    const int all = INT32_MAX - reads_left;
+    bytes[size - 1] ^= 1;
+    reads_left = INT32_MAX;
+    assert_int_equal(bslam_map_check(&source), BSLAM_MAP_BAD_CRC);
+    const int frame = INT32_MAX - reads_left;  // its beginning and its CRC; the rest is looked at, then taken
+    bytes[size - 1] ^= 1;
+    return (reads_t){frame + (all - frame) / 2, all};
+}
+
 static void test_map_load_where_the_source_fails_is_refused(void **state)
 {
     static bslam_slam_t before;
     const bslam_map_source_t source = {read_while_it_lasts, bytes, size};
-    reads_left = INT32_MAX;
-    assert_int_equal(bslam_map_check(&source), BSLAM_MAP_FINE);
-    const int reads = INT32_MAX - reads_left;
+    const reads_t reads = count_reads();
     memcpy(&before, &slam, sizeof slam);
-    for (int read = 0; read < reads; read++) {
+    for (int read = 0; read < reads.looked; read++) {
         bslam_map_fault_t fault = BSLAM_MAP_FINE;
         reads_left = read;
         assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
@@ -414,14 +554,16 @@ static void test_map_load_where_the_source_fails_is_refused(void **state)
 static void test_map_load_where_the_source_fails_after_the_check_leaves_no_map(void **state)
 {
     const bslam_map_source_t source = {read_while_it_lasts, bytes, size};
-    reads_left = INT32_MAX;
-    assert_int_equal(bslam_map_check(&source), BSLAM_MAP_FINE);
-    reads_left = INT32_MAX - reads_left + 20;
-    bslam_map_fault_t fault;
-    assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
-    assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
-    assert_true(slam.is_lost);
+    const reads_t reads = count_reads();
+    for (int read = reads.looked; read < reads.all; read += 7) {
+        setup(NULL);
+        reads_left = read;
+        bslam_map_fault_t fault;
+        assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
+        assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
+        assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+        assert_true(slam.is_lost);
+    }
 }
 
 static void test_map_faults_have_names(void **state)
@@ -459,6 +601,11 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name, setup),
         cmocka_unit_test_setup(test_map_load_with_a_rival_that_is_no_sample_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
+        cmocka_unit_test_setup(test_map_load_of_values_that_fit_by_pairs_only_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_of_a_covariance_short_by_rounding_raises_its_variances, setup),
+        cmocka_unit_test_setup(test_map_load_of_a_value_without_variance_asks_that_it_goes_with_no_other,
+                               setup),
+        cmocka_unit_test_setup(test_map_load_beside_a_map_that_leaves_no_room_asks_to_forget_it, setup),
         cmocka_unit_test_setup(test_map_load_where_the_source_fails_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_where_the_source_fails_after_the_check_leaves_no_map, setup),
         cmocka_unit_test(test_map_faults_have_names),

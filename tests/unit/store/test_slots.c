@@ -159,6 +159,28 @@ static void test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_nex
     assert_true(loads_new());
 }
 
+/// Both look whole, and the newer one's covariance is none: the load finds it, and takes the older one.
+static void test_slots_newer_slot_that_a_load_refuses_gives_the_older(void **state)
+{
+    save(&old_slam, BSLAM_OK);
+    const bslam_real_t one = new_slam.ekf.covariance[bslam_symmat_at(3, 3)];
+    bslam_real_t *m = new_slam.ekf.covariance;
+    for (int i = 3; i < 6; i++) {
+        for (int j = 3; j <= i; j++) {
+            bslam_symmat_set(m, i, j, j == i ? one : real(-0.9 * (double)one));
+        }
+        for (int k = 6; k < new_slam.ekf.dim; k++) {
+            bslam_symmat_set(m, k, i, 0);
+        }
+    }
+    save(&new_slam, BSLAM_OK);
+    assert_false(loads_new());
+    save(&new_slam, BSLAM_OK);  // for a save both are whole: it takes the place of the older one
+    bslam_map_fault_t fault;
+    assert_int_equal(load(&fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_COVARIANCE);
+}
+
 /// A head whose check sum is right, but which says more than the area holds, is no save.
 static void test_slots_head_that_says_too_much_is_no_save(void **state)
 {
@@ -224,6 +246,7 @@ int main(void)
         cmocka_unit_test_setup(test_slots_save_cut_at_any_byte_leaves_the_old_map_or_the_new, setup),
         cmocka_unit_test_setup(test_slots_saves_cut_at_any_two_bytes_leave_the_old_map, setup),
         cmocka_unit_test_setup(test_slots_damaged_newer_slot_gives_the_older_and_is_overwritten_next, setup),
+        cmocka_unit_test_setup(test_slots_newer_slot_that_a_load_refuses_gives_the_older, setup),
         cmocka_unit_test_setup(test_slots_head_that_says_too_much_is_no_save, setup),
         cmocka_unit_test_setup(test_slots_area_that_ends_within_the_last_piece_is_too_small, setup),
         cmocka_unit_test_setup(test_slots_map_that_ends_with_a_piece_is_saved_as_any, setup),
