@@ -36,8 +36,8 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
 }
 LIBC_HEADERS = frozenset(
     {"assert.h", "float.h", "limits.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
-    # Of the compiler: instructions of Arm's cores as functions, where there is one (math/bytes.h).
-    | {"arm_acle.h"}
+    # Of the compiler: instructions of cores as functions, where there are any (math/bytes.h).
+    | {"arm_acle.h", "emmintrin.h"}
 )
 
 LOG = frozenset({"errors", "parsing", "log"})
