@@ -104,7 +104,7 @@ pytest-rest: images
 PROOF :=
 
 .PHONY: proof
-proof: setup ## every long proof beside its goal, in a table (two hours; goes on if stopped); out/proof
+proof: setup ## every long proof beside its goal, in a table (90 minutes; goes on if stopped); out/proof
 	@$(PYTHON) tools/prove.py $(PROOF)
 
 .PHONY: clean

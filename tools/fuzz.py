@@ -1,7 +1,8 @@
 """Runs the fuzz targets in slices, keeps a ledger of what ran, prints it against the goals.
 
 Examples:
-    tools/fuzz.py                          until every goal is met, in slices of five minutes
+    tools/fuzz.py                          until every goal is met, in slices of five minutes at most
+    tools/fuzz.py --jobs 2                 two slices at a time
     tools/fuzz.py --seconds 120 --targets map api
     tools/fuzz.py --each 60                a minute of each target, whatever ran before, then as above
     tools/fuzz.py --table                  what ran so far
@@ -20,10 +21,13 @@ import csv
 import hashlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,7 +45,15 @@ GOAL_ALL = 200_000_000
 # So many of these are needed for the sum; the link's parser is the fastest by far.
 FILLER = "link"
 SLICE_S = 300
+# What a slice makes at least where several are to share a target: each begins with the inputs that were kept.
+SHARE_LEAST = 50_000
 KEPT_BYTES = 300_000
+# How libFuzzer ends when it is stopped by a signal.
+INTERRUPTED = 72
+# Of the ledger, and of what is under way.
+LOCK = threading.RLock()
+RUNNING: list[subprocess.Popen[str]] = []
+STOP = threading.Event()
 
 
 class Slice(NamedTuple):
@@ -113,8 +125,10 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
     ]  # fmt: skip
     began = time.monotonic()
     commit, sources = commit_name(), BUILT_OF.read_text(encoding="utf-8")
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    found = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
+    status, log = follow(command)
+    if status == INTERRUPTED:
+        raise KeyboardInterrupt
+    found = re.search(r"stat::number_of_executed_units:\s*(\d+)", log)
     line = Slice(
         time.strftime("%Y-%m-%d %H:%M:%S"),
         commit,
@@ -123,12 +137,34 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
         seed,
         int(found.group(1)) if found else 0,
         round(time.monotonic() - began),
-        0 if done.returncode == 0 else 1,
+        0 if status == 0 else 1,
     )
-    write_down(line)
-    if done.returncode != 0:
-        print_crash(done.stderr, target)
+    with LOCK:
+        write_down(line)
+        if status != 0:
+            print_crash(log, target)
     return line
+
+
+def follow(command: list[str]) -> tuple[int, str]:
+    """Exit status of a program, and what it complained of."""
+    with LOCK:
+        if STOP.is_set():
+            raise KeyboardInterrupt
+        process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        RUNNING.append(process)
+    with process:
+        log = process.communicate()[1]
+    with LOCK:
+        RUNNING.remove(process)
+    return process.returncode, log
 
 
 def print_crash(log: str, target: str) -> None:
@@ -219,28 +255,81 @@ def keep(targets: list[str]) -> None:
     print(f"fuzz: {count} inputs kept, {size:,} bytes of at most {KEPT_BYTES:,}")
 
 
-def run_next(target: str, seconds: float, runs: int) -> bool:
-    """The next slice, and a line about it; false: a crash."""
-    line = run_slice(target, len(read_ledger()) + 1, max(1, round(seconds)), runs)
-    print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
-    return line.crashes == 0
+class Campaign:
+    """Slices, several at a time."""
 
+    def __init__(self, jobs: int, seconds: float) -> None:
+        self.jobs = jobs
+        self.end = time.monotonic() + seconds
+        self.seed = len(read_ledger())
+        self.under_way: list[tuple[str, int]] = []  # target and executions
+        self.crashed = False
+        STOP.clear()
 
-def campaign(targets: list[str], seconds: float) -> bool:
-    """Slices until all goals are met or the time is over; false: a crash."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    def run_until_none(self, choose: Callable[[], tuple[str, float, int] | None]) -> bool:
+        """Slices (target, seconds, executions) as they are chosen; false: one crashed, which ends it."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            try:
+                for done in [pool.submit(self._work, choose) for _ in range(self.jobs)]:
+                    done.result()
+            except BaseException:
+                self._stop()
+                raise
+        return not self.crashed
+
+    def _stop(self) -> None:
+        """Nothing more begins, and what is under way ends: it is not written down."""
+        with LOCK:
+            STOP.set()
+            for process in RUNNING:
+                process.send_signal(signal.SIGINT)
+
+    def _work(self, choose: Callable[[], tuple[str, float, int] | None]) -> None:
+        while True:
+            with LOCK:
+                chosen = None if self.crashed or STOP.is_set() else choose()
+                if chosen is None:
+                    return
+                target, seconds, runs = chosen
+                self.seed += 1
+                seed = self.seed
+                self.under_way.append((target, runs))
+            line = run_slice(target, seed, max(1, round(seconds)), runs)
+            print(f"fuzz {target}: {line.executions:,} executions in {line.seconds} s", flush=True)
+            with LOCK:
+                self.under_way.remove((target, runs))
+                self.crashed |= line.crashes > 0
+
+    def next_missing(self, targets: list[str]) -> tuple[str, float, int] | None:
+        """What goes towards the goals; None: nothing is left to begin, or the time is over."""
+        left_s = self.end - time.monotonic()
         ledger = read_ledger()
-        need = {target: missing(ledger, target) for target in targets}
+        need = {
+            target: missing(ledger, target) - sum(runs for name, runs in self.under_way if name == target)
+            for target in targets
+        }
         # The one that ran the shortest: each gets its share of a time that is too short.
         waiting = [target for target in targets if need[target] > 0]
-        if not waiting:
-            return True
+        if not waiting or left_s <= 0:
+            return None
         spent = {t: sum(line.seconds for line in ledger if line.target == t) for t in waiting}
         target = min(waiting, key=lambda name: (name == FILLER, spent[name]))
-        if not run_next(target, min(SLICE_S, end - time.monotonic()), need[target]):
-            return False
-    return True
+        share = max(SHARE_LEAST, -(-missing(ledger, target) // self.jobs))
+        return target, min(SLICE_S, left_s), min(need[target], share)
+
+
+def run_each(targets: list[str], seconds: float, jobs: int) -> bool:
+    """A slice of each target, whatever ran before; false: a crash."""
+    waiting = list(targets) if seconds > 0 else []
+    return Campaign(jobs, float("inf")).run_until_none(
+        lambda: (waiting.pop(0), seconds, GOAL_EACH) if waiting else None
+    )
+
+
+def campaign(targets: list[str], seconds: float, jobs: int) -> bool:
+    """Slices until all goals are met or the time is over; false: a crash."""
+    one = Campaign(jobs, seconds)
+    return one.run_until_none(lambda: one.next_missing(targets))
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -252,6 +341,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--each", type=float, default=0.0, metavar="S", help="first each target so long, whatever ran before"
     )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="slices at a time (default: 1)")
     parser.add_argument("--targets", nargs="+", choices=TARGETS, default=list(TARGETS), metavar="TARGET")
     parser.add_argument("--table", action="store_true", help="print what ran, run nothing")
     parser.add_argument("--built", action="store_true", help="for make: the programs are of these sources")
@@ -270,8 +360,8 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     before = len(read_ledger())
     clean = options.table or (
-        all(run_next(target, options.each, GOAL_EACH) for target in options.targets if options.each > 0)
-        and campaign(options.targets, options.seconds)
+        run_each(options.targets, options.each, options.jobs)
+        and campaign(options.targets, options.seconds, options.jobs)
     )
     met = print_table(before)
     return 0 if clean and (met or options.seconds < float("inf")) else 1

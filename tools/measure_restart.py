@@ -18,9 +18,9 @@ References say what the restart itself loses. With --association known whoever i
 drive and after power-on; with --kept-after N the first drive is shorter. With --start told the robot is told
 at power-on exactly where it stands in the map's frame, with --start running it never was switched off:
 whoever has to find itself knows less than either. Takes drives as `bslam tables --sensor camera` keeps
-them (out/camera; rendered if they are not there, a minute each):
+them (out/camera; rendered if they are not there, a minute each), --jobs drives at a time:
 
-    .venv/bin/python tools/measure_restart.py --seeds 1000:1020
+    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --jobs 2
     .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --association known --start told
 """
 
@@ -30,7 +30,9 @@ import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Collection, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -220,28 +222,43 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="STEPS",
         help=f"when the map is kept, before {SWITCHED_ON_AT[0]} (default: 3000)",
     )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="drives at a time (default: 1)")
+
+
+Counts = dict[tuple[str, bool], Counter[str]]
+
+
+def count_drive(args: argparse.Namespace, seed: int) -> tuple[Counts, list[str]]:
+    """The outcomes of one drive's robots, and a line about each that is not near."""
+    scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
+    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery=True)
+    log = camera_log(scenario, seed, args.sigma, None, rig, store)
+    counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
+    lines = []
+    with tempfile.TemporaryDirectory() as folder:
+        kept = keep(log, options, args.kept_after, Path(folder))
+        robots = restarts(log, options, kept, args.start)
+    for first, robot in zip(SWITCHED_ON_AT, robots, strict=True):
+        for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
+            for aligned in (False, True):
+                counts[since, aligned][robot.outcome(since_us, aligned)] += 1
+        outcome = robot.outcome(robot.view_us, True)
+        if outcome != "near":
+            lines.append(f"seed {seed}, step {first}: {outcome}; {robot.why()}")
+    return counts, lines
 
 
 def main() -> int:
     """Measures and prints."""
     args = arguments(__doc__, range(1000, 1020), _add_arguments)
-    scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery=True)
-    counts: dict[tuple[str, bool], Counter[str]] = {
-        (since, aligned): Counter() for since in SINCE for aligned in (False, True)
-    }
-    for seed in args.seeds:
-        log = camera_log(scenario, seed, args.sigma, None, rig, store)
-        with tempfile.TemporaryDirectory() as folder:
-            kept = keep(log, options, args.kept_after, Path(folder))
-            robots = restarts(log, options, kept, args.start)
-            for first, robot in zip(SWITCHED_ON_AT, robots, strict=True):
-                for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
-                    for aligned in (False, True):
-                        counts[since, aligned][robot.outcome(since_us, aligned)] += 1
-                outcome = robot.outcome(robot.view_us, True)
-                if outcome != "near":
-                    print(f"seed {seed}, step {first}: {outcome}; {robot.why()}", flush=True)
+    counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
+    with ProcessPoolExecutor(args.jobs) as pool:
+        drives = pool.map(partial(count_drive, args), args.seeds)
+        for number, (of_drive, lines) in enumerate(drives, 1):
+            for key, count in of_drive.items():
+                counts[key] += count
+            print(*lines, f"{number} of {len(args.seeds)} drives", sep="\n", flush=True)
+    rig = load_rig(args.rig)
     seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
     print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}, {args.association}, {args.start}")
     for (since, aligned), count in counts.items():

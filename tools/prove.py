@@ -1,15 +1,16 @@
 """Runs the long proofs and prints what each reached beside its goal.
 
 Examples:
-    tools/prove.py                        all of them: some hours
+    tools/prove.py                        all of them: an hour and a half
     tools/prove.py --list                 what there is, how long each takes, what is proved already
     tools/prove.py --only soak mcdc       some
     tools/prove.py --quick                a little of each in half an hour: whether all of it runs here
 
 What a proof prints is in out/proof/NAME.txt, what came of it in out/proof/NAME.json: a proof that ended on
 the sources as they are is not run again (--again does), so that one that was stopped goes on where it was.
-Times are of two idle cores; what is left is told at the pace so far. Exit status 0: every goal is reached;
-1: one is not, or could not be measured.
+Parts that keep one core busy run two at a time, the others alone after them. Times are of two idle cores;
+what is left is told at the pace so far. Exit status 0: every goal is reached; 1: one is not, or could not be
+measured.
 """
 
 import argparse
@@ -17,11 +18,13 @@ import hashlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -37,6 +40,7 @@ LAST_LINE = r"([^\n]+)\n?\Z"
 SOURCES = ("firmware", "host_sim", "tests", "tools", "mk")
 SUFFIXES = frozenset((".c", ".h", ".py", ".mk", ".toml", ".sh", ".bin", ".npz"))
 SAY_EVERY_S = 60.0
+CORES = 2
 UNMEASURED = "not measured"
 
 
@@ -52,6 +56,7 @@ class Proof(NamedTuple):
     needs: tuple[str, ...] = ()  # targets of make, before it
     environment: Mapping[str, str] = MappingProxyType({})
     least: float | None = None  # share that is near, where the exit status does not judge it
+    alone: bool = False  # it keeps every core busy, or holds the time that something takes against it
 
 
 class Result(NamedTuple):
@@ -77,13 +82,14 @@ def own_proofs(quick: bool) -> list[Proof]:
     depth = MappingProxyType({}) if quick else THOROUGH
     less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []
     # The ledger tells of executions elsewhere, too: of each target some are made here.
-    how_long = ["--seconds", "60"] if quick else ["--each", "60"]
+    how_long = ["--seconds", "60"] if quick else ["--each", "30"]
+    fuzzing = [PYTHON, "tools/fuzz.py", "--jobs", str(CORES), *how_long]
     return [
         Proof("cuts", *cuts, [slots], 1, (slots,), depth),
         Proof("flips", *flips, [guard], 0.1, (guard,), depth),
         Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 1, soaks),
         Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 1, ("mcdc-programs",)),
-        Proof("fuzz", *fuzz, [PYTHON, "tools/fuzz.py", *how_long], 1 if quick else 20, ("fuzz-programs",)),
+        Proof("fuzz", *fuzz, fuzzing, 1 if quick else 12, ("fuzz-programs",), alone=True),
     ]
 
 
@@ -99,14 +105,14 @@ def fault_proofs(seeds: int) -> list[Proof]:
     rows = ("fault rows as promised", "all", r"(\d+ of \d+) as promised")
     found, near = "2 s, 0.3 m 5 s later, all", "0.2 m after 5 s, all"
     third = max(1, seeds // 3)
-    cameras = [PYTHON, "tools/measure_restart.py", "--seeds", f"1000:{1000 + third}"]
+    cameras = [PYTHON, "tools/measure_restart.py", "--seeds", f"1000:{1000 + third}", "--jobs", str(CORES)]
     in_frame = r"5 s after (two.*in the map's frame.*)"
     camera_row = (f"the same, camera in, {3 * third} restarts", "0.2 m, 59 of 60", in_frame)
     return [
-        Proof("faults", *rows, [BSLAM, "faults", "--out", str(OUT / "faults")], 3),
+        Proof("faults", *rows, [BSLAM, "faults", "--out", str(OUT / "faults")], 3, ("images",)),
         fault_proof("kidnapping", "kidnapped, and not", found, "kidnapping", seeds, 0.1),
         fault_proof("restart", "restart in a kept map", near, "restart", seeds, 0.1),
-        Proof("restart_camera", *camera_row, cameras, third * 2, least=59 / 60),
+        Proof("restart_camera", *camera_row, cameras, third, least=59 / 60, alone=True),
         fault_proof("outliers", "40 % outliers", "1.5 x clean, 0 false", "outlier", third, 0.1),
     ]
 
@@ -114,21 +120,25 @@ def fault_proofs(seeds: int) -> list[Proof]:
 def other_proofs(quick: bool) -> list[Proof]:
     """Of the whole project."""
     steps, runs = (200, 30) if quick else (5000, 1000)
-    bits = [PYTHON, "tools/same_bits.py", "--steps", str(steps)]
+    bits = [PYTHON, "tools/same_bits.py", "--steps", str(steps), "--jobs", str(CORES)]
     wide = [*bits, "--rig", "wide180"]
     smoothed = [*bits, "--association", "known", "--observation", "direction", "--filter", "smoother"]
     sweep = [PYTHON, "tools/kill_sweep.py", "--runs", str(runs)]
     minutes = 1 if quick else 10
     attack = [PYTHON, "tools/attack_link.py", "--minutes", str(minutes)]
-    return [
-        Proof("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),
-        Proof("cores", "library for every core", "builds", LAST_LINE, ["make", "firmware-all"], 1),
-        Proof("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, steps / 500),
-        Proof("bits180", "the same, wide180", "on every board", LAST_LINE, wide, steps / 500),
-        Proof("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed, steps / 500),
-        Proof("link", f"the link, {minutes} min attacked", "all the host's", LAST_LINE, attack, minutes),
-        Proof("sweep", f"{runs} runs, killed three times", "0 lost", LAST_LINE, sweep, runs / 100),
-    ]
+    cores = ["make", f"--jobs={CORES}", "firmware-all"]
+    bits_minutes = steps / 1000
+    rows = (
+        ("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),
+        ("cores", "library for every core", "builds", LAST_LINE, cores, 1),
+        ("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, bits_minutes),
+        ("bits180", "the same, wide180", "on every board", LAST_LINE, wide, bits_minutes),
+        ("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed, bits_minutes),
+        ("link", f"the link, {minutes} min attacked", "all the host's", LAST_LINE, attack, minutes),
+        ("sweep", f"{runs} runs, killed three times", "0 lost", LAST_LINE, sweep, runs / 100),
+    )
+    images = ("bits", "bits180", "bits_smoother", "link")
+    return [Proof(*row)._replace(needs=("images",) if row[0] in images else (), alone=True) for row in rows]
 
 
 def proofs(seeds: int = 60, quick: bool = False) -> list[Proof]:
@@ -179,33 +189,74 @@ def is_enough(proof: Proof, status: int, figure: str) -> bool:
     return status == 0 and share is not None and int(share[1]) >= proof.least * int(share[2])
 
 
-def run(proof: Proof, folder: Path) -> Result:
+class StoppedError(Exception):
+    """Nothing more shall run."""
+
+
+class Bench:
+    """Where proofs run: what is under way can be ended. One builds at a time, as two would write the same."""
+
+    def __init__(self) -> None:
+        self._building = threading.Lock()
+        self._lock = threading.Lock()
+        self._processes: set[subprocess.Popen[str]] = set()
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Ends all, with what they have started."""
+        with self._lock:
+            self._stopped = True
+            for process in self._processes:
+                if process.poll() is None:
+                    os.killpg(process.pid, signal.SIGTERM)
+
+    def build(self, proof: Proof, lines: list[str]) -> int:
+        """Has make build what one needs; the exit status."""
+        make = ["make", "--no-print-directory", "--silent", f"--jobs={CORES}", *proof.needs]
+        with self._building:
+            return self.follow(make, proof, lines) if proof.needs else 0
+
+    def follow(self, command: list[str], proof: Proof, lines: list[str]) -> int:
+        """The exit status; what it prints goes behind the lines there are."""
+        environment = {**os.environ, **proof.environment, "PYTHONUNBUFFERED": "1"}
+        with self._lock:
+            if self._stopped:
+                raise StoppedError
+            process = subprocess.Popen(
+                command,
+                cwd=ROOT,
+                env=environment,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                errors="replace",
+                start_new_session=True,
+            )
+            self._processes.add(process)
+        with process:
+            assert process.stdout is not None
+            lines += process.stdout
+        with self._lock:
+            self._processes.remove(process)
+            if self._stopped:
+                raise StoppedError
+        return process.returncode
+
+
+def run(proof: Proof, folder: Path, bench: Bench) -> Result:
     """Builds what one needs and runs it; each minute the last line that it printed is told."""
     began = time.monotonic()
     lines = [""]
     ended = threading.Event()
     threading.Thread(target=tell, args=(proof, lines, ended), daemon=True).start()
     try:
-        make = ["make", "--no-print-directory", "--silent", *proof.needs]
-        status = follow(make, proof, lines) if proof.needs else 0
-        status = status or follow(proof.command, proof, lines)
+        status = bench.build(proof, lines) or bench.follow(proof.command, proof, lines)
     finally:
         ended.set()
     output = "".join(lines)
     (folder / f"{proof.name}.txt").write_text(output, encoding="utf-8")
     figure = figure_of(proof, output)
     return Result(is_enough(proof, status, figure), figure, time.monotonic() - began)
-
-
-def follow(command: list[str], proof: Proof, lines: list[str]) -> int:
-    """The exit status; what it prints goes behind the lines there are."""
-    environment = {**os.environ, **proof.environment, "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(
-        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
-        assert process.stdout is not None
-        lines += process.stdout
-    return process.returncode
 
 
 def tell(proof: Proof, lines: list[str], ended: threading.Event) -> None:
@@ -227,28 +278,75 @@ def duration(minutes: float) -> str:
     return f"{whole} min" if whole < 60 else f"{whole // 60} h {whole % 60} min"
 
 
+def minutes_of(chosen: list[Proof]) -> float:
+    """Until all have run: those of one core side by side, the longest first, then each of the others."""
+    lanes = [0.0] * CORES
+    for proof in longest_first(chosen):
+        lanes[lanes.index(min(lanes))] += proof.minutes
+    return max(lanes) + sum(proof.minutes for proof in chosen if proof.alone)
+
+
+def longest_first(chosen: list[Proof]) -> list[Proof]:
+    """Those that run beside each other."""
+    return sorted((proof for proof in chosen if not proof.alone), key=lambda proof: -proof.minutes)
+
+
+class Progress:
+    """Which proof begins, and how long it all takes yet."""
+
+    def __init__(self, count: int, to_do: list[Proof]) -> None:
+        self._lock = threading.Lock()
+        self._count, self._to_do = count, list(to_do)
+        self._begun = count - len(to_do)
+        self._spent = self._expected = 0.0
+
+    def begin(self, proof: Proof) -> None:
+        """Tells it; what is under way counts whole."""
+        with self._lock:
+            self._begun += 1
+            pace = self._spent / self._expected if self._expected > 0 else 1.0
+            say(
+                f"proof {self._begun} of {self._count}, {proof.name}: about {duration(pace * proof.minutes)} "
+                f"of {duration(pace * minutes_of(self._to_do))} left"
+            )
+
+    def end(self, proof: Proof, result: Result) -> None:
+        """Tells it."""
+        with self._lock:
+            self._to_do.remove(proof)
+            self._spent += result.seconds / 60
+            self._expected += proof.minutes
+            say(f"  {proof.name}: {'reached' if result.reached else 'MISSED'}: {result.figure}")
+
+
 def run_all(chosen: list[Proof], folder: Path, sources: str, again: bool) -> list[tuple[Proof, Result]]:
     """The results of all, those that are kept not made again."""
     kept = {proof.name: None if again else kept_result(folder, proof, sources) for proof in chosen}
-    spent = expected = 0.0
-    rows = []
-    for number, proof in enumerate(chosen, 1):
-        result = kept[proof.name]
-        if result is None:
-            pace = spent / expected if expected > 0 else 1.0
-            left = sum(other.minutes for other in chosen[number - 1 :] if kept[other.name] is None)
-            say(
-                f"proof {number} of {len(chosen)}, {proof.name}: about {duration(pace * proof.minutes)} "
-                f"of {duration(pace * left)} left"
-            )
-            result = run(proof, folder)
-            if result.figure != UNMEASURED:
-                keep_result(folder, proof, sources, result)
-            spent, expected = spent + result.seconds / 60, expected + proof.minutes
-        else:
-            say(f"proof {number} of {len(chosen)}, {proof.name}: kept from before")
-        rows.append((proof, result))
-    return rows
+    results = {name: result for name, result in kept.items() if result is not None}
+    for name in results:
+        say(f"proof {name}: kept from before")
+    to_do = [proof for proof in chosen if proof.name not in results]
+    bench, progress = Bench(), Progress(len(chosen), to_do)
+
+    def make(proof: Proof) -> None:
+        progress.begin(proof)
+        result = results[proof.name] = run(proof, folder, bench)
+        if result.figure != UNMEASURED:
+            keep_result(folder, proof, sources, result)
+        progress.end(proof, result)
+
+    with ThreadPoolExecutor(CORES) as lanes:
+        try:
+            for done in [lanes.submit(make, proof) for proof in longest_first(to_do)]:
+                done.result()
+            for proof in to_do:
+                if proof.alone:
+                    lanes.submit(make, proof).result()
+        except BaseException:
+            bench.stop()
+            lanes.shutdown(wait=True, cancel_futures=True)
+            raise
+    return [(proof, results[proof.name]) for proof in chosen]
 
 
 # --- What is printed ----------------------------------------------------------------------------------------
@@ -270,7 +368,7 @@ def print_list(chosen: list[Proof], folder: Path, sources: str) -> None:
         result = kept_result(folder, proof, sources)
         state = "to do" if result is None else "reached" if result.reached else "missed"
         print(f"{proof.name:<16}{duration(proof.minutes):>12}  {state:<9}{proof.title}")
-    print(f"{'all':<16}{duration(sum(proof.minutes for proof in chosen)):>12}")
+    print(f"{'all':<16}{duration(minutes_of(chosen)):>12}")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -298,6 +396,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         sys.exit(main())
     except KeyboardInterrupt:

@@ -4,13 +4,15 @@ Prints the fingerprint of all states for each, and where the first difference is
 where the core runs (bslam_slam_fingerprint): the state, its covariance, the weights of every machine that was
 learned on the way, and all that a smoother keeps.
 
-A board whose image is too small for the run is left out, and named.
+A board whose image is too small for the run is left out, and named. The last line counts them.
 
-Exit status 0: all the same. 1: some differ.
+Exit status 0: all the same. 1: some differ, or none was compared.
 """
 
 import argparse
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +104,14 @@ def read_log(options: argparse.Namespace) -> Log:
     return camera_log(scenario, options.seed, None, noise, load_rig(options.rig), CameraStore(CAMERA_STORE))
 
 
+def on_board(log: Log, words: dict[str, Any], board: str) -> list[int] | str:
+    """The fingerprints of a board, or why it is left out."""
+    try:
+        return fingerprints(log, RunOptions(target=f"qemu:{board}", **words))
+    except BslamError as error:  # a small board's image
+        return str(error)
+
+
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("log", nargs="?", default="paper_room", help="a scenario, or the folder of a log")
@@ -114,6 +124,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--association", default="svm", help="default: svm")
     parser.add_argument("--observation", default="distance", help="default: distance")
     parser.add_argument("--filter", choices=FILTERS, default="invariant", help="default: invariant")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="boards at a time (default: 1)")
     options = parser.parse_args(argv)
     log = first_steps(read_log(options), options.steps)
     words = {
@@ -126,18 +137,21 @@ def main(argv: list[str] | None = None) -> int:
     here = fingerprints(log, RunOptions(**words))
     print(f"{log.name}, {len(log.odometry.time_us)} steps, {len(here)} states, {words}")
     print(f"{'host':<12} {here[-1]:016x}")
-    different = 0
-    for board in options.boards:
-        try:
-            there = fingerprints(log, RunOptions(target=f"qemu:{board}", **words))
-        except BslamError as error:  # a small board's image
-            print(f"{board:<12} left out: {error}", flush=True)
-            continue
-        place = first_difference(here, there)
-        different += place is not None
-        said = "the same" if place is None else f"differs from state {place} on"
-        print(f"{board:<12} {there[-1]:016x}  {said}", flush=True)
-    return 1 if different else 0
+    counts = {"the same": 0, "different": 0, "left out": 0}
+    with ProcessPoolExecutor(options.jobs) as pool:
+        found = pool.map(partial(on_board, log, words), options.boards)
+        for board, there in zip(options.boards, found, strict=True):
+            if isinstance(there, str):
+                counts["left out"] += 1
+                print(f"{board:<12} left out: {there}", flush=True)
+                continue
+            place = first_difference(here, there)
+            counts["the same" if place is None else "different"] += 1
+            said = "the same" if place is None else f"differs from state {place} on"
+            print(f"{board:<12} {there[-1]:016x}  {said}", flush=True)
+    figures = ", ".join(f"{count} {what}" for what, count in counts.items())
+    print(f"boards: {figures}, over {len(here)} states")
+    return 0 if counts["the same"] > 0 and counts["different"] == 0 else 1
 
 
 if __name__ == "__main__":

@@ -1,5 +1,8 @@
 """The ledger of fuzzing: what counts for which goal, and what is never run."""
 
+import signal
+import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -78,3 +81,66 @@ def test_each_target_runs_here_though_its_goal_was_met_elsewhere(
     assert main(["--each", "5"]) == 0
     assert ran == [(target, 5) for target in TARGETS]
     assert f"{7 * len(TARGETS)} of them now, 0 crashes" in capsys.readouterr().out
+
+
+def test_two_at_a_time_share_what_is_missing_and_make_no_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    both = threading.Barrier(2)
+    ran = []
+
+    def run(target: str, seed: int, seconds: int, runs: int) -> Slice:
+        ran.append((target, runs, seed))
+        both.wait(20)  # a second one is under way
+        line = Slice("when", "commit", "now", target, seed, runs, 1, 0)
+        with fuzz.LOCK:
+            fuzz.write_down(line)
+        return line
+
+    monkeypatch.setattr(fuzz, "run_slice", run)
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    fuzz.BUILT_OF.write_text("now")
+    assert main(["--jobs", "2"]) == 0
+    made = {target: [runs for name, runs, _ in ran if name == target] for target in TARGETS}
+    others = (len(TARGETS) - 1) * GOAL_EACH
+    assert made.pop(FILLER) == [(GOAL_ALL - others) // 2] * 2
+    assert all(runs == [GOAL_EACH // 2] * 2 for runs in made.values())
+    assert len({seed for *_, seed in ran}) == len(ran)
+    assert "0 crashes" in capsys.readouterr().out
+
+
+def test_a_crash_ends_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(target: str, seed: int, seconds: int, runs: int) -> Slice:
+        line = Slice("when", "commit", "now", target, seed, 5, 1, 1)
+        with fuzz.LOCK:
+            fuzz.write_down(line)
+        return line
+
+    monkeypatch.setattr(fuzz, "run_slice", run)
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    fuzz.BUILT_OF.write_text("now")
+    assert main(["--jobs", "2"]) == 1
+    assert len(fuzz.read_ledger()) <= 2
+    assert "crashes (0 on earlier sources)" in capsys.readouterr().out
+
+
+def test_a_slice_that_is_stopped_is_not_written_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(target: str) -> None:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    script = tmp_path / "link"
+    script.write_text(
+        f"#!{sys.executable}\nimport signal, sys, time\n"
+        "signal.signal(signal.SIGINT, lambda *_: sys.exit(72))\ntime.sleep(600)\n"
+    )
+    script.chmod(0o755)
+    monkeypatch.setattr(fuzz, "PROGRAMS", tmp_path)
+    monkeypatch.setattr(fuzz, "OUT", tmp_path / "out")
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    monkeypatch.setattr(fuzz, "unpack", stopped)
+    fuzz.BUILT_OF.write_text("now")
+    with pytest.raises(KeyboardInterrupt):
+        main(["--targets", "link"])
+    assert fuzz.read_ledger() == []

@@ -1,12 +1,16 @@
 """The proofs as a whole: what is kept, what is run again, what the table says."""
 
+import signal
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
-from prove import Proof, is_enough, kept_result, main, print_table, proofs, run_all
+import prove
+from prove import Proof, is_enough, kept_result, main, minutes_of, print_table, proofs, run_all
 
+LONG = "import time; time.sleep(600)"
 COUNT = "import pathlib; f = pathlib.Path('{}'); f.write_text((f.read_text() if f.exists() else '') + 'x'); "
 
 
@@ -32,6 +36,74 @@ def test_an_interrupted_proof_goes_on_and_the_table_has_all(
     assert "bad: about 1 min of 1 min left" in said.err
     assert [line.split()[0] for line in said.out.splitlines()] == ["yes", "NO", "proof:"]
     assert said.out.endswith("1 of 2 goals reached; not: bad\n")
+
+
+def test_proofs_of_one_core_run_beside_each_other(tmp_path: Path) -> None:
+    """Each waits until the other has begun."""
+
+    def meeting(name: str, other: str) -> Proof:
+        code = f"""if True:
+            import pathlib, time
+            here = pathlib.Path({str(tmp_path)!r})
+            (here / {name!r}).touch()
+            until = time.monotonic() + 20
+            while not (here / {other!r}).exists() and time.monotonic() < until:
+                time.sleep(0.01)
+            print("reached:", (here / {other!r}).exists())
+        """
+        return Proof(name, name, "goal", r"reached: (.*)", [sys.executable, "-c", code], 1)
+
+    results = run_all([meeting("a", "b"), meeting("b", "a")], tmp_path, "sources", again=False)
+    assert [(one.name, result.figure) for one, result in results] == [("a", "True"), ("b", "True")]
+
+
+def test_proofs_that_ask_for_it_run_alone_in_their_order_after_the_others(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+
+    def noting(name: str, minutes: float, alone: bool) -> Proof:
+        code = f"""if True:
+            import time
+            for what in ("begin", "end"):
+                with open({str(log)!r}, "a") as file:
+                    print(what, {name!r}, file=file)
+                time.sleep(0.1)
+            print("reached: 1")
+        """
+        return Proof(name, name, "goal", r"reached: (.*)", [sys.executable, "-c", code], minutes, alone=alone)
+
+    chosen = [noting("a", 1, True), noting("b", 9, True), noting("beside", 1, False)]
+    results = run_all(chosen, tmp_path, "sources", again=False)
+    assert [one.name for one, _ in results] == ["a", "b", "beside"]
+    order = [f"{what} {name}" for name in ("beside", "a", "b") for what in ("begin", "end")]
+    assert log.read_text().splitlines() == order
+
+
+def test_the_time_of_all_is_that_of_two_lanes_and_then_of_those_that_run_alone(tmp_path: Path) -> None:
+    one = proof(tmp_path, "one", "")
+    assert minutes_of([one._replace(minutes=minutes) for minutes in (1, 5, 2, 2)]) == 5
+    assert minutes_of([one._replace(minutes=3), one._replace(minutes=4, alone=True)]) == 7
+
+
+def test_stopped_all_ends_and_what_had_not_ended_is_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    long = Proof("long", "long", "goal", r"reached: (.*)", [sys.executable, "-c", LONG], 9)
+    quick, later = proof(tmp_path, "quick", "reached: 7"), long._replace(name="later", minutes=0.5)
+    say = prove.say
+
+    def say_and_stop(text: str) -> None:
+        say(text)
+        if "later" in text:  # the last of three to begin, in the place of the quick one
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    monkeypatch.setattr(prove, "say", say_and_stop)
+    with pytest.raises(KeyboardInterrupt):
+        run_all([long, quick, later], tmp_path, "sources", again=False)
+    monkeypatch.undo()
+    assert kept_result(tmp_path, long, "sources") is None
+    rest = [quick, proof(tmp_path, "long", "reached: 7"), proof(tmp_path, "later", "reached: 7")]
+    assert print_table(run_all(rest, tmp_path, "sources", again=False))
+    assert runs(tmp_path, "quick") == runs(tmp_path, "long") == runs(tmp_path, "later") == 1
 
 
 def test_what_was_proved_on_other_sources_or_otherwise_is_not_proved(tmp_path: Path) -> None:
