@@ -4,7 +4,8 @@ Prints the fingerprint of all states for each, and where the first difference is
 where the core runs (bslam_slam_fingerprint): the state, its covariance, the weights of every machine that was
 learned on the way, and all that a smoother keeps.
 
-A board whose image is too small for the run is left out, and named. The last line counts them.
+A board whose image is too small for the run, or has no smoother, is left out, and named. The last line
+counts them.
 
 Exit status 0: all the same. 1: some differ, or none was compared.
 """
@@ -25,7 +26,7 @@ from bslam.experiment.runner import run_log
 from bslam.log import Log, first_steps, read_folder
 from bslam.recording.recorder import FINGERPRINT_START
 from bslam.rig import load_rig
-from bslam.target.lines import boards_here
+from bslam.target.lines import TargetError, boards_here
 from bslam.target.remote import connect
 from bslam.world.simulate import load_scenario, simulate
 
@@ -110,6 +111,10 @@ def on_board(log: Log, words: dict[str, Any], board: str) -> list[int] | str:
         return fingerprints(log, RunOptions(target=f"qemu:{board}", **words))
     except BslamError as error:  # a small board's image
         return str(error)
+    except TargetError as error:
+        if "the image has no smoother" in str(error):
+            return str(error)
+        raise
 
 
 def main(argv: list[str] | None = None) -> int:

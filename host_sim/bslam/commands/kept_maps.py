@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bslam.commands.report import table_of
 from bslam.core.builds import SIZE_CLASSES
@@ -80,12 +81,26 @@ def _from_text(path: Path) -> KeptMap:
 def _write(path: Path, kept: KeptMap) -> None:
     blob = pack(kept)
     ensure_sound(path, blob)
+    try:
+        Slam(beacons_max=SIZE_CLASSES[-1]).load_map(blob)  # which looks at the covariance as a whole
+    except BslamError as error:
+        raise BslamError(f"{path}: {error}") from error
     write_atomically(path, blob)
     print(f"written: {path}, {len(kept.beacons)} beacons, {len(blob)} bytes")
 
 
+def _least_eigenvalue(covariance: NDArray[np.float64]) -> float:
+    """Of the correlations: below 0, but for rounding, it is no covariance."""
+    known = np.diag(covariance) > 0  # the others go with nothing
+    part = covariance[np.ix_(known, known)]
+    sd = np.sqrt(np.diag(part))
+    return float(np.linalg.eigvalsh(part / np.outer(sd, sd))[0]) if known.any() else 1.0
+
+
 def _show(path: Path, out: Path) -> None:
     kept = read_map(path)
+    values = f"{len(kept.values)} state values"
+    print(f"{values}, least eigenvalue of their correlations {_least_eigenvalue(kept.covariance):.1e}")
     slam = Slam(beacons_max=SIZE_CLASSES[-1])
     slam.load_map(path.read_bytes())
     rows = [["uid", "label", "kind", "class", "x m", "y m", "sd m", "scale", "sightings", "machine"]]

@@ -124,12 +124,21 @@ def test_maps_that_share_nothing_or_fit_in_two_ways_are_refused():
         merge(nameless, nameless)
 
 
+def correlations(path):
+    covariance = parse(path.read_bytes()).covariance
+    sd = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(sd, sd)
+
+
 def test_the_command_shows_exports_imports_and_merges(tmp_path, capsys):
     one, two, both = (tmp_path / f"{name}.bslam" for name in ("one", "two", "both"))
     one.write_bytes(seen_map(PLACES[:4], [0, 1, 2, 3]))
     two.write_bytes(seen_map(from_elsewhere(PLACES[1:], (1.0, 2.0, 0.5)), [1, 2, 3, 4]))
     assert main(["map", "show", str(one), "--out", str(tmp_path)]) == 0
-    assert "4.00   1.00" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "4.00   1.00" in shown
+    least = np.linalg.eigvalsh(correlations(one))[0]
+    assert f"8 state values, least eigenvalue of their correlations {least:.1e}" in shown
     assert (tmp_path / "one.png").read_bytes()[:4] == b"\x89PNG"
     assert main(["map", "export", str(one), str(tmp_path / "one.json")]) == 0
     assert main(["map", "import", str(tmp_path / "one.json"), str(tmp_path / "again.bslam")]) == 0
@@ -159,6 +168,15 @@ def test_what_is_bad_is_named_and_nothing_is_written(tmp_path, monkeypatch, caps
     assert main(["map", *words]) == 2
     assert says in capsys.readouterr().err.splitlines()[-1]
     assert not (tmp_path / "out.bslam").exists()
+
+
+def test_a_map_whose_covariance_fits_by_pairs_only_is_not_written(tmp_path, capsys):
+    kept = parse(seen_map(PLACES[:2], [0, 1]))
+    together = np.full((4, 4), -0.4) + 1.4 * np.eye(4)
+    (tmp_path / "odd.json").write_text(to_json(replace(kept, covariance=together)))
+    assert main(["map", "import", str(tmp_path / "odd.json"), str(tmp_path / "odd.bslam")]) == 2
+    assert "covariance" in capsys.readouterr().err
+    assert not (tmp_path / "odd.bslam").exists()
 
 
 def test_a_run_leaves_its_map_and_another_starts_in_it_and_replays(tmp_path, capsys):
