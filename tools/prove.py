@@ -87,8 +87,8 @@ def own_proofs(quick: bool) -> list[Proof]:
     return [
         Proof("cuts", *cuts, [slots], 1, (slots,), depth),
         Proof("flips", *flips, [guard], 0.1, (guard,), depth),
-        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 1, soaks),
-        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 1, ("mcdc-programs",)),
+        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 0.2 if quick else 4, soaks),
+        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 2, ("mcdc-programs",)),
         Proof("fuzz", *fuzz, fuzzing, 1 if quick else 12, ("fuzz-programs",), alone=True),
     ]
 
@@ -110,10 +110,10 @@ def fault_proofs(seeds: int) -> list[Proof]:
     camera_row = (f"the same, camera in, {3 * third} restarts", "0.2 m, 59 of 60", in_frame)
     return [
         Proof("faults", *rows, [BSLAM, "faults", "--out", str(OUT / "faults")], 3, ("images",)),
-        fault_proof("kidnapping", "kidnapped, and not", found, "kidnapping", seeds, 0.1),
-        fault_proof("restart", "restart in a kept map", near, "restart", seeds, 0.1),
+        fault_proof("kidnapping", "kidnapped, and not", found, "kidnapping", seeds, 0.02),
+        fault_proof("restart", "restart in a kept map", near, "restart", seeds, 0.02),
         Proof("restart_camera", *camera_row, cameras, third, least=59 / 60, alone=True),
-        fault_proof("outliers", "40 % outliers", "1.5 x clean, 0 false", "outlier", third, 0.1),
+        fault_proof("outliers", "40 % outliers", "1.5 x clean, 0 false", "outlier", third, 0.02),
     ]
 
 
@@ -127,13 +127,12 @@ def other_proofs(quick: bool) -> list[Proof]:
     minutes = 1 if quick else 10
     attack = [PYTHON, "tools/attack_link.py", "--minutes", str(minutes)]
     cores = ["make", f"--jobs={CORES}", "firmware-all"]
-    bits_minutes = steps / 1000
     rows = (
         ("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),
         ("cores", "library for every core", "builds", LAST_LINE, cores, 1),
-        ("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, bits_minutes),
-        ("bits180", "the same, wide180", "on every board", LAST_LINE, wide, bits_minutes),
-        ("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed, bits_minutes),
+        ("bits", f"the same bits over {steps} steps", "on every board", LAST_LINE, bits, steps / 700),
+        ("bits180", "the same, wide180", "on every board", LAST_LINE, wide, steps / 600),
+        ("bits_smoother", "the same, smoother", "on every board", LAST_LINE, smoothed, steps / 4000),
         ("link", f"the link, {minutes} min attacked", "all the host's", LAST_LINE, attack, minutes),
         ("sweep", f"{runs} runs, killed three times", "0 lost", LAST_LINE, sweep, runs / 100),
     )
