@@ -501,7 +501,8 @@ bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise)
         other += bslam_symmat_filled(j);
     }
     const bool is_zero = variance == 0 && pivot == 0;
-    if (!bslam_in_range(variance, 0, BSLAM_R(1e30)) || !(pivot > 0 || is_zero)) {
+    const bool goes = pivot > 0 || is_zero;
+    if (!goes || !bslam_in_range(variance, 0, BSLAM_R(1e30))) {
         return false;
     }
     own[i] = bslam_sqrt(pivot);
