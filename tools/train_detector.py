@@ -15,7 +15,17 @@ from threadpoolctl import threadpool_limits
 from bslam.core.vision import BeaconModel, DetectorModel
 from training.built_in import built_in_detector
 from training.detector_export import beacons_header
-from training.detector_fit import fit_cells, fit_fusion, fit_kinds, fit_screen, normaliser, summary
+from training.detector_fit import (
+    choose_thresholds,
+    fit_cells,
+    fit_fusion,
+    fit_glance,
+    fit_kinds,
+    fit_screen,
+    normaliser,
+    shares,
+    summary,
+)
 from training.detector_samples import CLASSES, blank_detector, gather_boxes, gather_cells
 from training.detector_score import look_at_worlds, score
 from training.export import write_header
@@ -24,6 +34,7 @@ from training.render_set import FRAMES_A_WORLD, RIGS, render_set
 ROOT = Path(__file__).resolve().parent.parent
 HEADER = ROOT / "firmware" / "models" / "beacons.h"
 VALIDATION_FROM = 5000
+GLANCE_WORLDS = 120  # few weights, as the cells' machine
 PRECISION = 0.95
 
 
@@ -56,6 +67,22 @@ def train(folder: Path, lens: str, worlds: int, validation: int, processes: int)
     for fit in (fit_screen, fit_kinds, fit_fusion):
         detector = fit(boxes, detector)
         print(f"{lens}: {fit.__name__} done, {time.monotonic() - started:.0f} s", flush=True)
+    return finish(folder, lens, detector, worlds, validation, processes)
+
+
+def finish(
+    folder: Path, lens: str, detector: DetectorModel, worlds: int, validation: int, processes: int
+) -> tuple[DetectorModel, str]:
+    """What depends on the other machines, hence comes last: the first glance, and all thresholds."""
+    plan, left_out = PLANS[lens], range(VALIDATION_FROM, VALIDATION_FROM + validation)
+    some = range(min(worlds, GLANCE_WORLDS))
+    for seeds in (some, left_out):
+        render_set(folder, lens, "train", seeds, processes)
+    boxes = gather_boxes(folder, lens, "train", some, detector, processes, plan.halves)
+    detector = fit_glance(boxes, detector)
+    boxes = gather_boxes(folder, lens, "train", left_out, detector, processes, plan.halves)
+    detector = choose_thresholds(boxes, detector)
+    print(f"{lens}: {shares(boxes, detector)}", flush=True)
     seen = look_at_worlds(folder, lens, "train", left_out, detector, processes)
     result = score(seen, PRECISION)
     detector = replace(detector, threshold=result.threshold)
@@ -77,6 +104,12 @@ def main() -> int:
     """Trains a detector for each kind of lens and writes the header."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lens", choices=tuple(RIGS), help="that one alone; the other stays as built in")
+    parser.add_argument(
+        "--finish",
+        action="store_true",
+        help="keep the machines that are built in; only the first glance and the thresholds come anew, as at "
+        "the end of a whole training",
+    )
     parser.add_argument("--worlds", type=int, help="to train on, a lens (default: as the model was made)")
     parser.add_argument("--validation", type=int, default=40, help="worlds left out (default: 40)")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "training", help="rendered worlds")
@@ -90,9 +123,14 @@ def main() -> int:
             # BLAS shares the sums of a product out among the cores: another number of cores adds in another
             # order, and the fits would end in other bits.
             with threadpool_limits(1):
-                detectors[lens], notes[lens] = train(
-                    options.folder, lens, worlds, options.validation, options.processes
-                )
+                where = options.folder, lens
+                if options.finish:
+                    made = finish(
+                        *where, built_in_detector(lens), worlds, options.validation, options.processes
+                    )
+                else:
+                    made = train(*where, worlds, options.validation, options.processes)
+                detectors[lens], notes[lens] = made
         else:
             detectors[lens], notes[lens] = built_in_detector(lens), note_of(HEADER, lens)
         print(f"{lens}: {notes[lens]}", flush=True)

@@ -64,6 +64,12 @@ class AdditiveSvm:
     def features(self) -> int:
         return len(self.knots)
 
+    @property
+    def paired(self) -> NDArray[np.int8]:
+        """The weights as BSLAM_ADDITIVE_BYTES has them: (pairs of rows, weights, 2)."""
+        rows = np.concatenate([self.weights, np.zeros((self.rows % 2, self.weights.shape[1]), np.int8)])
+        return np.ascontiguousarray(rows.reshape(-1, 2, rows.shape[1]).transpose(0, 2, 1))
+
 
 @dataclass(frozen=True)
 class BeaconClass:

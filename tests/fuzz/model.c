@@ -32,7 +32,7 @@ static struct {
     float bias[ROWS];
     uint8_t crossed[BSLAM_CROSSED_MAX];
 } made, whole;
-static int8_t kinds_bytes[ROWS * BSLAM_ADDITIVE_WEIGHTS(BSLAM_BLOB_FEATURES, BSLAM_CROSSED_MAX)];
+static int8_t kinds_bytes[BSLAM_ADDITIVE_BYTES(ROWS, BSLAM_BLOB_FEATURES, BSLAM_CROSSED_MAX)];
 static float fusion_weights[BSLAM_SVM_WEIGHTS(FUSED, true)];
 static float object_weights[BSLAM_SVM_ROWS_MAX * BSLAM_SIGNATURE_SIZE];
 static float object_bias[BSLAM_SVM_ROWS_MAX];
@@ -53,7 +53,7 @@ static void prepare(void)
     memcpy(whole.bias, from->kinds.bias, rows * sizeof whole.bias[0]);
     memcpy(whole.crossed, from->kinds.crossed, (size_t)from->kinds.crossed_count);
     memcpy(kinds_bytes, from->kinds.bytes,
-           rows * (size_t)BSLAM_ADDITIVE_WEIGHTS(BSLAM_BLOB_FEATURES, from->kinds.crossed_count));
+           (size_t)BSLAM_ADDITIVE_BYTES(from->kinds.rows, BSLAM_BLOB_FEATURES, from->kinds.crossed_count));
     memcpy(fusion_weights, from->fusion.weights,
            (size_t)BSLAM_SVM_WEIGHTS(from->fusion.features, from->fusion.quadratic) *
                sizeof fusion_weights[0]);
@@ -167,6 +167,7 @@ static void change_table(fuzz_input_t *input)
         {&made.model.pinhole.any_threshold, 1},
         {&made.model.pinhole.threshold, 1},
         {&made.recogniser.reject_margin, 1},
+        {&made.model.pinhole.glance_threshold, 1},
     };
     const unsigned which = fuzz_u8(input) % (sizeof tables / sizeof tables[0]);
     const unsigned at = fuzz_u16(input) % tables[which].count;
@@ -203,6 +204,9 @@ static void change(fuzz_input_t *input)
         break;
     case 8:
         made.model.recogniser = &made.recogniser;
+        break;
+    case 9:
+        change_svm(input, &detector->glance);
         break;
     default:
         change_table(input);

@@ -27,6 +27,8 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
     }
     const bslam_detector_model_t views = {
         .cell = machine(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
+        .glance = machine(1, BSLAM_GLANCE_FEATURES, false, d->glance_weights, &d->glance_bias),
+        .glance_threshold = -1e6f,
         .blob_offset = d->blob_offset,
         .blob_scale = d->blob_scale,
         .screen = machine(1, BSLAM_BLOB_FEATURES, false, d->screen_weights, &d->screen_bias),

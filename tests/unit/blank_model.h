@@ -10,17 +10,18 @@ typedef struct unit_detector {
     float cell_weights[BSLAM_CELL_FEATURES];
     float blob_offset[BSLAM_BLOB_FEATURES];
     float blob_scale[BSLAM_BLOB_FEATURES];
+    float glance_weights[BSLAM_GLANCE_FEATURES];
     float screen_weights[BSLAM_BLOB_FEATURES];
     float knots[BSLAM_BLOB_FEATURES * BSLAM_KNOTS];
-    int8_t kind_weights[(UNIT_MODEL_CLASSES + 2) * BSLAM_ADDITIVE_WEIGHTS(BSLAM_BLOB_FEATURES, 0)];
+    int8_t kind_weights[BSLAM_ADDITIVE_BYTES(UNIT_MODEL_CLASSES + 2, BSLAM_BLOB_FEATURES, 0)];
     float kind_scale[UNIT_MODEL_CLASSES + 2];
     float kind_bias[UNIT_MODEL_CLASSES + 2];
     float fusion_weights[UNIT_MODEL_CLASSES + 3];
-    float cell_bias, screen_bias, fusion_bias;
+    float cell_bias, glance_bias, screen_bias, fusion_bias;
 } unit_detector_t;
 
 /// Machines that view the tables of `detector`, which are set to 0, scales to 1; both lenses share it.
-/// Everything passes the screen, and the threshold is 0.
+/// Everything passes the glance and the screen, and the threshold is 0.
 bslam_beacon_model_t unit_blank_model(unit_detector_t *detector);
 
 #endif

@@ -20,6 +20,8 @@ def built_in_detector(lens: str) -> DetectorModel:
     features = made.screen.features
     return DetectorModel(
         cell=_svm(made.cell),
+        glance=_svm(made.glance),
+        glance_threshold=made.glance_threshold,
         blob_offset=_copy(made.blob_offset, features, np.float32),
         blob_scale=_copy(made.blob_scale, features, np.float32),
         screen=_svm(made.screen),
@@ -45,11 +47,12 @@ def _svm(made: Any) -> Svm:
 
 
 def _additive(made: Any) -> AdditiveSvm:
-    row = weights_of(made.features, made.crossed_count)
+    row, pair_count = weights_of(made.features, made.crossed_count), (made.rows + 1) // 2
+    pairs = _copy(made.bytes, 2 * pair_count * row, np.int8).reshape(pair_count, row, 2)
     return AdditiveSvm(
         _copy(made.knots, made.features * KNOTS, np.float32).reshape(-1, KNOTS),
         _copy(made.crossed, made.crossed_count, np.uint8),
-        _copy(made.bytes, made.rows * row, np.int8).reshape(-1, row),
+        pairs.transpose(0, 2, 1).reshape(-1, row)[: made.rows],
         _copy(made.byte_scale, made.rows, np.float32),
         _copy(made.bias, made.rows, np.float32),
     )

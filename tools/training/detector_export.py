@@ -25,6 +25,8 @@ def _detector(header: Header, name: str, detector: DetectorModel) -> str:
     return initialiser(
         {
             "cell": header.svm(f"{name}_cell", detector.cell),
+            "glance": header.svm(f"{name}_glance", detector.glance),
+            "glance_threshold": c_float(detector.glance_threshold),
             "blob_offset": header.array(f"{name}_offset", detector.blob_offset),
             "blob_scale": header.array(f"{name}_scale", detector.blob_scale),
             "screen": header.svm(f"{name}_screen", detector.screen),

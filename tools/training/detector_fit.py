@@ -26,6 +26,12 @@ KIND_EQUAL = 0.001  # average precisions that differ by less are equal
 FUSION_COST = 0.001
 SCREEN_COST = 0.01
 SCREEN_RECALL = 0.99
+GLANCE_COST = 0.01
+SURE = -0.5
+"""Objects whose best box scores this or more are those that the stages before it are to keep."""
+STAGE_LOSSES = {"glance": 0.001, "screen": 0.0025, "any": 0.0025}
+"""The share of these objects whose best box a stage may drop."""
+OVERLAP_FOUND = 0.5  # as OVERLAP_MIN of truth.py
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
 OVERLAP_NEGATIVE = 0.45
@@ -185,6 +191,56 @@ def fit_fusion(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     svm = fit_together(np.clip(values, -FUSION_LIMIT, FUSION_LIMIT), is_beacon, FUSION_COST, 150)
     any_threshold = float(np.quantile(values[is_beacon[:, 0], 0], 1 - SCREEN_RECALL))
     return replace(detector, fusion=svm, any_threshold=any_threshold)
+
+
+def machine_values(samples: BoxSamples, detector: DetectorModel) -> NDArray[np.float32]:
+    """What the machines say of boxes, (n, 4): glance, screen, the first additive one, the score."""
+    x = normalised(samples.features, detector)
+    screened = decide(detector.screen, x)
+    values = np.hstack([decide_additive(detector.kinds, x), screened])
+    values[:, 1 : 1 + len(KINDS)] -= misfits(samples.features, samples.is_cut)
+    score = decide(detector.fusion, np.clip(values, -FUSION_LIMIT, FUSION_LIMIT))
+    return np.hstack([decide(detector.glance, samples.glances), screened, values[:, :1], score])
+
+
+def fit_glance(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+    """The linear machine of the first glance: tells boxes that the others will find to be beacons from all
+    else. Thresholds are chosen anew after it."""
+    fits = samples.of(usable(samples))
+    is_beacon = kind_targets(fits)[:, 0]
+    found = np.flatnonzero(is_beacon)
+    sure = machine_values(fits.of(found), detector)[:, -1] >= SURE
+    targets = np.zeros((len(fits.label), 1), np.bool_)
+    targets[found[sure]] = True
+    chosen = ~is_beacon | targets[:, 0]
+    svm = fit(fits.glances[chosen], targets[chosen], GLANCE_COST, balanced=True).svm
+    return replace(detector, glance=svm)
+
+
+def choose_thresholds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+    """The thresholds of the stages before the score, from boxes that nothing was fitted to: each drops the
+    best box of so few of the objects that have a sure one."""
+    on_object = samples.of(samples.overlap >= OVERLAP_FOUND)
+    values = machine_values(on_object, detector)
+    best: dict[tuple[int, int], int] = {}
+    for i, key in enumerate(zip(on_object.world.tolist(), on_object.object_row.tolist(), strict=True)):
+        if values[i, -1] >= SURE and (key not in best or values[i, -1] > values[best[key], -1]):
+            best[key] = i
+    kept = values[list(best.values())]
+    glance, screen, first = (
+        float(np.quantile(kept[:, stage], loss)) for stage, loss in enumerate(STAGE_LOSSES.values())
+    )
+    return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
+
+
+def shares(samples: BoxSamples, detector: DetectorModel) -> str:
+    """How many boxes each stage leaves."""
+    values = machine_values(samples, detector)
+    limits = detector.glance_threshold, detector.screen_threshold, detector.any_threshold
+    left = np.cumprod([values[:, i] >= limit for i, limit in enumerate(limits)], axis=0).sum(axis=1)
+    return f"of {len(values)} boxes " + ", ".join(
+        f"{name} leaves {count}" for name, count in zip(STAGE_LOSSES, left.tolist(), strict=True)
+    )
 
 
 def summary(samples: BoxSamples) -> str:

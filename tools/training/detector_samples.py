@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, feature_counts
+from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, Proposals, feature_counts
 from bslam.modelfile import AdditiveSvm, BeaconClass, Svm, weights_in_row
 from training.additive import KNOTS
 from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
@@ -59,12 +59,17 @@ class BoxSamples:
     """Proposals, or candidates, of all frames."""
 
     features: NDArray[np.float32]
+    glances: NDArray[np.float32]
     is_cut: NDArray[np.bool_]  # above or below, by the frame
     label: NDArray[np.int64]
     overlap: NDArray[np.float32]  # with the best object that counts
     object_row: NDArray[np.int64]  # of the world's `seen`, or -1
     frame: NDArray[np.int32]
     world: NDArray[np.int32]
+
+    def of(self, chosen: NDArray[np.bool_] | NDArray[np.integer]) -> BoxSamples:
+        """Those that a mask or indices choose."""
+        return BoxSamples(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
 
 def recoloured(picture: NDArray[np.uint16], seed: int) -> NDArray[np.uint16]:
@@ -99,9 +104,11 @@ def blank_additive(rows: int, features: int) -> AdditiveSvm:
 
 def blank_detector() -> DetectorModel:
     """A detector that proposes nothing and accepts nothing: what training starts with."""
-    cells, blobs = feature_counts()
+    cells, glances, blobs = feature_counts()
     return DetectorModel(
         cell=Svm(cells, False, np.zeros((1, cells), np.float32), np.array([-4.0], np.float32)),
+        glance=blank_svm(1, glances),
+        glance_threshold=1.0,
         blob_offset=np.zeros(blobs, np.float32),
         blob_scale=np.ones(blobs, np.float32),
         screen=blank_svm(1, blobs),
@@ -186,15 +193,14 @@ def _boxes_of_world(
             continue
         front_end.see(picture if seed < RECOLOURED else recoloured(picture, seed))
         found = front_end.proposals()
-        parts.append(_label_boxes(world, index, found.boxes, found.features, CELL_PX / camera.zoom))
+        parts.append(_label_boxes(world, index, found, CELL_PX / camera.zoom))
     return BoxSamples(
         *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(BoxSamples))
     )
 
 
-def _label_boxes(
-    world: World, index: int, boxes: NDArray[np.float32], features: NDArray[np.float32], cell_px: float
-) -> BoxSamples:
+def _label_boxes(world: World, index: int, found: Proposals, cell_px: float) -> BoxSamples:
+    boxes = found.boxes
     rows = np.flatnonzero(world.seen["frame"] == index)
     seen = world.seen[rows]
     owner, overlap = owners(boxes, seen, teaches(seen, world.pictures.shape[2]))
@@ -206,7 +212,8 @@ def _label_boxes(
     object_row[owner >= 0] = rows[owner[owner >= 0]]
     top, bottom = boxes[:, 1], boxes[:, 3]
     return BoxSamples(
-        features,
+        found.features,
+        found.glances,
         (top < cell_px) | (bottom > world.pictures.shape[1] - cell_px),
         label,
         overlap.astype(np.float32),

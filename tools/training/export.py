@@ -73,7 +73,7 @@ class Header:
         if len(machine.crossed):
             fields["crossed_count"] = str(len(machine.crossed))
             fields["crossed"] = self.array(f"{name}_crossed", machine.crossed)
-        fields["bytes"] = self.array(f"{name}_bytes", machine.weights)
+        fields["bytes"] = self.array(f"{name}_bytes", machine.paired)
         fields["byte_scale"] = self.array(f"{name}_byte_scale", machine.byte_scale)
         fields["bias"] = self.array(f"{name}_bias", machine.bias)
         return initialiser(fields)

@@ -149,6 +149,28 @@ static inline uint32_t bslam_bytes_even(uint32_t bytes)
     return bytes & BSLAM_EVEN_BYTES;
 }
 
+/// Two numbers of 16 bits in a word, the first one lower.
+static inline uint32_t bslam_halves(int32_t low, int32_t high)
+{
+    return (uint16_t)low | (uint32_t)high << 16;
+}
+
+/// Bytes 0 and 2, which stand for signed numbers, as halves of a word.
+static inline uint32_t bslam_bytes_signed_even(uint32_t bytes)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return (uint32_t)__sxtb16((int8x4_t)bytes);
+#else
+    return bslam_halves((int8_t)bytes, (int8_t)(bytes >> 16));
+#endif
+}
+
+/// Bytes 1 and 3.
+static inline uint32_t bslam_bytes_signed_odd(uint32_t bytes)
+{
+    return bslam_bytes_signed_even(bytes >> 8 | bytes << 24);
+}
+
 /// Adds bytes 0 and 2 to the lower and upper half of sums, neither of which grows beyond 16 bits.
 static inline uint32_t bslam_bytes_add_even(uint32_t sums, uint32_t bytes)
 {
@@ -163,12 +185,6 @@ static inline uint32_t bslam_bytes_add_even(uint32_t sums, uint32_t bytes)
 static inline uint32_t bslam_bytes_add_odd(uint32_t sums, uint32_t bytes)
 {
     return bslam_bytes_add_even(sums, bytes >> 8 | bytes << 24);
-}
-
-/// Two numbers of 16 bits in a word, the first one lower.
-static inline uint32_t bslam_halves(int32_t low, int32_t high)
-{
-    return (uint16_t)low | (uint32_t)high << 16;
 }
 
 /// Each half of a less that of b, at least 0.

@@ -3,7 +3,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "bslam/math/bytes.h"
+
 #define ROWS_MAX 255
+/// Of a pair.
+#define ROWS 2
+/// Weights that a pair has of a grid.
+#define GRID_BYTES (ROWS * BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS)
 #define LARGEST 1e12f
 
 static const uint8_t grid_knots[BSLAM_GRID_KNOTS] = {0, 3, 5, BSLAM_KNOTS - 1};
@@ -76,11 +82,12 @@ bslam_status_t bslam_additive_check(const bslam_additive_t *machine, int32_t fea
     return BSLAM_OK;
 }
 
-static uint16_t share_between(float x, float low, float high)
+static uint32_t shares_between(float x, float low, float high)
 {
     const float share = (x - low) / (high - low);
     const float within = share < 0.0f ? 0.0f : share > 1.0f ? 1.0f : share;
-    return (uint16_t)(within * (float)BSLAM_SHARE_ONE + 0.5f);
+    const int32_t upper = (int32_t)(within * (float)BSLAM_SHARE_ONE + 0.5f);
+    return bslam_halves(upper - BSLAM_SHARE_ONE, -upper);
 }
 
 _Static_assert(BSLAM_KNOTS == 9, "eight intervals, found by halves");
@@ -98,8 +105,8 @@ void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bsla
     const float *knots = machine->knots;
     for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
         const int32_t k = interval_of(x[i], knots);
-        place->curves[i].at = (uint16_t)(i * BSLAM_KNOTS + k);
-        place->curves[i].share = share_between(x[i], knots[k], knots[k + 1]);
+        place->curves[i].at = (uint32_t)(ROWS * (i * BSLAM_KNOTS + k));
+        place->curves[i].shares = shares_between(x[i], knots[k], knots[k + 1]);
     }
     for (int32_t c = 0; c < machine->crossed_count; c++) {
         const int32_t i = machine->crossed[c];
@@ -108,57 +115,73 @@ void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bsla
         while (k < BSLAM_GRID_KNOTS - 2 && x[i] >= of_feature[grid_knots[k + 1]]) {
             k++;
         }
-        place->grids[c].at = (uint16_t)k;
-        place->grids[c].share = share_between(x[i], of_feature[grid_knots[k]], of_feature[grid_knots[k + 1]]);
+        place->grids[c].at = (uint32_t)(ROWS * k);
+        place->grids[c].shares =
+            shares_between(x[i], of_feature[grid_knots[k]], of_feature[grid_knots[k + 1]]);
     }
 }
 
-/// Of a row's curves, in steps of a byte, times BSLAM_SHARE_ONE: three times 96 * 127 * 32768 fits.
-static int32_t sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes)
+/// Adds to both rows' sums, times -BSLAM_SHARE_ONE, what the weights of a knot, first two bytes, and of the
+/// next one count.
+static inline void add_pair(const int8_t *weights, uint32_t shares, int32_t sums[ROWS])
 {
-    int32_t lower = 0, more = 0;
+    const uint32_t word = bslam_word_at(weights);
+    sums[0] = bslam_halves_dot(bslam_bytes_signed_even(word), shares, sums[0]);
+    sums[1] = bslam_halves_dot(bslam_bytes_signed_odd(word), shares, sums[1]);
+}
+
+/// Of a pair's curves, in steps of a byte, times -BSLAM_SHARE_ONE: 96 * 127 * 32768 fits.
+static void sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes,
+                       int32_t sums[ROWS])
+{
+    sums[0] = sums[1] = 0;
     for (const bslam_between_knots_t *end = place + features; place != end; place++) {
-        const int8_t *weights = bytes + place->at;
-        lower += weights[0];
-        more += place->share * (weights[1] - weights[0]);
+        add_pair(bytes + place->at, place->shares, sums);
     }
-    return lower * BSLAM_SHARE_ONE + more;
 }
 
-/// Of a row's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
-static int64_t sum_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes)
+/// In two steps, so that a compiler takes one multiplication of 32 bits.
+static int64_t product(int32_t sum, uint32_t share)
 {
-    int64_t sum = 0;
+    const int32_t of_it = (int16_t)share;
+    return (int64_t)sum * of_it;
+}
+
+/// Adds a pair's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
+static void add_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes,
+                      int64_t sums[ROWS])
+{
     const bslam_between_knots_t *end = place->grids + crossed_count;
     for (const bslam_between_knots_t *a = place->grids; a != end; a++) {
         // Of all grids of this feature: along its lower knots and its upper ones.
         const int8_t *grid = bytes + a->at * BSLAM_GRID_KNOTS;
-        int32_t low = 0, low_more = 0, high = 0, high_more = 0;
+        int32_t low[ROWS] = {0}, high[ROWS] = {0};
         for (const bslam_between_knots_t *b = a + 1; b != end; b++) {
-            const int8_t *corner = grid + b->at;
-            low += corner[0];
-            low_more += b->share * (corner[1] - corner[0]);
-            high += corner[BSLAM_GRID_KNOTS];
-            high_more += b->share * (corner[BSLAM_GRID_KNOTS + 1] - corner[BSLAM_GRID_KNOTS]);
-            grid += BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
+            add_pair(grid + b->at, b->shares, low);
+            add_pair(grid + b->at + ROWS * BSLAM_GRID_KNOTS, b->shares, high);
+            grid += GRID_BYTES;
         }
-        sum += (int64_t)(low * BSLAM_SHARE_ONE + low_more) * (BSLAM_SHARE_ONE - a->share) +
-               (int64_t)(high * BSLAM_SHARE_ONE + high_more) * a->share;
-        bytes += (end - a - 1) * BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS;
+        for (int32_t r = 0; r < ROWS; r++) {
+            sums[r] += product(low[r], a->shares) + product(high[r], a->shares >> 16);
+        }
+        bytes += (end - a - 1) * GRID_BYTES;
     }
-    return sum;
 }
 
 void bslam_additive_decide(const bslam_additive_t *machine, const bslam_additive_place_t *place,
                            int32_t first, int32_t end, float *values)
 {
     const int32_t weights = BSLAM_ADDITIVE_WEIGHTS(machine->features, machine->crossed_count);
-    for (int32_t row = first; row < end; row++) {
-        const int8_t *bytes = machine->bytes + row * weights;
-        const int64_t sum = (int64_t)sum_curves(place->curves, machine->features, bytes) * BSLAM_SHARE_ONE +
-                            sum_grids(place, machine->crossed_count, bytes + machine->features * BSLAM_KNOTS);
-        values[row - first] =
-            machine->bias[row] +
-            machine->byte_scale[row] * ((float)(int32_t)(sum / BSLAM_SHARE_ONE) * (1.0f / BSLAM_SHARE_ONE));
+    for (int32_t pair = first / ROWS * ROWS; pair < end; pair += ROWS) {
+        const int8_t *bytes = machine->bytes + pair * weights;
+        int32_t curves[ROWS];
+        sum_curves(place->curves, machine->features, bytes, curves);
+        int64_t sums[ROWS] = {-(int64_t)curves[0] * BSLAM_SHARE_ONE, -(int64_t)curves[1] * BSLAM_SHARE_ONE};
+        add_grids(place, machine->crossed_count, bytes + ROWS * machine->features * BSLAM_KNOTS, sums);
+        for (int32_t row = pair < first ? first : pair; row < pair + ROWS && row < end; row++) {
+            const float steps = (float)(int32_t)(sums[row - pair] / BSLAM_SHARE_ONE);
+            values[row - first] =
+                machine->bias[row] + machine->byte_scale[row] * (steps * (1.0f / BSLAM_SHARE_ONE));
+        }
     }
 }

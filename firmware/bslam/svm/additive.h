@@ -19,6 +19,12 @@ enum {
     BSLAM_CROSSED_MAX = 24,  ///< features that have a grid with each other
 };
 
+/// Bytes of a machine's weights: rows stand in pairs, the first two rows' weights in turn, then those of the
+/// next two; after an odd number of rows comes one of zeros. So a word holds what two rows make of a place
+/// between two knots.
+#define BSLAM_ADDITIVE_BYTES(rows, features, crossed_count) \
+    (((rows) + 1) / 2 * 2 * BSLAM_ADDITIVE_WEIGHTS(features, crossed_count))
+
 /// Weights of a row: those of the features' tents, feature by feature; then of the grids, of the pairs 0-1,
 /// 0-2, ... 1-2, ... of `crossed`, the second one's knots running fastest.
 #define BSLAM_ADDITIVE_WEIGHTS(features, crossed_count) \
@@ -31,19 +37,21 @@ typedef struct bslam_additive {
     const float *knots;       ///< features * BSLAM_KNOTS, rising in each feature; beyond, curves are level
     int32_t crossed_count;    ///< 0 or 2 to BSLAM_CROSSED_MAX
     const uint8_t *crossed;   ///< so many features
-    const int8_t *bytes;      ///< rows * BSLAM_ADDITIVE_WEIGHTS; a byte stands for byte * byte_scale[row]
+    const int8_t *bytes;      ///< BSLAM_ADDITIVE_BYTES; a byte stands for byte * byte_scale[row]
     const float *byte_scale;  ///< rows values, not negative
     const float *bias;        ///< rows values
 } bslam_additive_t;
 
-/// A place between two knots: where the lower one's weight stands, and the share of the way to the upper one.
-typedef struct bslam_between_knots {
-    uint16_t at;     ///< among the weights of a row; of a grid, the knot's number
-    uint16_t share;  ///< 0 to BSLAM_SHARE_ONE
-} bslam_between_knots_t;
-
 /// A whole way between knots. Shares are whole numbers, so that sums are exact and in integers.
 enum { BSLAM_SHARE_BITS = 15, BSLAM_SHARE_ONE = 1 << BSLAM_SHARE_BITS };
+
+/// A place between two knots: where the lower one's weights stand, bytes from where a pair's weights begin,
+/// of a grid those of the knot within a row of it; and how much the lower one counts, and the upper one: two
+/// halves of a word, of 0 to -BSLAM_SHARE_ONE, since that fits 16 bits.
+typedef struct bslam_between_knots {
+    uint32_t at;
+    uint32_t shares;
+} bslam_between_knots_t;
 
 /// Where a sample lies between knots: worked out once for all rows.
 typedef struct bslam_additive_place {
@@ -59,7 +67,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_additive_check(const bslam_additive_t *mac
 /// The place of a sample x, which is finite; the machine has passed bslam_additive_check.
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place);
 
-/// values[r - first] = f_r(x) for rows [first, end).
+/// values[r - first] = f_r(x) for rows [first, end). Two rows of a pair cost as much as one.
 void bslam_additive_decide(const bslam_additive_t *machine, const bslam_additive_place_t *place,
                            int32_t first, int32_t end, float *values);
 

@@ -32,6 +32,7 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
         bool may_be_quadratic;
     } parts[] = {
         {&detector->cell, BSLAM_CELL_FEATURES, false},
+        {&detector->glance, BSLAM_GLANCE_FEATURES, false},
         {&detector->screen, BSLAM_BLOB_FEATURES, false},
         {&detector->fusion, class_count + 3, true},
     };
@@ -48,8 +49,9 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
     if (status != BSLAM_OK) {
         return status;
     }
-    const float limits[] = {detector->screen_threshold, detector->any_threshold, detector->threshold};
-    if (!are_numbers(limits, 3) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
+    const float limits[] = {detector->glance_threshold, detector->screen_threshold, detector->any_threshold,
+                            detector->threshold};
+    if (!are_numbers(limits, 4) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
         !are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
         return BSLAM_E_NOT_FINITE;
     }

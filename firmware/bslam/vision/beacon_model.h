@@ -7,11 +7,12 @@
 #include "bslam/svm/additive.h"
 #include "bslam/svm/svm.h"
 
-/// Lengths of the feature vectors (proposals.h, features.h); a model of other lengths is refused. Not macros,
-/// so that Python sees them.
+/// Lengths of the feature vectors (cells.h, features.h, glance.h); a model of other lengths is refused. Not
+/// macros, so that Python sees them.
 enum {
     BSLAM_CELL_FEATURES = 22,
     BSLAM_BLOB_FEATURES = 82,
+    BSLAM_GLANCE_FEATURES = 56,
 };
 
 #define BSLAM_CLASSES_MAX 16
@@ -37,6 +38,8 @@ typedef struct bslam_beacon_class {
 /// values followed by the screen's.
 typedef struct bslam_detector_model {
     bslam_svm_t cell;          ///< 1 row, linear, BSLAM_CELL_FEATURES: beacon or surroundings
+    bslam_svm_t glance;        ///< 1 row, linear, BSLAM_GLANCE_FEATURES
+    float glance_threshold;    ///< a proposal below it is dropped before its features are worked out
     const float *blob_offset;  ///< [BSLAM_BLOB_FEATURES], subtracted from a feature,
     const float *blob_scale;   ///< [BSLAM_BLOB_FEATURES], which is then multiplied by it: about unit range
     bslam_svm_t screen;        ///< 1 row, linear, BSLAM_BLOB_FEATURES

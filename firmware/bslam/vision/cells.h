@@ -72,13 +72,21 @@ typedef struct bslam_channel_tables {
     bslam_tone_sum_t kept[BSLAM_TONES_KEPT];
 } bslam_channel_tables_t;
 
+/// How the colour steps sideways where a kind of upright would stand (uprights.h), by kind and column; mean,
+/// in quarters.
+#define BSLAM_UPRIGHTS 6
+typedef struct bslam_upright_steps {
+    uint8_t of_kind[BSLAM_UPRIGHTS][BSLAM_COLUMNS_MAX];
+} bslam_upright_steps_t;
+
 /// What is made of a frame's cells, [rows][columns].
 typedef struct bslam_cell_notes {
     uint16_t frequent[BSLAM_CELLS_ROOM];  ///< as the view has it; so the values
     int8_t values[BSLAM_CELLS_ROOM];
     union {
-        bslam_cell_tables_t tables;      ///< while these are worked out,
-        uint8_t mask[BSLAM_CELLS_ROOM];  ///< and then 1: the present segmentation joins this cell
+        bslam_cell_tables_t tables;       ///< while these are worked out,
+        uint32_t mask[BSLAM_MASK_WORDS];  ///< then bits: the present segmentation joins these cells;
+        bslam_upright_steps_t steps;      ///< and then while uprights are looked for
     };
 } bslam_cell_notes_t;
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bslam/base/types.h"
+#include "bslam/vision/glance.h"
 
 /// Of two candidates that overlap more than this, or of which one lies this much within the other, the surer
 /// one stays.
@@ -76,11 +77,37 @@ static void take_off_misfits(const bslam_beacon_class_t *classes, int32_t class_
     }
 }
 
+/// False if a first glance tells that it is no beacon.
+static bool is_worth_a_look(const bslam_detector_model_t *model, const bslam_view_t *view,
+                            const bslam_proposal_t *proposal)
+{
+    float glance[BSLAM_GLANCE_FEATURES];
+    float value = 0;
+    bslam_box_glance(view, proposal, glance);
+    bslam_svm_decide(&model->glance, glance, &value);
+    return value >= model->glance_threshold;
+}
+
 /// What the machines say of a proposal.
 typedef struct opinion {
     float values[BSLAM_CLASSES_MAX + 3];
     float score;
 } opinion_t;
+
+/// The additive machines' values; false if the first one refuses it. Not to be inlined: the sample's place
+/// takes a kilobyte of stack.
+__attribute__((noinline)) static bool ask_additive(const bslam_detector_model_t *model, const float *features,
+                                                   float *values)
+{
+    bslam_additive_place_t place;
+    bslam_additive_locate(&model->kinds, features, &place);
+    bslam_additive_decide(&model->kinds, &place, 0, 2, values);  // two rows cost as much as one
+    if (!(values[0] >= model->any_threshold)) {
+        return false;
+    }
+    bslam_additive_decide(&model->kinds, &place, 2, model->kinds.rows, values + 2);
+    return true;
+}
 
 /// False if a machine refuses it. Not to be inlined: its kilobyte of stack is then free for what follows.
 __attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t *model,
@@ -98,13 +125,9 @@ __attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t 
     if (!(*screen >= model->screen_threshold)) {
         return false;
     }
-    bslam_additive_place_t place;
-    bslam_additive_locate(&model->kinds, features, &place);
-    bslam_additive_decide(&model->kinds, &place, 0, 1, values);
-    if (!(values[0] >= model->any_threshold)) {
+    if (!ask_additive(model, features, values)) {
         return false;
     }
-    bslam_additive_decide(&model->kinds, &place, 1, model->kinds.rows, values + 1);
     if (has_height(view, &proposal->box, per_metre)) {
         take_off_misfits(classes, class_count, log_height, values + 1);
     }
@@ -119,7 +142,8 @@ static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_cl
                       bslam_candidate_t *candidate)
 {
     opinion_t opinion;
-    if (!ask_machines(model, classes, class_count, view, proposal, &opinion)) {
+    if (!is_worth_a_look(model, view, proposal) ||
+        !ask_machines(model, classes, class_count, view, proposal, &opinion)) {
         return false;
     }
     memset(candidate, 0, sizeof *candidate);

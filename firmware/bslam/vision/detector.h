@@ -1,5 +1,6 @@
-/// Which of the proposed boxes are beacons, and of which kind: a linear machine screens them, additive ones
-/// judge what is left, a quadratic one weighs their answers; overlapping boxes give way to the best.
+/// Which of the proposed boxes are beacons, and of which kind: two linear machines screen them, the first by
+/// a glance, additive ones judge what is left, a quadratic one weighs their answers; overlapping boxes give
+/// way to the best.
 #ifndef BSLAM_VISION_DETECTOR_H
 #define BSLAM_VISION_DETECTOR_H
 

@@ -17,6 +17,11 @@
 /// Loops over cells go so many at a time, from any cell; tables that they read or write have room for that.
 #define BSLAM_CELL_STEP 16
 #define BSLAM_CELLS_ROOM (BSLAM_CELLS_MAX + 2 * BSLAM_CELL_STEP)
+/// A mask of the cells has a bit a cell, in rows of whole words.
+#define BSLAM_MASK_BITS 32
+#define BSLAM_MASK_WORDS \
+    (BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX * \
+     ((BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX + BSLAM_MASK_BITS - 1) / BSLAM_MASK_BITS))
 /// Pixels of the half-resolution copy.
 #define BSLAM_HALF_MAX ((BSLAM_IMAGE_WIDTH_MAX / 2) * (BSLAM_IMAGE_HEIGHT_MAX / 2))
 

@@ -81,39 +81,46 @@ static void join(bslam_run_t *runs, int32_t a, int32_t b)
     into->cells = (uint16_t)(into->cells + from->cells);
 }
 
-/// Four cells of a mask at once: none in it, or all.
-#define NONE_OF_WORD 0U
-#define ALL_OF_WORD 0x01010101U
+// A mask has a bit a cell: rows of whole words, the first cell in the lowest bit, none set behind the last.
 
-/// The first cell from `column` on that is not as those of the word.
-static int32_t skip(const uint8_t *mask, int32_t column, int32_t columns, uint32_t word)
+/// Words of a row.
+static int32_t words_of(int32_t columns)
 {
-    for (; column + BSLAM_WORD_BYTES <= columns; column += BSLAM_WORD_BYTES) {
-        uint32_t others = bslam_word_at(mask + column) ^ word;
-        if (others != 0) {
-            for (; (others & 255) == 0; others >>= 8) {
-                column++;
-            }
-            return column;
+    return (columns + BSLAM_MASK_BITS - 1) / BSLAM_MASK_BITS;
+}
+
+/// The bits of a row's last word that stand for cells.
+static uint32_t last_bits(int32_t columns)
+{
+    return ~0U >> (-columns & (BSLAM_MASK_BITS - 1));
+}
+
+/// The first cell from `column` on that is in the mask, `flip` 0, or that is not, `flip` all ones; `columns`
+/// if there is none.
+static int32_t next_cell(const uint32_t *mask, int32_t column, int32_t columns, uint32_t flip)
+{
+    while (column < columns) {
+        const uint32_t bits = (mask[column / BSLAM_MASK_BITS] ^ flip) >> column % BSLAM_MASK_BITS;
+        if (bits != 0) {
+            const int32_t found = column + __builtin_ctz(bits);
+            return found < columns ? found : columns;
         }
+        column = (column | (BSLAM_MASK_BITS - 1)) + 1;
     }
-    while (column < columns && mask[column] == (uint8_t)word) {
-        column++;
-    }
-    return column;
+    return columns;
 }
 
 /// Appends the runs of a row; returns how many runs there are then.
-static int32_t find_runs(bslam_proposals_t *proposals, const uint8_t *mask, int32_t columns, int32_t row,
+static int32_t find_runs(bslam_proposals_t *proposals, const uint32_t *mask, int32_t columns, int32_t row,
                          int32_t count)
 {
     int32_t end = 0;
     for (;;) {
-        const int32_t first = skip(mask, end, columns, NONE_OF_WORD);
+        const int32_t first = next_cell(mask, end, columns, 0);
         if (first == columns) {
             return count;
         }
-        end = skip(mask, first, columns, ALL_OF_WORD);
+        end = next_cell(mask, first, columns, ~0U);
         if (count == BSLAM_RUNS_MAX) {
             proposals->runs_dropped++;
             continue;
@@ -261,7 +268,7 @@ static int32_t find_components(bslam_proposals_t *proposals, const bslam_frame_t
 {
     int32_t begin = 0, middle = 0;
     for (int32_t row = 0; row < frame->rows; row++) {
-        const uint8_t *mask = proposals->mask + row * frame->columns;
+        const uint32_t *mask = proposals->mask + row * words_of(frame->columns);
         const int32_t end = find_runs(proposals, mask, frame->columns, row, middle);
         join_rows(proposals->runs, begin, middle, end);
         begin = middle;
@@ -280,52 +287,53 @@ static void propose_components(bslam_proposals_t *proposals, const bslam_view_t 
     }
 }
 
-#if BSLAM_HAS_BYTES
+#define ALL_FOUR 0x01010101U
 
-static void mask_likely(uint8_t *restrict mask, const int8_t *restrict values, int32_t cells, int8_t level)
+/// Four cells of which each byte says 0 or 1, as four bits.
+static uint32_t four_bits(uint32_t bytes)
 {
-    const uint32_t limit = (uint32_t)(level + 128) * 0x01010101U;
-    for (int32_t i = 0; i < cells; i += BSLAM_WORD_BYTES) {
-        bslam_word_put(mask + i, bslam_bytes_above(bslam_word_at(values + i) ^ BSLAM_TOP_BITS, limit));
-    }
+    return (bytes * 0x01020408U) >> 24;
 }
 
-static void mask_smooth(uint8_t *restrict mask, const uint8_t *restrict step_x,
-                        const uint8_t *restrict step_y, int32_t cells, uint8_t level)
+/// Bits of cells side by side, one word of them at most, whose value is above the level, which `limit` has
+/// 128 more in each byte.
+static uint32_t likely_bits(const int8_t *values, int32_t count, uint32_t limit)
 {
-    const uint32_t limit = level * 0x01010101U;
-    for (int32_t i = 0; i < cells; i += BSLAM_WORD_BYTES) {
-        const uint32_t beyond = bslam_bytes_less(bslam_word_at(step_x + i), limit) |
-                                bslam_bytes_less(bslam_word_at(step_y + i), limit);
-        bslam_word_put(mask + i, bslam_bytes_above(0x01010101U, beyond));
+    uint32_t bits = 0;
+    for (int32_t k = 0; k < count; k += BSLAM_WORD_BYTES) {
+        bits |= four_bits(bslam_bytes_above(bslam_word_at(values + k) ^ BSLAM_TOP_BITS, limit)) << k;
     }
+    return bits;
 }
 
-#else
+/// Of those near which the colour steps by no more than `limit` has in each byte.
+static uint32_t smooth_bits(const uint8_t *step_x, const uint8_t *step_y, int32_t count, uint32_t limit)
+{
+    uint32_t bits = 0;
+    for (int32_t k = 0; k < count; k += BSLAM_WORD_BYTES) {
+        const uint32_t beyond = bslam_bytes_less(bslam_word_at(step_x + k), limit) |
+                                bslam_bytes_less(bslam_word_at(step_y + k), limit);
+        bits |= four_bits(bslam_bytes_above(ALL_FOUR, beyond)) << k;
+    }
+    return bits;
+}
 
-/// Whole steps of BSLAM_CELL_STEP cells, so that a compiler can use vector instructions; the tables have
+/// The mask of a source. Words of cells go beyond a row's end, whose bits are then left out; tables have
 /// room.
-static void mask_likely(uint8_t *restrict mask, const int8_t *restrict values, int32_t cells, int8_t level)
+static void fill_mask(uint32_t *mask, const bslam_view_t *view, source_t source, int32_t level)
 {
-    for (int32_t i = 0; i < cells; i += BSLAM_CELL_STEP) {
-        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
-            mask[k] = values[k] > level ? 1 : 0;
+    const int32_t columns = view->frame->columns, cells = columns * view->frame->rows;
+    const uint32_t limit = (uint32_t)(source == LIKELY ? level + 128 : level) * ALL_FOUR;
+    for (int32_t first = 0; first < cells; first += columns) {
+        for (int32_t start = 0; start < columns; start += BSLAM_MASK_BITS) {
+            const int32_t count = least(columns - start, BSLAM_MASK_BITS), i = first + start;
+            const uint32_t bits = source == LIKELY
+                                      ? likely_bits(view->values + i, count, limit)
+                                      : smooth_bits(view->step_x + i, view->step_y + i, count, limit);
+            *mask++ = count < BSLAM_MASK_BITS ? bits & last_bits(columns) : bits;
         }
     }
 }
-
-static void mask_smooth(uint8_t *restrict mask, const uint8_t *restrict step_x,
-                        const uint8_t *restrict step_y, int32_t cells, uint8_t level)
-{
-    for (int32_t i = 0; i < cells; i += BSLAM_CELL_STEP) {
-        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
-            const uint8_t step = step_x[k] > step_y[k] ? step_x[k] : step_y[k];
-            mask[k] = step <= level ? 1 : 0;
-        }
-    }
-}
-
-#endif
 
 static bool is_room(const bslam_run_t *face, const bslam_frame_t *frame)
 {
@@ -334,58 +342,59 @@ static bool is_room(const bslam_run_t *face, const bslam_frame_t *frame)
     return leaves || face->cells > frame->columns * frame->rows * FACE_MAX_PERCENT / 100;
 }
 
+/// Takes the cells [first, end) of a row out of its mask.
+static void clear_cells(uint32_t *mask, int32_t first, int32_t end)
+{
+    for (int32_t word = first / BSLAM_MASK_BITS; word * BSLAM_MASK_BITS < end; word++) {
+        const int32_t start = word * BSLAM_MASK_BITS;
+        const uint32_t from = first > start ? ~0U << (first - start) : ~0U;
+        const uint32_t to = end - start < BSLAM_MASK_BITS ? ~(~0U << (end - start)) : ~0U;
+        mask[word] &= ~(from & to);
+    }
+}
+
 /// From the components of the smooth cells: all that is not a face of the room, nor below the floor line.
 static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view, int32_t runs)
 {
     const bslam_frame_t *frame = view->frame;
-    uint8_t *mask = proposals->mask;
-    for (int32_t i = 0; i < frame->rows * frame->columns; i += BSLAM_WORD_BYTES) {
-        bslam_word_put(mask + i, ALL_OF_WORD);
+    const int32_t words = words_of(frame->columns);
+    uint32_t *mask = proposals->mask;
+    for (int32_t i = 0; i < frame->rows * words; i++) {
+        mask[i] = (i + 1) % words == 0 ? last_bits(frame->columns) : ~0U;
     }
     for (int32_t i = 0; i < runs; i++) {
         const bslam_run_t *run = &proposals->runs[i];
         if (is_room(&proposals->runs[root_of(proposals->runs, i)], frame)) {
-            memset(mask + run->row * frame->columns + run->first, 0, (size_t)(run->end - run->first));
+            clear_cells(mask + run->row * words, run->first, run->end);
         }
     }
     for (int32_t column = 0; column < frame->columns; column++) {
+        const uint32_t others = ~(1U << column % BSLAM_MASK_BITS);
+        uint32_t *bits = mask + column / BSLAM_MASK_BITS;
         for (int32_t row = view->floor_line->row[column] + 2; row < frame->rows; row++) {
-            mask[row * frame->columns + column] = 0;
+            bits[row * words] &= others;
         }
     }
-}
-
-/// out[i] is in all three masks. Whole steps of BSLAM_CELL_STEP cells; all have room.
-static void keep_common(uint8_t *restrict out, const uint8_t *a, const uint8_t *b, const uint8_t *c,
-                        int32_t columns)
-{
-#if BSLAM_HAS_BYTES
-    for (int32_t i = 0; i < columns; i += BSLAM_WORD_BYTES) {
-        bslam_word_put(out + i, bslam_word_at(a + i) & bslam_word_at(b + i) & bslam_word_at(c + i));
-    }
-#else
-    for (int32_t i = 0; i < columns; i += BSLAM_CELL_STEP) {
-        for (int32_t k = i; k < i + BSLAM_CELL_STEP; k++) {
-            out[k] = a[k] & b[k] & c[k];
-        }
-    }
-#endif
 }
 
 /// Leaves only the cells whose eight neighbours are in the mask too: columns, then rows.
-static void shrink_mask(uint8_t *mask, int32_t columns, int32_t rows)
+static void shrink_mask(uint32_t *mask, int32_t columns, int32_t rows)
 {
-    enum { ROOM = BSLAM_COLUMNS_MAX + BSLAM_CELL_STEP };
-    uint8_t above[ROOM] = {0}, here[ROOM] = {0}, upright[1 + ROOM] = {0};
-    static const uint8_t none[ROOM] = {0};
-    for (int32_t row = 0; row < rows; row++) {
-        uint8_t *line = mask + row * columns;
-        memcpy(here, line, (size_t)columns);
-        keep_common(upright + 1, above, here, row + 1 < rows ? line + columns : none, columns);
-        upright[1 + columns] = 0;
-        memcpy(above, here, sizeof above);
-        keep_common(here, upright, upright + 1, upright + 2, columns);
-        memcpy(line, here, (size_t)columns);
+    enum { WORDS = (BSLAM_COLUMNS_MAX + BSLAM_MASK_BITS - 1) / BSLAM_MASK_BITS };
+    const int32_t words = words_of(columns);
+    uint32_t above[WORDS] = {0}, upright[1 + WORDS + 1] = {0};  // nothing on either side
+    for (int32_t row = 0; row < rows; row++, mask += words) {
+        for (int32_t i = 0; i < words; i++) {
+            const uint32_t here = mask[i], below = row + 1 < rows ? mask[words + i] : 0;
+            upright[1 + i] = above[i] & here & below;
+            above[i] = here;
+        }
+        for (int32_t i = 0; i < words; i++) {
+            const uint32_t *three = upright + i;
+            const uint32_t before = three[1] << 1 | three[0] >> (BSLAM_MASK_BITS - 1);
+            const uint32_t after = three[1] >> 1 | three[2] << (BSLAM_MASK_BITS - 1);
+            mask[i] = three[1] & before & after;
+        }
     }
 }
 
@@ -393,12 +402,7 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
 {
     const pass_t *p = &passes[pass];
     const bslam_frame_t *frame = view->frame;
-    const int32_t cells = frame->rows * frame->columns;
-    if (p->source == LIKELY) {
-        mask_likely(proposals->mask, view->values, cells, (int8_t)p->level);
-    } else {
-        mask_smooth(proposals->mask, view->step_x, view->step_y, cells, (uint8_t)p->level);
-    }
+    fill_mask(proposals->mask, view, p->source, p->level);
     if (p->source == STANDING) {
         mask_standing(proposals, view, find_components(proposals, frame));
     }
@@ -409,7 +413,7 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
 }
 
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view, bslam_run_t *runs,
-                          uint8_t *mask)
+                          uint32_t *mask)
 {
     proposals->count = 0;
     proposals->runs = runs;

@@ -46,7 +46,7 @@ typedef struct bslam_proposals {
     uint32_t boxes_dropped;  ///< since init: BSLAM_PROPOSALS_MAX did not suffice
     bslam_proposal_t items[BSLAM_PROPOSALS_MAX];
     bslam_run_t *runs;  ///< scratch of bslam_proposals_find, and NULL after it
-    uint8_t *mask;
+    uint32_t *mask;
 } bslam_proposals_t;
 
 /// Moves each side of a box by up to a cell to where the colour steps most along it, then adds the box,
@@ -79,9 +79,9 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
                               int32_t line);
 
 /// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice. Scratch, whose content does not matter before or
-/// after: BSLAM_RUNS_MAX runs, BSLAM_CELLS_ROOM cells.
+/// after: BSLAM_RUNS_MAX runs, BSLAM_MASK_WORDS words.
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view, bslam_run_t *runs,
-                          uint8_t *mask);
+                          uint32_t *mask);
 
 /// Intersection over union of two boxes.
 bslam_real_t bslam_box_overlap(const bslam_box_t *a, const bslam_box_t *b);

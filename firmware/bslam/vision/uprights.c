@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bytes.h"
+
 /// What is looked for: from and to this height above the floor, at least and at most so wide as it appears,
 /// slanted by up to 60 degrees.
 typedef struct upright {
@@ -18,7 +20,8 @@ static const upright_t uprights[] = {
     {0.6f, 1.2f, 0.10f, 0.30f},    // extinguishers, which hang at any height
     {0.9f, 1.5f, 0.10f, 0.30f},
 };
-#define UPRIGHTS ((int32_t)(sizeof uprights / sizeof uprights[0]))
+#define UPRIGHTS BSLAM_UPRIGHTS
+_Static_assert(sizeof uprights / sizeof uprights[0] == BSLAM_UPRIGHTS, "room for the steps of each kind");
 
 /// Sides of a kind in a frame, and boxes that come of them.
 #define SIDES_FEW 14
@@ -70,15 +73,45 @@ static int32_t end_row(const side_t *side, int32_t rows)
     return end < rows ? end : rows;
 }
 
+/// The sideways steps of four columns side by side, from their upper end to each row: of the even ones and of
+/// the odd ones, each two in the halves of a word.
+typedef struct column_sums {
+    uint32_t even[BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX + 1];
+    uint32_t odd[BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX + 1];
+} column_sums_t;
+
+/// Of columns from `first` on; tables have room for a word that goes beyond the last.
+static void sum_columns(const bslam_view_t *view, int32_t first, column_sums_t *sums)
+{
+    const uint8_t *step = view->step_x + first;
+    uint32_t even = 0, odd = 0;
+    sums->even[0] = sums->odd[0] = 0;
+    for (int32_t row = 1; row <= view->frame->rows; row++, step += view->frame->columns) {
+        const uint32_t four = bslam_bytes_least(bslam_word_at(step), STEP_MAX * 0x01010101U);
+        sums->even[row] = even = bslam_bytes_add_even(even, four);
+        sums->odd[row] = odd = bslam_bytes_add_odd(odd, four);
+    }
+}
+
+/// Of one of these columns, between two rows.
+static int32_t steps_between(const column_sums_t *sums, int32_t column, int32_t top, int32_t bottom)
+{
+    const uint32_t *to = column % 2 == 0 ? sums->even : sums->odd;
+    const int32_t shift = column % 4 < 2 ? 0 : 16;
+    return (int32_t)(((to[bottom] >> shift) - (to[top] >> shift)) & 0xFFFFU);
+}
+
 /// Mean of the sideways steps along a line, in quarters.
-static uint8_t mean_step(const bslam_view_t *view, const side_t *side)
+static uint8_t mean_step(const bslam_view_t *view, const column_sums_t *sums, const side_t *side)
 {
     const int32_t columns = view->frame->columns;
     const int32_t top = first_row(side), bottom = end_row(side, view->frame->rows);
-    const bool is_straight = side->u_px[0] == side->u_px[2];
+    if (side->u_px[0] == side->u_px[2]) {
+        return (uint8_t)(4 * steps_between(sums, side->column, top, bottom) / (bottom - top));
+    }
     int32_t sum = 0;
     for (int32_t row = top; row < bottom; row++) {
-        const int32_t column = is_straight ? side->column : column_at(side, row);
+        const int32_t column = column_at(side, row);
         const int32_t step = column >= 0 && column < columns ? view->step_x[row * columns + column] : 0;
         sum += step < STEP_MAX ? step : STEP_MAX;
     }
@@ -162,18 +195,28 @@ static bool shows_much(const bslam_view_t *view)
     return view->frame->columns > COLUMNS_FEW;
 }
 
+/// How the colour steps where each kind would stand in each column; 0: it does not.
+static void find_steps(const bslam_view_t *view, const wall_t *wall, bslam_upright_steps_t *steps)
+{
+    column_sums_t sums;
+    for (int32_t column = 0; column < view->frame->columns; column++) {
+        if (column % BSLAM_WORD_BYTES == 0) {
+            sum_columns(view, column, &sums);
+        }
+        for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
+            side_t side = {0};
+            const bool stands = place(view, wall, &uprights[kind], column, &side);
+            steps->of_kind[kind][column] = stands ? mean_step(view, &sums, &side) : 0;
+        }
+    }
+}
+
 /// The strongest sides of a kind, in order of columns.
 static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const upright_t *kind,
-                          side_t sides[SIDES_MAX])
+                          const uint8_t *steps, side_t sides[SIDES_MAX])
 {
     const int32_t limit = shows_much(view) ? SIDES_MAX : SIDES_FEW;
-    uint8_t steps[BSLAM_COLUMNS_MAX];
     const int32_t columns = view->frame->columns;
-    side_t side = {0};
-    for (int32_t column = 0; column < columns; column++) {
-        const bool stands = place(view, wall, kind, column, &side);
-        steps[column] = stands ? mean_step(view, &side) : 0;
-    }
     int32_t count = 0;
     for (int32_t column = 1; column + 1 < columns; column++) {
         const uint8_t step = steps[column];
@@ -323,22 +366,24 @@ static void propose_cut(bslam_proposals_t *proposals, const bslam_view_t *view, 
 
 /// Not to be inlined: each function has a kilobyte of stack at most.
 __attribute__((noinline)) static void propose_kind(bslam_proposals_t *proposals, const bslam_view_t *view,
-                                                   const wall_t *wall, int32_t kind)
+                                                   const wall_t *wall, const uint8_t *steps, int32_t kind)
 {
     side_t sides[SIDES_MAX] = {0};
-    const int32_t count = find_sides(view, wall, &uprights[kind], sides);
+    const int32_t count = find_sides(view, wall, &uprights[kind], steps, sides);
     propose_pairs(proposals, view, sides, count, kind);
     propose_cut(proposals, view, sides, count, kind, true);
     propose_cut(proposals, view, sides, count, kind, false);
 }
 
-void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view)
+void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view,
+                            bslam_upright_steps_t *steps)
 {
     wall_t wall;
     if (view->camera->lens == BSLAM_LENS_EQUIDISTANT) {
         find_wall(view, &wall);
     }
+    find_steps(view, &wall, steps);
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-        propose_kind(proposals, view, &wall, kind);
+        propose_kind(proposals, view, &wall, steps->of_kind[kind], kind);
     }
 }

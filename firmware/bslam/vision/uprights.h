@@ -9,7 +9,8 @@
 
 #include "bslam/vision/proposals.h"
 
-/// Adds boxes to those known.
-void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view);
+/// Adds boxes to those known. `steps` is scratch, whose content does not matter before or after.
+void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *view,
+                            bslam_upright_steps_t *steps);
 
 #endif

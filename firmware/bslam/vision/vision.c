@@ -6,6 +6,7 @@
 
 #include "bslam/math/bytes.h"
 #include "bslam/math/trig.h"
+#include "bslam/vision/glance.h"
 #include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
 
@@ -372,7 +373,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     bslam_cells_decide(&view, &vision->machines[camera], &notes->tables, &vision->channel_tables,
                        notes->frequent, notes->values);
     bslam_proposals_find(&vision->proposals, &view, vision->runs, notes->mask);
-    bslam_uprights_propose(&vision->proposals, &view);
+    bslam_uprights_propose(&vision->proposals, &view, &notes->steps);
     vision->candidate_count =
         bslam_detector_judge(detector, vision->model->classes, vision->model->class_count, &view,
                              &vision->proposals, vision->candidates, &vision->candidates_dropped);
@@ -417,6 +418,13 @@ void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
     const bslam_frame_t frame = finished_frame(vision);
     const bslam_view_t view = view_of(vision, &frame);
     bslam_blob_features(&view, &vision->proposals.items[index], features);
+}
+
+void bslam_vision_glance(const bslam_vision_t *vision, int32_t index, float glance[BSLAM_GLANCE_FEATURES])
+{
+    const bslam_frame_t frame = finished_frame(vision);
+    const bslam_view_t view = view_of(vision, &frame);
+    bslam_box_glance(&view, &vision->proposals.items[index], glance);
 }
 
 void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,

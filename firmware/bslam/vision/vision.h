@@ -94,6 +94,7 @@ bslam_box_t bslam_vision_proposal_box(const bslam_vision_t *vision, int32_t inde
 /// them, and those of a cell. Indices in range.
 void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
                                 float features[BSLAM_BLOB_FEATURES]);
+void bslam_vision_glance(const bslam_vision_t *vision, int32_t index, float glance[BSLAM_GLANCE_FEATURES]);
 void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,
                                 int16_t features[BSLAM_CELL_FEATURES]);
 

@@ -143,7 +143,7 @@ class VisionLibrary:
             knots=self.table("float", machine.knots, keep),
             crossed_count=len(machine.crossed),
             crossed=self.table("uint8_t", machine.crossed, keep),
-            bytes=self.table("int8_t", machine.weights, keep),
+            bytes=self.table("int8_t", machine.paired, keep),
             byte_scale=self.table("float", machine.byte_scale, keep),
             bias=self.table("float", machine.bias, keep),
         )

@@ -41,6 +41,8 @@ class DetectorModel:
     """The detector for one kind of lens, as bslam_detector_model_t describes it."""
 
     cell: Svm
+    glance: Svm
+    glance_threshold: float
     blob_offset: NDArray[np.float32]
     blob_scale: NDArray[np.float32]
     screen: Svm
@@ -117,6 +119,7 @@ class Proposals:
     boxes: NDArray[np.float32]  # (n, 4) left, top, right, bottom, px
     segmentations: NDArray[np.int64]  # (n,) which segmentation found each first
     features: NDArray[np.float32]  # (n, blob features), not normalised
+    glances: NDArray[np.float32]  # (n, glance features)
 
 
 class FrontEnd:
@@ -250,14 +253,17 @@ class FrontEnd:
         boxes = [self._library.lib.bslam_vision_proposal_box(self._vision, i) for i in range(found.count)]
         sides = ("left_px", "top_px", "right_px", "bottom_px")
         features = np.empty((found.count, self._library.lib.BSLAM_BLOB_FEATURES), dtype=np.float32)
+        glances = np.empty((found.count, self._library.lib.BSLAM_GLANCE_FEATURES), dtype=np.float32)
         for i in range(found.count):
             self._library.lib.bslam_vision_blob_features(self._vision, i, self._library.floats(features[i]))
+            self._library.lib.bslam_vision_glance(self._vision, i, self._library.floats(glances[i]))
         return Proposals(
             boxes=np.array([[getattr(box, side) for side in sides] for box in boxes], np.float32).reshape(
                 -1, 4
             ),
             segmentations=np.array([item.segmentation for item in items], np.int64),
             features=features,
+            glances=glances,
         )
 
     def cell_features(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.int16]:
@@ -377,6 +383,8 @@ class FrontEnd:
         made = library.new_filled(
             "bslam_detector_model_t",
             cell=library.svm(model.cell, keep),
+            glance=library.svm(model.glance, keep),
+            glance_threshold=model.glance_threshold,
             blob_offset=library.table("float", model.blob_offset, keep),
             blob_scale=library.table("float", model.blob_scale, keep),
             screen=library.svm(model.screen, keep),
@@ -390,7 +398,7 @@ class FrontEnd:
         return made[0]
 
 
-def feature_counts() -> tuple[int, int]:
-    """Features of a cell and of a proposal."""
+def feature_counts() -> tuple[int, int, int]:
+    """Features of a cell, of a glance at a proposal, and of a proposal."""
     lib = vision_library().lib
-    return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_BLOB_FEATURES)
+    return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_GLANCE_FEATURES), int(lib.BSLAM_BLOB_FEATURES)

@@ -60,6 +60,8 @@ static void test_sums_of_bytes_and_of_halves(void **state)
         }
         assert_int_equal(bslam_bytes_sum(a, (uint32_t)round), sum);
         assert_int_equal(bslam_bytes_even(a), even);
+        assert_int_equal(bslam_bytes_signed_even(a), bslam_halves((int8_t)a, (int8_t)(a >> 16)));
+        assert_int_equal(bslam_bytes_signed_odd(a), bslam_halves((int8_t)(a >> 8), (int8_t)(a >> 24)));
         assert_int_equal(bslam_bytes_add_even(7U << 16, a), even + (7U << 16));
         assert_int_equal(bslam_bytes_add_odd(9U, a), odd + 9);
         const int16_t low_a = (int16_t)a, high_a = (int16_t)(a >> 16);

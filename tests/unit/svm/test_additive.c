@@ -4,13 +4,19 @@
 
 #include "bslam/svm/additive.h"
 
-enum { ROWS = 2, FEATURES = 5, CROSSED = 3, WEIGHTS = BSLAM_ADDITIVE_WEIGHTS(FEATURES, CROSSED) };
+enum {
+    ROWS = 3,
+    FEATURES = 5,
+    CROSSED = 3,
+    WEIGHTS = BSLAM_ADDITIVE_WEIGHTS(FEATURES, CROSSED),
+    BYTES = BSLAM_ADDITIVE_BYTES(ROWS, FEATURES, CROSSED)
+};
 
 /// A machine with tables of its own.
 typedef struct machine {
     float knots[FEATURES * BSLAM_KNOTS];
     uint8_t crossed[CROSSED];
-    int8_t bytes[ROWS * WEIGHTS];
+    int8_t bytes[BYTES];
     float byte_scale[ROWS];
     float bias[ROWS];
     bslam_additive_t view;
@@ -27,7 +33,7 @@ static void fill(machine_t *m, unsigned seed)
             at += (float)unit_random(&random, 0.01, 1);
         }
     }
-    for (int k = 0; k < ROWS * WEIGHTS; k++) {
+    for (int k = 0; k < BYTES; k++) {
         m->bytes[k] = (int8_t)unit_random(&random, -127, 128);
     }
     const uint8_t crossed[CROSSED] = {0, 2, 4};
@@ -73,11 +79,12 @@ static double by_definition(const machine_t *m, int row, const float *x)
 {
     static const int all[BSLAM_KNOTS] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
     static const int coarse[BSLAM_GRID_KNOTS] = {0, 3, 5, 8};
-    const int8_t *bytes = m->bytes + row * WEIGHTS;
+    const int8_t *bytes = m->bytes + row / 2 * 2 * WEIGHTS + row % 2;  // every second byte
     double sum = 0;
     for (int i = 0; i < FEATURES; i++) {
         for (int k = 0; k < BSLAM_KNOTS; k++) {
-            sum += *bytes++ * tent(m->knots + i * BSLAM_KNOTS, all, BSLAM_KNOTS, k, (double)x[i]);
+            sum += *bytes * tent(m->knots + i * BSLAM_KNOTS, all, BSLAM_KNOTS, k, (double)x[i]);
+            bytes += 2;
         }
     }
     for (int a = 0; a < CROSSED; a++) {
@@ -86,7 +93,8 @@ static double by_definition(const machine_t *m, int row, const float *x)
             for (int k = 0; k < BSLAM_GRID_KNOTS; k++) {
                 const double share = tent(m->knots + i * BSLAM_KNOTS, coarse, 4, k, (double)x[i]);
                 for (int l = 0; l < BSLAM_GRID_KNOTS; l++) {
-                    sum += *bytes++ * share * tent(m->knots + j * BSLAM_KNOTS, coarse, 4, l, (double)x[j]);
+                    sum += *bytes * share * tent(m->knots + j * BSLAM_KNOTS, coarse, 4, l, (double)x[j]);
+                    bytes += 2;
                 }
             }
         }
@@ -111,9 +119,13 @@ static void test_additive_is_weights_times_tents(void **state)
         for (int r = 0; r < ROWS; r++) {
             assert_near(values[r], by_definition(&m, r, x), 1e-4);
         }
-        float second;
-        bslam_additive_decide(&m.view, &place, 1, 2, &second);
-        assert_true(second == values[1]);
+        for (int r = 0; r < ROWS; r++) {  // some rows alone, from the second one of a pair, too
+            float some[ROWS];
+            bslam_additive_decide(&m.view, &place, r, ROWS, some);
+            assert_memory_equal(some, values + r, (size_t)(ROWS - r) * sizeof values[0]);
+            bslam_additive_decide(&m.view, &place, r, r + 1, some);
+            assert_true(some[0] == values[r]);
+        }
     }
 }
 
@@ -123,8 +135,7 @@ static void test_additive_curve_goes_through_its_knots(void **state)
     fill(&m, 7);
     m.view.crossed_count = 0;
     memset(m.bytes, 0, sizeof m.bytes);
-    // Without grids a row is shorter: the first one's second feature stands at this place.
-    m.bytes[BSLAM_KNOTS + 4] = 100;
+    m.bytes[2 * (BSLAM_KNOTS + 4)] = 100;  // the first row's second feature
     float x[FEATURES] = {0};
     bslam_additive_place_t place;
     for (int k = 0; k < BSLAM_KNOTS; k++) {

@@ -48,6 +48,9 @@ static void test_model_check_refuses_a_quadratic_machine_without_reading_its_wei
     model = unit_blank_model(&detector);
     model.pinhole.screen.quadratic = true;
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_PARAMETER);
+    model = unit_blank_model(&detector);
+    model.wide.glance.quadratic = true;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_PARAMETER);
     static const float products[BSLAM_SVM_WEIGHTS(UNIT_MODEL_CLASSES + 3, true)];
     model = unit_blank_model(&detector);
     model.pinhole.fusion.quadratic = true;
@@ -62,6 +65,9 @@ static void test_model_check_refuses_machines_of_another_size(void **state)
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
     model = unit_blank_model(&detector);
     model.pinhole.fusion.features--;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
+    model = unit_blank_model(&detector);
+    model.pinhole.glance.features--;
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
     model = unit_blank_model(&detector);
     model.wide.kinds.rows--;
@@ -82,6 +88,9 @@ static void test_model_check_refuses_numbers_that_are_not_finite(void **state)
     }
     bslam_beacon_model_t model = unit_blank_model(&detector);
     model.wide.any_threshold = NAN;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_NOT_FINITE);
+    model = unit_blank_model(&detector);
+    model.pinhole.glance_threshold = NAN;
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_NOT_FINITE);
 }
 

@@ -112,9 +112,13 @@ static void test_detector_keeps_the_surest_where_there_is_no_room(void **state)
     }
 }
 
-static void test_detector_asks_screen_first_machine_and_threshold(void **state)
+static void test_detector_asks_glance_screen_first_machine_and_threshold(void **state)
 {
     add(10, 10, 20, 20);
+    assert_int_equal(judge(), 1);
+    model.pinhole.glance_threshold = 0.5f;
+    assert_int_equal(judge(), 0);
+    detector.glance_bias = 1;
     assert_int_equal(judge(), 1);
     model.pinhole.screen_threshold = 10;
     assert_int_equal(judge(), 0);
@@ -182,7 +186,7 @@ int main(void)
         cmocka_unit_test_setup(test_detector_a_part_gives_way_to_the_whole, setup),
         cmocka_unit_test_setup(test_detector_a_surer_box_takes_the_place_of_several, setup),
         cmocka_unit_test_setup(test_detector_keeps_the_surest_where_there_is_no_room, setup),
-        cmocka_unit_test_setup(test_detector_asks_screen_first_machine_and_threshold, setup),
+        cmocka_unit_test_setup(test_detector_asks_glance_screen_first_machine_and_threshold, setup),
         cmocka_unit_test_setup(test_detector_class_is_the_surest_kind_and_by_how_much, setup),
         cmocka_unit_test_setup(test_detector_a_kind_of_another_height_loses_at_most_one, setup),
         cmocka_unit_test_setup(test_detector_a_box_at_the_frames_edge_may_be_of_any_height, setup),

@@ -24,7 +24,8 @@ static void draw_edge(int32_t column, float bottom_m, float top_m)
 static int32_t propose(void)
 {
     memset(&proposals, 0, sizeof proposals);
-    bslam_uprights_propose(&proposals, &made.view);
+    static bslam_upright_steps_t steps;
+    bslam_uprights_propose(&proposals, &made.view, &steps);
     return proposals.count;
 }
 
