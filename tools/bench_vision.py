@@ -25,7 +25,7 @@ STAGES = {
     "room": ("bslam_background_tones", "bslam_background_learn", "bslam_background_floor_line"),
     "cells": ("bslam_cells_step", "bslam_cells_decide"),
     "boxes": ("bslam_proposals_find", "bslam_uprights_propose"),
-    "features": ("bslam_blob_features", "bslam_detector_normalise"),
+    "features": ("bslam_box_glance", "bslam_blob_features", "bslam_detector_normalise"),
     "machines": ("bslam_svm_decide", "bslam_additive_locate", "bslam_additive_decide"),
     "measuring": ("bslam_measure",),
 }

@@ -84,9 +84,9 @@ typedef struct bslam_cell_notes {
     uint16_t frequent[BSLAM_CELLS_ROOM];  ///< as the view has it; so the values
     int8_t values[BSLAM_CELLS_ROOM];
     union {
-        bslam_cell_tables_t tables;       ///< while these are worked out,
-        uint32_t mask[BSLAM_MASK_WORDS];  ///< then bits: the present segmentation joins these cells;
-        bslam_upright_steps_t steps;      ///< and then while uprights are looked for
+        bslam_cell_tables_t tables;            ///< while these are worked out,
+        uint32_t masks[2 * BSLAM_MASK_WORDS];  ///< then bits: segmentations join these cells;
+        bslam_upright_steps_t steps;           ///< and then while uprights are looked for
     };
 } bslam_cell_notes_t;
 

@@ -20,13 +20,14 @@ typedef struct pass {
     int16_t level;
     bool shrink;
     uint8_t grow;
+    bool again;  ///< the mask is that of the first pass, which no other one writes to
 } pass_t;
 
 static const pass_t passes[] = {
-    {LIKELY, 0, false, 0},
-    {LIKELY, 24, false, 0},
-    {LIKELY, 0, true, 1},
-    {STANDING, 40, true, 1},
+    {LIKELY, 0, false, 0, false},
+    {LIKELY, 24, false, 0, false},
+    {LIKELY, 0, true, 1, true},
+    {STANDING, 40, true, 1, false},
 };
 #define PASSES ((int32_t)(sizeof passes / sizeof passes[0]))
 _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one number a segmentation");
@@ -402,7 +403,9 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
 {
     const pass_t *p = &passes[pass];
     const bslam_frame_t *frame = view->frame;
-    fill_mask(proposals->mask, view, p->source, p->level);
+    if (!p->again) {
+        fill_mask(proposals->mask, view, p->source, p->level);
+    }
     if (p->source == STANDING) {
         mask_standing(proposals, view, find_components(proposals, frame));
     }
@@ -417,8 +420,8 @@ void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view
 {
     proposals->count = 0;
     proposals->runs = runs;
-    proposals->mask = mask;
     for (int32_t pass = 0; pass < PASSES; pass++) {
+        proposals->mask = pass == 0 || passes[pass].again ? mask : mask + BSLAM_MASK_WORDS;
         segment(proposals, view, pass);
     }
     proposals->runs = NULL;

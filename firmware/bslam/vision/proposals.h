@@ -79,7 +79,7 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
                               int32_t line);
 
 /// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice. Scratch, whose content does not matter before or
-/// after: BSLAM_RUNS_MAX runs, BSLAM_MASK_WORDS words.
+/// after: BSLAM_RUNS_MAX runs, twice BSLAM_MASK_WORDS words.
 void bslam_proposals_find(bslam_proposals_t *proposals, const bslam_view_t *view, bslam_run_t *runs,
                           uint32_t *mask);
 

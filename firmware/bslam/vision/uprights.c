@@ -199,12 +199,12 @@ static bool shows_much(const bslam_view_t *view)
 static void find_steps(const bslam_view_t *view, const wall_t *wall, bslam_upright_steps_t *steps)
 {
     column_sums_t sums;
+    side_t side = {0};
     for (int32_t column = 0; column < view->frame->columns; column++) {
         if (column % BSLAM_WORD_BYTES == 0) {
             sum_columns(view, column, &sums);
         }
         for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-            side_t side = {0};
             const bool stands = place(view, wall, &uprights[kind], column, &side);
             steps->of_kind[kind][column] = stands ? mean_step(view, &sums, &side) : 0;
         }

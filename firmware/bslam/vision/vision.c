@@ -372,7 +372,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     bslam_cell_notes_t *notes = &vision->thumbnail.notes;
     bslam_cells_decide(&view, &vision->machines[camera], &notes->tables, &vision->channel_tables,
                        notes->frequent, notes->values);
-    bslam_proposals_find(&vision->proposals, &view, vision->runs, notes->mask);
+    bslam_proposals_find(&vision->proposals, &view, vision->runs, notes->masks);
     bslam_uprights_propose(&vision->proposals, &view, &notes->steps);
     vision->candidate_count =
         bslam_detector_judge(detector, vision->model->classes, vision->model->class_count, &view,
