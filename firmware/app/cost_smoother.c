@@ -8,8 +8,10 @@
 
 #define STEP_US 40000
 #define STEP_S 0.04f
-/// Until the window is full, and what is measured then.
-#define STEPS_BEFORE (BSLAM_SMOOTHER_NODES_MAX * BSLAM_SMOOTHER_FRAMES + 100)
+/// Until the window is full, of nodes of all lengths, and what is measured then.
+#define STEPS_BEFORE \
+    ((BSLAM_SMOOTHER_NODES_MAX << BSLAM_SMOOTHER_LEVELS) / BSLAM_SMOOTHER_LEVELS * BSLAM_SMOOTHER_FRAMES + \
+     100)
 #define STEPS 300
 #define WHEELBASE_M 0.4f
 #define SEEN_MAX 5

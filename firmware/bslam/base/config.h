@@ -52,10 +52,10 @@
 #error "BSLAM_HISTORY_MAX is 1 to 1024"
 #endif
 
-/// Nodes that the smoother keeps, one for three frames, so 320 are 38 s of 25 frames/s; 48 bytes each in
-/// float.
+/// Nodes that the smoother keeps, of three frames or, farther back, of 6, 12 and 24, so 232 are 95 s of 25
+/// frames/s; 52 bytes each in float.
 #ifndef BSLAM_SMOOTHER_NODES_MAX
-#define BSLAM_SMOOTHER_NODES_MAX 320
+#define BSLAM_SMOOTHER_NODES_MAX 232
 #endif
 #if BSLAM_SMOOTHER_NODES_MAX < 8 || BSLAM_SMOOTHER_NODES_MAX > 10000
 #error "BSLAM_SMOOTHER_NODES_MAX is 8 to 10000"
@@ -64,7 +64,7 @@
 /// Beacons seen from these nodes, all together, 4 bytes each, 8 with a distance: where they are too many, the
 /// oldest nodes go. Twice BSLAM_BEACONS_MAX at least: a node's own.
 #ifndef BSLAM_SMOOTHER_SEEN_MAX
-#define BSLAM_SMOOTHER_SEEN_MAX (6 * BSLAM_SMOOTHER_NODES_MAX)
+#define BSLAM_SMOOTHER_SEEN_MAX (8 * BSLAM_SMOOTHER_NODES_MAX)
 #endif
 #if BSLAM_SMOOTHER_SEEN_MAX < 2 * BSLAM_BEACONS_MAX || BSLAM_SMOOTHER_SEEN_MAX > 100000
 #error "BSLAM_SMOOTHER_SEEN_MAX is twice BSLAM_BEACONS_MAX to 100000"

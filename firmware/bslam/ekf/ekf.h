@@ -192,10 +192,19 @@ typedef struct bslam_transition {
     bslam_real_t keep[2];                  ///< what is left of these
 } bslam_transition_t;
 
+/// How a way of changing speeds differs from the arc at their means: its chord is turned to the left, and
+/// stretched.
+typedef struct bslam_bend {
+    bslam_real_t turned_rad;
+    bslam_real_t stretch;
+} bslam_bend_t;
+
 /// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the
-/// models are linearised about from then on. *transition, if not NULL, becomes what it did.
+/// models are linearised about from then on, with velocity states the motion, too. *transition, if not NULL,
+/// becomes what it did.
 void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
-                             const bslam_real_t *next, bslam_transition_t *transition);
+                             const bslam_bend_t *bend, const bslam_real_t *next,
+                             bslam_transition_t *transition);
 
 /// The speedometers' part, where there are velocity states.
 void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion);

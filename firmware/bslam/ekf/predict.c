@@ -351,17 +351,51 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
     }
 }
 
+/// A walk of v makes the way no more doubtful than this, which is as good as unknown: beside more, the few
+/// millimetres that are known of it would be rounded away.
+static const bslam_real_t WAY_SD_MAX_M = BSLAM_R(1.5);
+
+/// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
+static void drive_about(const moving_t *state, const bslam_params_t *params, bslam_real_t dt_s,
+                        bslam_real_t stretch, const bslam_real_t *next)
+{
+    const bslam_real_t v_walk = params->velocity_walk_mps_sqrt_s;
+    const bslam_real_t turn_walk = params->turn_rate_walk_radps_sqrt_s;
+    bslam_transition_t transition;
+    bslam_motion_jacobian_t jacobian;
+    const bslam_real_t v_keep = 1 / (1 + dt_s / params->velocity_decay_s);
+    const bslam_real_t turn_keep = 1 / (1 + dt_s / params->turn_rate_decay_s);
+    const bslam_real_t v_var = v_walk * v_walk * dt_s;
+    const bslam_real_t v_sd_max = WAY_SD_MAX_M / dt_s;
+    walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_var < v_sd_max * v_sd_max ? v_var : v_sd_max * v_sd_max);
+    walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
+    for (int i = BSLAM_STATE_FORWARD; i <= BSLAM_STATE_TURN; i++) {
+        state->correction[i] += state->mean[i] - next[i];
+        state->mean[i] = next[i];
+    }
+    step_pose(state, params, next[BSLAM_STATE_FORWARD] * dt_s * stretch, next[BSLAM_STATE_TURN] * dt_s,
+              &jacobian);
+    fill_transition(&jacobian, dt_s * stretch, dt_s, &transition);
+    transition.keep[0] = v_keep;
+    transition.keep[1] = turn_keep;
+    move_covariance(state, &transition);
+}
+
 void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
-                             const bslam_real_t *next, bslam_transition_t *transition)
+                             const bslam_bend_t *bend, const bslam_real_t *next,
+                             bslam_transition_t *transition)
 {
     bslam_ekf_settle(ekf);
     const moving_t state = {ekf->mean, ekf->covariance, ekf->correction, transition, ekf->base_dim, ekf->dim};
-    bslam_motion_t moved = *motion;
+    ekf->mean[BSLAM_STATE_THETA] += bend->turned_rad;
     if (params->velocity_states == 0) {
+        bslam_motion_t moved = *motion;
+        moved.forward_m *= bend->stretch;
         drive_by_increment(&state, params, motion, &moved);
     } else {
-        drive_by_velocity(&state, params, motion->dt_s);
+        drive_about(&state, params, motion->dt_s, bend->stretch, next);
     }
+    ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
     for (int i = 0; i < ekf->base_dim; i++) {
         const bslam_real_t left = ekf->mean[i] - next[i];
         ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;

@@ -55,6 +55,8 @@ static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
         hash = add_words(hash, node->at, sizeof node->at);
         hash = add_words(hash, &node->motion, sizeof node->motion);
         hash = add_word(hash, (uint32_t)node->seen);
+        hash = add_word(hash, (uint32_t)node->turned);
+        hash = add_word(hash, (uint32_t)node->stretched);
     }
     for (int s = 0; s < smoother->seen_count; s++) {
         const int at = (smoother->first_seen + s) % BSLAM_SMOOTHER_SEEN_MAX;

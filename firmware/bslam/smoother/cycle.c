@@ -18,9 +18,9 @@ enum { UP_COST = 8, BACK_COST = 12 };
 /// Places move no farther at once, as a share of the distance from the robot: beyond that the model is far
 /// from linear, and a beacon must not jump to the robot.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
-/// The logarithm of 5.5 m, and its standard deviation: 3.3 to 9 m. Rather too far than too near: directions
+/// The logarithm of 4.7 m, and its standard deviation: 2.9 to 7.8 m. Rather too far than too near: directions
 /// are the more linear the farther a beacon is.
-static const bslam_real_t LN_GUESS_M = BSLAM_R(1.7);
+static const bslam_real_t LN_GUESS_M = BSLAM_R(1.55);
 static const bslam_real_t GUESS_SD_LN = BSLAM_R(0.5);
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 /// No beacon is linearised about a place nearer than this to where the robot is: with 1 / distance in its
@@ -103,7 +103,8 @@ static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_
 static void pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
                       int first_seen)
 {
-    bslam_ekf_predict_about(ekf, &smoother->model, &node->motion, node->at, NULL);
+    const bslam_bend_t bend = bslam_smoother_bend(node);
+    bslam_ekf_predict_about(ekf, &smoother->model, &node->motion, &bend, node->at, NULL);
     take_node(smoother, ekf, node, first_seen);
 }
 
@@ -119,12 +120,17 @@ void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
     smoother->seen_count -= node->seen;
     smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;
     smoother->node_count--;
+    int level = BSLAM_SMOOTHER_LEVELS - 1;
+    while (level > 0 && smoother->levels[level] == 0) {
+        level--;
+    }
+    smoother->levels[level] -= smoother->node_count > 0 ? 1 : 0;  // the next one is the oldest now
 }
 
 void bslam_smoother_begin(bslam_smoother_t *smoother)
 {
-    while (smoother->node_count > BSLAM_SMOOTHER_NODES_MAX - SLACK_NODES ||
-           smoother->seen_count > BSLAM_SMOOTHER_SEEN_MAX - SLACK_SEEN) {
+    bslam_smoother_thin(smoother, BSLAM_SMOOTHER_NODES_MAX - SLACK_NODES);
+    while (smoother->seen_count > BSLAM_SMOOTHER_SEEN_MAX - SLACK_SEEN) {
         bslam_smoother_drop_oldest(smoother);
     }
     bslam_smoother_linearise_base(smoother);
@@ -313,7 +319,8 @@ static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *nex
     bslam_transition_t transition;
     bslam_real_t l[ROBOT][ROBOT];
     memcpy(step->here, run->correction, (size_t)n * sizeof step->here[0]);
-    bslam_ekf_predict_about(run, &smoother->model, &next->motion, next->at, &transition);
+    const bslam_bend_t bend = bslam_smoother_bend(next);
+    bslam_ekf_predict_about(run, &smoother->model, &next->motion, &bend, next->at, &transition);
     memcpy(step->next, run->correction, (size_t)n * sizeof step->next[0]);
     factor(run->covariance, n, l);
     for (int i = 0; i < n; i++) {
@@ -329,8 +336,9 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
         (first + BSLAM_SMOOTHER_PART < smoother->top ? first + BSLAM_SMOOTHER_PART : smoother->top) - 1;
     const int n = smoother->run.base_dim;
     restore_mark(smoother, &smoother->marks[first / BSLAM_SMOOTHER_PART], first);
-    bslam_ekf_predict_about(&smoother->run, &smoother->model, &bslam_smoother_node(smoother, first)->motion,
-                            bslam_smoother_node(smoother, first)->at, NULL);
+    const bslam_smoother_node_t *begin = bslam_smoother_node(smoother, first);
+    const bslam_bend_t bend = bslam_smoother_bend(begin);
+    bslam_ekf_predict_about(&smoother->run, &smoother->model, &begin->motion, &bend, begin->at, NULL);
     for (int k = first; k <= last; k++) {
         const bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
         take_node(smoother, &smoother->run, node, first_seen);

@@ -1,4 +1,4 @@
-/// What the smoother's two files share. Not for users.
+/// What the smoother's files share. Not for users.
 #ifndef BSLAM_SMOOTHER_INTERNAL_H
 #define BSLAM_SMOOTHER_INTERNAL_H
 
@@ -7,6 +7,7 @@
 #define BSLAM_SMOOTHER_BEARING_RAD BSLAM_R(9.58737992e-5)  ///< of a bslam_smoother_seen_t's units
 #define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-6)
 #define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
+#define BSLAM_SMOOTHER_BEND BSLAM_R(5e-5)
 
 /// Node k, counted from the oldest.
 static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoother, int k)
@@ -25,6 +26,12 @@ static inline bslam_real_t bslam_smoother_bearing_rad(const bslam_smoother_seen_
     return (int16_t)direction->value * BSLAM_SMOOTHER_BEARING_RAD;
 }
 
+static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node)
+{
+    const bslam_bend_t bend = {node->turned * BSLAM_SMOOTHER_BEND, 1 + node->stretched * BSLAM_SMOOTHER_BEND};
+    return bend;
+}
+
 static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *direction)
 {
     return (bslam_real_t)((16 + (direction->weight & 15)) << (direction->weight >> 4)) *
@@ -34,6 +41,19 @@ static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *di
 /// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the
 /// logarithm of its distance from the base's robot, which is what directions are nearly linear in. O(n²).
 void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
+
+/// sum += motion, which goes on from it or leads to it.
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion);
+
+/// The nearest whole number, 65535 at most.
+int32_t bslam_smoother_units(bslam_real_t value);
+
+/// A standard deviation as a bslam_smoother_seen_t has it.
+uint8_t bslam_smoother_weight(bslam_real_t sd_rad);
+
+/// Of nodes beyond so many, the oldest two of a level become one of the next, whose room is used up first; at
+/// the last one the oldest leaves, into the base. The cycle must be begun anew. O(what is kept).
+void bslam_smoother_thin(bslam_smoother_t *smoother, int nodes_max);
 
 /// Begins a cycle: what is too old leaves first, into the base.
 void bslam_smoother_begin(bslam_smoother_t *smoother);

@@ -17,7 +17,7 @@ static const bslam_real_t FIRST_SD_M = BSLAM_R(2.5);
 static const bslam_real_t UNSEEN_SD_M = BSLAM_R(20.0);
 /// Passes are wanted most while the map is young. In nodes a frame: at first, and less by one for each so
 /// many nodes.
-enum { UNITS_FIRST = 60, NODES_A_UNIT_LESS = BSLAM_SMOOTHER_NODES_MAX / 16 + 1 };
+enum { UNITS_FIRST = 64, NODES_A_UNIT_LESS = BSLAM_SMOOTHER_NODES_MAX / 15 + 1 };
 static const bslam_real_t UNITS_MAX = BSLAM_R(65535.0);
 static const bslam_real_t HUBER_D = BSLAM_R(3.0);
 
@@ -45,6 +45,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     memcpy(smoother->place, ekf->mean, sizeof smoother->place);
     smoother->first_node = 0;
     smoother->node_count = 0;
+    memset(smoother->levels, 0, sizeof smoother->levels);
     smoother->first_seen = 0;
     smoother->seen_count = 0;
     smoother->to_middle = (bslam_motion_t){0};
@@ -55,7 +56,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
 
 // ---- nodes ------------------------------------------------------------------------------------------------
 
-static void add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
 {
     sum->dt_s += motion->dt_s;
     sum->forward_m += motion->forward_m;
@@ -65,8 +66,7 @@ static void add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
     sum->forward_turn_cov_mrad += motion->forward_turn_cov_mrad;
 }
 
-/// The nearest whole number, 65535 at most.
-static int32_t units(bslam_real_t value)
+int32_t bslam_smoother_units(bslam_real_t value)
 {
     return (int32_t)(value < UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5)) : UNITS_MAX);
 }
@@ -85,22 +85,23 @@ static bool has_range(const bslam_smoother_line_t *line)
 static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
 {
     const bslam_smoother_seen_t range = {
-        .value = (uint16_t)(line->ranges > 0 ? units(mean_range_m(line) / BSLAM_SMOOTHER_RANGE_M) : 0),
+        .value =
+            (uint16_t)(line->ranges > 0 ? bslam_smoother_units(mean_range_m(line) / BSLAM_SMOOTHER_RANGE_M)
+                                        : 0),
         .weight = (uint8_t)(line->ranges > 0 ? line->ranges : BSLAM_SMOOTHER_FIRST),
         .beacon = BSLAM_SMOOTHER_RANGE,
     };
     return range;
 }
 
-/// A standard deviation as a bslam_smoother_seen_t has it.
-static uint8_t weight_of(bslam_real_t sd_rad)
+uint8_t bslam_smoother_weight(bslam_real_t sd_rad)
 {
     bslam_real_t mantissa = sd_rad / BSLAM_SMOOTHER_SD_RAD;
     int exponent = 0;
     for (; mantissa >= BSLAM_R(31.5) && exponent < 15; exponent++) {
         mantissa /= 2;
     }
-    const int32_t low = units(mantissa) - 16;
+    const int32_t low = bslam_smoother_units(mantissa) - 16;
     return (uint8_t)(exponent * 16 + (low < 0 ? 0 : (low > 15 ? 15 : low)));
 }
 
@@ -120,8 +121,8 @@ static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
     const bslam_real_t bearing_rad = line->first_rad + (sloped * y - s1 * ty) / determinant;
     const bslam_smoother_seen_t direction = {
         // Half a turn to the left is half a turn to the right.
-        .value = (uint16_t)units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
-        .weight = weight_of(bslam_sqrt(sloped / determinant)),
+        .value = (uint16_t)bslam_smoother_units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
+        .weight = bslam_smoother_weight(bslam_sqrt(sloped / determinant)),
         .beacon = (uint8_t)beacon,
     };
     return direction;
@@ -166,6 +167,8 @@ static void close_block(bslam_smoother_t *smoother)
     memcpy(node->at, smoother->middle, sizeof node->at);
     node->motion = smoother->to_middle;
     node->seen = (int16_t)seen;
+    node->turned = 0;
+    node->stretched = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
         const bslam_smoother_line_t *line = &smoother->lines[b];
         if (line->count > 0) {
@@ -175,6 +178,7 @@ static void close_block(bslam_smoother_t *smoother)
             push_seen(smoother, range_of(line));
         }
     }
+    smoother->levels[0] += smoother->node_count > 0 ? 1 : 0;
     smoother->node_count++;
     smoother->to_middle = (bslam_motion_t){0};
     clear_block(smoother);
@@ -183,7 +187,7 @@ static void close_block(bslam_smoother_t *smoother)
 /// The middle of the block is now, as far as one knows.
 static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
 {
-    add_motion(&smoother->to_middle, &smoother->from_middle);
+    bslam_smoother_add_motion(&smoother->to_middle, &smoother->from_middle);
     smoother->from_middle = (bslam_motion_t){0};
     smoother->middle_s = smoother->block_s;
     memcpy(smoother->middle, ekf->mean, (size_t)ekf->base_dim * sizeof smoother->middle[0]);
@@ -194,7 +198,7 @@ void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, con
     if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BLOCK_MAX_S) {
         close_block(smoother);
     }
-    add_motion(&smoother->from_middle, motion);
+    bslam_smoother_add_motion(&smoother->from_middle, motion);
     if (smoother->frames > 0) {
         smoother->block_s += motion->dt_s;
     } else if (smoother->from_middle.dt_s >= BLOCK_MAX_S) {

@@ -3,8 +3,8 @@
 ///
 /// A filter linearises each sighting once, at what it holds true then. In direction only that is wrong: a
 /// beacon's distance is not known for half a minute, and a wrong one enters every Jacobian. So the last
-/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames) are kept with what was read and seen
-/// there, and the filter as it was before them, the *base*. A cycle is
+/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames; of 6, 12 and 24 farther back) are
+/// kept with what was read and seen there, and the filter as it was before them, the *base*. A cycle is
 ///
 ///     forth   from the base through all nodes, linear about their poses and the beacons' places: ends as the
 ///             filter of now, which takes the place of the one that has been carried on frame by frame
@@ -13,8 +13,9 @@
 ///             linearise at. They lie on a path as smooth as robots drive, for the jitter of one that rests
 ///             on noisy wheels alone would look like parallax
 ///
-/// and then as many nodes as came in meanwhile leave at the old end, into the base. Work is bounded a frame.
-/// All of it is the filter's own code (ekf/ekf.h) with its models, gate and Huber's rule.
+/// and then as many nodes as came in meanwhile are joined with their neighbours, or leave at the old end,
+/// into the base. Work is bounded a frame. All of it is the filter's own code (ekf/ekf.h) with its models,
+/// gate and Huber's rule.
 ///
 /// The caller owns the struct; it serves one pipeline (slam/slam.h, bslam_slam_attach_smoother).
 #ifndef BSLAM_SMOOTHER_SMOOTHER_H
@@ -27,6 +28,9 @@
 /// Nodes of one of the parts in which the way back is gone.
 #define BSLAM_SMOOTHER_PART 20
 #define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
+
+/// Two nodes of a level become one of the next where room is wanted: 1, 2, 4 and 8 times so many frames.
+#define BSLAM_SMOOTHER_LEVELS 4
 
 /// In place of a number of distances: none, and nothing was known of the beacon before.
 #define BSLAM_SMOOTHER_FIRST 255
@@ -47,6 +51,8 @@ typedef struct bslam_smoother_node {
     bslam_real_t at[BSLAM_ROBOT_DIM_MAX];  ///< the robot's values: where its models are linearised
     bslam_motion_t motion;                 ///< odometry since the node before, or since the base
     int16_t seen;                          ///< directions and distances
+    int16_t turned;                        ///< how its way differs from an arc: bslam_bend_t, in units of
+    int16_t stretched;                     ///< BSLAM_SMOOTHER_BEND, the latter less 1
 } bslam_smoother_node_t;
 
 /// Sums over the sightings of a beacon in the open block, for a line of bearing over time.
@@ -94,6 +100,7 @@ typedef struct bslam_smoother {
     bslam_smoother_seen_t seen[BSLAM_SMOOTHER_SEEN_MAX];
     int32_t first_node;  ///< rings: where the oldest stands, and how many
     int32_t node_count;
+    int32_t levels[BSLAM_SMOOTHER_LEVELS];  ///< nodes of each, the newest ones' first
     int32_t first_seen;
     int32_t seen_count;
     bslam_smoother_phase_t phase;

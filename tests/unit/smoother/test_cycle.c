@@ -26,14 +26,16 @@ enum { V = BSLAM_STATE_FORWARD, OMEGA = BSLAM_STATE_TURN, V_WALK = BASE, OMEGA_W
 
 static void step(const double *in, double *out, const void *context)
 {
-    const double dt_s = *(const double *)context;
+    const bslam_smoother_node_t *node = context;
+    const double dt_s = (double)node->motion.dt_s;
+    const bslam_bend_t bend = bslam_smoother_bend(node);
     double c;
     double s;
     out[V] = in[V] / (1 + dt_s / (double)params.velocity_decay_s) + in[V_WALK];
     out[OMEGA] = in[OMEGA] / (1 + dt_s / (double)params.turn_rate_decay_s) + in[OMEGA_WALK];
-    unit_mean_direction(in[BSLAM_STATE_THETA], out[OMEGA] * dt_s, &c, &s);
-    out[BSLAM_STATE_X] = in[BSLAM_STATE_X] + out[V] * dt_s * c;
-    out[BSLAM_STATE_Y] = in[BSLAM_STATE_Y] + out[V] * dt_s * s;
+    unit_mean_direction(in[BSLAM_STATE_THETA] + (double)bend.turned_rad, out[OMEGA] * dt_s, &c, &s);
+    out[BSLAM_STATE_X] = in[BSLAM_STATE_X] + out[V] * dt_s * (double)bend.stretch * c;
+    out[BSLAM_STATE_Y] = in[BSLAM_STATE_Y] + out[V] * dt_s * (double)bend.stretch * s;
     out[BSLAM_STATE_THETA] = in[BSLAM_STATE_THETA] + out[OMEGA] * dt_s;
 }
 
@@ -106,15 +108,17 @@ static void point_before(int k, double point[ARGUMENTS])
     }
 }
 
-/// The step to node k, which becomes rows[k + 1].
+/// The step to node k, which becomes rows[k + 1]. Linear about speeds that have walked to those of node k.
 static void add_step(int k)
 {
     const bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
-    const double dt_s = (double)node->motion.dt_s;
     double point[ARGUMENTS];
     double next[BASE];
     point_before(k, point);
-    step(point, next, &dt_s);
+    step(point, next, node);
+    point[V_WALK] = (double)node->at[V] - next[V];
+    point[OMEGA_WALK] = (double)node->at[OMEGA] - next[OMEGA];
+    step(point, next, node);
     batch.rows[k + 1] = batch.rows[k];
     memcpy(batch.offset[k + 1], batch.offset[k], sizeof batch.offset[k]);
     for (int i = 0; i < BASE; i++) {
@@ -122,15 +126,16 @@ static void add_step(int k)
         batch.offset[k + 1][i] = i == BSLAM_STATE_THETA ? unit_angle_between(jump, 0) : jump;
         memset(batch.rows[k + 1].at[i], 0, sizeof batch.rows[k + 1].at[i]);
         for (int a = 0; a < BASE; a++) {
-            const double by = unit_derivative(step, point, ARGUMENTS, i, a, &dt_s);
+            const double by = unit_derivative(step, point, ARGUMENTS, i, a, node);
             batch.offset[k + 1][i] += by * batch.offset[k][a];
             for (int j = 0; j < batch.rows[k].columns; j++) {
                 batch.rows[k + 1].at[i][j] += by * batch.rows[k].at[a][j];
             }
         }
         for (int w = 0; w < WALKS; w++) {
-            batch.rows[k + 1].at[i][DIM + WALKS * k + w] =
-                unit_derivative(step, point, ARGUMENTS, i, V_WALK + w, &dt_s);
+            const double by = unit_derivative(step, point, ARGUMENTS, i, V_WALK + w, node);
+            batch.rows[k + 1].at[i][DIM + WALKS * k + w] = by;
+            batch.offset[k + 1][i] -= by * point[V_WALK + w];
         }
     }
 }
@@ -293,6 +298,10 @@ static void make_window(uint64_t seed, int nodes)
     while (smoother.node_count < nodes) {
         move(&random);
         see(&random, map);
+    }
+    for (int k = 0; k < nodes; k++) {
+        bslam_smoother_node(&smoother, k)->turned = (int16_t)(unit_random(&random, -2000, 2000));
+        bslam_smoother_node(&smoother, k)->stretched = (int16_t)(unit_random(&random, -1000, 1000));
     }
     bslam_smoother_begin(&smoother);
     assert_int_equal(smoother.node_count, nodes);

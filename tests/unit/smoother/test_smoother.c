@@ -200,7 +200,7 @@ static void test_more_beacons_than_the_window_holds_push_the_oldest_out(void **s
 static void test_frames_that_show_one_beacon_fill_the_window_with_nodes(void **state)
 {
     look(0, 1);
-    for (int k = 0; k < 4 * BSLAM_SMOOTHER_NODES_MAX; k++) {
+    for (int k = 0; k < 16 * BSLAM_SMOOTHER_NODES_MAX; k++) {
         drive(0.016, 0.018);
         look(0, 1);
     }

@@ -1,0 +1,235 @@
+// Nodes farther back become fewer: what of them stays as it was, and what becomes of the rest.
+#include <math.h>
+
+#include "support.h"
+
+#include "bslam/model/motion.h"
+#include "bslam/model/observation.h"
+#include "bslam/smoother/internal.h"
+
+enum { NODES = 40, BEACONS = 3 };
+
+static const double places[BEACONS][2] = {{3, 2}, {4, -2.5}, {-1.5, 3}};
+static const double SD_RAD = 0.0136;
+
+static bslam_smoother_t smoother;
+static unit_random_t noise;
+
+/// A window of nodes along a curve, with a turn on the spot in its middle, whose sightings err by nothing.
+/// The third beacon is seen from every second node, and its distance from every fourth.
+static void fill(void)
+{
+    bslam_params_t params = unit_params();
+    params.filter = BSLAM_FILTER_SMOOTHER;
+    params.velocity_states = 1;
+    static bslam_ekf_t filter;
+    bslam_ekf_init(&filter, &params);
+    for (int b = 0; b < BEACONS; b++) {
+        int index;
+        assert_int_equal(bslam_ekf_add_guess(&filter, real(places[b][0]), real(places[b][1]), 1, &index),
+                         BSLAM_OK);
+    }
+    memset(&smoother, 0, sizeof smoother);
+    bslam_smoother_restart(&smoother, &params, &filter);
+    assert_true(NODES < BSLAM_SMOOTHER_NODES_MAX);
+    bslam_pose_t pose = {0, 0, 0};
+    const bslam_pose_t mount = {params.mount_x_m, params.mount_y_m, params.mount_yaw_rad};
+    for (int k = 0; k < NODES; k++) {
+        const bool spins = k > 18 && k < 24;
+        const bslam_real_t v = spins ? 0 : real(0.4 + 0.1 * sin(0.3 * k));
+        const bslam_real_t omega = spins ? 1 : real(0.6 * sin(0.25 * k));
+        const bslam_real_t dt = real(0.12);
+        bslam_motion_jacobian_t unused;
+        pose = bslam_motion_step(BSLAM_MOTION_ARC, &pose, v * dt, omega * dt, &unused);
+        bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
+        *node = (bslam_smoother_node_t){
+            .at = {pose.x_m, pose.y_m, pose.theta_rad, v, omega},
+            .motion = {.dt_s = dt,
+                       .forward_m = v * dt + real(unit_random(&noise, -0.01, 0.01)),
+                       .turn_rad = omega * dt,
+                       .forward_var_m2 = real(1e-4),
+                       .turn_var_rad2 = real(2e-3)},
+        };
+        for (int b = 0; b < BEACONS; b++) {
+            bslam_observation_t seen;
+            assert_int_equal(
+                bslam_observe_point(&pose, &mount, real(places[b][0]), real(places[b][1]), &seen), BSLAM_OK);
+            if (b < 2 || k % 2 == 0) {
+                *bslam_smoother_seen(&smoother, smoother.seen_count) = (bslam_smoother_seen_t){
+                    .value = (uint16_t)bslam_smoother_units(seen.bearing_rad / BSLAM_SMOOTHER_BEARING_RAD),
+                    .weight = bslam_smoother_weight(real(SD_RAD)),
+                    .beacon = (uint8_t)b};
+                smoother.seen_count++;
+                node->seen++;
+            }
+            if (b == 2 && k % 4 == 0) {
+                *bslam_smoother_seen(&smoother, smoother.seen_count) = (bslam_smoother_seen_t){
+                    .value = (uint16_t)bslam_smoother_units(seen.range_m / BSLAM_SMOOTHER_RANGE_M),
+                    .weight = 3,
+                    .beacon = BSLAM_SMOOTHER_RANGE};
+                smoother.seen_count++;
+                node->seen++;
+            }
+        }
+    }
+    smoother.node_count = NODES;
+    smoother.levels[0] = NODES - 1;
+}
+
+static int setup(void **state)
+{
+    noise.state = 3;
+    fill();
+    return 0;
+}
+
+static bslam_motion_t sum_of_motions(void)
+{
+    bslam_motion_t sum = {0};
+    for (int k = 0; k < smoother.node_count; k++) {
+        bslam_smoother_add_motion(&sum, &bslam_smoother_node(&smoother, k)->motion);
+    }
+    return sum;
+}
+
+static void assert_counts(void)
+{
+    int nodes = 1;
+    int seen = 0;
+    for (int l = 0; l < BSLAM_SMOOTHER_LEVELS; l++) {
+        assert_true(smoother.levels[l] >= 0);
+        nodes += smoother.levels[l];
+    }
+    for (int k = 0; k < smoother.node_count; k++) {
+        seen += bslam_smoother_node(&smoother, k)->seen;
+    }
+    assert_int_equal(smoother.node_count, nodes);
+    assert_int_equal(smoother.seen_count, seen);
+}
+
+// ---- what stays -------------------------------------------------------------------------------------------
+
+static void test_window_that_has_room_stays_as_it_is(void **state)
+{
+    static bslam_smoother_t before;
+    before = smoother;
+    bslam_smoother_thin(&smoother, NODES);
+    assert_memory_equal(&smoother, &before, sizeof smoother);
+}
+
+static void test_no_way_is_lost_and_neither_the_oldest_nor_the_newest_node(void **state)
+{
+    for (int most = NODES - 1; most > 20; most -= 3) {
+        const bslam_motion_t before = sum_of_motions();
+        const bslam_smoother_node_t first = *bslam_smoother_node(&smoother, 0);
+        const bslam_smoother_node_t last = *bslam_smoother_node(&smoother, smoother.node_count - 1);
+        bslam_smoother_thin(&smoother, most);
+        assert_int_equal(smoother.node_count, most);
+        assert_counts();
+        const bslam_motion_t after = sum_of_motions();
+        assert_near((double)after.dt_s, (double)before.dt_s, 1e-5);
+        assert_near((double)after.forward_m, (double)before.forward_m, 1e-5);
+        assert_near((double)after.turn_rad, (double)before.turn_rad, 1e-5);
+        assert_near((double)after.forward_var_m2, (double)before.forward_var_m2, 1e-7);
+        assert_near((double)after.turn_var_rad2, (double)before.turn_var_rad2, 1e-6);
+        assert_memory_equal(bslam_smoother_node(&smoother, 0), &first, sizeof first);
+        const bslam_smoother_node_t *newest = bslam_smoother_node(&smoother, smoother.node_count - 1);
+        assert_memory_equal(newest->at, last.at, 3 * sizeof last.at[0]);
+        assert_int_equal(newest->seen, last.seen);
+    }
+    assert_true(smoother.levels[1] > 0);
+}
+
+static void test_older_nodes_are_longer_ones(void **state)
+{
+    bslam_smoother_thin(&smoother, 30);
+    bslam_smoother_thin(&smoother, 18);
+    assert_true(smoother.levels[2] > 0);
+    const bslam_real_t whole = real(0.12 * 4);
+    assert_near((double)bslam_smoother_node(&smoother, 2)->motion.dt_s, (double)whole, 1e-5);
+    assert_true(bslam_smoother_node(&smoother, smoother.node_count - 1)->motion.dt_s < real(0.2));
+}
+
+static void test_where_all_levels_are_full_the_oldest_leave(void **state)
+{
+    const bslam_real_t begun_s = sum_of_motions().dt_s;
+    for (int most = NODES - 1; most > 3; most--) {
+        bslam_smoother_thin(&smoother, most);
+        assert_int_equal(smoother.node_count, most);
+        assert_counts();
+    }
+    assert_true(sum_of_motions().dt_s < begun_s);
+}
+
+// ---- what becomes of the rest -----------------------------------------------------------------------------
+
+static void test_bent_way_leads_from_a_node_to_the_next(void **state)
+{
+    bslam_smoother_thin(&smoother, 30);
+    bslam_smoother_thin(&smoother, 18);
+    int bent = 0;
+    for (int k = 1; k < smoother.node_count; k++) {
+        const bslam_real_t *from = bslam_smoother_node(&smoother, k - 1)->at;
+        const bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
+        const bslam_bend_t bend = bslam_smoother_bend(node);
+        const bslam_real_t dt = node->motion.dt_s;
+        const bslam_pose_t start = {from[0], from[1], from[2] + bend.turned_rad};
+        bslam_motion_jacobian_t unused;
+        const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, node->at[3] * dt * bend.stretch,
+                                                   node->at[4] * dt, &unused);
+        // A way shorter than 1 cm has no direction.
+        const double least =
+            hypot((double)(node->at[0] - from[0]), (double)(node->at[1] - from[1])) > 0.012 ? 1e-4 : 0.024;
+        assert_near((double)end.x_m, (double)node->at[0], least);
+        assert_near((double)end.y_m, (double)node->at[1], least);
+        assert_near(unit_angle_between((double)(end.theta_rad - bend.turned_rad), (double)node->at[2]), 0,
+                    1e-5);
+        bent += bend.turned_rad > real(0.01) || bend.turned_rad < real(-0.01) ? 1 : 0;
+    }
+    assert_true(bent > 2);
+}
+
+static void test_directions_are_those_from_where_the_node_is_and_weigh_as_many(void **state)
+{
+    bslam_smoother_thin(&smoother, 30);
+    bslam_smoother_thin(&smoother, 18);
+    int at = 0;
+    for (int k = 0; k < smoother.node_count; k++) {
+        const bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
+        const bslam_pose_t pose = {node->at[0], node->at[1], node->at[2]};
+        const bslam_pose_t mount = {smoother.model.mount_x_m, smoother.model.mount_y_m,
+                                    smoother.model.mount_yaw_rad};
+        bslam_observation_t seen = {0};
+        for (int s = 0; s < node->seen; s++, at++) {
+            const bslam_smoother_seen_t *one = bslam_smoother_seen(&smoother, at);
+            if (one->beacon == BSLAM_SMOOTHER_RANGE) {
+                assert_near((double)(one->value * BSLAM_SMOOTHER_RANGE_M), (double)seen.range_m, 0.02);
+                continue;
+            }
+            const double *place = places[one->beacon];
+            assert_int_equal(bslam_observe_point(&pose, &mount, real(place[0]), real(place[1]), &seen),
+                             BSLAM_OK);
+            const double off = (double)(bslam_smoother_bearing_rad(one) - seen.bearing_rad);
+            assert_near(unit_angle_between(off, 0), 0, 4e-4);
+        }
+    }
+    assert_int_equal(at, smoother.seen_count);
+    // The third node is of four, from all of which the first beacon was seen: half as doubtful.
+    const bslam_smoother_seen_t *first = bslam_smoother_seen(
+        &smoother, bslam_smoother_node(&smoother, 0)->seen + bslam_smoother_node(&smoother, 1)->seen);
+    assert_int_equal(first->beacon, 0);
+    assert_near((double)bslam_smoother_sd_rad(first), SD_RAD / 2, 0.06 * SD_RAD / 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_window_that_has_room_stays_as_it_is, setup),
+        cmocka_unit_test_setup(test_no_way_is_lost_and_neither_the_oldest_nor_the_newest_node, setup),
+        cmocka_unit_test_setup(test_older_nodes_are_longer_ones, setup),
+        cmocka_unit_test_setup(test_where_all_levels_are_full_the_oldest_leave, setup),
+        cmocka_unit_test_setup(test_bent_way_leads_from_a_node_to_the_next, setup),
+        cmocka_unit_test_setup(test_directions_are_those_from_where_the_node_is_and_weigh_as_many, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
