@@ -48,6 +48,8 @@ SLICE_S = 300
 # What a slice makes at least where several are to share a target: each begins with the inputs that were kept.
 SHARE_LEAST = 50_000
 KEPT_BYTES = 300_000
+# Of one input, seconds.
+LIMITS = ("-timeout=10",)
 # How libFuzzer ends when it is stopped by a signal.
 INTERRUPTED = 72
 # Of the ledger, and of what is under way.
@@ -120,7 +122,7 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
     command = [
         str(PROGRAMS / target), f"-max_total_time={seconds}", f"-runs={runs}", f"-max_len={LENGTHS[target]}",
         # Weighing inputs by what is rare about them costs an eighth of the fastest target's time.
-        "-len_control=0", f"-entropic={int(target != FILLER)}", "-timeout=10", "-print_final_stats=1",
+        "-len_control=0", f"-entropic={int(target != FILLER)}", *LIMITS, "-print_final_stats=1",
         f"-artifact_prefix={crashes}/{target}-", f"-seed={seed}", str(corpus),
     ]  # fmt: skip
     began = time.monotonic()
@@ -129,6 +131,7 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
     if status == INTERRUPTED:
         raise KeyboardInterrupt
     found = re.search(r"stat::number_of_executed_units:\s*(\d+)", log)
+    crashed = status != 0 and not was_only_slow(target, log)
     line = Slice(
         time.strftime("%Y-%m-%d %H:%M:%S"),
         commit,
@@ -137,13 +140,26 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
         seed,
         int(found.group(1)) if found else 0,
         round(time.monotonic() - began),
-        0 if status == 0 else 1,
+        int(crashed),
     )
     with LOCK:
         write_down(line)
-        if status != 0:
+        if crashed:
             print_crash(log, target)
     return line
+
+
+def was_only_slow(target: str, log: str) -> bool:
+    """Whether a program gave up an input after so many seconds that it ends in time when it has it alone: a
+    computer that stood still is no fault of the input. The input is gone then."""
+    kept = re.search(r"Test unit written to (\S+)", log)
+    if "ERROR: libFuzzer: timeout" not in log or kept is None:
+        return False
+    status, _ = follow([str(PROGRAMS / target), *LIMITS, kept[1]])
+    if status == 0:
+        Path(kept[1]).unlink()
+        print(f"fuzz {target}: an input took long once and does not alone: no crash", file=sys.stderr)
+    return status == 0
 
 
 def follow(command: list[str]) -> tuple[int, str]:

@@ -144,3 +144,29 @@ def test_a_slice_that_is_stopped_is_not_written_down(tmp_path: Path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         main(["--targets", "link"])
     assert fuzz.read_ledger() == []
+
+
+@pytest.mark.parametrize(("alone", "crashes"), [(0, 0), (70, 1)])
+def test_an_input_that_took_long_once_is_a_crash_if_it_does_again(
+    alone: int, crashes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fuzz, "PROGRAMS", tmp_path)
+    monkeypatch.setattr(fuzz, "OUT", tmp_path / "out")
+    monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
+    monkeypatch.setattr(fuzz, "STOP", threading.Event())
+    fuzz.BUILT_OF.write_text("now")
+    given_up = tmp_path / "map-timeout-0"
+    given_up.write_bytes(b"input")
+    program = tmp_path / "map"
+    program.write_text(
+        f"""#!/bin/sh
+for last; do :; done
+if [ "$last" = {given_up} ]; then exit {alone}; fi
+echo "Test unit written to {given_up}" >&2
+echo "==1== ERROR: libFuzzer: timeout after 11 seconds" >&2
+exit 70
+"""
+    )
+    program.chmod(0o755)
+    assert fuzz.run_slice("map", 1, 1, 1).crashes == crashes
+    assert given_up.exists() == bool(crashes)
