@@ -110,6 +110,7 @@ typedef struct bslam_smoother {
     int32_t work;     ///< what the frame may still do; below 0: what the next ones do less
     bslam_smoother_mark_t marks[BSLAM_SMOOTHER_PARTS];
     bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
+    bslam_smoother_seen_t joined[2 * BSLAM_BEACONS_MAX];  ///< scratch: too much for a stack
     // The open block.
     bslam_smoother_line_t lines[BSLAM_BEACONS_MAX];
     bslam_motion_t to_middle;    ///< from the newest node to the block's middle

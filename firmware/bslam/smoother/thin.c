@@ -265,13 +265,12 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
                    {at->seen, at->seen + older.seen, at->seen + older.seen + joined.seen}};
     go_half_way(older.at, joined.at);
     pair.mean = pose_at(joined.at);
-    bslam_smoother_seen_t seen[2 * BSLAM_BEACONS_MAX];
     int count = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
-        count += join_seen(smoother, &pair, b, &seen[count]);
+        count += join_seen(smoother, &pair, b, &smoother->joined[count]);
     }
     for (int k = 0; k < count; k++) {
-        *bslam_smoother_seen(smoother, at->to_seen + k) = seen[k];
+        *bslam_smoother_seen(smoother, at->to_seen + k) = smoother->joined[k];
     }
     at->seen = pair.first_seen[2];
     at->ahead = half_of(&joined.motion);
