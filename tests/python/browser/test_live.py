@@ -41,10 +41,7 @@ def live(*words: object, out: Path) -> Iterator[Command]:
     """The command with these words, on any port, from its address on."""
     arguments = [sys.executable, "-m", "bslam", "live", *map(str, words)]
     arguments += ["--port", "0", "--no-browser", "--out", str(out)]
-    # A shell lets what it starts in the background ignore Ctrl-C, which is handed down.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    signal.signal(signal.SIGINT, before)
     try:
         assert process.stdout is not None
         found = re.search(r"http://\S+", line := process.stdout.readline())
