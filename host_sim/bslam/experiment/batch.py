@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import os
 import signal
 import threading
 import traceback
@@ -218,13 +219,15 @@ def outcomes_of(
         return
     with joblib.parallel_config(backend=backend or "loky"):
         parallel = joblib.Parallel(n_jobs=-1 if backend else processes, return_as="generator_unordered")
-    work = (joblib.delayed(_execute_in_worker)(index, job, out) for index, job in enumerate(jobs))
+    own = os.getpid()
+    work = (joblib.delayed(_execute_in_worker)(index, job, out, own) for index, job in enumerate(jobs))
     yield from parallel(work)
 
 
-def _execute_in_worker(index: int, job: Job, out: Path) -> tuple[int, Outcome]:
-    if threading.current_thread() is threading.main_thread():
-        # Ctrl-C reaches every process of the terminal; the parent alone decides what it means.
+def _execute_in_worker(index: int, job: Job, out: Path, parent: int) -> tuple[int, Outcome]:
+    if os.getpid() != parent and threading.current_thread() is threading.main_thread():
+        # Ctrl-C reaches every process of the terminal; the parent alone decides what it means. (Where there
+        # are no processes to be had, the parent itself does the work.)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     return index, execute(job, out)
 
