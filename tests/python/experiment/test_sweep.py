@@ -2,6 +2,7 @@
 
 import json
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -171,6 +172,7 @@ def test_sweep_on_a_dask_cluster_makes_the_same_runs(
         assert sweep_into(tmp_path / "there", sweep, "--cluster", cluster.scheduler_address) == 0
     here, there = (kill_sweep.entries_of(tmp_path / place) for place in ("here", "there"))
     assert here == there
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler  # this process is no worker
     assert sweep_into(tmp_path / "none", sweep, "--cluster", "tcp://127.0.0.1:9") == 2
     assert "--cluster tcp://127.0.0.1:9: " in last_line(capsys)
 
