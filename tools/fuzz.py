@@ -21,7 +21,6 @@ import csv
 import hashlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -128,7 +127,7 @@ def run_slice(target: str, seed: int, seconds: int, runs: int) -> Slice:
     began = time.monotonic()
     commit, sources = commit_name(), BUILT_OF.read_text(encoding="utf-8")
     status, log = follow(command)
-    if status == INTERRUPTED:
+    if status == INTERRUPTED or STOP.is_set():
         raise KeyboardInterrupt
     found = re.search(r"stat::number_of_executed_units:\s*(\d+)", log)
     crashed = status != 0 and not was_only_slow(target, log)
@@ -298,7 +297,7 @@ class Campaign:
         with LOCK:
             STOP.set()
             for process in RUNNING:
-                process.send_signal(signal.SIGINT)
+                process.terminate()  # which one that has just begun heeds, too
 
     def _work(self, choose: Callable[[], tuple[str, float, int] | None]) -> None:
         while True:
