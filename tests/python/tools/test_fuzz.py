@@ -131,7 +131,7 @@ def test_a_slice_that_is_stopped_is_not_written_down(tmp_path: Path, monkeypatch
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
     script = tmp_path / "link"
-    script.write_text(f"#!{sys.executable}\nimport time\ntime.sleep(600)\n")
+    script.write_text(f"#!{sys.executable}\nimport time\ntime.sleep(20)\n")
     script.chmod(0o755)
     monkeypatch.setattr(fuzz, "PROGRAMS", tmp_path)
     monkeypatch.setattr(fuzz, "OUT", tmp_path / "out")
