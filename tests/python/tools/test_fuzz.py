@@ -3,6 +3,7 @@
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -127,7 +128,9 @@ def test_a_crash_ends_all(
 
 
 def test_a_slice_that_is_stopped_is_not_written_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def stopped(target: str) -> None:
+    def stop_what_runs() -> None:
+        while not fuzz.RUNNING:
+            time.sleep(0.01)
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
     script = tmp_path / "link"
@@ -136,8 +139,9 @@ def test_a_slice_that_is_stopped_is_not_written_down(tmp_path: Path, monkeypatch
     monkeypatch.setattr(fuzz, "PROGRAMS", tmp_path)
     monkeypatch.setattr(fuzz, "OUT", tmp_path / "out")
     monkeypatch.setattr(fuzz, "BUILT_OF", tmp_path / "sources")
-    monkeypatch.setattr(fuzz, "unpack", stopped)
+    monkeypatch.setattr(fuzz, "unpack", lambda target: None)
     fuzz.BUILT_OF.write_text("now")
+    threading.Thread(target=stop_what_runs, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
         main(["--targets", "link"])
     assert fuzz.read_ledger() == []
