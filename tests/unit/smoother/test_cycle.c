@@ -416,6 +416,63 @@ static void test_old_end_leaves_into_the_base_without_loss(void **state)
     }
 }
 
+// ---- beacons where the robot is ---------------------------------------------------------------------------
+
+/// A window in which beacon 1 is held to be where the sensor stands at node 2. Seen from there in any
+/// direction.
+static void go_forth_over_a_beacon(uint16_t direction)
+{
+    make_window(10, 5);
+    const bslam_real_t *at = bslam_smoother_node(&smoother, 2)->at;
+    const double theta = (double)at[BSLAM_STATE_THETA];
+    const double mount[2] = {(double)params.mount_x_m, (double)params.mount_y_m};
+    bslam_real_t *place = &smoother.place[smoother.base.beacons[1].at];
+    place[0] = at[BSLAM_STATE_X] + real(cos(theta) * mount[0] - sin(theta) * mount[1]);
+    place[1] = at[BSLAM_STATE_Y] + real(sin(theta) * mount[0] + cos(theta) * mount[1]);
+    bslam_smoother_seen_t *seen = bslam_smoother_seen(&smoother, 2 * BEACONS + 1);
+    assert_int_equal(seen->beacon, 1);
+    seen->value = direction;
+    bslam_smoother_begin(&smoother);
+    go_forth();
+}
+
+static void test_sighting_from_the_beacon_s_own_place_is_left_out_and_counted(void **state)
+{
+    static bslam_ekf_t other;
+    go_forth_over_a_beacon(0);
+    assert_int_equal(smoother.left_out, 1);
+    assert_true(bslam_ekf_is_sane(&smoother.run));
+    other = smoother.run;
+    go_forth_over_a_beacon(20000);
+    assert_memory_equal(smoother.run.mean, other.mean, sizeof other.mean);
+    assert_memory_equal(smoother.run.covariance, other.covariance, sizeof other.covariance);
+}
+
+static void test_beacon_near_the_robot_is_linearised_about_a_metre_off(void **state)
+{
+    // The way forth ends at a robot in (1, 2), on beacon 0, 0.4 m from beacon 1 and 2.5 m from beacon 2.
+    static const double ends[BEACONS][2] = {{1, 2}, {1 + 0.24, 2 + 0.32}, {1 - 2.5, 2}};
+    static const double abouts[BEACONS][2] = {{1, 2}, {1 + 0.6, 2 + 0.8}, {1 - 2.5, 2}};
+    make_window(11, 1);
+    bslam_ekf_t *run = &smoother.run;
+    smoother.at = smoother.node_count;
+    memset(run->correction, 0, sizeof run->correction);
+    run->mean[BSLAM_STATE_X] = 1;
+    run->mean[BSLAM_STATE_Y] = 2;
+    for (int b = 0; b < BEACONS; b++) {
+        run->mean[run->beacons[b].at] = real(ends[b][0]);
+        run->mean[run->beacons[b].at + 1] = real(ends[b][1]);
+    }
+    go_forth();
+    for (int b = 0; b < BEACONS; b++) {
+        const int at = run->beacons[b].at;
+        assert_near((double)smoother.place[at], abouts[b][0], 1e-6);
+        assert_near((double)smoother.place[at + 1], abouts[b][1], 1e-6);
+        assert_near((double)run->mean[at], ends[b][0], 1e-6);  // the filter keeps what it found
+        assert_near((double)run->mean[at + 1], ends[b][1], 1e-6);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -423,6 +480,8 @@ int main(void)
         cmocka_unit_test(test_up_and_back_is_the_batch_least_squares_in_the_map),
         cmocka_unit_test(test_way_back_in_several_parts_is_the_same),
         cmocka_unit_test(test_old_end_leaves_into_the_base_without_loss),
+        cmocka_unit_test(test_sighting_from_the_beacon_s_own_place_is_left_out_and_counted),
+        cmocka_unit_test(test_beacon_near_the_robot_is_linearised_about_a_metre_off),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

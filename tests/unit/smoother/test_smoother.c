@@ -174,6 +174,21 @@ static void test_node_is_the_line_through_its_bearings(void **state)
     assert_near((double)bslam_smoother_sd_rad(seen), sd_rad, 0.51 * last_bit_rad);
 }
 
+static void test_deviation_is_kept_within_three_percent_and_one_radian_at_most(void **state)
+{
+    static const double kept_rad[] = {16e-6, 1e-4, 1e-3, 0.0136, 0.1, 0.5, 1};
+    static const double larger_rad[] = {1.1, 2, 1e3};
+    bslam_smoother_seen_t seen = {0};
+    for (int i = 0; i < COUNT_OF(kept_rad); i++) {
+        seen.weight = bslam_smoother_weight(real(kept_rad[i]));
+        assert_near((double)bslam_smoother_sd_rad(&seen) / kept_rad[i], 1, 0.032);
+    }
+    for (int i = 0; i < COUNT_OF(larger_rad); i++) {
+        seen.weight = bslam_smoother_weight(real(larger_rad[i]));
+        assert_near((double)bslam_smoother_sd_rad(&seen), 31e-6 * 32768, 1e-6);
+    }
+}
+
 static void test_windows_of_any_length_stay_within_their_room(void **state)
 {
     for (int k = 0; k < 4; k++) {
@@ -387,6 +402,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_node_is_the_line_through_its_bearings, setup),
+        cmocka_unit_test(test_deviation_is_kept_within_three_percent_and_one_radian_at_most),
         cmocka_unit_test_setup(test_windows_of_any_length_stay_within_their_room, setup),
         cmocka_unit_test_setup(test_more_beacons_than_the_window_holds_push_the_oldest_out, setup),
         cmocka_unit_test_setup(test_frames_that_show_one_beacon_fill_the_window_with_nodes, setup),

@@ -13,16 +13,57 @@ static const double places[BEACONS][2] = {{3, 2}, {4, -2.5}, {-1.5, 3}};
 static const double SD_RAD = 0.0136;
 
 static bslam_smoother_t smoother;
+static bslam_ekf_t filter;
 static unit_random_t noise;
+
+/// What is seen of a beacon from node k.
+static bslam_observation_t observed(int k, int beacon)
+{
+    const bslam_real_t *at = bslam_smoother_node(&smoother, k)->at;
+    const bslam_pose_t pose = {at[0], at[1], at[2]};
+    const bslam_params_t *model = &smoother.model;
+    const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
+    bslam_observation_t seen;
+    assert_int_equal(
+        bslam_observe_point(&pose, &mount, real(places[beacon][0]), real(places[beacon][1]), &seen),
+        BSLAM_OK);
+    return seen;
+}
+
+static bslam_smoother_seen_t direction_of(int k, int beacon, double error_rad, double sd_rad)
+{
+    const double bearing_rad = (double)observed(k, beacon).bearing_rad + error_rad;
+    return (bslam_smoother_seen_t){.value = (uint16_t)bslam_smoother_units(
+                                       real(unit_angle_between(bearing_rad, 0)) / BSLAM_SMOOTHER_BEARING_RAD),
+                                   .weight = bslam_smoother_weight(real(sd_rad)),
+                                   .beacon = (uint8_t)beacon};
+}
+
+static bslam_smoother_seen_t range_of(int k, int beacon, double error_m, int weight)
+{
+    const bslam_real_t range_m = observed(k, beacon).range_m + real(error_m);
+    const bool is_measured = weight != BSLAM_SMOOTHER_FIRST;
+    return (bslam_smoother_seen_t){
+        .value = (uint16_t)(is_measured ? bslam_smoother_units(range_m / BSLAM_SMOOTHER_RANGE_M) : 0),
+        .weight = (uint8_t)weight,
+        .beacon = BSLAM_SMOOTHER_RANGE};
+}
+
+/// Seen from node k, behind all that was before.
+static void show(int k, bslam_smoother_seen_t seen)
+{
+    *bslam_smoother_seen(&smoother, smoother.seen_count) = seen;
+    smoother.seen_count++;
+    bslam_smoother_node(&smoother, k)->seen++;
+}
 
 /// A window of nodes along a curve, with a turn on the spot in its middle, whose sightings err by nothing.
 /// The third beacon is seen from every second node, and its distance from every fourth.
-static void fill(void)
+static void fill(int nodes)
 {
     bslam_params_t params = unit_params();
     params.filter = BSLAM_FILTER_SMOOTHER;
     params.velocity_states = 1;
-    static bslam_ekf_t filter;
     bslam_ekf_init(&filter, &params);
     for (int b = 0; b < BEACONS; b++) {
         int index;
@@ -31,18 +72,16 @@ static void fill(void)
     }
     memset(&smoother, 0, sizeof smoother);
     bslam_smoother_restart(&smoother, &params, &filter);
-    assert_true(NODES < BSLAM_SMOOTHER_NODES_MAX);
+    assert_true(nodes <= BSLAM_SMOOTHER_NODES_MAX);
     bslam_pose_t pose = {0, 0, 0};
-    const bslam_pose_t mount = {params.mount_x_m, params.mount_y_m, params.mount_yaw_rad};
-    for (int k = 0; k < NODES; k++) {
+    for (int k = 0; k < nodes; k++) {
         const bool spins = k > 18 && k < 24;
         const bslam_real_t v = spins ? 0 : real(0.4 + 0.1 * sin(0.3 * k));
         const bslam_real_t omega = spins ? 1 : real(0.6 * sin(0.25 * k));
         const bslam_real_t dt = real(0.12);
         bslam_motion_jacobian_t unused;
         pose = bslam_motion_step(BSLAM_MOTION_ARC, &pose, v * dt, omega * dt, &unused);
-        bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
-        *node = (bslam_smoother_node_t){
+        *bslam_smoother_node(&smoother, k) = (bslam_smoother_node_t){
             .at = {pose.x_m, pose.y_m, pose.theta_rad, v, omega},
             .motion = {.dt_s = dt,
                        .forward_m = v * dt + real(unit_random(&noise, -0.01, 0.01)),
@@ -51,35 +90,22 @@ static void fill(void)
                        .turn_var_rad2 = real(2e-3)},
         };
         for (int b = 0; b < BEACONS; b++) {
-            bslam_observation_t seen;
-            assert_int_equal(
-                bslam_observe_point(&pose, &mount, real(places[b][0]), real(places[b][1]), &seen), BSLAM_OK);
             if (b < 2 || k % 2 == 0) {
-                *bslam_smoother_seen(&smoother, smoother.seen_count) = (bslam_smoother_seen_t){
-                    .value = (uint16_t)bslam_smoother_units(seen.bearing_rad / BSLAM_SMOOTHER_BEARING_RAD),
-                    .weight = bslam_smoother_weight(real(SD_RAD)),
-                    .beacon = (uint8_t)b};
-                smoother.seen_count++;
-                node->seen++;
+                show(k, direction_of(k, b, 0, SD_RAD));
             }
             if (b == 2 && k % 4 == 0) {
-                *bslam_smoother_seen(&smoother, smoother.seen_count) = (bslam_smoother_seen_t){
-                    .value = (uint16_t)bslam_smoother_units(seen.range_m / BSLAM_SMOOTHER_RANGE_M),
-                    .weight = 3,
-                    .beacon = BSLAM_SMOOTHER_RANGE};
-                smoother.seen_count++;
-                node->seen++;
+                show(k, range_of(k, b, 0, 3));
             }
         }
     }
-    smoother.node_count = NODES;
-    smoother.levels[0] = NODES - 1;
+    smoother.node_count = nodes;
+    smoother.levels[0] = nodes - 1;
 }
 
 static int setup(void **state)
 {
     noise.state = 3;
-    fill();
+    fill(NODES);
     return 0;
 }
 
@@ -161,6 +187,23 @@ static void test_where_all_levels_are_full_the_oldest_leave(void **state)
     assert_true(sum_of_motions().dt_s < begun_s);
 }
 
+static void test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end(void **state)
+{
+    fill(BSLAM_SMOOTHER_NODES_MAX);
+    const bslam_smoother_node_t oldest = *bslam_smoother_node(&smoother, 0);
+    const bslam_real_t begun_s = sum_of_motions().dt_s;
+    const bslam_motion_t motion = {.dt_s = BSLAM_R(0.25)};
+    filter.mean[BSLAM_STATE_X] = BSLAM_R(7.5);
+    bslam_smoother_move(&smoother, &filter, &motion);
+    assert_counts();
+    assert_in_range(smoother.node_count, BSLAM_SMOOTHER_NODES_MAX / 2, BSLAM_SMOOTHER_NODES_MAX - 1);
+    const bslam_smoother_node_t *newest = bslam_smoother_node(&smoother, smoother.node_count - 1);
+    assert_true(newest->at[BSLAM_STATE_X] == BSLAM_R(7.5) && newest->motion.dt_s == motion.dt_s);
+    assert_int_equal(newest->seen, 0);
+    assert_memory_equal(smoother.base.mean, oldest.at, sizeof oldest.at);
+    assert_near((double)sum_of_motions().dt_s, (double)(begun_s - oldest.motion.dt_s + motion.dt_s), 1e-4);
+}
+
 // ---- what becomes of the rest -----------------------------------------------------------------------------
 
 static void test_bent_way_leads_from_a_node_to_the_next(void **state)
@@ -221,6 +264,109 @@ static void test_directions_are_those_from_where_the_node_is_and_weigh_as_many(v
     assert_near((double)bslam_smoother_sd_rad(first), SD_RAD / 2, 0.06 * SD_RAD / 2);
 }
 
+/// Nodes 1 and 2 become node 1, half way between them.
+static void join_pair(void)
+{
+    bslam_smoother_thin(&smoother, NODES - 1);
+    assert_counts();
+    assert_near((double)bslam_smoother_node(&smoother, 1)->motion.dt_s, 0.12 * 1.5, 1e-6);
+}
+
+/// As if no node had seen anything.
+static void forget_seen(void)
+{
+    for (int k = 0; k < smoother.node_count; k++) {
+        bslam_smoother_node(&smoother, k)->seen = 0;
+    }
+    smoother.seen_count = 0;
+}
+
+static void test_directions_that_differ_become_their_weighted_mean(void **state)
+{
+    forget_seen();
+    // Four times as sure as the other one: (4 x 20 - 10) / 5 mrad off.
+    show(1, direction_of(1, 0, 0.02, SD_RAD));
+    const double about_pi_rad = 3.14159265 - (double)observed(1, 2).bearing_rad;
+    show(1, direction_of(1, 2, about_pi_rad - 0.1, SD_RAD));
+    show(2, direction_of(2, 0, -0.01, 2 * SD_RAD));
+    show(2, direction_of(2, 2, about_pi_rad + 0.1, SD_RAD));
+    join_pair();
+    assert_int_equal(smoother.seen_count, 2);
+    const bslam_smoother_seen_t *first = bslam_smoother_seen(&smoother, 0);
+    const bslam_smoother_seen_t *across = bslam_smoother_seen(&smoother, 1);
+    const double off_rad = (double)(bslam_smoother_bearing_rad(first) - observed(1, 0).bearing_rad);
+    assert_near(unit_angle_between(off_rad, 0), 0.014, 3e-4);
+    assert_near((double)bslam_smoother_sd_rad(first), SD_RAD * 2 / sqrt(5), 0.06 * SD_RAD);
+    // On both sides of half a turn: not what lies between them the other way round.
+    const double around_rad = (double)(bslam_smoother_bearing_rad(across) - observed(1, 2).bearing_rad);
+    assert_near(unit_angle_between(around_rad, about_pi_rad), 0, 3e-4);
+}
+
+/// No distance.
+#define NONE 0
+#define FIRST BSLAM_SMOOTHER_FIRST
+
+static void test_distances_become_their_mean_and_a_measured_one_is_never_lost(void **state)
+{
+    static const struct {
+        int older;  ///< mean of so many
+        double older_error_m;
+        int newer;
+        double newer_error_m;
+        int joined;
+        double joined_error_m;
+    } cases[] = {
+        {NONE, 0, NONE, 0, NONE, 0},         {3, 0.1, NONE, 0, 3, 0.1},
+        {NONE, 0, 3, 0.1, 3, 0.1},           {FIRST, 0, NONE, 0, FIRST, 0},
+        {NONE, 0, FIRST, 0, FIRST, 0},       {FIRST, 0, 3, 0.1, 3, 0.1},
+        {3, 0.1, FIRST, 0, 3, 0.1},          {3, 0.1, 1, -0.02, 4, 0.07},
+        {200, 0.1, 100, -0.2, FIRST - 1, 0},  // a count that has no room is the largest that has
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        fill(NODES);
+        forget_seen();
+        const int weights[2] = {cases[i].older, cases[i].newer};
+        const double errors_m[2] = {cases[i].older_error_m, cases[i].newer_error_m};
+        for (int k = 0; k < 2; k++) {
+            show(1 + k, direction_of(1 + k, 0, 0, SD_RAD));
+            if (weights[k] != NONE) {
+                show(1 + k, range_of(1 + k, 0, errors_m[k], weights[k]));
+            }
+        }
+        join_pair();
+        assert_int_equal(smoother.seen_count, cases[i].joined == NONE ? 1 : 2);
+        if (cases[i].joined != NONE) {
+            const bslam_smoother_seen_t *range = bslam_smoother_seen(&smoother, 1);
+            const bslam_smoother_seen_t expected = range_of(1, 0, cases[i].joined_error_m, cases[i].joined);
+            assert_int_equal(range->beacon, BSLAM_SMOOTHER_RANGE);
+            assert_int_equal(range->weight, cases[i].joined);
+            assert_near(range->value, expected.value, cases[i].joined == FIRST ? 0 : 1);
+        }
+    }
+}
+
+static void test_what_is_seen_of_a_beacon_where_the_robot_stands_stays_as_it_was(void **state)
+{
+    // At the older node, at the newer one, or half way between them: from there it has no direction.
+    for (int i = 0; i < 3; i++) {
+        fill(NODES);
+        forget_seen();
+        const bslam_smoother_seen_t direction = direction_of(1, 0, 0.3, SD_RAD);
+        const bslam_smoother_seen_t range = range_of(1, 0, 0, 3);
+        show(i == 1 ? 2 : 1, direction);
+        show(i == 1 ? 2 : 1, range);
+        const bslam_real_t *older = bslam_smoother_node(&smoother, i == 1 ? 2 : 1)->at;
+        const bslam_real_t *newer = bslam_smoother_node(&smoother, i == 0 ? 1 : 2)->at;
+        bslam_real_t *place = &smoother.base.mean[smoother.base.beacons[0].at];
+        place[0] = (older[BSLAM_STATE_X] + newer[BSLAM_STATE_X]) / 2;
+        place[1] = (older[BSLAM_STATE_Y] + newer[BSLAM_STATE_Y]) / 2;
+        join_pair();
+        assert_int_equal(smoother.seen_count, 2);
+        assert_int_equal(bslam_smoother_seen(&smoother, 0)->value, direction.value);
+        assert_int_equal(bslam_smoother_seen(&smoother, 1)->value, range.value);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -228,8 +374,12 @@ int main(void)
         cmocka_unit_test_setup(test_no_way_is_lost_and_neither_the_oldest_nor_the_newest_node, setup),
         cmocka_unit_test_setup(test_older_nodes_are_longer_ones, setup),
         cmocka_unit_test_setup(test_where_all_levels_are_full_the_oldest_leave, setup),
+        cmocka_unit_test_setup(test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end, setup),
         cmocka_unit_test_setup(test_bent_way_leads_from_a_node_to_the_next, setup),
         cmocka_unit_test_setup(test_directions_are_those_from_where_the_node_is_and_weigh_as_many, setup),
+        cmocka_unit_test_setup(test_directions_that_differ_become_their_weighted_mean, setup),
+        cmocka_unit_test_setup(test_distances_become_their_mean_and_a_measured_one_is_never_lost, setup),
+        cmocka_unit_test_setup(test_what_is_seen_of_a_beacon_where_the_robot_stands_stays_as_it_was, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
