@@ -45,9 +45,10 @@ endif
 
 # What costs flash at -Os: loops that become calls of memmove, which nothing else needs; constants of a loop
 # kept in registers, which are saved and restored for it; functions with one caller, inlined with the same
-# end; instructions in an order for pipelines, which takes registers too.
+# end; instructions in an order for pipelines, which takes registers too; values worked out again where
+# they are used, which takes registers longer.
 SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inline-functions-called-once \
-    -fno-schedule-insns2
+    -fno-schedule-insns2 -fno-tree-forwprop
 
 # The rules for one core: $(1) is its name.
 define core_rules

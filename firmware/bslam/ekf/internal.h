@@ -32,7 +32,8 @@ static inline void bslam_ekf_clear(bslam_real_t *x, int n)
 }
 
 /// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
-void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
+/// Returns by how much less row P rowᵀ is for the pending ones.
+bslam_real_t bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
 
 /// row · vector.
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);

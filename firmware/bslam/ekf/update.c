@@ -27,34 +27,41 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
     return sum;
 }
 
-/// Adds to P rowᵀ what the waiting down-dates make of it.
-static void add_pending(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+/// Adds to P rowᵀ what the waiting down-dates make of it. Returns by how much less row P rowᵀ is for it.
+static bslam_real_t add_pending(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
+    bslam_real_t less = 0;
     for (int p = 0; p < ekf->pending_count; p++) {
         const bslam_real_t *column = ekf->pending[p];
-        const bslam_real_t factor = ekf->pending_scale[p] * bslam_ekf_dot(row, column);
+        const bslam_real_t by_row = bslam_ekf_dot(row, column);
+        const bslam_real_t factor = ekf->pending_scale[p] * by_row;
         bslam_ekf_add_scaled(out, factor, column, ekf->dim);
+        less -= factor * by_row;
     }
+    return less;
 }
 
-void bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+bslam_real_t bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
 {
     bslam_symmat_times(ekf->covariance, ekf->dim, row, out);
-    add_pending(ekf, row, out);
+    return add_pending(ekf, row, out);
 }
 
-/// P times the rows of a sighting's bearing and, if it has one, range.
-static void project_sighting(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
-                             bslam_real_t *by_bearing, bslam_real_t *by_range)
+/// P times the rows of a sighting's bearing (y) and, if it has one, range (x). Returns by how much less their
+/// variances are for what waits.
+static bslam_sym2_t project_sighting(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
+                                     bslam_real_t *by_bearing, bslam_real_t *by_range)
 {
+    bslam_sym2_t less = {0, 0, 0};
     if (!innovation->has_range) {
-        bslam_ekf_project(ekf, &innovation->bearing_row, by_bearing);
-        return;
+        less.yy = bslam_ekf_project(ekf, &innovation->bearing_row, by_bearing);
+        return less;
     }
     bslam_symmat_times_two(ekf->covariance, ekf->dim, &innovation->bearing_row, &innovation->range_row,
                            by_bearing, by_range);
-    add_pending(ekf, &innovation->bearing_row, by_bearing);
-    add_pending(ekf, &innovation->range_row, by_range);
+    less.yy = add_pending(ekf, &innovation->bearing_row, by_bearing);
+    less.xx = add_pending(ekf, &innovation->range_row, by_range);
+    return less;
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
@@ -325,7 +332,7 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
         flush(ekf);
     }
     bslam_real_t *column = ekf->pending[ekf->pending_count];
-    bslam_ekf_project(ekf, row, column);
+    (void)bslam_ekf_project(ekf, row, column);
     const bslam_real_t left = innovation - foreseen(ekf, row);
     accept_column(ekf, gain_of(left, bslam_ekf_dot(row, column) + variance));
 }
@@ -343,13 +350,19 @@ static bslam_status_t judge(const bslam_params_t *params, bslam_fusion_t *fusion
     return BSLAM_OK;
 }
 
-/// A measurement's variance, and at least what h P hᵀ itself is rounded by: a sighting that is surer than
-/// that of a pose in great doubt would leave no positive definite covariance. MATH "Update".
-static bslam_real_t noise_of(bslam_real_t variance, bslam_real_t weight, bslam_real_t hph)
+/// A measurement's variance, and at least what h P hᵀ is rounded by: a sighting that is surer than that of a
+/// pose in great doubt would leave no positive definite covariance. What h P hᵀ comes to does not tell: the
+/// doubt that a robot shares with a beacon cancels out, but not its rounding. So `before`, which is h P hᵀ
+/// without what waits, and the robot's own part of it. MATH "Update".
+static bslam_real_t noise_of(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t variance,
+                             bslam_real_t before)
 {
-    const bslam_real_t noise = variance / weight;
-    const bslam_real_t rounding = ROUNDINGS * hph;
-    return noise > rounding ? noise : rounding;
+    bslam_real_t terms = before;
+    for (int k = 0; k < POSE_DIM; k++) {
+        terms += row->base[k] * row->base[k] * ekf->covariance[5 * k];  // the first rows lie four apart
+    }
+    const bslam_real_t rounding = ROUNDINGS * terms;
+    return variance > rounding ? variance : rounding;
 }
 
 bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
@@ -364,7 +377,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
     const bslam_real_t bearing_left = innovation->bearing_rad - foreseen(ekf, bearing_row);
-    project_sighting(ekf, innovation, bearing_column, range_column);
+    const bslam_sym2_t less = project_sighting(ekf, innovation, bearing_column, range_column);
     hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
     if (innovation->has_range) {
         range_left = innovation->range_m - foreseen(ekf, &innovation->range_row);
@@ -382,7 +395,8 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     if (status != BSLAM_OK) {
         return status;
     }
-    const bslam_real_t bearing_s = hph.yy + noise_of(innovation->bearing_var_rad2, fusion->weight, hph.yy);
+    const bslam_real_t bearing_var = innovation->bearing_var_rad2 / fusion->weight;
+    const bslam_real_t bearing_s = hph.yy + noise_of(ekf, bearing_row, bearing_var, hph.yy + less.yy);
     const gain_t bearing = gain_of(bearing_left, bearing_s);
     if (!innovation->has_range) {
         accept_column(ekf, bearing);
@@ -390,8 +404,9 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     }
     // The range's variance and innovation, given the bearing.
     const bslam_real_t share = hph.xy / bearing_s;
+    const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
     const bslam_real_t range_s =
-        hph.xx - share * hph.xy + noise_of(innovation->range_var_m2, fusion->weight, hph.xx);
+        hph.xx - share * hph.xy + noise_of(ekf, &innovation->range_row, range_var, hph.xx + less.xx);
     accept_two(ekf, bearing, gain_of(range_left - share * bearing_left, range_s), share);
     return BSLAM_OK;
 }

@@ -673,6 +673,93 @@ static void test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible(void **
     }
 }
 
+/// A robot in great doubt of where it is starts two beacons a few millimetres from its sensor and moves by as
+/// much: of what the rows look at, each value is in doubt by metres, and all have the same doubt.
+static bslam_ekf_t filter_close_by(const bslam_params_t *params, unit_random_t *random)
+{
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, params);
+    const bslam_real_t doubt_m2 = (bslam_real_t)unit_random(random, 1, 400);
+    bslam_ekf_resume(&ekf, params, doubt_m2, (bslam_real_t)unit_random(random, 0.01, 10));
+    for (int b = 0; b < 2; b++) {
+        int index;
+        const double range_m = unit_random(random, 0.001, 0.01);
+        const bslam_sighting_t sighting = unit_polar(unit_random(random, -3, 3), range_m, b);
+        assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &sighting, &index), BSLAM_OK);
+    }
+    const bslam_motion_t motion = {.forward_m = (bslam_real_t)unit_random(random, -0.005, 0.005),
+                                   .turn_rad = (bslam_real_t)unit_random(random, -0.02, 0.02),
+                                   .forward_var_m2 = BSLAM_R(1e-4),
+                                   .turn_var_rad2 = BSLAM_R(1e-4),
+                                   .dt_s = BSLAM_R(0.04)};
+    bslam_motion_t moved;
+    bslam_ekf_predict(&ekf, params, &motion, &moved);
+    return ekf;
+}
+
+/// By how much |P_ij| exceeds sqrt(P_ii P_jj) at most, as part of what that was before.
+static double largest_excess(const bslam_ekf_t *ekf, const bslam_ekf_t *before)
+{
+    double largest = 0;
+    for (int i = 0; i < ekf->dim; i++) {
+        for (int j = 0; j < i; j++) {
+            const double pii = (double)bslam_symmat_get(ekf->covariance, i, i);
+            const double pjj = (double)bslam_symmat_get(ekf->covariance, j, j);
+            const double excess = fabs((double)bslam_symmat_get(ekf->covariance, i, j)) - sqrt(pii * pjj);
+            const double was_ii = (double)bslam_symmat_get(before->covariance, i, i);
+            const double was_jj = (double)bslam_symmat_get(before->covariance, j, j);
+            largest = fmax(largest, excess / sqrt(was_ii * was_jj));
+        }
+    }
+    return largest;
+}
+
+/// Fuses sightings of the first `count` beacons, those whose direction and distance float can still tell.
+/// Returns how many.
+static int see_close_by(bslam_ekf_t *ekf, const bslam_params_t *params, int count, bool has_range)
+{
+    int fused = 0;
+    for (int b = 0; b < count; b++) {
+        const plan_t plan = {b, has_range, 0, 0};
+        const bslam_sighting_t sighting = sighting_of(ekf, &plan);
+        bslam_innovation_t innovation;
+        bslam_fusion_t fusion;
+        if (bslam_ekf_innovation(ekf, params, &mount, &sighting, b, &innovation) == BSLAM_OK &&
+            bslam_ekf_fuse(ekf, params, &innovation, &fusion) == BSLAM_OK) {
+            fused++;
+        }
+    }
+    bslam_ekf_correct(ekf, params);
+    return fused;
+}
+
+/// set_pose: in between the robot is put where it is for sure, and the beacons alone share the doubt.
+static void assert_close_by_leaves_correlations_possible(int filter, bool velocity, bool set_pose)
+{
+    const bslam_params_t params = params_of(filter, velocity);
+    unit_random_t random = {22};
+    int fused = 0;
+    for (int round = 0; round < 2000; round++) {
+        bslam_ekf_t ekf = filter_close_by(&params, &random);
+        if (set_pose) {
+            const bslam_pose_t pose = bslam_ekf_pose(&ekf);
+            bslam_ekf_set_pose(&ekf, &pose, BSLAM_R(1e-6), BSLAM_R(1e-6));
+        }
+        const bslam_ekf_t before = ekf;
+        fused += see_close_by(&ekf, &params, 1 + round % 2, round % 3 != 0);
+        assert_true(bslam_ekf_is_sane(&ekf));
+        assert_true(largest_excess(&ekf, &before) <= 2 * (double)BSLAM_REAL_EPSILON);  // four roundings
+    }
+    assert_true(fused > 2000);
+}
+
+static void test_fuse_in_a_doubt_shared_with_beacons_close_by_leaves_correlations_possible(void **state)
+{
+    for (int k = 0; k < 8; k++) {
+        assert_close_by_leaves_correlations_possible(k % 2, k / 2 % 2 != 0, k / 4 != 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -705,6 +792,7 @@ int main(void)
         cmocka_unit_test(test_fuse_and_distance2_of_an_indefinite_state_are_singular),
 
         cmocka_unit_test(test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible),
+        cmocka_unit_test(test_fuse_in_a_doubt_shared_with_beacons_close_by_leaves_correlations_possible),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
