@@ -62,12 +62,13 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
     return bslam_given_distance2(&search->given) <= joint_limit(frame->params, search->given.count);
 }
 
-/// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better.
+/// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better: one of
+/// fewer does not come so far (try_next).
 static void keep_if_better(search_t *search)
 {
     const int32_t pairs = search->pairs[search->count];
     const bslam_real_t distance2 = bslam_given_distance2(&search->given);
-    if (pairs > search->best_pairs || (pairs == search->best_pairs && distance2 < search->best_distance2)) {
+    if (pairs > search->best_pairs || distance2 < search->best_distance2) {
         search->best_pairs = pairs;
         search->best_distance2 = distance2;
         memcpy(search->best, search->choice, sizeof search->best);

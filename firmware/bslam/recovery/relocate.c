@@ -267,8 +267,13 @@ static bool step(const bslam_clue_t *clues, int count, bslam_pose_t *pose, bslam
     const bslam_real_t *g = normal.g;
     pose->x_m += c[0] * g[0] + c[1] * g[1] + c[3] * g[2];
     pose->y_m += c[1] * g[0] + c[2] * g[1] + c[4] * g[2];
-    pose->theta_rad = bslam_angle_wrap(pose->theta_rad + c[3] * g[0] + c[4] * g[1] + c[5] * g[2]);
-    return bslam_is_number(pose->x_m) && bslam_is_number(pose->y_m);
+    const bslam_real_t theta_rad = pose->theta_rad + c[3] * g[0] + c[4] * g[1] + c[5] * g[2];
+    // No angle to wrap where one of the three is no number.
+    if (!bslam_is_number(bslam_abs(pose->x_m) + bslam_abs(pose->y_m) + bslam_abs(theta_rad))) {
+        return false;
+    }
+    pose->theta_rad = bslam_angle_wrap(theta_rad);
+    return true;
 }
 
 static bool refine(const bslam_clue_t *clues, int count, bslam_fix_t *fix)

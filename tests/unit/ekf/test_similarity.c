@@ -167,12 +167,41 @@ static void test_without_a_distance_it_is_the_invariant_form(void **state)
     assert_false(bslam_ekf_note_scale(&ekf, &params));  // a known place tells the scale
 }
 
+/// A ray from (0, 0) ahead, of this inverse distance, for a sensor at (x, 0).
+static bool one_ray_tells_the_scale(double inverse_per_m, double x_m)
+{
+    bslam_params_t params = similarity_params();
+    params.mount_x_m = 0;
+    params.mount_y_m = 0;
+    const bslam_pose_t axle = {0, 0, params.mount_yaw_rad};
+    const bslam_sighting_t seen = unit_direction(-(double)params.mount_yaw_rad, 0);
+    bslam_ekf_t ekf;
+    int index;
+    bslam_ekf_init(&ekf, &params);
+    assert_int_equal(bslam_ekf_add(&ekf, &params, &axle, &seen, &index), BSLAM_OK);
+    ekf.mean[ekf.beacons[index].at + 3] = real(inverse_per_m);
+    ekf.mean[BSLAM_STATE_X] = real(x_m);
+    return bslam_ekf_note_scale(&ekf, &params);
+}
+
+static void test_beacon_without_a_positive_distance_tells_no_scale(void **state)
+{
+    static const double nowhere_per_m[] = {0, -0.25, NAN};  // at infinity, behind it, no number
+    assert_true(one_ray_tells_the_scale(0.25, 0));
+    for (int i = 0; i < COUNT_OF(nowhere_per_m); i++) {
+        assert_false(one_ray_tells_the_scale(nowhere_per_m[i], 0));
+    }
+    assert_true(one_ray_tells_the_scale(0.25, 3));
+    assert_false(one_ray_tells_the_scale(0.25, 4));  // the sensor is where it is
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_covariance_is_that_of_the_sandwich),
         cmocka_unit_test(test_directions_tell_nothing_of_the_size_of_the_world),
         cmocka_unit_test(test_without_a_distance_it_is_the_invariant_form),
+        cmocka_unit_test(test_beacon_without_a_positive_distance_tells_no_scale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -188,6 +188,23 @@ static void test_recovery_of_one_odd_beacon_ends_where_another_agrees(void **sta
     assert_int_equal(recovery.counters.lost, 0);
 }
 
+static void test_recovery_of_one_odd_beacon_ends_where_another_agrees_beside_it(void **state)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    look_on(20, 1, 2, -1, 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
+    const bslam_sighting_t seen[] = {
+        unit_polar(remainder(atan2(beacons[0][1] - 2, beacons[0][0] - 1) + 1, 2 * PI),
+                   hypot(beacons[0][0] - 1, beacons[0][1] - 2), 0),
+        unit_polar(atan2(beacons[1][1], beacons[1][0]), hypot(beacons[1][0], beacons[1][1]), 1)};
+    const uint32_t before = recovery.counters.contradicting;
+    now_us += STEP_US;
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, 2), BSLAM_OK);
+    assert_int_equal(recovery.counters.contradicting, before + 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    assert_int_equal(recovery.counters.lost, 0);
+}
+
 static void test_recovery_in_a_map_of_one_beacon_is_never_lost(void **state)
 {
     look_on(50, 0, 0, 0, 1);
@@ -354,6 +371,7 @@ int main(void)
         cmocka_unit_test_setup(
             test_recovery_by_one_beacon_that_is_elsewhere_gets_lost_in_a_second_and_learns_nothing, setup),
         cmocka_unit_test_setup(test_recovery_of_one_odd_beacon_ends_where_another_agrees, setup),
+        cmocka_unit_test_setup(test_recovery_of_one_odd_beacon_ends_where_another_agrees_beside_it, setup),
         cmocka_unit_test_setup(test_recovery_in_a_map_of_one_beacon_is_never_lost, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),

@@ -99,7 +99,14 @@ static void test_relocate_takes_a_beacon_that_is_seen_twice_for_one(void **state
         assert_int_equal(fix.beacons, 2);
         assert_int_equal(fix.with_range, 2);
     }
+    // Both of its distances agree: that is still one beacon with a distance.
+    const bslam_clue_t twice[] = {with, with, other};
+    assert_found(twice, 3, 1, 3, 0, 3);
     bslam_fix_t fix = {.agreeing = 77};
+    bslam_fix_t by_two;
+    assert_true(bslam_relocate(twice, 3, &by_two));
+    assert_int_equal(by_two.beacons, 2);
+    assert_int_equal(by_two.with_range, 2);
     const bslam_clue_t directions[] = {without, clue_of(1, 1, 3, 0, false), without};
     const bslam_clue_t distances[] = {with, with, clue_of(1, 1, 3, 0, false)};
     assert_false(bslam_relocate(directions, 3, &fix));
@@ -164,6 +171,57 @@ static void test_relocate_by_places_beyond_numbers_finds_nothing(void **state)
     bslam_fix_t fix = {.agreeing = 77};
     assert_false(bslam_relocate(clues, 3, &fix));
     assert_int_equal(fix.agreeing, 77);
+}
+
+/// Three directions tell a place of which one coordinate is beyond what is taken for a number, 10^12 m.
+static void test_relocate_to_half_a_place_finds_nothing(void **state)
+{
+    static const double directions[][2] = {{4, 1}, {0, 3}, {-2, 5}};
+    for (int k = 0; k < 2; k++) {
+        const double unit_m = k == 0 ? 1e3 : 1e12;
+        bslam_clue_t clues[3];
+        for (int i = 0; i < 3; i++) {
+            clues[i] = clue_of(i, 0, 0, 0, false);
+            clues[i].x_m = real(unit_m * directions[i][0]);
+            clues[i].y_m = real(unit_m * (directions[i][1] - 5));
+            clues[i].bearing_rad = real(atan2(directions[i][1], directions[i][0]));
+        }
+        bslam_fix_t fix = {.agreeing = 77};
+        assert_int_equal(bslam_relocate(clues, 3, &fix), k == 0);
+        assert_int_equal(fix.agreeing, k == 0 ? 3 : 77);
+        assert_near(fix.pose.x_m, 0, k == 0 ? 0.1 : 0);
+        assert_near(fix.pose.y_m, k == 0 ? -5e3 : 0, k == 0 ? 0.1 : 0);
+    }
+}
+
+/// Two beacons straight ahead, one behind the other.
+static bool find_before_two(double near_m, double far_m, double bearing_var_rad2, double range_var_m2)
+{
+    const double places_m[] = {near_m, far_m};
+    bslam_clue_t clues[2];
+    for (int i = 0; i < 2; i++) {
+        clues[i] = (bslam_clue_t){.beacon = i,
+                                  .x_m = real(places_m[i]),
+                                  .range_m = real(places_m[i]),
+                                  .has_range = true,
+                                  .bearing_var_rad2 = real(bearing_var_rad2),
+                                  .range_var_m2 = real(range_var_m2)};
+    }
+    bslam_fix_t fix = {.agreeing = 77};
+    const bool found = bslam_relocate(clues, 2, &fix);
+    assert_int_equal(fix.agreeing, found ? 2 : 77);
+    assert_true(!found || (bslam_is_number(fix.pose.x_m) && bslam_is_number(fix.pose.y_m)));
+    return found;
+}
+
+/// Clues so sure that their information has a determinant beyond numbers.
+static void test_relocate_by_clues_surer_than_numbers_finds_nothing(void **state)
+{
+    const double root = BSLAM_REAL_DOUBLE ? 1.1e154 : 1.5e19;  // so that twice its square is no number
+    assert_true(find_before_two(4, 7, 1e-4, 0.01));
+    assert_true(find_before_two(1, 100, 1e-4, 0.01));
+    assert_false(find_before_two(4, 7, 1e-4, BSLAM_REAL_DOUBLE ? 1e-305 : 1e-35));
+    assert_false(find_before_two(1, 100, 1 / root, 2));
 }
 
 /// A sighting that is beacon 1 or 3, which look alike.
@@ -247,6 +305,8 @@ int main(void)
         cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),
         cmocka_unit_test(test_relocate_on_a_beacon_leaves_its_direction_out),
         cmocka_unit_test(test_relocate_by_places_beyond_numbers_finds_nothing),
+        cmocka_unit_test(test_relocate_to_half_a_place_finds_nothing),
+        cmocka_unit_test(test_relocate_by_clues_surer_than_numbers_finds_nothing),
         cmocka_unit_test(test_relocate_tells_by_geometry_which_of_two_is_seen),
         cmocka_unit_test(test_relocate_of_two_that_agree_the_nearest_is_seen),
         cmocka_unit_test(test_relocate_with_too_little_finds_nothing),

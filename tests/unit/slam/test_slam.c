@@ -306,6 +306,16 @@ static void test_sightings_at_the_limits_of_their_fields_are_taken(void **state)
     assert_int_equal(bslam_slam_counters(&slam)->insane, 0);
 }
 
+static void test_sightings_distance_that_a_direction_does_not_have_is_not_what_is_wrong(void **state)
+{
+    bslam_slam_t slam = running(refusing_params(state));
+    bslam_sighting_t seen = unit_direction(100, 3);
+    seen.range_m = real(NAN);
+    assert_frame_refused(&slam, 11 * STEP_US, &seen, 1, BSLAM_E_RANGE, 0);
+    seen.has_range = true;
+    assert_frame_refused(&slam, 11 * STEP_US, &seen, 1, BSLAM_E_NOT_FINITE, 0);
+}
+
 static void test_add_known_beacon_every_refusal_changes_nothing(void **state)
 {
     bslam_slam_t slam = running(refusing_params(state));
@@ -1323,6 +1333,7 @@ int main(void)
         cmocka_unit_test(test_sightings_older_than_the_history_are_refused_and_change_nothing),
         cmocka_unit_test(test_sightings_bad_sighting_is_named_and_changes_nothing),
         cmocka_unit_test(test_sightings_at_the_limits_of_their_fields_are_taken),
+        cmocka_unit_test(test_sightings_distance_that_a_direction_does_not_have_is_not_what_is_wrong),
         cmocka_unit_test(test_add_known_beacon_every_refusal_changes_nothing),
         cmocka_unit_test(test_add_known_beacon_to_a_full_map_is_refused_and_changes_nothing),
         cmocka_unit_test(test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing),

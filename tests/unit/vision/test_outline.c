@@ -218,7 +218,8 @@ static void test_find_at_every_edge_of_the_frame_reads_nothing_outside(void **st
         unit_picture_set(&picture, (int)unit_random(&random, 0, 160), (int)unit_random(&random, 0, 120), 10,
                          240, 90);
     }
-    for (int i = 0; i < 400; i++) {
+    int found = 0;
+    for (int i = 0; i < 1500; i++) {
         bslam_camera_t *camera = &cameras[i % 2];
         camera->pitch_rad = real(unit_random(&random, -1.4, 1.4));
         const double left = unit_random(&random, -0.5, 318), top = unit_random(&random, -0.5, 238);
@@ -229,9 +230,51 @@ static void test_find_at_every_edge_of_the_frame_reads_nothing_outside(void **st
             bslam_outline_find(&picture.frame, camera, &rough, real(unit_random(&random, 0, 2)), &outline);
         assert_true(status == BSLAM_OK || status == BSLAM_E_RANGE);
         if (status == BSLAM_OK) {
+            found++;
             assert_true(bslam_is_number(outline.middle) && outline.middle_var > 0 &&
-                        outline.top > outline.bottom);
+                        outline.top > outline.bottom && outline.left > outline.right);
+            // All of it is before the camera.
+            assert_true(1 + outline.turn * outline.left > 0 && 1 + outline.turn * outline.right > 0);
         }
+    }
+    assert_true(found > 500);
+}
+
+/// Looking down at the floor: the box lies round what is straight below, of which no upright plane shows
+/// anything.
+static void test_find_refuses_a_box_that_reaches_to_straight_below(void **state)
+{
+    static unit_picture_t picture;
+    bslam_camera_t camera = unit_equidistant();
+    camera.pitch_rad = real(0.65);
+    unit_picture_fill(&picture, 120, 130, 140);
+    const bslam_box_t reaching = {36, 209, 287, 239};
+    const bslam_box_t above = {120, 120, 200, 180};
+    bslam_outline_t outline = {.left = 7};
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &reaching, 0, &outline), BSLAM_E_RANGE);
+    assert_true(outline.left == 7);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &above, 0, &outline), BSLAM_OK);
+}
+
+/// Looking up through a lens that bends straight lines much: an end of the upright side through the box's
+/// middle height lies where the lens sees nothing.
+static void test_find_refuses_a_box_of_which_the_lens_does_not_see_either_side(void **state)
+{
+    static unit_picture_t picture;
+    bslam_camera_t camera = unit_pinhole();
+    camera.fx_px = camera.fy_px = real(69.217);
+    camera.pitch_rad = real(-1.43259);
+    camera.k1 = real(-0.898651);
+    camera.k2 = real(0.387267);
+    unit_picture_fill(&picture, 120, 130, 140);
+    assert_int_equal(bslam_camera_check(&camera), BSLAM_OK);
+    const double left = 2.18808, right = 251.74, width = 2 * (double)camera.cx_px;
+    const bslam_box_t boxes[] = {{real(left), real(165.879), real(right), real(190.64)},
+                                 {real(width - right), real(165.879), real(width - left), real(190.64)}};
+    for (int i = 0; i < 2; i++) {
+        bslam_outline_t outline = {.left = 7};
+        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &boxes[i], 0, &outline), BSLAM_E_RANGE);
+        assert_true(outline.left == 7);
     }
 }
 
@@ -268,6 +311,8 @@ int main(void)
         cmocka_unit_test(test_find_is_less_sure_where_two_edges_may_be_the_side),
         cmocka_unit_test(test_find_where_nothing_is_keeps_the_box_and_doubts_it),
         cmocka_unit_test(test_find_at_every_edge_of_the_frame_reads_nothing_outside),
+        cmocka_unit_test(test_find_refuses_a_box_that_reaches_to_straight_below),
+        cmocka_unit_test(test_find_refuses_a_box_of_which_the_lens_does_not_see_either_side),
         cmocka_unit_test(test_find_refuses_a_box_that_is_none),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -251,6 +251,12 @@ static void test_signature_refuses_what_is_too_small_or_in_the_dark(void **state
     assert_int_equal(bslam_signature(&picture->frame, &QUAD, signature), BSLAM_E_RANGE);
     picture->surroundings.wall.green = NAN;
     assert_int_equal(bslam_signature(&picture->frame, &QUAD, signature), BSLAM_E_RANGE);
+    picture = room();
+    picture->surroundings.wall.blue = 3.9f;
+    assert_int_equal(bslam_signature(&picture->frame, &QUAD, signature), BSLAM_E_RANGE);
+    picture->surroundings.wall.blue = 4.0f;
+    float bright[BSLAM_SIGNATURE_SIZE];
+    assert_int_equal(bslam_signature(&picture->frame, &QUAD, bright), BSLAM_OK);
     assert_true(signature[0] == 7);
 }
 
