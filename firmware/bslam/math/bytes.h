@@ -198,6 +198,11 @@ static inline uint32_t bslam_halves_less(uint32_t a, uint32_t b)
 #endif
 }
 
+static inline uint32_t bslam_halves_least(uint32_t a, uint32_t b)
+{
+    return a - bslam_halves_less(a, b);
+}
+
 /// The other half first.
 static inline uint32_t bslam_halves_turned(uint32_t halves)
 {

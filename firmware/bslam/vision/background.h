@@ -84,21 +84,15 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
                             const bslam_camera_t *camera, const bslam_tones_t *tones);
 
 /// Histogram bin of a tone: 16 of light, 12 steps each; 8 of each chroma, 8 steps each but for the middle
-/// one, which has the greys on both sides of 0, and those at the ends, which are open.
-static inline int32_t bslam_light_bin(int32_t light)
-{
-    return light < 192 ? light * 171 >> 11 : 15;  // a twelfth, exact up to 192
-}
-
-static inline int32_t bslam_chroma_bin(int32_t chroma)
-{
-    return chroma <= -32 ? 0 : chroma >= 24 ? 7 : chroma / 8 + 4;
-}
+/// one, which has the greys on both sides of 0, and those at the ends, which are open. By tables, since all
+/// that looks at tones asks for it.
+extern const uint8_t bslam_light_bins[256];
+extern const uint8_t bslam_chroma_bins[256];  ///< [(uint8_t)chroma]
 
 static inline int32_t bslam_tone_bin(bslam_tone_t tone)
 {
-    return bslam_light_bin(tone.light) << 6 | bslam_chroma_bin(tone.reddish) << 3 |
-           bslam_chroma_bin(tone.bluish);
+    return bslam_light_bins[tone.light] << 6 | bslam_chroma_bins[(uint8_t)tone.reddish] << 3 |
+           bslam_chroma_bins[(uint8_t)tone.bluish];
 }
 
 /// Distance of two tones: chroma counts twice.

@@ -11,14 +11,15 @@
 #define GREEN_SHIFT 21
 /// 2 in each channel: makes a quarter of a sum of four round to nearest.
 #define HALF_OF_FOUR (2U | 2U << RED_SHIFT | 2U << GREEN_SHIFT)
-/// Pixel pairs in a step of the loop over a row.
+/// Pixel pairs that are copied at once.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
-/// Before the loop over a step: a core without vectors takes its pairs one after the other, without a loop;
-/// any other takes them at once, which a compiler sees in a loop alone.
+/// Pixel pairs that are summed at once, and cells that are made of them.
 #if BSLAM_HAS_BYTES
-#define A_STEP_IN_LINE _Pragma("GCC unroll 4")
+#define PAIRS_AT_ONCE 2
+#define CELLS_AT_ONCE 2
 #else
-#define A_STEP_IN_LINE
+#define PAIRS_AT_ONCE 4
+#define CELLS_AT_ONCE 4
 #endif
 
 static bool size_is_allowed(int32_t size_px, int32_t size_max_px, int32_t step_px)
@@ -50,12 +51,28 @@ static void pack_888(uint16_t *restrict packed, const uint8_t *restrict pixels, 
     }
 }
 
-/// The sum of a pair of pixels. The word of two, and the same turned by half, hold between them each channel
-/// of each pixel in its spread place; which of the two came first does not matter.
-static inline uint32_t pair_sum(const uint8_t *pair)
+/// Four bytes' boundaries let a core move several words at once.
+static inline const uint8_t *words_at(const void *bytes)
 {
-    const uint32_t word = bslam_word_at(pair);
-    return (word & SPREAD_MASK) + ((word >> 16 | word << 16) & SPREAD_MASK);
+    return __builtin_assume_aligned(bytes, sizeof(uint32_t));
+}
+
+/// The upper row of two as it comes: words of two pixels, until the lower one makes sums of them.
+static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, int32_t pairs)
+{
+    uint8_t *kept = __builtin_assume_aligned(words, sizeof(uint32_t));
+    _Pragma("GCC unroll 2")
+    for (int32_t i = 0; i < 4 * pairs; i += 4 * PAIRS_A_STEP) {
+        memcpy(kept + i, words_at(pixels + i), 4 * PAIRS_A_STEP);
+    }
+}
+
+/// The sum of two pixels above two. The word of a pair, and the same turned by half, hold between them each
+/// channel of each pixel in its spread place; which of the two came first does not matter.
+static inline uint32_t quad_sum(uint32_t above, uint32_t below)
+{
+    return (above & SPREAD_MASK) + (bslam_halves_turned(above) & SPREAD_MASK) + (below & SPREAD_MASK) +
+           (bslam_halves_turned(below) & SPREAD_MASK);
 }
 
 /// The mean of 2x2 pixels in RGB565 from their sum.
@@ -65,30 +82,39 @@ static inline uint16_t mean_565(uint32_t quad)
     return (uint16_t)(mean | mean >> 16);
 }
 
-/// The upper row of two: sums of its pairs.
-static void sum_pairs(uint32_t *restrict sums, const uint8_t *restrict pixels, int32_t pairs)
+/// Makes some words of the upper row the sums of 2x2 pixels; their means. A core without vectors takes two at
+/// a time, any other as many as a compiler makes a vector of.
+static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels)
 {
-    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
-        A_STEP_IN_LINE
-        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
-            sums[i + k] = pair_sum(pixels + 4 * (i + k));
-        }
+#if BSLAM_HAS_BYTES
+    const uint32_t above = words[0], next_above = words[1];
+    const uint32_t below = bslam_word_at(pixels), next_below = bslam_word_at(pixels + sizeof below);
+    const uint32_t sum = quad_sum(above, below), next_sum = quad_sum(next_above, next_below);
+    words[0] = sum;
+    words[1] = next_sum;
+    half[0] = mean_565(sum);
+    half[1] = mean_565(next_sum);
+#else
+    for (int32_t k = 0; k < PAIRS_AT_ONCE; k++) {
+        words[k] = quad_sum(words[k], bslam_word_at(pixels + 4 * k));
     }
+    for (int32_t k = 0; k < PAIRS_AT_ONCE; k++) {
+        half[k] = mean_565(words[k]);
+    }
+#endif
 }
 
-/// The lower row of two: to the sums of the upper row's pairs, which become those of 2x2 pixels; their means.
-static void sum_quads(uint32_t *restrict sums, uint16_t *restrict half, const uint8_t *restrict pixels,
+/// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means.
+static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels,
                       int32_t pairs)
 {
-    for (int32_t i = 0; i < pairs; i += PAIRS_A_STEP) {
-        A_STEP_IN_LINE
-        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
-            sums[i + k] += pair_sum(pixels + 4 * (i + k));
-        }
-        A_STEP_IN_LINE
-        for (int32_t k = 0; k < PAIRS_A_STEP; k++) {
-            half[i + k] = mean_565(sums[i + k]);
-        }
+    const uint32_t *end = words + pairs;
+    _Pragma("GCC unroll 2")
+    while (words != end) {
+        sum_some(words, half, words_at(pixels));
+        words += PAIRS_AT_ONCE;
+        half += PAIRS_AT_ONCE;
+        pixels += 4 * PAIRS_AT_ONCE;
     }
 }
 
@@ -98,31 +124,41 @@ static inline uint32_t luma(uint32_t quad)
     return (quad >> RED_SHIFT & 127) + (quad >> GREEN_SHIFT);
 }
 
-/// The largest luma of four quarters less the smallest, at most 255: of two at a time, in halves of a word.
-static inline uint8_t spread_of(const uint32_t above[2], const uint32_t below[2])
+#if BSLAM_HAS_BYTES
+
+/// Of two quarters, in halves of a word.
+static inline uint32_t two_lumas(uint32_t first, uint32_t second)
 {
-    const uint32_t uppers = luma(above[0]) | luma(above[1]) << 16;
-    const uint32_t lowers = luma(below[0]) | luma(below[1]) << 16;
-    const uint32_t less = bslam_halves_less(uppers, lowers);
-    const uint32_t highs = lowers + less, lows = uppers - less;
-    const uint32_t other_high = bslam_halves_turned(highs), other_low = bslam_halves_turned(lows);
-    const uint32_t high = other_high + bslam_halves_less(highs, other_high);
-    const uint32_t low = lows - bslam_halves_less(lows, other_low);
-    const int32_t spread = (int32_t)((high - low) & 0xFFFFU);
-    return (uint8_t)(spread < 0 ? 0 : spread < 255 ? spread : 255);
+    return luma(first) | luma(second) << 16;
 }
 
-static inline void fill_cell(bslam_cells_t *cells, int32_t i, const uint32_t *above, const uint32_t *below)
+/// Two neighbours' bytes, each the lowest of its word.
+static inline void put_two(uint8_t *bytes, uint32_t first, uint32_t second)
 {
+    const uint16_t both = (uint16_t)((first & 255) | second << 8);
+    memcpy(bytes, &both, sizeof both);
+}
+
+/// Some cells of a row, from their quarters.
+static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uint32_t *restrict above,
+                             const uint32_t *restrict below)
+{
+    const uint32_t a = two_lumas(above[0], above[2]), b = two_lumas(above[1], above[3]);
+    const uint32_t a_more = bslam_halves_less(a, b), low = a - a_more, high = b + a_more;
+    const uint32_t c = two_lumas(below[0], below[2]), d = two_lumas(below[1], below[3]);
+    const uint32_t c_more = bslam_halves_less(c, d), other_low = c - c_more, other_high = d + c_more;
+    const uint32_t highest = other_high + bslam_halves_less(high, other_high);
+    const uint32_t lowest = low - bslam_halves_less(low, other_low);
+    const uint32_t spreads = bslam_halves_least(highest - lowest, BSLAM_EVEN_BYTES);
     const uint32_t sum = above[0] + above[1] + below[0] + below[1];
-    cells->red[i] = (uint8_t)(sum >> (RED_SHIFT + 1));
-    cells->green[i] = (uint8_t)(sum >> (GREEN_SHIFT + 2));
-    cells->blue[i] = (uint8_t)(sum >> 1);
-    cells->spread[i] = spread_of(above, below);
+    const uint32_t next_sum = above[2] + above[3] + below[2] + below[3];
+    put_two(cells->spread + i, spreads, spreads >> 16);
+    put_two(cells->red + i, sum >> (RED_SHIFT + 1), next_sum >> (RED_SHIFT + 1));
+    put_two(cells->green + i, sum >> (GREEN_SHIFT + 2), next_sum >> (GREEN_SHIFT + 2));
+    put_two(cells->blue + i, sum >> 1, next_sum >> 1);
 }
 
-#if !BSLAM_HAS_BYTES
-#define CELLS_AT_ONCE 4
+#else
 
 static inline int32_t most(int32_t a, int32_t b)
 {
@@ -134,8 +170,8 @@ static inline int32_t least(int32_t a, int32_t b)
     return a < b ? a : b;
 }
 
-/// fill_cell() for several in a row.
-static void fill_four(bslam_cells_t *cells, int32_t i, const uint32_t *restrict above,
+/// Some cells of a row, from their quarters.
+static void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *restrict above,
                       const uint32_t *restrict below)
 {
     uint32_t sum[CELLS_AT_ONCE];
@@ -157,21 +193,12 @@ static void fill_four(bslam_cells_t *cells, int32_t i, const uint32_t *restrict 
 }
 #endif
 
-/// A row of cells, from cell `first` on, from the sums of their quarters.
+/// A row of cells, from cell `first` on, from the sums of their quarters. Whole steps: what is beyond is
+/// written over later, or lies in the tables' room.
 static void fill_cells(bslam_cells_t *cells, int32_t first, const bslam_row_sums_t *sums, int32_t pairs)
 {
-    const uint32_t *above = sums->upper, *below = sums->lower;
-    const int32_t end = first + pairs / 2;
-    int32_t i = first;
-#if !BSLAM_HAS_BYTES
-    for (; i + CELLS_AT_ONCE <= end; i += CELLS_AT_ONCE) {
-        fill_four(cells, i, above, below);
-        above += 2 * CELLS_AT_ONCE;
-        below += 2 * CELLS_AT_ONCE;
-    }
-#endif
-    for (; i < end; i++, above += 2, below += 2) {
-        fill_cell(cells, i, above, below);
+    for (int32_t i = 0; i < pairs / 2; i += CELLS_AT_ONCE) {
+        fill_some(cells, first + i, sums->upper + 2 * i, sums->lower + 2 * i);
     }
 }
 
@@ -187,11 +214,14 @@ bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_
     if (t->format == BSLAM_PIXELS_RGB888) {
         pack_888(sums->packed, pixels, t->width_px);
         packed = (const uint8_t *)sums->packed;
+    } else if ((uintptr_t)pixels % sizeof(uint32_t) != 0) {
+        memcpy(sums->packed, pixels, (size_t)t->width_px * sizeof sums->packed[0]);
+        packed = (const uint8_t *)sums->packed;
     }
     uint16_t *half = t->half + row / 2 * pairs;
     uint32_t *quads = row % BSLAM_CELL_PX < 2 ? sums->upper : sums->lower;
     if (row % 2 == 0) {
-        sum_pairs(quads, packed, pairs);
+        keep_row(quads, packed, pairs);
     } else {
         sum_quads(quads, half, packed, pairs);
     }

@@ -17,11 +17,14 @@ typedef enum bslam_pixel_format {
     BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
 } bslam_pixel_format_t;
 
+/// Room for a row's pairs of pixels, in whole steps of a loop over them.
+#define BSLAM_ROW_SUMS (BSLAM_IMAGE_WIDTH_MAX / 2 + BSLAM_IMAGE_WIDTH_STEP / 2)
+
 /// What is summed of a row of cells until it is finished. Scratch of a frame that streams in.
 typedef struct bslam_row_sums {
-    uint32_t upper[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of 2x2 pixels of its upper half,
-    uint32_t lower[BSLAM_IMAGE_WIDTH_MAX / 2];  ///< of its lower one; of pairs, after the upper row of two
-    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];     ///< a row that came with 8 bits a channel, or is stretched
+    uint32_t upper[BSLAM_ROW_SUMS];          ///< of 2x2 pixels of its upper half,
+    uint32_t lower[BSLAM_ROW_SUMS];          ///< of its lower one; two pixels, after the upper row of two
+    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];  ///< a row that came with 8 bits a channel, or is stretched
 } bslam_row_sums_t;
 
 typedef struct bslam_thumbnail {

@@ -71,6 +71,9 @@ static void test_sums_of_bytes_and_of_halves(void **state)
             assert_int_equal(bslam_halves_dot(a, b, round), dot + round);
         }
         assert_int_equal(bslam_halves(low_a, high_a), a);
+        const int lower = least((int)(a & 0xFFFF), (int)(b & 0xFFFF));
+        const int upper = least((int)(a >> 16), (int)(b >> 16));
+        assert_int_equal(bslam_halves_least(a, b), bslam_halves(lower, upper));
     }
 }
 

@@ -176,7 +176,9 @@ static void test_tone_bin_covers_every_tone_once(void **state)
     for (int chroma = -128; chroma < 128; chroma++) {
         tone.reddish = (int8_t)chroma;
         tone.bluish = (int8_t)-chroma;
-        assert_in_range(bslam_tone_bin(tone), 0, BSLAM_TONE_BINS - 1);
+        const int reddish = chroma <= -32 ? 0 : chroma >= 24 ? 7 : chroma / 8 + 4;
+        const int bluish = -tone.reddish >= 24 ? 7 : -tone.reddish <= -32 ? 0 : -tone.reddish / 8 + 4;
+        assert_int_equal(bslam_tone_bin(tone) & 63, reddish << 3 | (chroma == -128 ? 0 : bluish));
     }
 }
 

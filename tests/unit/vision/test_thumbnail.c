@@ -145,6 +145,27 @@ static void test_row_random_picture_is_summed_as_pixel_by_pixel(void **state)
     }
 }
 
+static void test_row_may_lie_anywhere(void **state)
+{
+    static uint8_t bytes[sizeof picture[0] + 3];
+    static bslam_thumbnail_t aligned;
+    unit_random_t random = {22};
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        picture[i / WIDTH][i % WIDTH] = (uint16_t)unit_random(&random, 0, 65536);
+    }
+    stream_in();
+    aligned = thumbnail;
+    for (int shift = 1; shift < 4; shift++) {
+        assert_int_equal(bslam_thumbnail_begin(&thumbnail, BSLAM_PIXELS_RGB565, WIDTH, HEIGHT), BSLAM_OK);
+        for (int row = 0; row < HEIGHT; row++) {
+            memcpy(bytes + shift, picture[row], sizeof picture[row]);
+            assert_int_equal(bslam_thumbnail_row(&thumbnail, &row_sums, bytes + shift), BSLAM_OK);
+        }
+        assert_memory_equal(&thumbnail.cells, &aligned.cells, sizeof aligned.cells);
+        assert_memory_equal(thumbnail.half, aligned.half, sizeof aligned.half);
+    }
+}
+
 static void test_row_extremes_do_not_run_over(void **state)
 {
     fill(rgb565(31, 63, 31));
@@ -218,6 +239,7 @@ int main(void)
         cmocka_unit_test(test_row_cell_is_the_mean_of_its_pixels_by_hand),
         cmocka_unit_test(test_row_half_resolution_is_the_mean_of_four_rounded),
         cmocka_unit_test(test_row_random_picture_is_summed_as_pixel_by_pixel),
+        cmocka_unit_test(test_row_may_lie_anywhere),
         cmocka_unit_test(test_row_extremes_do_not_run_over),
         cmocka_unit_test(test_row_rgb888_is_as_rgb565),
         cmocka_unit_test(test_row_picture_moved_by_a_cell_moves_the_cells),
