@@ -149,6 +149,26 @@ static inline uint32_t bslam_bytes_even(uint32_t bytes)
     return bytes & BSLAM_EVEN_BYTES;
 }
 
+/// A number below 2^31, at most 255.
+static inline uint8_t bslam_byte_at_most(uint32_t number)
+{
+#ifdef __ARM_FEATURE_SAT
+    return (uint8_t)__builtin_arm_usat((int32_t)number, 8);
+#else
+    return (uint8_t)(number < 255 ? number : 255);
+#endif
+}
+
+/// The signed byte that is nearest to a number.
+static inline int32_t bslam_signed_byte_nearest(int32_t number)
+{
+#ifdef __ARM_FEATURE_SAT
+    return (int32_t)__builtin_arm_ssat(number, 8);
+#else
+    return number < -128 ? -128 : number < 127 ? number : 127;
+#endif
+}
+
 /// Two numbers of 16 bits in a word, the first one lower.
 static inline uint32_t bslam_halves(int32_t low, int32_t high)
 {

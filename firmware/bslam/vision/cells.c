@@ -300,8 +300,17 @@ __attribute__((noinline)) static void sum_tone(const tone_machine_t *machine, ui
     sum->tone = tone;
     sum->sum = bslam_halves_dot(bslam_bytes_even(distances), bslam_halves(w[4], w[5]), values) +
                w[6] * nearest + w[15] * bslam_byte_of(distances, 3);
-    sum->above_floor = a->above_floor + w[20] * bslam_byte_of(distances, TO_WALL);
+    sum->sum_above_floor = sum->sum + a->above_floor + w[20] * bslam_byte_of(distances, TO_WALL);
     sum->frequent = machine->bins->frequent[bin];
+}
+
+/// A sum as a cell's value, rounded towards 0 and within +-127.
+static inline int8_t value_of(int32_t sum)
+{
+    const uint32_t if_below_zero = (uint32_t)(sum >> 31) >> (32 - BSLAM_CELL_WEIGHT_SHIFT);
+    const int32_t value =
+        bslam_signed_byte_nearest((sum + (int32_t)if_below_zero) >> BSLAM_CELL_WEIGHT_SHIFT);
+    return (int8_t)(value == -128 ? -127 : value);
 }
 
 /// Values of a row's cells: by their tones, and the sums of the rest.
@@ -321,9 +330,8 @@ static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, 
         if (known->tone != tone) {
             sum_tone(machine, tone, known);
         }
-        const int32_t sum = sums[i] + known->sum + (floor_row[i] >= row ? known->above_floor : 0);
         frequent[i] = (uint16_t)known->frequent;
-        values[i] = (int8_t)most(clamp(sum / (1 << BSLAM_CELL_WEIGHT_SHIFT), -128, 127), -127);
+        values[i] = value_of(sums[i] + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
     }
 }
 

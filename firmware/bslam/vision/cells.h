@@ -59,7 +59,7 @@ typedef struct bslam_chroma_terms {
 typedef struct bslam_tone_sum {
     uint32_t tone;  ///< light, reddish and bluish, a byte each; no tone has a fourth
     int32_t sum;
-    int32_t above_floor;
+    int32_t sum_above_floor;  ///< of a cell that is not below the floor line
     uint32_t frequent;
 } bslam_tone_sum_t;
 

@@ -13,11 +13,14 @@
 #define HALF_OF_FOUR (2U | 2U << RED_SHIFT | 2U << GREEN_SHIFT)
 /// Pixel pairs that are copied at once.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
-/// Pixel pairs that are summed at once, and cells that are made of them.
+/// Pixel pairs that are summed at once, and cells that are made of them. A core without vectors takes two,
+/// and two steps before it asks whether a row ends; any other as many as a compiler makes a vector of.
 #if BSLAM_HAS_BYTES
+#define TWO_STEPS_A_LOOP _Pragma("GCC unroll 2")
 #define PAIRS_AT_ONCE 2
 #define CELLS_AT_ONCE 2
 #else
+#define TWO_STEPS_A_LOOP
 #define PAIRS_AT_ONCE 4
 #define CELLS_AT_ONCE 4
 #endif
@@ -61,7 +64,7 @@ static inline const uint8_t *words_at(const void *bytes)
 static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, int32_t pairs)
 {
     uint8_t *kept = __builtin_assume_aligned(words, sizeof(uint32_t));
-    _Pragma("GCC unroll 2")
+    TWO_STEPS_A_LOOP
     for (int32_t i = 0; i < 4 * pairs; i += 4 * PAIRS_A_STEP) {
         memcpy(kept + i, words_at(pixels + i), 4 * PAIRS_A_STEP);
     }
@@ -82,8 +85,7 @@ static inline uint16_t mean_565(uint32_t quad)
     return (uint16_t)(mean | mean >> 16);
 }
 
-/// Makes some words of the upper row the sums of 2x2 pixels; their means. A core without vectors takes two at
-/// a time, any other as many as a compiler makes a vector of.
+/// Makes some words of the upper row the sums of 2x2 pixels; their means.
 static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels)
 {
 #if BSLAM_HAS_BYTES
@@ -109,7 +111,7 @@ static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const u
                       int32_t pairs)
 {
     const uint32_t *end = words + pairs;
-    _Pragma("GCC unroll 2")
+    TWO_STEPS_A_LOOP
     while (words != end) {
         sum_some(words, half, words_at(pixels));
         words += PAIRS_AT_ONCE;
@@ -132,11 +134,17 @@ static inline uint32_t two_lumas(uint32_t first, uint32_t second)
     return luma(first) | luma(second) << 16;
 }
 
-/// Two neighbours' bytes, each the lowest of its word.
-static inline void put_two(uint8_t *bytes, uint32_t first, uint32_t second)
+/// Bytes 0 and 1 of a word.
+static inline void put_two(uint8_t *bytes, uint32_t word)
 {
-    const uint16_t both = (uint16_t)((first & 255) | second << 8);
+    const uint16_t both = (uint16_t)word;
     memcpy(bytes, &both, sizeof both);
+}
+
+/// A channel of two neighbours, from bit `shift` of their sums on.
+static inline void put_channel(uint8_t *bytes, uint32_t sum, uint32_t next_sum, int32_t shift)
+{
+    put_two(bytes, (sum >> shift & 255) | next_sum >> shift << 8);
 }
 
 /// Some cells of a row, from their quarters.
@@ -152,10 +160,10 @@ static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uin
     const uint32_t spreads = bslam_halves_least(highest - lowest, BSLAM_EVEN_BYTES);
     const uint32_t sum = above[0] + above[1] + below[0] + below[1];
     const uint32_t next_sum = above[2] + above[3] + below[2] + below[3];
-    put_two(cells->spread + i, spreads, spreads >> 16);
-    put_two(cells->red + i, sum >> (RED_SHIFT + 1), next_sum >> (RED_SHIFT + 1));
-    put_two(cells->green + i, sum >> (GREEN_SHIFT + 2), next_sum >> (GREEN_SHIFT + 2));
-    put_two(cells->blue + i, sum >> 1, next_sum >> 1);
+    put_two(cells->spread + i, spreads | spreads >> 8);
+    put_channel(cells->red + i, sum, next_sum, RED_SHIFT + 1);
+    put_channel(cells->green + i, sum, next_sum, GREEN_SHIFT + 2);
+    put_channel(cells->blue + i, sum, next_sum, 1);
 }
 
 #else

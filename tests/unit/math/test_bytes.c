@@ -77,6 +77,21 @@ static void test_sums_of_bytes_and_of_halves(void **state)
     }
 }
 
+static void test_numbers_become_the_nearest_byte(void **state)
+{
+    static const struct {
+        int32_t number, nearest;
+    } signed_ones[] = {{-128, -128}, {-129, -128}, {INT32_MIN, -128}, {-1, -1},
+                       {127, 127},   {128, 127},   {INT32_MAX, 127}};
+    for (int i = 0; i < COUNT_OF(signed_ones); i++) {
+        assert_int_equal(bslam_signed_byte_nearest(signed_ones[i].number), signed_ones[i].nearest);
+    }
+    assert_int_equal(bslam_byte_at_most(0), 0);
+    assert_int_equal(bslam_byte_at_most(255), 255);
+    assert_int_equal(bslam_byte_at_most(256), 255);
+    assert_int_equal(bslam_byte_at_most(INT32_MAX), 255);
+}
+
 static void test_words_lie_anywhere(void **state)
 {
     uint8_t bytes[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
@@ -93,6 +108,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bytes_are_each_as_a_number),
         cmocka_unit_test(test_sums_of_bytes_and_of_halves),
+        cmocka_unit_test(test_numbers_become_the_nearest_byte),
         cmocka_unit_test(test_words_lie_anywhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
