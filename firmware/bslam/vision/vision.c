@@ -154,7 +154,8 @@ bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
     bslam_row_sums_t *sums = &vision->row_sums;
     bslam_thumbnail_stretch(sums, vision->format, pixels, vision->thumbnail.width_px / zoom);
     bslam_status_t status = BSLAM_OK;
-    for (int32_t i = 0; i < zoom && status == BSLAM_OK; i++) {
+    // There is room for all of them, or for none: the height is a multiple of the zoom.
+    for (int32_t i = 0; i < zoom; i++) {
         status = bslam_thumbnail_row(&vision->thumbnail, sums, sums->packed);
     }
     return status;

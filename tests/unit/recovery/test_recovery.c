@@ -28,15 +28,28 @@ static int setup(void **state)
     return 0;
 }
 
+static bslam_sighting_t seen_from(double x, double y, double theta, int beacon)
+{
+    const double dx = beacons[beacon][0] - x;
+    const double dy = beacons[beacon][1] - y;
+    bslam_sighting_t seen =
+        unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), stretch * hypot(dx, dy), beacon);
+    seen.has_range = beacon != cut;
+    return seen;
+}
+
+static void show(const bslam_sighting_t *seen, int count)
+{
+    now_us += STEP_US;
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, count), BSLAM_OK);
+}
+
 /// A frame of a robot that stands at (x, y, theta) and says so by its wheels, with the first `count` beacons.
 static void look_from(double x, double y, double theta, int count)
 {
     bslam_sighting_t seen[BEACONS];
     for (int i = 0; i < count; i++) {
-        const double dx = beacons[i][0] - x;
-        const double dy = beacons[i][1] - y;
-        seen[i] = unit_polar(remainder(atan2(dy, dx) - theta, 2 * PI), stretch * hypot(dx, dy), i);
-        seen[i].has_range = i != cut;
+        seen[i] = seen_from(x, y, theta, i);
     }
     now_us += STEP_US;
     const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
@@ -193,16 +206,33 @@ static void test_recovery_of_one_odd_beacon_ends_where_another_agrees_beside_it(
     look_on(50, 0, 0, 0, BEACONS);
     look_on(20, 1, 2, -1, 1);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
-    const bslam_sighting_t seen[] = {
-        unit_polar(remainder(atan2(beacons[0][1] - 2, beacons[0][0] - 1) + 1, 2 * PI),
-                   hypot(beacons[0][0] - 1, beacons[0][1] - 2), 0),
-        unit_polar(atan2(beacons[1][1], beacons[1][0]), hypot(beacons[1][0], beacons[1][1]), 1)};
+    const bslam_sighting_t seen[] = {seen_from(1, 2, -1, 0), seen_from(0, 0, 0, 1)};
     const uint32_t before = recovery.counters.contradicting;
-    now_us += STEP_US;
-    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, 2), BSLAM_OK);
+    show(seen, 2);
     assert_int_equal(recovery.counters.contradicting, before + 1);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
     assert_int_equal(recovery.counters.lost, 0);
+}
+
+/// Where as many beacons contradict as agree the robot is in doubt only if all of them are right elsewhere:
+/// here from a place on a circle around beacon 0, which is seen alike from there.
+static void test_recovery_of_as_many_that_agree_doubts_if_all_fit_elsewhere(void **state)
+{
+    const double turn = 0.5;
+    const double x = beacons[0][0] - cos(turn) * beacons[0][0] + sin(turn) * beacons[0][1];
+    const double y = beacons[0][1] - sin(turn) * beacons[0][0] - cos(turn) * beacons[0][1];
+    const bslam_sighting_t all[] = {seen_from(x, y, turn, 0), seen_from(x, y, turn, 2)};
+    const bslam_sighting_t three_of_four[] = {all[0], seen_from(0, 0, 0, 1), all[1],
+                                              seen_from(x, y, turn, 3)};
+    look_on(50, 0, 0, 0, BEACONS);
+    show(three_of_four, BEACONS);
+    assert_int_equal(recovery.counters.contradicting, 2);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    setup(NULL);
+    look_on(50, 0, 0, 0, BEACONS);
+    show(all, 2);
+    assert_int_equal(recovery.counters.contradicting, 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
 }
 
 static void test_recovery_in_a_map_of_one_beacon_is_never_lost(void **state)
@@ -372,6 +402,7 @@ int main(void)
             test_recovery_by_one_beacon_that_is_elsewhere_gets_lost_in_a_second_and_learns_nothing, setup),
         cmocka_unit_test_setup(test_recovery_of_one_odd_beacon_ends_where_another_agrees, setup),
         cmocka_unit_test_setup(test_recovery_of_one_odd_beacon_ends_where_another_agrees_beside_it, setup),
+        cmocka_unit_test_setup(test_recovery_of_as_many_that_agree_doubts_if_all_fit_elsewhere, setup),
         cmocka_unit_test_setup(test_recovery_in_a_map_of_one_beacon_is_never_lost, setup),
         cmocka_unit_test_setup(test_recovery_by_one_beacon_is_never_a_guess, setup),
         cmocka_unit_test_setup(test_recovery_of_a_short_glitch_does_not_get_lost, setup),

@@ -348,6 +348,140 @@ static void test_end_candidates_come_surest_first(void **state)
     }
 }
 
+/// All that is proposed is a candidate, the largest box first.
+static void take_all(int class_count)
+{
+    detector.fusion_weights[class_count + 2] = 1;
+    detector.screen_weights[5] = 1;
+}
+
+static const bslam_candidate_t *found_in(bslam_status_t shown, int32_t *count)
+{
+    assert_int_equal(shown, BSLAM_OK);
+    const bslam_candidate_t *found = bslam_vision_candidates(&vision, count);
+    assert_true(*count > 0);
+    return found;
+}
+
+static void start_with(const bslam_camera_t *camera)
+{
+    assert_int_equal(bslam_vision_init(&vision, &model, camera, 1), BSLAM_OK);
+}
+
+static void test_end_of_a_model_of_one_kind_there_is_no_second(void **state)
+{
+    // That it is of its kind is as unlikely as can be, and it hangs where no such thing does.
+    const bslam_beacon_class_t kind = {.name = "small", .height_m = 0.3f, .top_low_m = 2, .top_high_m = 2.1f};
+    const bslam_camera_t camera = camera_at(0);
+    bslam_detector_model_t *lenses[] = {&model.pinhole, &model.wide};
+    model.class_count = 1;
+    model.classes = &kind;
+    detector.kind_bias[1] = -1000;
+    for (int i = 0; i < 2; i++) {
+        lenses[i]->kinds.rows = 1 + 2;
+        lenses[i]->fusion.features = 1 + 3;
+    }
+    take_all(1);
+    start_with(&camera);
+    paint_room();
+    paint(100, 60, 140, 100, 200, 30, 30);
+    int32_t count;
+    const bslam_candidate_t *found = found_in(show(0, true), &count);
+    for (int i = 0; i < count; i++) {
+        assert_int_equal(found[i].beacon_class, 1);
+        assert_int_equal(found[i].second_class, BSLAM_CLASS_NONE);
+    }
+    assert_true(found->misplaced_sds > 2);
+}
+
+/// What hangs too high for its kind becomes the next one, which hangs there, if it can be measured as that.
+static void test_end_candidate_becomes_its_second_kind_where_that_can_be_measured(void **state)
+{
+    bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {
+        {.name = "tall", .height_m = 2, .top_low_m = 1.9f, .top_high_m = 2.1f},
+        {.name = "small", .height_m = 0.3f, .top_low_m = 0.9f, .top_high_m = 1.0f}};
+    const bslam_camera_t camera = camera_at(0);
+    model.classes = kinds;
+    take_all(UNIT_MODEL_CLASSES);
+    detector.kind_bias[1] = 1.5f;  // surer than the other by half a margin, though it would be 14 m away
+    paint_room();
+    paint(140, 60, 180, 100, 200, 30, 30);  // 0.3 m high, 2.1 m away its top is at 0.95 m
+    // A body that is deeper than twice its height is no upright thing.
+    static const float depths_m[] = {0, 0.1f, 0.7f};
+    for (int i = 0; i < COUNT_OF(depths_m); i++) {
+        kinds[1].depth_m = depths_m[i];
+        start_with(&camera);
+        int32_t count;
+        const bslam_candidate_t *found = found_in(show(0, true), &count);
+        assert_int_equal(count, 1);
+        assert_int_equal(found->beacon_class, i < 2 ? 2 : 1);
+        assert_int_equal(found->second_class, i < 2 ? 1 : 2);
+        assert_int_equal(found->has_range, i < 2);
+    }
+}
+
+/// Whether a candidate's outline is the box of a proposal, as the detector had it.
+static bool is_of_the_detector(const bslam_candidate_t *candidate)
+{
+    bool is = false;
+    for (int i = 0; i < vision.proposals.count; i++) {
+        is = is || memcmp(&vision.proposals.items[i].box, &candidate->outline, sizeof(bslam_box_t)) == 0;
+    }
+    return is;
+}
+
+/// Overlap of a candidate's outline with the proposal that is nearest to it.
+static bslam_real_t overlap_of(const bslam_candidate_t *candidate)
+{
+    bslam_real_t best = 0;
+    for (int i = 0; i < vision.proposals.count; i++) {
+        const bslam_real_t overlap = bslam_box_overlap(&vision.proposals.items[i].box, &candidate->outline);
+        best = overlap > best ? overlap : best;
+    }
+    return best;
+}
+
+static void test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s(void **state)
+{
+    take_all(UNIT_MODEL_CLASSES);
+    for (int is_wide = 0; is_wide < 2; is_wide++) {
+        bslam_camera_t camera = camera_at(0);
+        camera.lens = is_wide ? BSLAM_LENS_EQUIDISTANT : BSLAM_LENS_PINHOLE;
+        camera.fx_px = camera.fy_px = is_wide ? BSLAM_R(101.9) : camera.fx_px;
+        start_with(&camera);
+        paint_room();
+        paint(142, 61, 181, 103, 200, 30, 30);
+        int32_t count;
+        const bslam_candidate_t *found = found_in(show(0, true), &count);
+        assert_int_equal(is_of_the_detector(found), is_wide);
+    }
+}
+
+/// Measuring takes the blue square for the thing, not the rim round it that hardly differs from the wall.
+static void test_end_outline_of_something_else_is_not_taken(void **state)
+{
+    const bslam_camera_t camera = camera_at(0);
+    const bslam_size_t size = {.height_m = 0.3f};
+    take_all(UNIT_MODEL_CLASSES);
+    start_with(&camera);
+    paint_room();
+    paint(140, 60, 160, 80, 144, 144, 166);
+    paint(142, 62, 158, 78, 10, 10, 200);
+    int32_t count;
+    const bslam_candidate_t *found = found_in(show(0, true), &count);
+    int others = 0;
+    for (int i = 0; i < count; i++) {
+        assert_true(overlap_of(&found[i]) >= BSLAM_R(0.75));
+        if (is_of_the_detector(&found[i])) {
+            bslam_candidate_t measured = {0};
+            assert_int_equal(bslam_vision_measure(&vision, &found[i].outline, &size, &measured), BSLAM_OK);
+            assert_true(bslam_box_overlap(&measured.outline, &found[i].outline) < BSLAM_R(0.75));
+            others++;
+        }
+    }
+    assert_true(others > 0);
+}
+
 /// A camera of half the size that is looked at doubled.
 static bslam_camera_t small_camera(void)
 {
@@ -588,6 +722,10 @@ int main(void)
         TEST(test_end_rectangle_moved_by_cells_moves_its_box),
         TEST(test_end_brighter_light_gives_the_same_boxes),
         TEST(test_end_candidates_come_surest_first),
+        TEST(test_end_of_a_model_of_one_kind_there_is_no_second),
+        TEST(test_end_candidate_becomes_its_second_kind_where_that_can_be_measured),
+        TEST(test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s),
+        TEST(test_end_outline_of_something_else_is_not_taken),
         TEST(test_end_zoomed_camera_sees_what_a_doubled_picture_shows),
         TEST(test_init_zoom_without_room_is_refused_and_nothing_changes),
         TEST(test_end_same_frames_give_the_same_state),
