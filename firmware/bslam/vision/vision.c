@@ -349,7 +349,9 @@ __attribute__((noinline)) static void measure(bslam_vision_t *vision, const bsla
         const bslam_box_t found = candidate.outline;
         if (measure_one(vision, frame, &candidate) == BSLAM_OK) {
             const bool agrees = bslam_box_overlap(&found, &candidate.outline) >= AGREE_MIN;
-            candidate.outline = is_wide || !agrees ? found : candidate.outline;
+            if (is_wide || !agrees) {
+                candidate.outline = found;
+            }
             candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
             vision->candidates[kept++] = candidate;
         }

@@ -232,6 +232,29 @@ static void test_bent_way_leads_from_a_node_to_the_next(void **state)
     assert_true(bent > 2);
 }
 
+static void test_way_shorter_than_a_centimetre_has_no_bend(void **state)
+{
+    // The speeds say 12 mm straight ahead, where it is 9 or 11 mm and half a radian to the left of that.
+    static const double ways_m[] = {0.011, 0.009};
+    for (int i = 0; i < COUNT_OF(ways_m); i++) {
+        fill(NODES);
+        const bslam_real_t *from = bslam_smoother_node(&smoother, 0)->at;
+        const double direction_rad = (double)from[BSLAM_STATE_THETA] + 0.5;
+        for (int k = 1; k < 3; k++) {
+            bslam_real_t *at = bslam_smoother_node(&smoother, k)->at;
+            at[BSLAM_STATE_X] = from[BSLAM_STATE_X] + real(ways_m[i] * cos(direction_rad));
+            at[BSLAM_STATE_Y] = from[BSLAM_STATE_Y] + real(ways_m[i] * sin(direction_rad));
+            at[BSLAM_STATE_THETA] = from[BSLAM_STATE_THETA];
+            at[BSLAM_STATE_FORWARD] = real(0.012 / 0.18);
+            at[BSLAM_STATE_TURN] = 0;
+        }
+        bslam_smoother_thin(&smoother, NODES - 1);
+        const bslam_bend_t bend = bslam_smoother_bend(bslam_smoother_node(&smoother, 1));
+        assert_near((double)bend.turned_rad, i == 0 ? 0.5 : 0, 1e-3);
+        assert_near((double)bend.stretch, i == 0 ? 11.0 / 12 : 1, 1e-3);
+    }
+}
+
 static void test_directions_are_those_from_where_the_node_is_and_weigh_as_many(void **state)
 {
     bslam_smoother_thin(&smoother, 30);
@@ -376,6 +399,7 @@ int main(void)
         cmocka_unit_test_setup(test_where_all_levels_are_full_the_oldest_leave, setup),
         cmocka_unit_test_setup(test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end, setup),
         cmocka_unit_test_setup(test_bent_way_leads_from_a_node_to_the_next, setup),
+        cmocka_unit_test_setup(test_way_shorter_than_a_centimetre_has_no_bend, setup),
         cmocka_unit_test_setup(test_directions_are_those_from_where_the_node_is_and_weigh_as_many, setup),
         cmocka_unit_test_setup(test_directions_that_differ_become_their_weighted_mean, setup),
         cmocka_unit_test_setup(test_distances_become_their_mean_and_a_measured_one_is_never_lost, setup),
