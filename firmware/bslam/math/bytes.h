@@ -121,6 +121,42 @@ static inline uint32_t bslam_bytes_above(uint32_t a, uint32_t b)
     return bslam_bytes_least(bslam_bytes_less(a, b), 0x01010101U);
 }
 
+/// The top bits of eight bytes, the first word's lowest byte's first.
+static inline uint32_t bslam_top_bits(uint32_t first, uint32_t next)
+{
+    const uint32_t both = (first & BSLAM_TOP_BITS) >> 4 | (next & BSLAM_TOP_BITS);
+    return both * 0x00204081U >> 24;
+}
+
+/// Top bits of the bytes of which one or the other, with the bits of `flip` turned over, is above the limit.
+static inline uint32_t bslam_word_above(const uint8_t *one, const uint8_t *other, uint32_t flip,
+                                        uint32_t limit)
+{
+    // A byte above the limit and what that is short of 255 make 256 or more: the top bit of their mean.
+    return bslam_bytes_mean(bslam_word_at(one) ^ flip, ~limit) |
+           bslam_bytes_mean(bslam_word_at(other) ^ flip, ~limit);
+}
+
+/// In which of 16 places the byte of one table or that of the other, with the bits of `flip` turned over, is
+/// above the limit: a bit each, the first place's lowest. In flip and limit the same byte stands four times.
+static inline uint32_t bslam_bits_above(const void *one, const void *other, uint32_t flip, uint32_t limit)
+{
+#if BSLAM_HAS_SSE2
+    const __m128i flips = _mm_set1_epi32((int)flip), limits = _mm_set1_epi32((int)limit);
+    const __m128i most = _mm_max_epu8(_mm_xor_si128(_mm_loadu_si128(one), flips),
+                                      _mm_xor_si128(_mm_loadu_si128(other), flips));
+    const __m128i are_within = _mm_cmpeq_epi8(_mm_max_epu8(most, limits), limits);
+    return (uint32_t)_mm_movemask_epi8(are_within) ^ 0xFFFFU;
+#else
+    const uint8_t *a = one, *b = other;
+    const uint32_t low =
+        bslam_top_bits(bslam_word_above(a, b, flip, limit), bslam_word_above(a + 4, b + 4, flip, limit));
+    const uint32_t high = bslam_top_bits(bslam_word_above(a + 8, b + 8, flip, limit),
+                                         bslam_word_above(a + 12, b + 12, flip, limit));
+    return low | high << 8;
+#endif
+}
+
 static inline bool bslam_has_zero_byte(uint32_t bytes)
 {
     return ((bytes - 0x01010101U) & ~bytes & BSLAM_TOP_BITS) != 0;
@@ -169,6 +205,18 @@ static inline int32_t bslam_signed_byte_nearest(int32_t number)
 #endif
 }
 
+/// Bytes 1 and 3. Here and below the core turns the word in the same instruction, which no intrinsic says.
+static inline uint32_t bslam_bytes_odd(uint32_t bytes)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    uint32_t halves;
+    __asm__("uxtb16 %0, %1, ror #8" : "=r"(halves) : "r"(bytes));
+    return halves;
+#else
+    return bytes >> 8 & BSLAM_EVEN_BYTES;
+#endif
+}
+
 /// Two numbers of 16 bits in a word, the first one lower.
 static inline uint32_t bslam_halves(int32_t low, int32_t high)
 {
@@ -188,7 +236,13 @@ static inline uint32_t bslam_bytes_signed_even(uint32_t bytes)
 /// Bytes 1 and 3.
 static inline uint32_t bslam_bytes_signed_odd(uint32_t bytes)
 {
-    return bslam_bytes_signed_even(bytes >> 8 | bytes << 24);
+#ifdef __ARM_FEATURE_SIMD32
+    uint32_t halves;
+    __asm__("sxtb16 %0, %1, ror #8" : "=r"(halves) : "r"(bytes));
+    return halves;
+#else
+    return bslam_bytes_signed_even(bytes >> 8);
+#endif
 }
 
 /// Adds bytes 0 and 2 to the lower and upper half of sums, neither of which grows beyond 16 bits.
@@ -204,7 +258,13 @@ static inline uint32_t bslam_bytes_add_even(uint32_t sums, uint32_t bytes)
 /// Adds bytes 1 and 3.
 static inline uint32_t bslam_bytes_add_odd(uint32_t sums, uint32_t bytes)
 {
-    return bslam_bytes_add_even(sums, bytes >> 8 | bytes << 24);
+#ifdef __ARM_FEATURE_SIMD32
+    uint32_t more;
+    __asm__("uxtab16 %0, %1, %2, ror #8" : "=r"(more) : "r"(sums), "r"(bytes));
+    return more;
+#else
+    return bslam_bytes_add_even(sums, bytes >> 8);
+#endif
 }
 
 /// Each half of a less that of b, at least 0.

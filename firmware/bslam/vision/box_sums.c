@@ -110,7 +110,7 @@ typedef struct byte_sums {
 
 static inline void add_squared(byte_sums_t *sums, uint32_t bytes)
 {
-    const uint32_t even = bslam_bytes_even(bytes), odd = bslam_bytes_even(bytes >> 8);
+    const uint32_t even = bslam_bytes_even(bytes), odd = bslam_bytes_odd(bytes);
     sums->sum = bslam_bytes_sum(bytes, sums->sum);
     sums->square = bslam_halves_dot(even, even, bslam_halves_dot(odd, odd, sums->square));
 }

@@ -57,28 +57,42 @@ static int32_t most(int32_t a, int32_t b)
     return a > b ? a : b;
 }
 
-static int32_t root_of(bslam_run_t *runs, int32_t run)
+// An extent holds left, top and how far right and bottom are from 255, a byte each: what two have together is
+// the least of each.
+enum { LEFT, TOP, RIGHT, BOTTOM };
+
+static uint32_t extent_of(int32_t left, int32_t top, int32_t right, int32_t bottom)
 {
-    while (runs[run].parent != run) {
-        runs[run].parent = runs[runs[run].parent].parent;  // halves the path
-        run = runs[run].parent;
+    return (uint32_t)(left | top << 8 | (255 - right) << 16) | (uint32_t)(255 - bottom) << 24;
+}
+
+static int32_t side_of(uint32_t extent, int32_t side)
+{
+    const int32_t at = bslam_byte_of(extent, side);
+    return side < RIGHT ? at : 255 - at;
+}
+
+static bslam_run_t *root_of(bslam_run_t *runs, bslam_run_t *run)
+{
+    bslam_run_t *parent = &runs[run->parent];
+    while (parent != run) {
+        run->parent = parent->parent;  // halves the path
+        run = &runs[run->parent];
+        parent = &runs[run->parent];
     }
     return run;
 }
 
-static void join(bslam_run_t *runs, int32_t a, int32_t b)
+static void join(bslam_run_t *runs, bslam_run_t *a, bslam_run_t *b)
 {
-    const int32_t root_a = root_of(runs, a), root_b = root_of(runs, b);
+    bslam_run_t *root_a = root_of(runs, a), *root_b = root_of(runs, b);
     if (root_a == root_b) {
         return;
     }
-    bslam_run_t *into = &runs[least(root_a, root_b)];
-    bslam_run_t *from = &runs[most(root_a, root_b)];
-    from->parent = (uint16_t)least(root_a, root_b);
-    into->left = (uint8_t)least(into->left, from->left);
-    into->top = (uint8_t)least(into->top, from->top);
-    into->right = (uint8_t)most(into->right, from->right);
-    into->bottom = (uint8_t)most(into->bottom, from->bottom);
+    bslam_run_t *into = root_a < root_b ? root_a : root_b;
+    bslam_run_t *from = root_a < root_b ? root_b : root_a;
+    from->parent = into->parent;
+    into->extent = bslam_bytes_least(into->extent, from->extent);
     into->cells = (uint16_t)(into->cells + from->cells);
 }
 
@@ -96,60 +110,56 @@ static uint32_t last_bits(int32_t columns)
     return ~0U >> (-columns & (BSLAM_MASK_BITS - 1));
 }
 
-/// The first cell from `column` on that is in the mask, `flip` 0, or that is not, `flip` all ones; `columns`
-/// if there is none.
-static int32_t next_cell(const uint32_t *mask, int32_t column, int32_t columns, uint32_t flip)
+/// Appends the run [first, end) of a row, if there is room; returns how many runs there are then.
+static int32_t add_run(bslam_proposals_t *proposals, int32_t row, int32_t first, int32_t end, int32_t count)
 {
-    while (column < columns) {
-        const uint32_t bits = (mask[column / BSLAM_MASK_BITS] ^ flip) >> column % BSLAM_MASK_BITS;
-        if (bits != 0) {
-            const int32_t found = column + __builtin_ctz(bits);
-            return found < columns ? found : columns;
-        }
-        column = (column | (BSLAM_MASK_BITS - 1)) + 1;
+    if (count == BSLAM_RUNS_MAX) {
+        proposals->runs_dropped++;
+        return count;
     }
-    return columns;
+    proposals->runs[count] = (bslam_run_t){
+        .parent = (uint16_t)count,
+        .cells = (uint16_t)(end - first),
+        .row = (uint8_t)row,
+        .first = (uint8_t)first,
+        .end = (uint8_t)end,
+        .extent = extent_of(first, row, end, row + 1),
+    };
+    return count + 1;
 }
 
-/// Appends the runs of a row; returns how many runs there are then.
-static int32_t find_runs(bslam_proposals_t *proposals, const uint32_t *mask, int32_t columns, int32_t row,
+/// Appends the runs of a row, whose mask has so many words; returns how many runs there are then.
+static int32_t find_runs(bslam_proposals_t *proposals, const uint32_t *mask, int32_t words, int32_t row,
                          int32_t count)
 {
-    int32_t end = 0;
-    for (;;) {
-        const int32_t first = next_cell(mask, end, columns, 0);
-        if (first == columns) {
-            return count;
+    const int32_t columns =
+        words * BSLAM_MASK_BITS;  // with those behind the row's last, of which none is set
+    uint32_t before = 0;
+    int32_t first = -1;
+    for (int32_t start = 0; start < columns; start += BSLAM_MASK_BITS) {
+        const uint32_t cells = *mask++;
+        // Where a cell is not as the one on its left.
+        uint32_t changes = cells ^ (cells << 1 | before >> (BSLAM_MASK_BITS - 1));
+        before = cells;
+        for (; changes != 0; changes &= changes - 1) {
+            const int32_t column = start + __builtin_ctz(changes);
+            count = first < 0 ? count : add_run(proposals, row, first, column, count);
+            first = first < 0 ? column : -1;
         }
-        end = next_cell(mask, first, columns, ~0U);
-        if (count == BSLAM_RUNS_MAX) {
-            proposals->runs_dropped++;
-            continue;
-        }
-        proposals->runs[count] = (bslam_run_t){
-            .parent = (uint16_t)count,
-            .cells = (uint16_t)(end - first),
-            .row = (uint8_t)row,
-            .first = (uint8_t)first,
-            .end = (uint8_t)end,
-            .left = (uint8_t)first,
-            .top = (uint8_t)row,
-            .right = (uint8_t)end,
-            .bottom = (uint8_t)(row + 1),
-        };
-        count++;
     }
+    return first < 0 ? count : add_run(proposals, row, first, columns, count);
 }
 
 /// Joins the runs [middle, end) of a row with the runs [begin, middle) of the row above.
 static void join_rows(bslam_run_t *runs, int32_t begin, int32_t middle, int32_t end)
 {
-    int32_t above = begin, here = middle;
-    while (above < middle && here < end) {
-        if (runs[above].first < runs[here].end && runs[here].first < runs[above].end) {
+    bslam_run_t *above = runs + begin, *here = runs + middle;
+    const bslam_run_t *above_end = here, *here_end = runs + end;
+    while (above < above_end && here < here_end) {
+        if (above->first < here->end && here->first < above->end) {
             join(runs, above, here);
         }
-        if (runs[above].end < runs[here].end) {
+        if (above->end < here->end) {
             above++;
         } else {
             here++;
@@ -243,8 +253,10 @@ static void propose(bslam_proposals_t *proposals, const bslam_view_t *view, cons
 {
     const bslam_frame_t *frame = view->frame;
     const int32_t grow = passes[pass].grow;
-    const int32_t left = most(root->left - grow, 0), right = least(root->right + grow, frame->columns);
-    const int32_t top = most(root->top - grow, 0), bottom = least(root->bottom + grow, frame->rows);
+    const int32_t left = most(side_of(root->extent, LEFT) - grow, 0);
+    const int32_t right = least(side_of(root->extent, RIGHT) + grow, frame->columns);
+    const int32_t top = most(side_of(root->extent, TOP) - grow, 0);
+    const int32_t bottom = least(side_of(root->extent, BOTTOM) + grow, frame->rows);
     const int32_t cells_min = passes[pass].source == SMOOTH ? FACE_CELLS_MIN : CELLS_MIN;
     if (root->cells < cells_min || right - left < SIDE_MIN || bottom - top < SIDE_MIN ||
         right - left > frame->columns * SIDE_MAX_PERCENT / 100) {
@@ -267,11 +279,14 @@ static void propose(bslam_proposals_t *proposals, const bslam_view_t *view, cons
 /// Finds the components of the mask; returns how many runs they have.
 static int32_t find_components(bslam_proposals_t *proposals, const bslam_frame_t *frame)
 {
+    const int32_t words = words_of(frame->columns), rows = frame->rows;
+    const uint32_t *mask = proposals->mask;
     int32_t begin = 0, middle = 0;
-    for (int32_t row = 0; row < frame->rows; row++) {
-        const uint32_t *mask = proposals->mask + row * words_of(frame->columns);
-        const int32_t end = find_runs(proposals, mask, frame->columns, row, middle);
-        join_rows(proposals->runs, begin, middle, end);
+    for (int32_t row = 0; row < rows; row++, mask += words) {
+        const int32_t end = find_runs(proposals, mask, words, row, middle);
+        if (begin < middle && middle < end) {
+            join_rows(proposals->runs, begin, middle, end);
+        }
         begin = middle;
         middle = end;
     }
@@ -281,65 +296,47 @@ static int32_t find_components(bslam_proposals_t *proposals, const bslam_frame_t
 static void propose_components(bslam_proposals_t *proposals, const bslam_view_t *view, int32_t runs,
                                int32_t pass)
 {
+    const bslam_run_t *all = proposals->runs;
     for (int32_t run = 0; run < runs; run++) {
-        if (proposals->runs[run].parent == run) {
-            propose(proposals, view, &proposals->runs[run], pass);
+        if (all[run].parent == run) {
+            propose(proposals, view, &all[run], pass);
         }
     }
 }
 
 #define ALL_FOUR 0x01010101U
 
-/// Four cells of which each byte says 0 or 1, as four bits.
-static uint32_t four_bits(uint32_t bytes)
+/// Bits of 16 cells: those whose value is above the level, which `limit` has 128 more in each byte, or near
+/// which the colour steps by no more than it has.
+static inline uint32_t bits_of(const bslam_view_t *view, source_t source, int32_t i, uint32_t limit)
 {
-    return (bytes * 0x01020408U) >> 24;
-}
-
-/// Bits of cells side by side, one word of them at most, whose value is above the level, which `limit` has
-/// 128 more in each byte.
-static uint32_t likely_bits(const int8_t *values, int32_t count, uint32_t limit)
-{
-    uint32_t bits = 0;
-    for (int32_t k = 0; k < count; k += BSLAM_WORD_BYTES) {
-        bits |= four_bits(bslam_bytes_above(bslam_word_at(values + k) ^ BSLAM_TOP_BITS, limit)) << k;
+    if (source == LIKELY) {
+        return bslam_bits_above(view->values + i, view->values + i, BSLAM_TOP_BITS, limit);
     }
-    return bits;
+    return bslam_bits_above(view->step_x + i, view->step_y + i, 0, limit) ^ 0xFFFFU;
 }
 
-/// Of those near which the colour steps by no more than `limit` has in each byte.
-static uint32_t smooth_bits(const uint8_t *step_x, const uint8_t *step_y, int32_t count, uint32_t limit)
-{
-    uint32_t bits = 0;
-    for (int32_t k = 0; k < count; k += BSLAM_WORD_BYTES) {
-        const uint32_t beyond = bslam_bytes_less(bslam_word_at(step_x + k), limit) |
-                                bslam_bytes_less(bslam_word_at(step_y + k), limit);
-        bits |= four_bits(bslam_bytes_above(ALL_FOUR, beyond)) << k;
-    }
-    return bits;
-}
-
-/// The mask of a source. Words of cells go beyond a row's end, whose bits are then left out; tables have
+/// The mask of a source. Steps of 16 cells go beyond a row's end, whose bits are then left out; tables have
 /// room.
 static void fill_mask(uint32_t *mask, const bslam_view_t *view, source_t source, int32_t level)
 {
     const int32_t columns = view->frame->columns, cells = columns * view->frame->rows;
     const uint32_t limit = (uint32_t)(source == LIKELY ? level + 128 : level) * ALL_FOUR;
     for (int32_t first = 0; first < cells; first += columns) {
-        for (int32_t start = 0; start < columns; start += BSLAM_MASK_BITS) {
-            const int32_t count = least(columns - start, BSLAM_MASK_BITS), i = first + start;
-            const uint32_t bits = source == LIKELY
-                                      ? likely_bits(view->values + i, count, limit)
-                                      : smooth_bits(view->step_x + i, view->step_y + i, count, limit);
-            *mask++ = count < BSLAM_MASK_BITS ? bits & last_bits(columns) : bits;
+        for (int32_t k = 0; k < columns; k += BSLAM_MASK_BITS) {
+            const uint32_t bits = bits_of(view, source, first + k, limit);
+            const bool is_half = columns - k <= BSLAM_CELL_STEP;
+            *mask++ = is_half ? bits : bits | bits_of(view, source, first + k + 16, limit) << 16;
         }
+        mask[-1] &= last_bits(columns);
     }
 }
 
 static bool is_room(const bslam_run_t *face, const bslam_frame_t *frame)
 {
-    const bool leaves =
-        face->left == 0 || face->top == 0 || face->right == frame->columns || face->bottom == frame->rows;
+    const uint32_t extent = face->extent;
+    const bool leaves = side_of(extent, LEFT) == 0 || side_of(extent, TOP) == 0 ||
+                        side_of(extent, RIGHT) == frame->columns || side_of(extent, BOTTOM) == frame->rows;
     return leaves || face->cells > frame->columns * frame->rows * FACE_MAX_PERCENT / 100;
 }
 
@@ -360,12 +357,13 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
     const bslam_frame_t *frame = view->frame;
     const int32_t words = words_of(frame->columns);
     uint32_t *mask = proposals->mask;
-    for (int32_t i = 0; i < frame->rows * words; i++) {
-        mask[i] = (i + 1) % words == 0 ? last_bits(frame->columns) : ~0U;
+    for (int32_t row = 0; row < frame->rows; row++) {
+        uint32_t *bits = mask + row * words;
+        memset(bits, 0xFF, (size_t)words * sizeof bits[0]);
+        bits[words - 1] = last_bits(frame->columns);
     }
-    for (int32_t i = 0; i < runs; i++) {
-        const bslam_run_t *run = &proposals->runs[i];
-        if (is_room(&proposals->runs[root_of(proposals->runs, i)], frame)) {
+    for (bslam_run_t *run = proposals->runs; run != proposals->runs + runs; run++) {
+        if (is_room(root_of(proposals->runs, run), frame)) {
             clear_cells(mask + run->row * words, run->first, run->end);
         }
     }
@@ -378,23 +376,33 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
     }
 }
 
-/// Leaves only the cells whose eight neighbours are in the mask too: columns, then rows.
-static void shrink_mask(uint32_t *mask, int32_t columns, int32_t rows)
+/// Leaves only the cells above and below which are others.
+static void shrink_columns(uint32_t *mask, int32_t words, int32_t rows)
 {
-    enum { WORDS = (BSLAM_COLUMNS_MAX + BSLAM_MASK_BITS - 1) / BSLAM_MASK_BITS };
-    const int32_t words = words_of(columns);
-    uint32_t above[WORDS] = {0}, upright[1 + WORDS + 1] = {0};  // nothing on either side
-    for (int32_t row = 0; row < rows; row++, mask += words) {
-        for (int32_t i = 0; i < words; i++) {
-            const uint32_t here = mask[i], below = row + 1 < rows ? mask[words + i] : 0;
-            upright[1 + i] = above[i] & here & below;
-            above[i] = here;
+    for (int32_t word = 0; word < words; word++) {
+        uint32_t *at = mask + word;
+        uint32_t above = 0, here = *at;
+        for (int32_t row = 1; row < rows; row++, at += words) {
+            const uint32_t below = at[words];
+            *at = above & here & below;
+            above = here;
+            here = below;
         }
+        *at = 0;
+    }
+}
+
+/// Leaves only the cells on whose left and right are others.
+static void shrink_rows(uint32_t *mask, int32_t words, int32_t rows)
+{
+    for (const uint32_t *end = mask + rows * words; mask != end; mask += words) {
+        uint32_t before = 0, here = mask[0];
         for (int32_t i = 0; i < words; i++) {
-            const uint32_t *three = upright + i;
-            const uint32_t before = three[1] << 1 | three[0] >> (BSLAM_MASK_BITS - 1);
-            const uint32_t after = three[1] >> 1 | three[2] << (BSLAM_MASK_BITS - 1);
-            mask[i] = three[1] & before & after;
+            const uint32_t after = i + 1 < words ? mask[i + 1] : 0;
+            mask[i] = here & (here << 1 | before >> (BSLAM_MASK_BITS - 1)) &
+                      (here >> 1 | after << (BSLAM_MASK_BITS - 1));
+            before = here;
+            here = after;
         }
     }
 }
@@ -410,7 +418,9 @@ static void segment(bslam_proposals_t *proposals, const bslam_view_t *view, int3
         mask_standing(proposals, view, find_components(proposals, frame));
     }
     if (p->shrink) {
-        shrink_mask(proposals->mask, frame->columns, frame->rows);
+        // Those whose eight neighbours are in the mask too are left.
+        shrink_columns(proposals->mask, words_of(frame->columns), frame->rows);
+        shrink_rows(proposals->mask, words_of(frame->columns), frame->rows);
     }
     propose_components(proposals, view, find_components(proposals, frame), pass);
 }

@@ -34,10 +34,7 @@ typedef struct bslam_run {
     uint8_t row;  ///< the run's own: columns [first, end) of this row
     uint8_t first;
     uint8_t end;
-    uint8_t left;  ///< of all joined to it, if it is their root
-    uint8_t top;
-    uint8_t right;
-    uint8_t bottom;
+    uint32_t extent;  ///< of all joined to it, if it is their root (proposals.c)
 } bslam_run_t;
 
 typedef struct bslam_proposals {

@@ -60,6 +60,7 @@ static void test_sums_of_bytes_and_of_halves(void **state)
         }
         assert_int_equal(bslam_bytes_sum(a, (uint32_t)round), sum);
         assert_int_equal(bslam_bytes_even(a), even);
+        assert_int_equal(bslam_bytes_odd(a), odd);
         assert_int_equal(bslam_bytes_signed_even(a), bslam_halves((int8_t)a, (int8_t)(a >> 16)));
         assert_int_equal(bslam_bytes_signed_odd(a), bslam_halves((int8_t)(a >> 8), (int8_t)(a >> 24)));
         assert_int_equal(bslam_bytes_add_even(7U << 16, a), even + (7U << 16));
@@ -92,6 +93,28 @@ static void test_numbers_become_the_nearest_byte(void **state)
     assert_int_equal(bslam_byte_at_most(INT32_MAX), 255);
 }
 
+static void test_bits_of_what_is_above(void **state)
+{
+    enum { PLACES = 16 };
+    unit_random_t random = {3};
+    for (int round = 0; round < ROUNDS; round++) {
+        uint8_t one[PLACES], other[PLACES];
+        for (int k = 0; k < PLACES; k += BSLAM_WORD_BYTES) {
+            bslam_word_put(one + k, random_word(&random));
+            bslam_word_put(other + k, random_word(&random));
+        }
+        const uint32_t limit = (uint32_t)(random_word(&random) & 255), flip = round % 2 == 0 ? 0 : 128;
+        uint32_t expected = 0, tops = 0;
+        for (int k = 0; k < PLACES; k++) {
+            const bool is_above = (one[k] ^ flip) > limit || (other[k] ^ flip) > limit;
+            expected |= is_above ? 1U << k : 0U;
+            tops |= k < 2 * BSLAM_WORD_BYTES && one[k] >= 128 ? 1U << k : 0U;
+        }
+        assert_int_equal(bslam_bits_above(one, other, flip * 0x01010101U, limit * 0x01010101U), expected);
+        assert_int_equal(bslam_top_bits(bslam_word_at(one), bslam_word_at(one + BSLAM_WORD_BYTES)), tops);
+    }
+}
+
 static void test_words_lie_anywhere(void **state)
 {
     uint8_t bytes[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
@@ -109,6 +132,7 @@ int main(void)
         cmocka_unit_test(test_bytes_are_each_as_a_number),
         cmocka_unit_test(test_sums_of_bytes_and_of_halves),
         cmocka_unit_test(test_numbers_become_the_nearest_byte),
+        cmocka_unit_test(test_bits_of_what_is_above),
         cmocka_unit_test(test_words_lie_anywhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
