@@ -5,20 +5,23 @@
 
 #include "bslam/math/bytes.h"
 
-/// What is looked for: from and to this height above the floor, at least and at most so wide as it appears,
-/// slanted by up to 60 degrees.
+/// What is looked for: foot, middle and top are so high above the floor, and it is at least and at most so
+/// wide as it appears, slanted by up to 60 degrees.
 typedef struct upright {
-    float bottom_m, top_m;
+    float heights_m[3];
     float width_min_m, width_max_m;
 } upright_t;
 
+#define FROM_TO(bottom_m, top_m) \
+    {(bottom_m), (bottom_m) + 0.5f * ((top_m) - (bottom_m)), (bottom_m) + ((top_m) - (bottom_m))}
+
 static const upright_t uprights[] = {
-    {0.0f, 1.9f, 0.45f, 1.3f},     // doors, cabinets
-    {0.1f, 0.7f, 0.40f, 1.7f},     // radiators
-    {0.9f, 2.1f, 0.45f, 1.9f},     // windows
-    {1.08f, 1.92f, 0.30f, 0.75f},  // posters
-    {0.6f, 1.2f, 0.10f, 0.30f},    // extinguishers, which hang at any height
-    {0.9f, 1.5f, 0.10f, 0.30f},
+    {FROM_TO(0.0f, 1.9f), 0.45f, 1.3f},     // doors, cabinets
+    {FROM_TO(0.1f, 0.7f), 0.40f, 1.7f},     // radiators
+    {FROM_TO(0.9f, 2.1f), 0.45f, 1.9f},     // windows
+    {FROM_TO(1.08f, 1.92f), 0.30f, 0.75f},  // posters
+    {FROM_TO(0.6f, 1.2f), 0.10f, 0.30f},    // extinguishers, which hang at any height
+    {FROM_TO(0.9f, 1.5f), 0.10f, 0.30f},
 };
 #define UPRIGHTS BSLAM_UPRIGHTS
 _Static_assert(sizeof uprights / sizeof uprights[0] == BSLAM_UPRIGHTS, "room for the steps of each kind");
@@ -44,7 +47,8 @@ _Static_assert(sizeof uprights / sizeof uprights[0] == BSLAM_UPRIGHTS, "room for
 /// An upright line on the wall where there may be a side, and what stands there: where its foot, middle and
 /// top fall in the frame; pixels of a metre; mean step in quarters. Through a wide lens it is bent.
 typedef struct side {
-    int16_t column;  ///< of the middle
+    int16_t column;       ///< of the middle
+    int16_t top, bottom;  ///< rows of cells [top, bottom)
     float u_px[3], v_px[3];
     float metre_px;
     float step;
@@ -62,50 +66,48 @@ static int32_t column_at(const side_t *side, int32_t row)
     return is_near ? (int32_t)(u_px / BSLAM_CELL_PX) : -1;
 }
 
-static int32_t first_row(const side_t *side)
-{
-    return side->v_px[2] < 0 ? 0 : (int32_t)(side->v_px[2] / BSLAM_CELL_PX);
-}
+/// The sideways steps of four columns side by side, from their upper end to a row: of the even ones and of
+/// the odd ones, each two in the halves of a word; STEP_FREE more a cell, which is what STEP_MAX leaves free.
+typedef struct step_sums {
+    uint32_t even, odd;
+} step_sums_t;
 
-static int32_t end_row(const side_t *side, int32_t rows)
-{
-    const int32_t end = (int32_t)(side->v_px[0] / BSLAM_CELL_PX + 0.5f);
-    return end < rows ? end : rows;
-}
+#define STEP_FREE (255 - STEP_MAX)
 
-/// The sideways steps of four columns side by side, from their upper end to each row: of the even ones and of
-/// the odd ones, each two in the halves of a word.
 typedef struct column_sums {
-    uint32_t even[BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX + 1];
-    uint32_t odd[BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX + 1];
+    step_sums_t to[BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX + 1];
 } column_sums_t;
 
 /// Of columns from `first` on; tables have room for a word that goes beyond the last.
 static void sum_columns(const bslam_view_t *view, int32_t first, column_sums_t *sums)
 {
+    const int32_t columns = view->frame->columns, rows = view->frame->rows;
     const uint8_t *step = view->step_x + first;
     uint32_t even = 0, odd = 0;
-    sums->even[0] = sums->odd[0] = 0;
-    for (int32_t row = 1; row <= view->frame->rows; row++, step += view->frame->columns) {
-        const uint32_t four = bslam_bytes_least(bslam_word_at(step), STEP_MAX * 0x01010101U);
-        sums->even[row] = even = bslam_bytes_add_even(even, four);
-        sums->odd[row] = odd = bslam_bytes_add_odd(odd, four);
+    sums->to[0] = (step_sums_t){0, 0};
+    for (int32_t row = 1; row <= rows; row++, step += columns) {
+        const uint32_t four = bslam_bytes_plus(bslam_word_at(step), STEP_FREE * 0x01010101U);
+        even = bslam_bytes_add_even(even, four);
+        odd = bslam_bytes_add_odd(odd, four);
+        sums->to[row] = (step_sums_t){even, odd};
     }
 }
 
 /// Of one of these columns, between two rows.
 static int32_t steps_between(const column_sums_t *sums, int32_t column, int32_t top, int32_t bottom)
 {
-    const uint32_t *to = column % 2 == 0 ? sums->even : sums->odd;
+    const bool is_even = column % 2 == 0;
     const int32_t shift = column % 4 < 2 ? 0 : 16;
-    return (int32_t)(((to[bottom] >> shift) - (to[top] >> shift)) & 0xFFFFU);
+    const uint32_t from = is_even ? sums->to[top].even : sums->to[top].odd;
+    const uint32_t to = is_even ? sums->to[bottom].even : sums->to[bottom].odd;
+    return (int32_t)(((to >> shift) - (from >> shift)) & 0xFFFFU) - STEP_FREE * (bottom - top);
 }
 
 /// Mean of the sideways steps along a line, in quarters.
 static uint8_t mean_step(const bslam_view_t *view, const column_sums_t *sums, const side_t *side)
 {
     const int32_t columns = view->frame->columns;
-    const int32_t top = first_row(side), bottom = end_row(side, view->frame->rows);
+    const int32_t top = side->top, bottom = side->bottom;
     if (side->u_px[0] == side->u_px[2]) {
         return (uint8_t)(4 * steps_between(sums, side->column, top, bottom) / (bottom - top));
     }
@@ -118,18 +120,25 @@ static uint8_t mean_step(const bslam_view_t *view, const column_sums_t *sums, co
     return (uint8_t)(4 * sum / (bottom - top));
 }
 
-/// Through a lens that bends uprights: where the wall stands in each column, horizontally, from the camera;
-/// worked out once for all kinds.
+/// The row of the horizon; and through a lens that bends uprights where the wall stands in each column,
+/// horizontally, from the camera: worked out once for all kinds.
 typedef struct wall {
+    float horizon_px;
     bslam_real_t x_m[BSLAM_COLUMNS_MAX], y_m[BSLAM_COLUMNS_MAX];
     bool is_seen[BSLAM_COLUMNS_MAX];
 } wall_t;
+
+static bool does_bend(const bslam_view_t *view)
+{
+    return view->camera->lens == BSLAM_LENS_EQUIDISTANT;
+}
 
 static void find_wall(const bslam_view_t *view, wall_t *wall)
 {
     const bslam_camera_t *camera = view->camera;
     const bslam_real_t v_px = bslam_horizon_px(camera);
-    for (int32_t column = 0; column < view->frame->columns; column++) {
+    wall->horizon_px = (float)v_px;
+    for (int32_t column = 0; does_bend(view) && column < view->frame->columns; column++) {
         const bslam_real_t u_px = (bslam_real_t)(column * BSLAM_CELL_PX) + BSLAM_R(1.5);
         const bslam_real_t distance_m = view->floor_line->distance_m[column];
         bslam_direction_t ahead = {0};
@@ -149,9 +158,8 @@ static bool bend(const bslam_view_t *view, const wall_t *wall, const upright_t *
         return false;
     }
     for (int32_t i = 0; i < 3; i++) {
-        const float height_m = kind->bottom_m + 0.5f * (float)i * (kind->top_m - kind->bottom_m);
         const bslam_direction_t there = {wall->x_m[side->column], wall->y_m[side->column],
-                                         (bslam_real_t)height_m - camera->z_m};
+                                         (bslam_real_t)kind->heights_m[i] - camera->z_m};
         bslam_real_t u = 0, v = 0;
         if (bslam_camera_project_as(camera, &view->mounting, &there, &u, &v) != BSLAM_OK) {
             return false;
@@ -162,32 +170,38 @@ static bool bend(const bslam_view_t *view, const wall_t *wall, const upright_t *
     return true;
 }
 
-/// Where the kind would stand in a column. False: it would leave the frame, or the floor line is not known.
-static bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, int32_t column,
-                  side_t *side)
+/// What all kinds have in common in a column. False: the floor line is not known there.
+static bool begin_side(const bslam_view_t *view, const wall_t *wall, int32_t column, side_t *side)
 {
-    const float camera_m = (float)view->camera->z_m;
-    const float horizon_px = (float)bslam_horizon_px(view->camera);
-    const float below_px = (float)view->floor_line->edge_px[column] - horizon_px;
+    const float below_px = (float)view->floor_line->edge_px[column] - wall->horizon_px;
     if (!(view->floor_line->distance_m[column] > 0) || below_px < 4.0f) {
         return false;
     }
     side->column = (int16_t)column;
-    side->metre_px = below_px / camera_m;
+    side->metre_px = below_px / (float)view->camera->z_m;
+    side->u_px[0] = side->u_px[1] = side->u_px[2] = (float)(column * BSLAM_CELL_PX) + 1.5f;
+    return true;
+}
+
+/// Where the kind would stand in the side's column. False: it would leave the frame.
+static bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+{
+    const float camera_m = (float)view->camera->z_m;
     for (int32_t i = 0; i < 3; i++) {
-        const float height_m = kind->bottom_m + 0.5f * (float)i * (kind->top_m - kind->bottom_m);
-        side->u_px[i] = (float)(column * BSLAM_CELL_PX) + 1.5f;
-        side->v_px[i] = horizon_px - side->metre_px * (height_m - camera_m);
+        side->v_px[i] = wall->horizon_px - side->metre_px * (kind->heights_m[i] - camera_m);
     }
-    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT && !bend(view, wall, kind, side)) {
+    if (does_bend(view) && !bend(view, wall, kind, side)) {
         return false;
     }
+    const float foot_px = side->v_px[0], top_px = side->v_px[2];
     // In positive form: a camera on the floor gives no number.
-    if (!(side->v_px[2] >= -2.0f) || !(side->v_px[0] >= side->v_px[2]) ||
-        !(side->v_px[0] <= (float)view->frame->height_px)) {
+    if (!(top_px >= -2.0f) || !(foot_px >= top_px) || !(foot_px <= (float)view->frame->height_px)) {
         return false;
     }
-    return end_row(side, view->frame->rows) - first_row(side) >= 2;
+    const int32_t end = (int32_t)(foot_px / BSLAM_CELL_PX + 0.5f), rows = view->frame->rows;
+    side->top = (int16_t)(top_px < 0 ? 0 : (int32_t)(top_px / BSLAM_CELL_PX));
+    side->bottom = (int16_t)(end < rows ? end : rows);
+    return side->bottom - side->top >= 2;
 }
 
 static bool shows_much(const bslam_view_t *view)
@@ -204,8 +218,9 @@ static void find_steps(const bslam_view_t *view, const wall_t *wall, bslam_uprig
         if (column % BSLAM_WORD_BYTES == 0) {
             sum_columns(view, column, &sums);
         }
+        const bool is_known = begin_side(view, wall, column, &side);
         for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-            const bool stands = place(view, wall, &uprights[kind], column, &side);
+            const bool stands = is_known && place(view, wall, &uprights[kind], &side);
             steps->of_kind[kind][column] = stands ? mean_step(view, &sums, &side) : 0;
         }
     }
@@ -234,7 +249,8 @@ static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const up
             memmove(&sides[at], &sides[at + 1], (size_t)(count - 1 - at) * sizeof sides[0]);
             at = --count;
         }
-        (void)place(view, wall, kind, column, &sides[at]);
+        (void)begin_side(view, wall, column, &sides[at]);
+        (void)place(view, wall, kind, &sides[at]);
         sides[at].step = (float)step;
         count++;
     }
@@ -267,16 +283,14 @@ static float most_of(const float values[3])
 static bslam_proposal_t box_of(const bslam_view_t *view, const side_t *left, const side_t *right,
                                int32_t kind)
 {
-    const int32_t columns = view->frame->columns, rows = view->frame->rows;
+    const int32_t columns = view->frame->columns;
     const bslam_real_t cell_px = BSLAM_CELL_PX, middle_px = BSLAM_R(1.5), edge_px = BSLAM_R(0.5);
     const int32_t first = (int32_t)(least_of(left->u_px) / BSLAM_CELL_PX);
     const int32_t last = (int32_t)(most_of(right->u_px) / BSLAM_CELL_PX);
     const int16_t from = (int16_t)(first < 0 ? 0 : first);
     const int16_t to = (int16_t)(last < columns - 1 ? last : columns - 1);
-    const int32_t top_left = first_row(left), top_right = first_row(right);
-    const int32_t bottom_left = end_row(left, rows), bottom_right = end_row(right, rows);
-    const int16_t top = (int16_t)(top_left < top_right ? top_left : top_right);
-    const int16_t bottom = (int16_t)(bottom_left > bottom_right ? bottom_left : bottom_right);
+    const int16_t top = left->top < right->top ? left->top : right->top;
+    const int16_t bottom = left->bottom > right->bottom ? left->bottom : right->bottom;
     const bslam_proposal_t proposal = {
         .left = from,
         .top = top,
@@ -379,9 +393,7 @@ void bslam_uprights_propose(bslam_proposals_t *proposals, const bslam_view_t *vi
                             bslam_upright_steps_t *steps)
 {
     wall_t wall;
-    if (view->camera->lens == BSLAM_LENS_EQUIDISTANT) {
-        find_wall(view, &wall);
-    }
+    find_wall(view, &wall);
     find_steps(view, &wall, steps);
     for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
         propose_kind(proposals, view, &wall, steps->of_kind[kind], kind);
