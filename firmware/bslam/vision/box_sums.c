@@ -61,20 +61,10 @@ static area_t strip_of(const bslam_proposal_t *box, bslam_side_t side)
     }
 }
 
-static bslam_zone_sums_t zone_of(const bslam_sums_t *sums)
-{
-    return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
-}
-
 /// The box's zones: rows and columns that they begin at, and one past the last.
 typedef struct grid {
     int32_t left[ZONES + 1], top[ZONES + 1];
 } grid_t;
-
-static area_t zone_area(const grid_t *grid, int32_t row, int32_t column)
-{
-    return (area_t){grid->left[column], grid->top[row], grid->left[column + 1], grid->top[row + 1]};
-}
 
 static grid_t grid_of(const bslam_proposal_t *p)
 {
@@ -102,218 +92,269 @@ static void fill_strides(const grid_t *grid, const bslam_proposal_t *p, int32_t 
 
 // --- By words, four cells at a time
 
-/// Sums of bytes and of their squares. Those that stand for signed numbers are 128 more.
-typedef struct byte_sums {
-    uint32_t sum;
-    int32_t square;
-} byte_sums_t;
-
-static inline void add_squared(byte_sums_t *sums, uint32_t bytes)
-{
-    const uint32_t even = bslam_bytes_even(bytes), odd = bslam_bytes_odd(bytes);
-    sums->sum = bslam_bytes_sum(bytes, sums->sum);
-    sums->square = bslam_halves_dot(even, even, bslam_halves_dot(odd, odd, sums->square));
-}
-
 #define ALL_BYTES 0xFFFFFFFFU
-#define ONES 0x01010101U
+/// Bytes that stand for signed numbers are 128 more while they are added up.
 #define SIGNED_ZERO 0x80808080U
 
-/// The bytes of a row's last word that count.
-static uint32_t mask_of(int32_t cells)
+/// An area's rows as words.
+typedef struct words {
+    int32_t first;        ///< its first cell
+    int32_t rows, apart;  ///< how many rows, and cells from one to the next
+    int32_t width;        ///< cells of a row
+    int32_t whole;        ///< of these in whole words
+    uint32_t mask;        ///< bytes of the word behind these that count; 0: there is no such word
+} words_t;
+
+static inline words_t words_of(const bslam_view_t *view, const rows_t *rows)
 {
-    return cells > 0 ? (1U << 8 * cells) - 1 : 0U;
+    const int32_t columns = view->frame->columns, width = rows->right - rows->left;
+    const int32_t rest = width & (BSLAM_WORD_BYTES - 1), height = most(rows->end - rows->first, 0);
+    return (words_t){
+        .first = rows->first * columns + rows->left,
+        .rows = rows->stride == 1 ? height : (height + 1) >> 1,
+        .apart = rows->stride * columns,
+        .width = width,
+        .whole = width - rest,
+        .mask = (1U << 8 * rest) - 1,
+    };
 }
 
-static inline void add_tones(const bslam_tones_t *tones, int32_t i, uint32_t mask, byte_sums_t *light,
-                             byte_sums_t *reddish, byte_sums_t *bluish)
+/// Sums of light, chroma and spread, and of the squares of the former.
+typedef struct tone_sums {
+    uint32_t light, reddish, bluish, spread;
+    int32_t light_sq, reddish_sq, bluish_sq;
+} tone_sums_t;
+
+static inline int32_t square_sum(uint32_t even, uint32_t odd, int32_t sum)
 {
-    add_squared(light, bslam_word_at(tones->light + i) & mask);
-    add_squared(reddish, (bslam_word_at(tones->reddish + i) ^ SIGNED_ZERO) & mask);
-    add_squared(bluish, (bslam_word_at(tones->bluish + i) ^ SIGNED_ZERO) & mask);
+    return bslam_halves_dot(even, even, bslam_halves_dot(odd, odd, sum));
 }
 
-/// Light and chroma of an area.
-static void sum_tones(const bslam_view_t *view, const rows_t *rows, bslam_sums_t *sums)
+/// Bytes that do not count are 0.
+static inline void add_tones(uint32_t light, uint32_t reddish, uint32_t bluish, tone_sums_t *sums)
 {
-    byte_sums_t light = {0}, reddish = {0}, bluish = {0};
-    const int32_t width = rows->right - rows->left, last = width & ~(BSLAM_WORD_BYTES - 1);
-    const uint32_t mask = mask_of(width - last);
-    int32_t cells = 0;
-    for (int32_t row = rows->first; row < rows->end; row += rows->stride) {
-        int32_t i = row * view->frame->columns + rows->left;
-        for (const int32_t end = i + last; i < end; i += BSLAM_WORD_BYTES) {
-            add_tones(view->tones, i, ALL_BYTES, &light, &reddish, &bluish);
-        }
-        if (mask != 0) {
-            add_tones(view->tones, i, mask, &light, &reddish, &bluish);
-        }
-        cells += width;
-    }
-    sums->cells = cells;
-    sums->light = (int32_t)light.sum;
-    sums->light_sq = light.square;
-    sums->reddish = (int32_t)reddish.sum - 128 * cells;
-    sums->reddish_sq = reddish.square - 256 * sums->reddish - 128 * 128 * cells;
-    sums->bluish = (int32_t)bluish.sum - 128 * cells;
-    sums->bluish_sq = bluish.square - 256 * sums->bluish - 128 * 128 * cells;
+    sums->light = bslam_bytes_sum(light, sums->light);
+    sums->reddish = bslam_bytes_sum(reddish ^ SIGNED_ZERO, sums->reddish);
+    sums->bluish = bslam_bytes_sum(bluish ^ SIGNED_ZERO, sums->bluish);
+    sums->light_sq = square_sum(bslam_bytes_even(light), bslam_bytes_odd(light), sums->light_sq);
+    sums->reddish_sq =
+        square_sum(bslam_bytes_signed_even(reddish), bslam_bytes_signed_odd(reddish), sums->reddish_sq);
+    sums->bluish_sq =
+        square_sum(bslam_bytes_signed_even(bluish), bslam_bytes_signed_odd(bluish), sums->bluish_sq);
 }
 
-/// Sums of an area's texture and values.
-typedef struct texture_sums {
-    uint32_t spread, step_x, step_y;
-    uint32_t value, likely;
-    uint32_t wall, floor;
-} texture_sums_t;
-
-/// The two halves of a word together.
-static uint32_t halves_sum(uint32_t halves)
+static inline void add_strip(const bslam_tones_t *tones, int32_t i, uint32_t mask, tone_sums_t *sums)
 {
-    return (halves & 0xFFFFU) + (halves >> 16);
-}
-
-static inline void add_texture(const bslam_view_t *view, int32_t i, uint32_t mask, texture_sums_t *sums)
-{
-    const uint32_t value = (bslam_word_at(view->values + i) ^ SIGNED_ZERO) & mask;
-    sums->spread = bslam_bytes_sum(bslam_word_at(view->tones->spread + i) & mask, sums->spread);
-    sums->step_x = bslam_bytes_sum(bslam_word_at(view->step_x + i) & mask, sums->step_x);
-    sums->step_y = bslam_bytes_sum(bslam_word_at(view->step_y + i) & mask, sums->step_y);
-    sums->value = bslam_bytes_sum(value, sums->value);
-    sums->likely = bslam_bytes_sum(bslam_bytes_above(value, SIGNED_ZERO), sums->likely);
-}
-
-static void merge_tones(bslam_sums_t *into, const bslam_sums_t *from)
-{
-    into->cells += from->cells;
-    into->light += from->light;
-    into->reddish += from->reddish;
-    into->bluish += from->bluish;
-    into->light_sq += from->light_sq;
-    into->reddish_sq += from->reddish_sq;
-    into->bluish_sq += from->bluish_sq;
-}
-
-/// Two cells, to a half of walls and of floors each.
-static inline void add_frequent(const bslam_view_t *view, int32_t i, uint32_t *walls, uint32_t *floors)
-{
-    const uint32_t both = bslam_word_at(view->frequent + i);
-    *walls = bslam_bytes_add_even(*walls, both);
-    *floors = bslam_bytes_add_odd(*floors, both);
-}
-
-/// The cells of a row's last word: `count` of them, 1 to 3.
-static inline void add_frequent_of(const bslam_view_t *view, int32_t i, int32_t count, uint32_t *walls,
-                                   uint32_t *floors)
-{
-    const uint32_t both = bslam_word_at(view->frequent + i) & (count == 1 ? 0xFFFFU : ALL_BYTES);
-    *walls = bslam_bytes_add_even(*walls, both);
-    *floors = bslam_bytes_add_odd(*floors, both);
-    if (count > 2) {
-        *walls += view->frequent[i + 2] & 255U;
-        *floors += view->frequent[i + 2] >> 8;
-    }
-}
-
-/// Sums of a strip's cells: of bytes; those that stand for signed numbers are 128 more.
-typedef struct strip_sums {
-    uint32_t light, reddish, bluish, spread, value;
-    uint32_t walls, floors;  ///< in halves, which a strip does not fill
-} strip_sums_t;
-
-static inline void add_strip(const bslam_view_t *view, int32_t i, uint32_t mask, strip_sums_t *sums)
-{
-    const bslam_tones_t *tones = view->tones;
     sums->light = bslam_bytes_sum(bslam_word_at(tones->light + i) & mask, sums->light);
     sums->reddish = bslam_bytes_sum((bslam_word_at(tones->reddish + i) ^ SIGNED_ZERO) & mask, sums->reddish);
     sums->bluish = bslam_bytes_sum((bslam_word_at(tones->bluish + i) ^ SIGNED_ZERO) & mask, sums->bluish);
     sums->spread = bslam_bytes_sum(bslam_word_at(tones->spread + i) & mask, sums->spread);
-    sums->value = bslam_bytes_sum((bslam_word_at(view->values + i) ^ SIGNED_ZERO) & mask, sums->value);
+}
+
+/// Of an area in a box, the spread aside. The tables come one by one, not to be known as parts of one: so
+/// each has a pointer in a register, where offsets from one would take sums out of theirs.
+__attribute__((noinline, noclone)) static tone_sums_t sum_tones(const uint8_t *light, const int8_t *reddish,
+                                                                const int8_t *bluish, const words_t *words)
+{
+    tone_sums_t sums = {0};
+    const int32_t skip = words->apart - words->whole;
+    const uint32_t mask = words->mask;
+    for (int32_t row = words->rows; row > 0; row--) {
+        for (const uint8_t *end = light + words->whole; light != end;) {
+            add_tones(bslam_word_at(light), bslam_word_at(reddish), bslam_word_at(bluish), &sums);
+            light += BSLAM_WORD_BYTES;
+            reddish += BSLAM_WORD_BYTES;
+            bluish += BSLAM_WORD_BYTES;
+        }
+        if (mask != 0) {
+            add_tones(bslam_word_at(light) & mask, bslam_word_at(reddish) & mask,
+                      bslam_word_at(bluish) & mask, &sums);
+        }
+        light += skip;
+        reddish += skip;
+        bluish += skip;
+    }
+    const int32_t a_row = (words->width + BSLAM_WORD_BYTES - 1) & ~(BSLAM_WORD_BYTES - 1);
+    const int32_t zeros = 128 * words->rows * a_row;
+    sums.reddish -= (uint32_t)zeros;
+    sums.bluish -= (uint32_t)zeros;
+    return sums;
+}
+
+/// Of an area beside a box, without squares.
+static tone_sums_t sum_strip(const bslam_view_t *view, const words_t *words)
+{
+    const bslam_tones_t *tones = view->tones;
+    tone_sums_t sums = {0};
+    int32_t first = words->first, last = first + words->whole;
+    for (int32_t row = words->rows; row > 0; row--, first += words->apart, last += words->apart) {
+        for (int32_t i = first; i < last; i += BSLAM_WORD_BYTES) {
+            add_strip(tones, i, ALL_BYTES, &sums);
+        }
+        if (words->mask != 0) {
+            add_strip(tones, last, words->mask, &sums);
+        }
+    }
+    const int32_t zeros = 128 * words->rows * words->width;
+    sums.reddish -= (uint32_t)zeros;
+    sums.bluish -= (uint32_t)zeros;
+    return sums;
+}
+
+/// Sums of spread and steps.
+typedef struct step_sums {
+    uint32_t spread, x, y;
+} step_sums_t;
+
+static inline void add_steps(const bslam_view_t *view, int32_t i, uint32_t mask, step_sums_t *sums)
+{
+    sums->spread = bslam_bytes_sum(bslam_word_at(view->tones->spread + i) & mask, sums->spread);
+    sums->x = bslam_bytes_sum(bslam_word_at(view->step_x + i) & mask, sums->x);
+    sums->y = bslam_bytes_sum(bslam_word_at(view->step_y + i) & mask, sums->y);
+}
+
+static step_sums_t sum_steps(const bslam_view_t *view, const words_t *words)
+{
+    step_sums_t sums = {0};
+    int32_t first = words->first, last = first + words->whole;
+    for (int32_t row = words->rows; row > 0; row--, first += words->apart, last += words->apart) {
+        for (int32_t i = first; i < last; i += BSLAM_WORD_BYTES) {
+            add_steps(view, i, ALL_BYTES, &sums);
+        }
+        if (words->mask != 0) {
+            add_steps(view, last, words->mask, &sums);
+        }
+    }
+    return sums;
+}
+
+/// Sums of the cells' values, of how many are likely, and of how frequent their tones are.
+typedef struct value_sums {
+    uint32_t value;
+    uint32_t likely;         ///< 128 a cell
+    uint32_t walls, floors;  ///< in halves, which a third of a frame does not fill
+} value_sums_t;
+
+static inline void add_values(const int8_t *values, uint32_t mask, value_sums_t *sums)
+{
+    const uint32_t value = (bslam_word_at(values) ^ SIGNED_ZERO) & mask;
+    sums->value = bslam_bytes_sum(value, sums->value);
+    // A value above 0 and 127 make 256 or more: the top bit of their mean.
+    const uint32_t likely = bslam_bytes_mean(value, ~SIGNED_ZERO) & SIGNED_ZERO;
+    sums->likely = bslam_bytes_sum(likely, sums->likely);
+}
+
+/// Two cells, or with a mask the first one.
+static inline void add_frequent(const uint16_t *frequent, uint32_t mask, value_sums_t *sums)
+{
+    const uint32_t both = bslam_word_at(frequent) & mask;
+    sums->walls = bslam_bytes_add_even(sums->walls, both);
+    sums->floors = bslam_bytes_add_odd(sums->floors, both);
+}
+
+/// The cells of a row's last word.
+static inline void add_last_values(const bslam_view_t *view, int32_t i, uint32_t mask, value_sums_t *sums)
+{
+    add_values(view->values + i, mask, sums);
+    add_frequent(view->frequent + i, mask > 0xFFU ? ALL_BYTES : 0xFFFFU, sums);
+    if (mask > 0xFFFFU) {
+        add_frequent(view->frequent + i + 2, 0xFFFFU, sums);
+    }
+}
+
+static value_sums_t sum_values(const bslam_view_t *view, const words_t *words)
+{
+    value_sums_t sums = {0};
+    int32_t first = words->first, last = first + words->whole;
+    for (int32_t row = words->rows; row > 0; row--, first += words->apart, last += words->apart) {
+        for (int32_t i = first; i < last; i += BSLAM_WORD_BYTES) {
+            add_values(view->values + i, ALL_BYTES, &sums);
+            add_frequent(view->frequent + i, ALL_BYTES, &sums);
+            add_frequent(view->frequent + i + 2, ALL_BYTES, &sums);
+        }
+        if (words->mask != 0) {
+            add_last_values(view, last, words->mask, &sums);
+        }
+    }
+    sums.value -= (uint32_t)(128 * words->rows * words->width);
+    return sums;
+}
+
+/// The two halves of a word together.
+static int32_t halves_sum(uint32_t halves)
+{
+    return (int32_t)((halves & 0xFFFFU) + (halves >> 16));
 }
 
 bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
 {
-    strip_sums_t sums = {0};
     const rows_t rows = rows_of(view, strip_of(box, side));
-    const int32_t width = rows.right - rows.left, last = width & ~(BSLAM_WORD_BYTES - 1);
-    const uint32_t mask = mask_of(width - last);
-    int32_t cells = 0;
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        int32_t i = row * view->frame->columns + rows.left;
-        for (const int32_t end = i + last; i < end; i += BSLAM_WORD_BYTES) {
-            add_strip(view, i, ALL_BYTES, &sums);
-            add_frequent(view, i, &sums.walls, &sums.floors);
-            add_frequent(view, i + 2, &sums.walls, &sums.floors);
-        }
-        if (mask != 0) {
-            add_strip(view, i, mask, &sums);
-            add_frequent_of(view, i, width - last, &sums.walls, &sums.floors);
-        }
-        cells += width;
-    }
+    const words_t words = words_of(view, &rows);
+    const tone_sums_t tones = sum_strip(view, &words);
+    const value_sums_t values = sum_values(view, &words);
     return (bslam_sums_t){
-        .cells = cells,
-        .light = (int32_t)sums.light,
-        .reddish = (int32_t)sums.reddish - 128 * cells,
-        .bluish = (int32_t)sums.bluish - 128 * cells,
-        .spread = (int32_t)sums.spread,
-        .value = (int32_t)sums.value - 128 * cells,
-        .wall = (int32_t)halves_sum(sums.walls),
-        .floor = (int32_t)halves_sum(sums.floors),
+        .cells = words.rows * words.width,
+        .light = (int32_t)tones.light,
+        .reddish = (int32_t)tones.reddish,
+        .bluish = (int32_t)tones.bluish,
+        .spread = (int32_t)tones.spread,
+        .value = (int32_t)values.value,
+        .wall = halves_sum(values.walls),
+        .floor = halves_sum(values.floors),
     };
 }
 
 /// Adds the texture and the values of an area's cells.
-static void add_texture_of(const bslam_view_t *view, const rows_t *rows, texture_sums_t *sums)
+static void add_texture(const bslam_view_t *view, const rows_t *rows, bslam_sums_t *sums)
 {
-    texture_sums_t all = *sums;
-    uint32_t walls = 0, floors = 0;  // in halves, which a third of a frame does not fill
-    const int32_t width = rows->right - rows->left, last = width & ~(BSLAM_WORD_BYTES - 1);
-    const uint32_t mask = mask_of(width - last);
-    for (int32_t row = rows->first; row < rows->end; row += rows->stride) {
-        int32_t i = row * view->frame->columns + rows->left;
-        const int32_t end = i + width;
-        for (; i + BSLAM_WORD_BYTES <= end; i += BSLAM_WORD_BYTES) {
-            add_texture(view, i, ALL_BYTES, &all);
-            add_frequent(view, i, &walls, &floors);
-            add_frequent(view, i + 2, &walls, &floors);
-        }
-        if (mask != 0) {
-            add_texture(view, i, mask, &all);
-            add_frequent_of(view, i, end - i, &walls, &floors);
-        }
-    }
-    all.wall += halves_sum(walls);
-    all.floor += halves_sum(floors);
-    *sums = all;
+    const words_t words = words_of(view, rows);
+    const step_sums_t steps = sum_steps(view, &words);
+    const value_sums_t values = sum_values(view, &words);
+    sums->spread += (int32_t)steps.spread;
+    sums->step_x += (int32_t)steps.x;
+    sums->step_y += (int32_t)steps.y;
+    sums->value += (int32_t)values.value;
+    sums->likely += (int32_t)(values.likely / 128);
+    sums->wall += halves_sum(values.walls);
+    sums->floor += halves_sum(values.floors);
 }
 
-static void take_texture(const texture_sums_t *all, bslam_sums_t *sums)
+/// Adds the tones of a zone.
+static bslam_zone_sums_t add_zone(const bslam_view_t *view, const rows_t *rows, bslam_sums_t *sums)
 {
-    sums->spread = (int32_t)all->spread;
-    sums->step_x = (int32_t)all->step_x;
-    sums->step_y = (int32_t)all->step_y;
-    sums->value = (int32_t)all->value - 128 * sums->cells;
-    sums->likely = (int32_t)all->likely;
-    sums->wall = (int32_t)all->wall;
-    sums->floor = (int32_t)all->floor;
+    const words_t words = words_of(view, rows);
+    const bslam_tones_t *all = view->tones;
+    const tone_sums_t tones =
+        sum_tones(all->light + words.first, all->reddish + words.first, all->bluish + words.first, &words);
+    const int32_t cells = words.rows * words.width;
+    sums->cells += cells;
+    sums->light += (int32_t)tones.light;
+    sums->reddish += (int32_t)tones.reddish;
+    sums->bluish += (int32_t)tones.bluish;
+    sums->light_sq += tones.light_sq;
+    sums->reddish_sq += tones.reddish_sq;
+    sums->bluish_sq += tones.bluish_sq;
+    return (bslam_zone_sums_t){cells, (int32_t)tones.light, (int32_t)tones.reddish, (int32_t)tones.bluish};
 }
 
-/// A row of zones: the texture, which nothing asks of single zones, across them where they have the same
-/// stride.
-static void sum_zones(const bslam_view_t *view, const grid_t *grid, int32_t r, int32_t stride,
-                      bslam_sums_t zones[ZONES], texture_sums_t *texture)
+/// Adds a row of zones: the texture, which nothing asks of single zones, across them where they have the same
+/// stride, else, 0, of each.
+static void add_zones(const bslam_view_t *view, const grid_t *grid, int32_t r, int32_t stride,
+                      bslam_zone_sums_t zones[ZONES], bslam_sums_t *sums)
 {
-    rows_t rows = {0};
+    rows_t rows = {.first = grid->top[r], .end = grid->top[r + 1], .stride = stride};
     for (int32_t c = 0; c < ZONES; c++) {
-        rows = rows_of(view, zone_area(grid, r, c));
-        sum_tones(view, &rows, &zones[c]);
+        rows.left = grid->left[c];
+        rows.right = grid->left[c + 1];
         if (stride == 0) {
-            add_texture_of(view, &rows, texture);
+            rows.stride = stride_of((rows.right - rows.left) * (rows.end - rows.first));
+            add_texture(view, &rows, sums);
         }
+        zones[c] = add_zone(view, &rows, sums);
     }
     if (stride != 0) {
         rows.left = grid->left[0];
-        add_texture_of(view, &rows, texture);
+        add_texture(view, &rows, sums);
     }
 }
 
@@ -323,18 +364,10 @@ void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
     const grid_t grid = grid_of(box);
     int32_t strides[ZONES];
     fill_strides(&grid, box, strides);
-    bslam_sums_t sums = {0};
-    texture_sums_t texture = {0};
+    memset(inside, 0, sizeof *inside);
     for (int32_t r = 0; r < ZONES; r++) {
-        bslam_sums_t row[ZONES];
-        sum_zones(view, &grid, r, strides[r], row, &texture);
-        for (int32_t c = 0; c < ZONES; c++) {
-            zones[ZONES * r + c] = zone_of(&row[c]);
-            merge_tones(&sums, &row[c]);
-        }
+        add_zones(view, &grid, r, strides[r], zones + ZONES * r, inside);
     }
-    take_texture(&texture, &sums);
-    *inside = sums;
 }
 
 #else
@@ -370,6 +403,16 @@ static void merge(bslam_sums_t *into, const bslam_sums_t *from)
     for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
         a[i] += b[i];
     }
+}
+
+static area_t zone_area(const grid_t *grid, int32_t row, int32_t column)
+{
+    return (area_t){grid->left[column], grid->top[row], grid->left[column + 1], grid->top[row + 1]};
+}
+
+static bslam_zone_sums_t zone_of(const bslam_sums_t *sums)
+{
+    return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
 }
 
 static bslam_sums_t sum_inside(const bslam_view_t *view, area_t area)
