@@ -15,7 +15,9 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high)
 
 #if BSLAM_HAS_BYTES
 
-#define LIMITS (BSLAM_EDGE_STEP_MAX * 0x01010101U)
+/// What a step leaves free up to the largest byte: where it is added, sums stop at the limit, so much higher.
+#define FREE (255 - BSLAM_EDGE_STEP_MAX)
+#define ALL_FREE (FREE * 0x01010101U)
 
 /// Columns of cells summed at a time.
 enum { COLUMNS_AT_ONCE = BSLAM_WORD_BYTES };
@@ -24,28 +26,30 @@ enum { COLUMNS_AT_ONCE = BSLAM_WORD_BYTES };
 static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t sums[COLUMNS_AT_ONCE])
 {
     uint32_t even = 0, odd = 0;
-    for (; rows > 0; rows--, steps += columns) {
-        const uint32_t four = bslam_bytes_least(bslam_word_at(steps), LIMITS);
+    for (int32_t left = rows; left > 0; left--, steps += columns) {
+        const uint32_t four = bslam_bytes_plus(bslam_word_at(steps), ALL_FREE);
         even = bslam_bytes_add_even(even, four);
         odd = bslam_bytes_add_odd(odd, four);
     }
     for (int32_t k = 0; k < COLUMNS_AT_ONCE; k++) {
         const uint32_t halves = k % 2 == 0 ? even : odd;
-        sums[k] = (uint16_t)(k < 2 ? halves : halves >> 16);
+        sums[k] = (uint16_t)((k < 2 ? halves : halves >> 16) - (uint32_t)(FREE * rows));
     }
 }
 
 static uint16_t sum_row(const uint8_t *steps, int32_t count)
 {
+    const int32_t rest = count & (BSLAM_WORD_BYTES - 1);
+    const uint8_t *last = steps + count - rest;
     uint32_t sum = 0;
-    int32_t i = 0;
-    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
-        sum = bslam_bytes_sum(bslam_bytes_least(bslam_word_at(steps + i), LIMITS), sum);
+    for (; steps != last; steps += BSLAM_WORD_BYTES) {
+        sum = bslam_bytes_sum(bslam_bytes_plus(bslam_word_at(steps), ALL_FREE), sum);
     }
-    for (; i < count; i++) {
-        sum += steps[i] < BSLAM_EDGE_STEP_MAX ? steps[i] : BSLAM_EDGE_STEP_MAX;
+    if (rest > 0) {
+        const uint32_t mask = (1U << 8 * rest) - 1;
+        sum = bslam_bytes_sum(bslam_bytes_plus(bslam_word_at(steps), ALL_FREE) & mask, sum);
     }
-    return (uint16_t)sum;
+    return (uint16_t)(sum - (uint32_t)(FREE * count));
 }
 
 #else
@@ -90,15 +94,16 @@ static uint16_t sum_row(const uint8_t *steps, int32_t count)
 
 #endif
 
-/// A side of a box, and the mean steps of the lines of cells about it, as bslam_edge_along gives them, as far
-/// as they were asked for.
+/// A side of a box, and the sums of the steps along the lines of cells about it, as far as they were asked
+/// for; 0 outside the frame.
 typedef struct near {
     const bslam_view_t *view;
     const bslam_proposal_t *box;
     int32_t line;     ///< the side's own
     int32_t outside;  ///< 1 or -1: where the next line outside is
     bool is_upright;
-    float steps[SNAP_LINES];
+    int32_t cells;  ///< of a line
+    int32_t sums[SNAP_LINES];
 } near_t;
 
 static int32_t line_of(const near_t *near, int32_t i)
@@ -117,22 +122,20 @@ static bool is_in_frame(const near_t *near, int32_t i)
 static void fill_columns(near_t *near, int32_t first)
 {
     const bslam_proposal_t *box = near->box;
-    const int32_t columns = near->view->frame->columns, cells = box->bottom - box->top;
+    const int32_t columns = near->view->frame->columns;
     const int32_t lowest = line_of(near, near->outside > 0 ? first : first + 3);
     const int32_t start = lowest > 0 ? lowest : 0;
     uint16_t sums[COLUMNS_AT_ONCE];
-    sum_down(near->view->step_x + box->top * columns + start, columns, cells, sums);
+    sum_down(near->view->step_x + box->top * columns + start, columns, near->cells, sums);
     for (int32_t i = first; i < first + 4; i++) {
-        near->steps[i] = is_in_frame(near, i) ? (float)sums[line_of(near, i) - start] / (float)cells : 0.0f;
+        near->sums[i] = is_in_frame(near, i) ? sums[line_of(near, i) - start] : 0;
     }
 }
 
 static void fill_row(near_t *near, int32_t i)
 {
-    const bslam_proposal_t *box = near->box;
-    const int32_t cells = box->right - box->left;
-    const uint8_t *row = near->view->step_y + line_of(near, i) * near->view->frame->columns;
-    near->steps[i] = is_in_frame(near, i) ? (float)sum_row(row + box->left, cells) / (float)cells : 0.0f;
+    const int32_t first = line_of(near, i) * near->view->frame->columns + near->box->left;
+    near->sums[i] = is_in_frame(near, i) ? sum_row(near->view->step_y + first, near->cells) : 0;
 }
 
 /// Of an upright side four columns cost as much as one, and the innermost is seldom asked for.
@@ -161,22 +164,24 @@ static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, 
     near_t near = {.view = view, .box = box, .line = line};
     near.outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
     near.is_upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    near.cells = near.is_upright ? box->bottom - box->top : box->right - box->left;
     if (near.is_upright) {
         fill_columns(&near, INNER);
     }
-    const float *steps = near.steps;
+    const int32_t *sums = near.sums;
     fill(&near, OWN);
     fill(&near, OUTER);
     fill(&near, INNER);
-    int32_t best = steps[OUTER] > steps[OWN] ? OUTER : OWN;
-    if (steps[best] < (float)BSLAM_EDGE_STEP_MIN && steps[INNER] > steps[best]) {
+    int32_t best = sums[OUTER] > sums[OWN] ? OUTER : OWN;
+    if (sums[best] < BSLAM_EDGE_STEP_MIN * near.cells && sums[INNER] > sums[best]) {
         best = INNER;
     }
     if (best != OWN) {
         fill(&near, best + best - OWN);
     }
-    const float before = steps[best - near.outside], after = steps[best + near.outside];
-    *shift = peak_of(before, steps[best], after);
+    const float cells = (float)near.cells;
+    *shift = peak_of((float)sums[best - near.outside] / cells, (float)sums[best] / cells,
+                     (float)sums[best + near.outside] / cells);
     return line_of(&near, best);
 }
 
