@@ -40,21 +40,33 @@ typedef struct glanced {
     int32_t cells;
 } glanced_t;
 
+static void add_cell(const bslam_view_t *view, int32_t i, glanced_t *sums)
+{
+    sums->light += view->tones->light[i];
+    sums->value += (uint32_t)(view->values[i] + 128);
+    sums->cells++;
+}
+
 /// Adds `count` cells side by side.
 static void add_row(const bslam_view_t *view, int32_t first, int32_t count, glanced_t *sums)
 {
     const uint8_t *light = view->tones->light + first;
     const int8_t *values = view->values + first;
-    int32_t i = 0;
-    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
-        sums->light = bslam_bytes_sum(bslam_word_at(light + i), sums->light);
-        sums->value = bslam_bytes_sum(bslam_word_at(values + i) ^ SIGNED_ZERO, sums->value);
+    uint32_t light_sum = sums->light, value_sum = sums->value;
+    int32_t left = count;
+    for (; left >= BSLAM_WORD_BYTES; left -= BSLAM_WORD_BYTES) {
+        light_sum = bslam_bytes_sum(bslam_word_at(light), light_sum);
+        value_sum = bslam_bytes_sum(bslam_word_at(values) ^ SIGNED_ZERO, value_sum);
+        light += BSLAM_WORD_BYTES;
+        values += BSLAM_WORD_BYTES;
     }
-    if (i < count) {
-        const uint32_t mask = (1U << 8 * (count - i)) - 1;
-        sums->light = bslam_bytes_sum(bslam_word_at(light + i) & mask, sums->light);
-        sums->value = bslam_bytes_sum((bslam_word_at(values + i) ^ SIGNED_ZERO) & mask, sums->value);
+    if (left > 0) {
+        const uint32_t mask = (1U << 8 * left) - 1;
+        light_sum = bslam_bytes_sum(bslam_word_at(light) & mask, light_sum);
+        value_sum = bslam_bytes_sum((bslam_word_at(values) ^ SIGNED_ZERO) & mask, value_sum);
     }
+    sums->light = light_sum;
+    sums->value = value_sum;
     sums->cells += count;
 }
 
@@ -80,8 +92,8 @@ static float *look_features(const bslam_view_t *view, const bslam_proposal_t *bo
     for (int32_t i = 0; i < ROWS_LOOKED_AT; i++) {
         const int32_t first = (box->top + (2 * i + 1) * height / (2 * ROWS_LOOKED_AT)) * columns;
         add_row(view, first + box->left, width, &inside);
-        add_row(view, first + left, 1, &sides[BSLAM_SIDE_LEFT]);
-        add_row(view, first + right, 1, &sides[BSLAM_SIDE_RIGHT]);
+        add_cell(view, first + left, &sides[BSLAM_SIDE_LEFT]);
+        add_cell(view, first + right, &sides[BSLAM_SIDE_RIGHT]);
     }
     add_row(view, top * columns + box->left, width, &sides[BSLAM_SIDE_TOP]);
     add_row(view, bottom * columns + box->left, width, &sides[BSLAM_SIDE_BOTTOM]);
@@ -105,12 +117,13 @@ static float *look_features(const bslam_view_t *view, const bslam_proposal_t *bo
 static bslam_edge_t edge_of(const uint8_t *step, int32_t count, int32_t apart_by)
 {
     const int32_t every = count < 2 * SIDE_CELLS ? 1 : count / SIDE_CELLS;
-    int32_t sum = 0, clear = 0, cells = 0;
-    for (int32_t i = 0; i < count; i += every) {
-        const int32_t here = step[i * apart_by];
+    const int32_t cells = (count + every - 1) / every;
+    int32_t sum = 0;
+    uint32_t clear = 0;
+    for (int32_t k = cells; k > 0; k--, step += every * apart_by) {
+        const int32_t here = *step;
         sum += least(here, BSLAM_EDGE_STEP_MAX);
-        clear += here > BSLAM_EDGE_STEP_MIN ? 1 : 0;
-        cells++;
+        clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
     }
     const float per_cell = 1.0f / (float)cells;
     return (bslam_edge_t){(float)sum * per_cell, (float)clear * per_cell};
