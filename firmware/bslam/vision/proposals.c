@@ -213,11 +213,12 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
     const uint8_t *step =
         upright ? view->step_x + first * columns + line : view->step_y + line * columns + first;
     const int32_t stride = upright ? columns : 1;
-    int32_t sum = 0, clear = 0;
-    for (int32_t i = 0; i < end - first; i++) {
-        const int32_t here = step[i * stride];
+    int32_t sum = 0;
+    uint32_t clear = 0;
+    for (int32_t left = end - first; left > 0; left--, step += stride) {
+        const int32_t here = *step;
         sum += least(here, BSLAM_EDGE_STEP_MAX);
-        clear += here > BSLAM_EDGE_STEP_MIN ? 1 : 0;
+        clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
     }
     edge.step = (float)sum / (float)(end - first);
     edge.share = (float)clear / (float)(end - first);
@@ -357,10 +358,10 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
     const bslam_frame_t *frame = view->frame;
     const int32_t words = words_of(frame->columns);
     uint32_t *mask = proposals->mask;
-    for (int32_t row = 0; row < frame->rows; row++) {
-        uint32_t *bits = mask + row * words;
-        memset(bits, 0xFF, (size_t)words * sizeof bits[0]);
-        bits[words - 1] = last_bits(frame->columns);
+    const uint32_t last = last_bits(frame->columns);
+    memset(mask, 0xFF, (size_t)(frame->rows * words) * sizeof mask[0]);
+    for (int32_t i = words - 1; i < frame->rows * words; i += words) {
+        mask[i] = last;
     }
     for (bslam_run_t *run = proposals->runs; run != proposals->runs + runs; run++) {
         if (is_room(root_of(proposals->runs, run), frame)) {
