@@ -135,8 +135,13 @@ static void sum_curves(const bslam_between_knots_t *place, int32_t features, con
                        int32_t sums[ROWS])
 {
     sums[0] = sums[1] = 0;
-    for (const bslam_between_knots_t *end = place + features; place != end; place++) {
+    if (features % 2 != 0) {
         add_pair(bytes + place->at, place->shares, sums);
+        place++;
+    }
+    for (const bslam_between_knots_t *end = place + features / 2 * 2; place != end; place += 2) {
+        add_pair(bytes + place[0].at, place[0].shares, sums);
+        add_pair(bytes + place[1].at, place[1].shares, sums);
     }
 }
 

@@ -182,6 +182,12 @@ bslam_real_t bslam_box_overlap(const bslam_box_t *a, const bslam_box_t *b)
     return both / (area_a + area_b - both);
 }
 
+static bool is_within(bslam_real_t a, bslam_real_t b, bslam_real_t most_apart)
+{
+    const bslam_real_t apart = a - b;
+    return apart <= most_apart && apart >= -most_apart;
+}
+
 /// Boxes the same to SAME_OVERLAP have each side within .15 / .85 of the box's width or height: those that
 /// have not need no division.
 static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
@@ -190,9 +196,8 @@ static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
     const bslam_real_t off_y = SAME_SIDES * (box->bottom_px - box->top_px);
     for (int32_t i = 0; i < proposals->count; i++) {
         const bslam_box_t *known = &proposals->items[i].box;
-        if (bslam_abs(known->left_px - box->left_px) <= off_x &&
-            bslam_abs(known->top_px - box->top_px) <= off_y &&
-            bslam_abs(known->right_px - box->right_px) <= off_x &&
+        if (is_within(known->left_px, box->left_px, off_x) && is_within(known->top_px, box->top_px, off_y) &&
+            is_within(known->right_px, box->right_px, off_x) &&
             bslam_box_overlap(known, box) > SAME_OVERLAP) {
             return true;
         }

@@ -132,17 +132,22 @@ static void fill_columns(near_t *near, int32_t first)
     }
 }
 
-static void fill_row(near_t *near, int32_t i)
+/// Fills in lines [first, last] of a level side.
+static void fill_rows(near_t *near, int32_t first, int32_t last)
 {
-    const int32_t first = line_of(near, i) * near->view->frame->columns + near->box->left;
-    near->sums[i] = is_in_frame(near, i) ? sum_row(near->view->step_y + first, near->cells) : 0;
+    const int32_t columns = near->view->frame->columns;
+    const uint8_t *step_y = near->view->step_y + near->box->left;
+    for (int32_t i = first; i <= last; i++) {
+        near->sums[i] = is_in_frame(near, i) ? sum_row(step_y + line_of(near, i) * columns, near->cells) : 0;
+    }
 }
 
-/// Of an upright side four columns cost as much as one, and the innermost is seldom asked for.
-static void fill(near_t *near, int32_t i)
+/// Fills in a line beyond those next to the side's own. Of an upright side four columns cost as much as one,
+/// and the innermost is seldom asked for.
+static void fill_beyond(near_t *near, int32_t i)
 {
     if (!near->is_upright) {
-        fill_row(near, i);
+        fill_rows(near, i, i);
     } else if (i == 0) {
         fill_columns(near, 0);
     }
@@ -167,17 +172,16 @@ static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, 
     near.cells = near.is_upright ? box->bottom - box->top : box->right - box->left;
     if (near.is_upright) {
         fill_columns(&near, INNER);
+    } else {
+        fill_rows(&near, INNER, OUTER);
     }
     const int32_t *sums = near.sums;
-    fill(&near, OWN);
-    fill(&near, OUTER);
-    fill(&near, INNER);
     int32_t best = sums[OUTER] > sums[OWN] ? OUTER : OWN;
     if (sums[best] < BSLAM_EDGE_STEP_MIN * near.cells && sums[INNER] > sums[best]) {
         best = INNER;
     }
     if (best != OWN) {
-        fill(&near, best + best - OWN);
+        fill_beyond(&near, best + best - OWN);
     }
     const float cells = (float)near.cells;
     *shift = peak_of((float)sums[best - near.outside] / cells, (float)sums[best] / cells,
