@@ -159,7 +159,11 @@ static inline uint32_t bslam_bits_above(const void *one, const void *other, uint
 
 static inline bool bslam_has_zero_byte(uint32_t bytes)
 {
+#ifdef __ARM_FEATURE_SIMD32
+    return __uqsub8(0x01010101U, bytes) != 0;
+#else
     return ((bytes - 0x01010101U) & ~bytes & BSLAM_TOP_BITS) != 0;
+#endif
 }
 
 /// Byte k, counted from the lowest; in memory, too, on a machine of that byte order.

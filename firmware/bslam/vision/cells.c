@@ -283,8 +283,8 @@ typedef struct tone_machine {
 } tone_machine_t;
 
 /// Not to be inlined: most tones are kept, and the loop over the cells has the registers then.
-__attribute__((noinline)) static void sum_tone(const tone_machine_t *machine, uint32_t tone,
-                                               bslam_tone_sum_t *sum)
+__attribute__((noinline)) static bslam_tone_sum_t *sum_tone(bslam_tone_sum_t *sum, uint32_t tone,
+                                                            const tone_machine_t *machine)
 {
     const int16_t *w = machine->weights;
     const int32_t light = bslam_byte_of(tone, 0), reddish = bslam_byte_of(tone, 1);
@@ -302,15 +302,16 @@ __attribute__((noinline)) static void sum_tone(const tone_machine_t *machine, ui
                w[6] * nearest + w[15] * bslam_byte_of(distances, 3);
     sum->sum_above_floor = sum->sum + a->above_floor + w[20] * bslam_byte_of(distances, TO_WALL);
     sum->frequent = machine->bins->frequent[bin];
+    return sum;
 }
 
 /// A sum as a cell's value, rounded towards 0 and within +-127.
-static inline int8_t value_of(int32_t sum)
+static inline int32_t value_of(int32_t sum)
 {
     const uint32_t if_below_zero = (uint32_t)(sum >> 31) >> (32 - BSLAM_CELL_WEIGHT_SHIFT);
     const int32_t value =
         bslam_signed_byte_nearest((sum + (int32_t)if_below_zero) >> BSLAM_CELL_WEIGHT_SHIFT);
-    return (int8_t)(value == -128 ? -127 : value);
+    return value + (int32_t)((uint32_t)(value + 127) >> 31);
 }
 
 /// Values of a row's cells: by their tones, and the sums of the rest.
@@ -328,10 +329,10 @@ static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, 
         const uint32_t tone = lights[i] | (uint32_t)reddish[i] << 8 | (uint32_t)bluish[i] << 16;
         bslam_tone_sum_t *known = &kept[(tone ^ tone >> 5 ^ tone >> 10) % BSLAM_TONES_KEPT];
         if (known->tone != tone) {
-            sum_tone(machine, tone, known);
+            known = sum_tone(known, tone, machine);
         }
         frequent[i] = (uint16_t)known->frequent;
-        values[i] = value_of(sums[i] + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
+        values[i] = (int8_t)value_of(sums[i] + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
     }
 }
 
