@@ -183,6 +183,16 @@ static inline uint32_t bslam_bytes_sum(uint32_t bytes, uint32_t sum)
 #endif
 }
 
+/// How far the bytes of a are from those of b, all four together.
+static inline uint32_t bslam_bytes_apart_sum(uint32_t a, uint32_t b)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __usad8(a, b);
+#else
+    return bslam_bytes_sum(bslam_bytes_apart(a, b), 0);
+#endif
+}
+
 /// Bytes 0 and 2 as halves of a word.
 static inline uint32_t bslam_bytes_even(uint32_t bytes)
 {

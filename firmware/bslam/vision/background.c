@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "bslam/math/bytes.h"
+#include "bslam/vision/spread.h"
 
 /// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
 static const uint8_t tone_log[256] = {
@@ -224,15 +225,46 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
     known->known = true;
 }
 
-/// How much more a cell looks like floor than like wall.
-static int32_t floor_evidence(const bslam_background_t *background, bslam_tone_t tone)
+/// A tone in a word, its chromas moved above 0; and where these stand.
+static uint32_t word_of_tone(bslam_tone_t tone)
+{
+    return (tone.light | (uint32_t)(uint8_t)tone.reddish << 8 | (uint32_t)(uint8_t)tone.bluish << 16) ^
+           0x808000U;
+}
+
+#define CHROMAS 0xFFFF00U
+
+/// bslam_tone_distance() of two such words.
+static int32_t word_distance(uint32_t a, uint32_t b)
+{
+    return (int32_t)(bslam_bytes_apart_sum(a, b) + bslam_bytes_apart_sum(a & CHROMAS, b & CHROMAS));
+}
+
+/// How much more a cell looks like floor than like wall, whose tones are given as words.
+static int32_t floor_evidence(const bslam_background_t *background, bslam_tone_t tone, uint32_t wall,
+                              uint32_t floor)
 {
     const int32_t bin = bslam_tone_bin(tone);
     const int32_t frequent = tone_log[background->counts[BSLAM_ZONE_FLOOR][bin]] -
                              tone_log[background->counts[BSLAM_ZONE_WALL][bin]];
-    const int32_t nearer = bslam_tone_distance(tone, background->tone[BSLAM_ZONE_WALL]) -
-                           bslam_tone_distance(tone, background->tone[BSLAM_ZONE_FLOOR]);
-    return frequent + clamp(nearer, -64, 64);
+    const uint32_t word = word_of_tone(tone);
+    return frequent + clamp(word_distance(word, wall) - word_distance(word, floor), -64, 64);
+}
+
+/// The row of cells below which all of a column is floor.
+static int32_t floor_end(const bslam_background_t *background, const bslam_frame_t *frame,
+                         const bslam_tones_t *tones, int32_t column, int32_t stop)
+{
+    const uint32_t wall = word_of_tone(background->tone[BSLAM_ZONE_WALL]);
+    const uint32_t floor = word_of_tone(background->tone[BSLAM_ZONE_FLOOR]);
+    int32_t end = frame->rows;
+    for (int32_t row = frame->rows - 1; row >= stop && row >= end - 2; row--) {
+        const bslam_tone_t tone = bslam_tone_at(tones, row * frame->columns + column);
+        if (floor_evidence(background, tone, wall, floor) > 0) {
+            end = row;
+        }
+    }
+    return end;
 }
 
 /// Horizontal distance of the floor at a pixel, 0 where it does not look down at it.
@@ -260,58 +292,68 @@ enum {
     WIDE = 5         // and those that must differ as well, or it is only a line on the floor
 };
 
-/// Sums of the channels over rows [0, i) of a column of cells in the half-resolution copy.
+/// A column of cells in the half-resolution copy: two pixels a row, their channels' sums spread.
 typedef struct strip {
     int32_t rows;
     int32_t first;  ///< row of the copy
-    int32_t sums[FINE_ROWS + 1][3];
+    uint32_t pairs[FINE_ROWS];
 } strip_t;
 
-static void sum_strip(const bslam_frame_t *frame, int32_t column, int32_t first, int32_t end, strip_t *strip)
+static void fill_strip(const bslam_frame_t *frame, int32_t column, int32_t first, int32_t end, strip_t *strip)
 {
     const int32_t width = frame->width_px / 2;
     const uint16_t *at = frame->half + first * width + 2 * column;
-    memset(strip->sums[0], 0, sizeof strip->sums[0]);
     strip->first = first;
     strip->rows = end - first < FINE_ROWS ? end - first : FINE_ROWS;
     for (int32_t i = 0; i < strip->rows; i++, at += width) {
-        const int32_t *above = strip->sums[i];
-        int32_t *sums = strip->sums[i + 1];
-        sums[0] = above[0] + 2 * ((at[0] >> 11) + (at[1] >> 11));
-        sums[1] = above[1] + (at[0] >> 5 & 63) + (at[1] >> 5 & 63);
-        sums[2] = above[2] + 2 * ((at[0] & 31) + (at[1] & 31));
+        strip->pairs[i] = bslam_spread_pair(bslam_word_at(at));
+    }
+}
+
+/// Sums of rows [first, end): green, which has a bit more than red and blue, counts half as much.
+static void sum_rows(const strip_t *strip, int32_t first, int32_t end, int32_t sums[3])
+{
+    memset(sums, 0, 3 * sizeof sums[0]);
+    for (int32_t i = first; i < end; i++) {
+        const uint32_t pair = strip->pairs[i];
+        sums[0] += 2 * (int32_t)(pair >> BSLAM_SPREAD_RED & 63);
+        sums[1] += (int32_t)(pair >> BSLAM_SPREAD_GREEN);
+        sums[2] += 2 * (int32_t)(pair & 63);
     }
 }
 
 /// How much the means of the rows [first, at) and [at, end) differ.
 static int32_t difference(const strip_t *strip, int32_t first, int32_t at, int32_t end)
 {
-    int32_t sum = 0;
+    int32_t above[3], below[3], sum = 0;
+    sum_rows(strip, first, at, above);
+    sum_rows(strip, at, end, below);
     for (int32_t k = 0; k < 3; k++) {
-        const int32_t above = (strip->sums[at][k] - strip->sums[first][k]) / (at - first);
-        const int32_t below = (strip->sums[end][k] - strip->sums[at][k]) / (end - at);
-        sum += above < below ? below - above : above - below;
+        const int32_t apart = above[k] / (at - first) - below[k] / (end - at);
+        sum += apart < 0 ? -apart : apart;
     }
     return sum;
+}
+
+/// The means of two rows, times SHARP: a byte a channel.
+static uint32_t mean_of_two(const uint32_t *pairs)
+{
+    const uint32_t sum = pairs[0] + pairs[1];
+    return (sum & 127) | (sum >> BSLAM_SPREAD_RED & 127) << 8 | sum >> (BSLAM_SPREAD_GREEN + 1) << 16;
 }
 
 /// The same of the SHARP rows above and below each boundary that has so many; 0 before the first and after
 /// the last of them.
 static void fill_contrasts(const strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
 {
+    uint32_t means[FINE_ROWS];
     int32_t i = SHARP;
+    for (int32_t k = 0; k + 1 < strip->rows; k++) {
+        means[k] = mean_of_two(strip->pairs + k);
+    }
     contrasts[i - 1] = 0;
     for (; i <= strip->rows - SHARP; i++) {
-        const int32_t *before = strip->sums[i - SHARP], *here = strip->sums[i];
-        const int32_t *after = strip->sums[i + SHARP];
-        int32_t sum = 0;
-        for (int32_t k = 0; k < 3; k++) {
-            // Sums only grow; halves of numbers that cannot be negative take one instruction each.
-            const uint32_t above = (uint32_t)(here[k] - before[k]) / SHARP;
-            const uint32_t below = (uint32_t)(after[k] - here[k]) / SHARP;
-            sum += (int32_t)(above < below ? below - above : above - below);
-        }
-        contrasts[i] = sum;
+        contrasts[i] = (int32_t)bslam_bytes_apart_sum(means[i - SHARP], means[i]);
     }
     contrasts[i] = 0;
 }
@@ -337,7 +379,7 @@ static int32_t fine_end(const bslam_frame_t *frame, int32_t column, int32_t coar
     int32_t contrasts[FINE_ROWS + 2];
     const int32_t half_rows = frame->height_px / 2;
     const int32_t first = coarse > WIDE ? coarse - WIDE : 0;
-    sum_strip(frame, column, first, lowest + WIDE < half_rows ? lowest + WIDE : half_rows, &strip);
+    fill_strip(frame, column, first, lowest + WIDE < half_rows ? lowest + WIDE : half_rows, &strip);
     fill_contrasts(&strip, contrasts);
     int32_t sharpest = 0;
     for (int32_t i = SHARP; i <= strip.rows - SHARP; i++) {
@@ -358,12 +400,7 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
     const int32_t stop = clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
     const bslam_mounting_t mounting = bslam_camera_mounting(camera);
     for (int32_t column = 0; column < frame->columns; column++) {
-        int32_t row = frame->rows;  // the row below which all is floor
-        for (int32_t r = frame->rows - 1; r >= stop && r >= row - 2; r--) {
-            if (floor_evidence(background, bslam_tone_at(tones, r * frame->columns + column)) > 0) {
-                row = r;
-            }
-        }
+        const int32_t row = floor_end(background, frame, tones, column, stop);
         int32_t edge_px = row * BSLAM_CELL_PX;
         if (row < frame->rows) {
             const bslam_real_t below_px = (bslam_real_t)edge_px - bslam_horizon_px(camera);

@@ -3,14 +3,10 @@
 #include <string.h>
 
 #include "bslam/math/bytes.h"
+#include "bslam/vision/spread.h"
 
-/// Where the channels of an RGB565 pixel stand in a word once spread: blue in bits 0-4, red in 11-15, green
-/// in 21-26. Above each are 5 free bits or more, so that up to 32 pixels add up.
-#define SPREAD_MASK 0x07E0F81FU
-#define RED_SHIFT 11
-#define GREEN_SHIFT 21
 /// 2 in each channel: makes a quarter of a sum of four round to nearest.
-#define HALF_OF_FOUR (2U | 2U << RED_SHIFT | 2U << GREEN_SHIFT)
+#define HALF_OF_FOUR (2U | 2U << BSLAM_SPREAD_RED | 2U << BSLAM_SPREAD_GREEN)
 /// Pixel pairs that are copied at once.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
 /// Pixel pairs that are summed at once, and cells that are made of them. A core without vectors takes two,
@@ -70,18 +66,16 @@ static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, i
     }
 }
 
-/// The sum of two pixels above two. The word of a pair, and the same turned by half, hold between them each
-/// channel of each pixel in its spread place; which of the two came first does not matter.
+/// The sum of two pixels above two.
 static inline uint32_t quad_sum(uint32_t above, uint32_t below)
 {
-    return (above & SPREAD_MASK) + (bslam_halves_turned(above) & SPREAD_MASK) + (below & SPREAD_MASK) +
-           (bslam_halves_turned(below) & SPREAD_MASK);
+    return bslam_spread_pair(above) + bslam_spread_pair(below);
 }
 
 /// The mean of 2x2 pixels in RGB565 from their sum.
 static inline uint16_t mean_565(uint32_t quad)
 {
-    const uint32_t mean = ((quad + HALF_OF_FOUR) >> 2) & SPREAD_MASK;
+    const uint32_t mean = ((quad + HALF_OF_FOUR) >> 2) & BSLAM_SPREAD_MASK;
     return (uint16_t)(mean | mean >> 16);
 }
 
@@ -123,7 +117,7 @@ static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const u
 /// Brightness of a 2x2 sum, 0 to 376: green counts twice as much as red, because it has a bit more.
 static inline uint32_t luma(uint32_t quad)
 {
-    return (quad >> RED_SHIFT & 127) + (quad >> GREEN_SHIFT);
+    return (quad >> BSLAM_SPREAD_RED & 127) + (quad >> BSLAM_SPREAD_GREEN);
 }
 
 #if BSLAM_HAS_BYTES
@@ -161,8 +155,8 @@ static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uin
     const uint32_t sum = above[0] + above[1] + below[0] + below[1];
     const uint32_t next_sum = above[2] + above[3] + below[2] + below[3];
     put_two(cells->spread + i, spreads | spreads >> 8);
-    put_channel(cells->red + i, sum, next_sum, RED_SHIFT + 1);
-    put_channel(cells->green + i, sum, next_sum, GREEN_SHIFT + 2);
+    put_channel(cells->red + i, sum, next_sum, BSLAM_SPREAD_RED + 1);
+    put_channel(cells->green + i, sum, next_sum, BSLAM_SPREAD_GREEN + 2);
     put_channel(cells->blue + i, sum, next_sum, 1);
 }
 
@@ -193,8 +187,8 @@ static void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *restrict 
             most(most(of_a, of_b), most(of_c, of_d)) - least(least(of_a, of_b), least(of_c, of_d)), 255);
     }
     for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
-        cells->red[i + k] = (uint8_t)(sum[k] >> (RED_SHIFT + 1));
-        cells->green[i + k] = (uint8_t)(sum[k] >> (GREEN_SHIFT + 2));
+        cells->red[i + k] = (uint8_t)(sum[k] >> (BSLAM_SPREAD_RED + 1));
+        cells->green[i + k] = (uint8_t)(sum[k] >> (BSLAM_SPREAD_GREEN + 2));
         cells->blue[i + k] = (uint8_t)(sum[k] >> 1);
         cells->spread[i + k] = (uint8_t)spread[k];
     }
