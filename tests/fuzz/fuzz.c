@@ -10,10 +10,27 @@
 static const double ROUNDING = 1e-6;
 static const double COVARIANCE_MIN = 1e-19;
 static double largest_variance;
+/// Where the filter stood when it was last looked at.
+static int64_t filter_us;
 
 void fuzz_begin(void)
 {
     largest_variance = 0;
+    filter_us = 0;
+}
+
+/// The variance of the speeds that the last call's prediction made, which a sighting of the same call may have
+/// taken away again: no look between calls has seen it.
+static void count_walk(const bslam_slam_t *slam)
+{
+    const int64_t now_us = slam->odometry.time_us - slam->history.filter.behind_us;
+    const double gone_s = 1e-6 * (double)(now_us - filter_us);
+    const double walk = fmax((double)slam->params.velocity_walk_mps_sqrt_s,
+                             (double)slam->params.turn_rate_walk_radps_sqrt_s);
+    if (slam->ekf.base_dim > BSLAM_STATE_FORWARD && gone_s > 0) {
+        largest_variance = fmax(largest_variance, walk * walk * gone_s);
+    }
+    filter_us = now_us;
 }
 
 static void require_finite(const bslam_ekf_t *ekf)
@@ -68,6 +85,7 @@ void fuzz_require_sound(const bslam_slam_t *slam)
 {
     require_counts(&slam->ekf);
     require_finite(&slam->ekf);
+    count_walk(slam);
     fuzz_require(is_positive(&slam->ekf) || slam->counters.insane > 0);
     const bslam_pose_t pose = bslam_slam_pose(slam);
     fuzz_require(isfinite((double)pose.x_m) && isfinite((double)pose.y_m) &&
