@@ -116,9 +116,9 @@ def costs(board: str, program: str = "cost") -> dict[tuple[str, int], int]:
     return {(name, int(size)): round(int(ticks) * INSTRUCTIONS_A_TICK) for name, size, ticks in lines}
 
 
-def picture_loader(lens: str, folder: Path) -> tuple[str, str]:
-    """QEMU's arguments to put a short walk through a rendered world where cost_vision.c looks for it."""
-    frames = render_world(WORLD_SEED, "test", camera_of(lens, WORLD_SEED), FRAMES).pictures
+def picture_loader(lens: str, folder: Path, seed: int = WORLD_SEED, count: int = FRAMES) -> tuple[str, str]:
+    """QEMU's arguments to put a walk of so many frames through a world where cost_vision.c looks for it."""
+    frames = render_world(seed, "test", camera_of(lens, seed), count).pictures
     path = folder / f"{lens}.bin"
     head = np.array([lens == "wide", len(frames)], "<u4")
     path.write_bytes(head.tobytes() + frames.astype("<u2").tobytes())
@@ -274,7 +274,8 @@ frame of 6 beacons, 5 of 20; firmware/app/cost_smoother.c.
 {table(("", "beacons", "instructions", f"of {CORE_HZ // 1_000_000} million a second"), smoother_rows())}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
 world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
-`.venv/bin/python tools/profile_image.py cost_vision`.
+`.venv/bin/python tools/profile_image.py cost_vision`. A frame costs as much as it shows: of other worlds \
+`--worlds 7000:7020 --frames 8` tells (EXPERIMENTS.md).
 
 
 {table(("lens", *COST_BOARDS), vision_rows(seeing))}

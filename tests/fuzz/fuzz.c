@@ -19,14 +19,14 @@ void fuzz_begin(void)
     filter_us = 0;
 }
 
-/// The variance of the speeds that the last call's prediction made, which a sighting of the same call may have
-/// taken away again: no look between calls has seen it.
+/// The variance of the speeds that the last call's prediction made, which a sighting of the same call may
+/// have taken away again: no look between calls has seen it.
 static void count_walk(const bslam_slam_t *slam)
 {
     const int64_t now_us = slam->odometry.time_us - slam->history.filter.behind_us;
     const double gone_s = 1e-6 * (double)(now_us - filter_us);
-    const double walk = fmax((double)slam->params.velocity_walk_mps_sqrt_s,
-                             (double)slam->params.turn_rate_walk_radps_sqrt_s);
+    const double walk =
+        fmax((double)slam->params.velocity_walk_mps_sqrt_s, (double)slam->params.turn_rate_walk_radps_sqrt_s);
     if (slam->ekf.base_dim > BSLAM_STATE_FORWARD && gone_s > 0) {
         largest_variance = fmax(largest_variance, walk * walk * gone_s);
     }

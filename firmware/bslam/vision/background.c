@@ -347,15 +347,15 @@ static uint32_t mean_of_two(const uint32_t *pairs)
 static void fill_contrasts(const strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
 {
     uint32_t means[FINE_ROWS];
-    int32_t i = SHARP;
-    for (int32_t k = 0; k + 1 < strip->rows; k++) {
-        means[k] = mean_of_two(strip->pairs + k);
-    }
-    contrasts[i - 1] = 0;
+    int32_t i = 0;
+    contrasts[SHARP - 1] = 0;
     for (; i <= strip->rows - SHARP; i++) {
-        contrasts[i] = (int32_t)bslam_bytes_apart_sum(means[i - SHARP], means[i]);
+        means[i] = mean_of_two(strip->pairs + i);
+        if (i >= SHARP) {
+            contrasts[i] = (int32_t)bslam_bytes_apart_sum(means[i - SHARP], means[i]);
+        }
     }
-    contrasts[i] = 0;
+    contrasts[i < SHARP ? SHARP : i] = 0;
 }
 
 /// True if it is sharp, and what lies between it and the coarse end differs from what lies below it: a line
@@ -375,7 +375,7 @@ static bool is_boundary(const strip_t *strip, const int32_t *contrasts, int32_t 
 /// what is floor and what is not, down to `lowest`; the coarse one where there is none.
 static int32_t fine_end(const bslam_frame_t *frame, int32_t column, int32_t coarse, int32_t lowest)
 {
-    strip_t strip;
+    strip_t strip = {0};
     int32_t contrasts[FINE_ROWS + 2];
     const int32_t half_rows = frame->height_px / 2;
     const int32_t first = coarse > WIDE ? coarse - WIDE : 0;

@@ -6,8 +6,8 @@
 
 #include "bslam/math/bytes.h"
 
-/// Where the channels of a pixel stand once spread: blue in bits 0-4, red in 11-15, green in 21-26. Above each
-/// are 5 free bits or more, so that up to 32 pixels add up.
+/// Where the channels of a pixel stand once spread: blue in bits 0-4, red in 11-15, green in 21-26. Above
+/// each are 5 free bits or more, so that up to 32 pixels add up.
 #define BSLAM_SPREAD_MASK 0x07E0F81FU
 #define BSLAM_SPREAD_RED 11
 #define BSLAM_SPREAD_GREEN 21
