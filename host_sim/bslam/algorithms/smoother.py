@@ -5,7 +5,7 @@ Every pose is an unknown, and so is every beacon; the first pose is the origin. 
   arc          what is left of the move beside that arc: 0, to a hundredth of a millimetre
   speeds       (v, omega) of a step against that of the step before, MATH (15), with velocity states
   sightings    direction and distance, MATH (11), (13); the sd of a distance is that of the predicted one
-  beacon       seen in direction only: 4 m along its first direction, +- 2.5 m
+  beacon       seen in direction only: 4 m along its first direction, +- 2.5 m; one that is known: where it is
 Poses couple with their neighbours only: their normal equations are a band, beacons its dense border.
 """
 
@@ -27,6 +27,7 @@ _ARC_SD_M: Final = 1e-5
 _SPEED_VARIANCE_MIN: Final = 1e-12  # (m/s)², (rad/s)²: speeds without a walk would weigh infinitely
 _FIRST_RANGE_M: Final = 4.0
 _FIRST_RANGE_SD_M: Final = 2.5
+_KNOWN_SD_M: Final = 1e-3
 _ITERATIONS_MAX: Final = 100
 _SETTLED: Final = 1e-7  # m, rad: the largest change of an iteration that changes nothing
 _SETTLED_COST: Final = 1e-10  # nor does one that lessens the cost by so small a share
@@ -44,8 +45,9 @@ class Smoother:
     def __init__(self, parameters: Mapping[str, int | float]) -> None:
         self._p = parameters
         self._steps: list[tuple[float, float, float, float]] = []  # dt_s, left_m, right_m, gyro_radps
-        self._seen: list[tuple[int, int, float, float]] = []  # pose, beacon, bearing_rad, range_m
-        self._priors: list[tuple[int, float, float]] = []  # beacon, x_m, y_m
+        # pose, beacon, bearing_rad, range_m, bearing_sd_rad, range_sd_m
+        self._seen: list[tuple[int, int, float, float, float, float]] = []
+        self._priors: list[tuple[int, float, float, float]] = []  # beacon, x_m, y_m, sd_m
         self._new_poses: list[tuple[float, float, float]] = []
         self._new_beacons: list[tuple[float, float]] = []
         self._poses: Array = np.zeros((1, _POSE))
@@ -90,9 +92,27 @@ class Smoother:
         self._steps.append((dt_s, left_m, right_m, gyro_radps))
         self._new_poses.append(pose)
 
-    def add_sighting(self, pose: int, beacon: int, bearing_rad: float, range_m: float) -> None:
-        """A sighting from the pose of that number; NaN: no distance. A new beacon has the next number."""
-        self._seen.append((pose, beacon, bearing_rad, range_m))
+    def add_known_beacon(self, x_m: float, y_m: float) -> int:
+        """A beacon whose place, in the first pose's frame, is known to a millimetre; its number."""
+        number = len(self._beacons) + len(self._new_beacons)
+        self._new_beacons.append((x_m, y_m))
+        self._priors.append((number, x_m, y_m, _KNOWN_SD_M))
+        return number
+
+    def add_sighting(
+        self,
+        pose: int,
+        beacon: int,
+        bearing_rad: float,
+        range_m: float,
+        bearing_sd_rad: float = math.nan,
+        range_sd_m: float = math.nan,
+    ) -> None:
+        """A sighting from the pose of that number; NaN: no distance, a noise as the parameters have it.
+
+        A new beacon has the next number.
+        """
+        self._seen.append((pose, beacon, bearing_rad, range_m, bearing_sd_rad, range_sd_m))
         if beacon < len(self._beacons) + len(self._new_beacons):
             return
         guess_m = range_m
@@ -106,8 +126,13 @@ class Smoother:
             y_m + eye_y_m + guess_m * float(np.sin(heading_rad)),
         )
         if np.isnan(range_m):
-            self._priors.append((beacon, *place))
+            self._priors.append((beacon, *place, _FIRST_RANGE_SD_M))
         self._new_beacons.append(place)
+
+    def set_out_from(self, poses: Array) -> None:
+        """Where `solve` begins, (steps + 1, 3), in place of what odometry leads to; the first is 0, 0, 0."""
+        assert poses.shape == self.poses.shape
+        self._poses = poses.copy()
 
     def solve(self) -> int:
         """Iterate until nothing changes; the number of iterations. ArithmeticError if that never is."""
@@ -182,8 +207,8 @@ class _Problem:
         self,
         parameters: Mapping[str, int | float],
         steps: list[tuple[float, float, float, float]],
-        seen: list[tuple[int, int, float, float]],
-        priors: list[tuple[int, float, float]],
+        seen: list[tuple[int, int, float, float, float, float]],
+        priors: list[tuple[int, float, float, float]],
     ) -> None:
         self._p = parameters
         self._dt_s, left_m, right_m, gyro_radps = np.array(steps, dtype=np.float64).reshape(-1, 4).T
@@ -192,19 +217,22 @@ class _Problem:
         self._with_speeds = bool(parameters["velocity_states"]) and len(steps) > 0
         if self._with_speeds:
             self._keep, self._speed_weight = _speed_model(parameters, self._dt_s)
-        table = np.array(seen, dtype=np.float64).reshape(-1, 4)
+        table = np.array(seen, dtype=np.float64).reshape(-1, 6)
         self._pose_of, self._beacon_of = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp)
         self._bearing_rad, self._range_m = table[:, 2], table[:, 3]
+        self._bearing_sd_rad, self._range_sd_m = table[:, 4], table[:, 5]
         self._has_range = np.isfinite(self._range_m)
         self._range_m = np.where(self._has_range, self._range_m, 0.0)
-        prior = np.array(priors, dtype=np.float64).reshape(-1, 3)
-        self._prior_of, self._prior_m = prior[:, 0].astype(np.intp), prior[:, 1:]
+        prior = np.array(priors, dtype=np.float64).reshape(-1, 4)
+        self._prior_of, self._prior_m = prior[:, 0].astype(np.intp), prior[:, 1:3]
+        self._prior_sd_m = prior[:, 3:]
 
     def weights(self, poses: Array, beacons: Array) -> Array:
         """1 / sd of (bearing, range) of each sighting, (m, 2), with the predicted distances; no range: 0."""
-        range_m = self._look(poses, beacons)[0][:, 1]
-        bearing = np.full(len(range_m), 1.0 / self._p["bearing_sd_rad"])
-        return np.column_stack([bearing, np.where(self._has_range, 1.0 / range_sd_m(self._p, range_m), 0.0)])
+        by_model_m = range_sd_m(self._p, self._look(poses, beacons)[0][:, 1])
+        sd_rad = np.where(np.isnan(self._bearing_sd_rad), self._p["bearing_sd_rad"], self._bearing_sd_rad)
+        sd_m = np.where(np.isnan(self._range_sd_m), by_model_m, self._range_sd_m)
+        return np.column_stack([1.0 / sd_rad, np.where(self._has_range, 1.0 / sd_m, 0.0)])
 
     def cost(self, poses: Array, beacons: Array, weights: Array) -> float:
         """Half the sum of squares."""
@@ -345,12 +373,12 @@ class _Problem:
         np.add.at(normal.corner, at, np.einsum("mri,mrj->mij", by_beacon, by_beacon))
 
     def _prior_residuals(self, beacons: Array) -> Array:
-        return (beacons[self._prior_of] - self._prior_m) / _FIRST_RANGE_SD_M
+        return (beacons[self._prior_of] - self._prior_m) / self._prior_sd_m
 
     def _add_priors(self, normal: _Normal, beacons: Array) -> None:
-        of, weight = self._prior_of, 1.0 / _FIRST_RANGE_SD_M
+        of, weight = self._prior_of, 1.0 / self._prior_sd_m
         for axis in range(_BEACON):
-            normal.corner[of, axis, of, axis] += weight**2
+            normal.corner[of, axis, of, axis] += weight[:, 0] ** 2
         normal.beacon_gradient[of] += weight * self._prior_residuals(beacons)
 
 

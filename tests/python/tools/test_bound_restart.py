@@ -1,0 +1,42 @@
+"""The best that a restarted robot could know: right by right sightings, and no better than they are."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bound_restart import WAYS, best_error_m, restarts
+from bslam.core.slam import Slam
+from bslam.experiment.options import RunOptions, core_params
+from bslam.log import Log
+from bslam.world.simulate import load_scenario, simulate
+from measure_restart import DRIVEN_US, SWITCHED_ON_AT
+
+
+def _log() -> Log:
+    return simulate(load_scenario("paper_room"), seed=3, sigma_mps=0.6)
+
+
+def _best_m(log: Log, way: str) -> list[float]:
+    params = Slam.defaults() | core_params(RunOptions(association="known", sigma_mps=0.6), log)
+    return [best_error_m(one, params, WAYS[way]) for one in restarts(log)]
+
+
+def test_restarts_end_five_seconds_after_two_beacons_were_in_view() -> None:
+    log = _log()
+    parts = list(restarts(log))
+    assert len(parts) == len(SWITCHED_ON_AT)
+    for first, one in zip(SWITCHED_ON_AT, parts, strict=True):
+        assert one.odometry.time_us[0] == log.odometry.time_us[first]
+        driven_us = one.odometry.time_us[-1] - one.odometry.time_us[0]
+        assert DRIVEN_US <= driven_us < 6 * DRIVEN_US
+
+
+def test_best_is_near_by_right_sightings_and_off_by_as_much_as_they_are() -> None:
+    log = _log()
+    right_m = _best_m(log, "as told")
+    assert max(right_m) < 0.1
+    seen = log.sightings
+    skewed = replace(log, sightings=replace(seen, range_m=1.1 * seen.range_m))
+    worse = np.array(_best_m(skewed, "as told")) / right_m
+    assert worse.min() > 1.3
+    np.testing.assert_allclose(_best_m(skewed, "directions alone"), _best_m(log, "directions alone"))
