@@ -27,7 +27,6 @@ _ARC_SD_M: Final = 1e-5
 _SPEED_VARIANCE_MIN: Final = 1e-12  # (m/s)², (rad/s)²: speeds without a walk would weigh infinitely
 _FIRST_RANGE_M: Final = 4.0
 _FIRST_RANGE_SD_M: Final = 2.5
-_KNOWN_SD_M: Final = 1e-3
 _ITERATIONS_MAX: Final = 100
 _SETTLED: Final = 1e-7  # m, rad: the largest change of an iteration that changes nothing
 _SETTLED_COST: Final = 1e-10  # nor does one that lessens the cost by so small a share
@@ -92,11 +91,11 @@ class Smoother:
         self._steps.append((dt_s, left_m, right_m, gyro_radps))
         self._new_poses.append(pose)
 
-    def add_known_beacon(self, x_m: float, y_m: float) -> int:
-        """A beacon whose place, in the first pose's frame, is known to a millimetre; its number."""
+    def add_beacon(self, x_m: float, y_m: float, sd_m: float) -> int:
+        """A beacon whose place, in the first pose's frame, is known so well in each direction; its number."""
         number = len(self._beacons) + len(self._new_beacons)
         self._new_beacons.append((x_m, y_m))
-        self._priors.append((number, x_m, y_m, _KNOWN_SD_M))
+        self._priors.append((number, x_m, y_m, sd_m))
         return number
 
     def add_sighting(

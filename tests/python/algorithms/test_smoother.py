@@ -34,7 +34,7 @@ def drive(p, steps, seed=4, has_range=True, has_gyro=False, sds=()):
     smoother = Smoother(p)
     true = guess = (0.0, 0.0, 0.0)
     if sds:
-        assert [smoother.add_known_beacon(*place) for place in PLACES[:2]] == [0, 1]
+        assert [smoother.add_beacon(*place, 1e-3) for place in PLACES[:2]] == [0, 1]
     look(smoother, p, true, 0, rng, has_range, sds)
     for step in range(1, steps + 1):
         wheels = 0.02 + 0.004 * np.array([math.sin(0.1 * step), math.cos(0.07 * step)])

@@ -1,15 +1,16 @@
-"""The best that a restarted robot could know: right by right sightings, and no better than they are."""
+"""The best that could be known of a drive: right by right sightings, and no better than they are."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from bound_restart import WAYS, best_error_m, restarts
+from bound_drive import KNOWN_SD_M, UNKNOWN_SD_M, WAYS, best_errors_m, with_true_sizes
+from bound_restart import restarts
 from bslam.core.slam import Slam
 from bslam.experiment.options import RunOptions, core_params
 from bslam.log import Log
 from bslam.world.simulate import load_scenario, simulate
-from measure_restart import DRIVEN_US, SWITCHED_ON_AT
+from measure_restart import DRIVEN_US, SWITCHED_ON_AT, part
 
 
 def _log() -> Log:
@@ -18,7 +19,7 @@ def _log() -> Log:
 
 def _best_m(log: Log, way: str) -> list[float]:
     params = Slam.defaults() | core_params(RunOptions(association="known", sigma_mps=0.6), log)
-    return [best_error_m(one, params, WAYS[way]) for one in restarts(log)]
+    return [float(best_errors_m(one, params, WAYS[way], KNOWN_SD_M)[-1]) for one in restarts(log)]
 
 
 def test_restarts_end_five_seconds_after_two_beacons_were_in_view() -> None:
@@ -40,3 +41,17 @@ def test_best_is_near_by_right_sightings_and_off_by_as_much_as_they_are() -> Non
     worse = np.array(_best_m(skewed, "as told")) / right_m
     assert worse.min() > 1.3
     np.testing.assert_allclose(_best_m(skewed, "directions alone"), _best_m(log, "directions alone"))
+
+
+def test_best_of_a_drive_is_as_good_as_its_sizes() -> None:
+    log = part(_log(), 0, 1000)
+    params = Slam.defaults() | core_params(RunOptions(association="known", sigma_mps=0.6), log)
+
+    def mean_m(log: Log) -> float:
+        return float(best_errors_m(log, params, WAYS["as told"], UNKNOWN_SD_M).mean())
+
+    skewed = replace(log, sightings=replace(log.sightings, range_m=1.3 * log.sightings.range_m))
+    right_m = mean_m(with_true_sizes(log))
+    assert right_m < 0.15
+    assert mean_m(skewed) > 1.5 * right_m
+    assert abs(mean_m(with_true_sizes(skewed)) - right_m) < 1e-3

@@ -1,0 +1,161 @@
+"""What could be known at best of a whole drive that was seen by cameras.
+
+The reference for `bslam tables --sensor camera`, on the same drives, by code that shares nothing with the
+core: the exact MAP (bslam.algorithms.smoother) of all that the wheels and the pictures say, with hindsight.
+It is told which beacon each sighting shows, and sets out from the true way and map. Printed is the mean
+distance of its way from the true one. What errs then is what the pictures say.
+
+They do not say how their errors hang together, so the sightings are believed in several ways: as they are
+told, directions alone, and with three times the standard deviation. With --sizes the distances to each beacon
+are first divided by what they err in the median over the drive, which only the truth tells.
+
+    .venv/bin/python tools/bound_drive.py --seeds 1000:1020 --sigma 0.6
+    .venv/bin/python tools/bound_drive.py --seeds 1000:1020 --sigma 0.6 --sizes
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.algorithms.noise import range_sd_m
+from bslam.algorithms.smoother import Smoother
+from bslam.core.slam import Slam
+from bslam.experiment.align import Rigid
+from bslam.experiment.camera import CameraStore, camera_log
+from bslam.experiment.options import Number, RunOptions, core_params
+from bslam.experiment.truth import truth_at
+from bslam.log import Log, Sightings
+from bslam.rig import load_rig
+from bslam.world.simulate import load_scenario
+from camera_drives import arguments
+
+KNOWN_SD_M, UNKNOWN_SD_M = 1e-3, 1e3
+
+
+class Way(NamedTuple):
+    """How sightings are believed."""
+
+    factor: float  # of their standard deviations
+    has_range: bool
+
+
+WAYS = {
+    "as told": Way(1.0, True),
+    "directions alone": Way(1.0, False),
+    "a third as good": Way(3.0, True),
+}
+
+
+def best_errors_m(log: Log, params: Mapping[str, Number], way: Way, place_sd_m: float) -> NDArray[np.float64]:
+    """How far off the MAP is at each step of a log, (n,) m; beacons' true places are told so well."""
+    assert log.truth is not None
+    true = truth_at(log.truth, log.odometry.time_us)[0]
+    from_start = Rigid(*true[0, [2, 0, 1]].tolist()).inverse()
+    poses = from_start.poses(true)
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    smoother = Smoother(params)
+    _add_steps(smoother, log, poses)
+    _add_sightings(smoother, log, params, from_start, way, place_sd_m)
+    smoother.set_out_from(poses)
+    smoother.solve()
+    return np.hypot(*(smoother.poses[:, :2] - poses[:, :2]).T)
+
+
+def _add_steps(smoother: Smoother, log: Log, poses: NDArray[np.float64]) -> None:
+    odometry = log.odometry
+    gaps_s = np.diff(odometry.time_us, prepend=odometry.time_us[0]) * 1e-6
+    turn_radps = np.full(len(gaps_s), math.nan) if odometry.gyro_radps is None else odometry.gyro_radps
+    rows = zip(gaps_s, odometry.a, odometry.b, turn_radps, poses, strict=True)
+    next(rows)  # which leads to the first pose
+    for dt_s, left_m, right_m, gyro_radps, pose in rows:
+        x_m, y_m, theta_rad = pose.tolist()
+        smoother.add_step(dt_s, left_m, right_m, (x_m, y_m, theta_rad), gyro_radps)
+
+
+def _add_sightings(
+    smoother: Smoother,
+    log: Log,
+    params: Mapping[str, Number],
+    from_start: Rigid,
+    way: Way,
+    place_sd_m: float,
+) -> None:
+    assert log.beacons is not None
+    places_m = from_start.points(np.column_stack([log.beacons.x_m, log.beacons.y_m])).tolist()
+    number = {
+        one: smoother.add_beacon(x_m, y_m, place_sd_m)
+        for one, (x_m, y_m) in zip(log.beacons.beacon_id.tolist(), places_m, strict=True)
+    }
+    for row, seen in enumerate(log.sightings.beacon_id.tolist()):
+        if seen in number:
+            step = int(np.argmin(np.abs(log.odometry.time_us - log.sightings.time_us[row])))
+            bearing_rad, range_m, *sds = _told(log.sightings, row, params)
+            distance_m = range_m if way.has_range else math.nan
+            smoother.add_sighting(
+                step, number[seen], bearing_rad, distance_m, *(way.factor * sd for sd in sds)
+            )
+
+
+def _told(seen: Sightings, row: int, params: Mapping[str, Number]) -> tuple[float, float, float, float]:
+    """Direction, distance, and their standard deviations: the sighting's own, or by the parameters."""
+    range_m, sd_rad, sd_m = float(seen.range_m[row]), float(params["bearing_sd_rad"]), math.nan
+    if seen.bearing_sd_rad is not None and seen.bearing_sd_rad[row] > 0:
+        sd_rad = float(seen.bearing_sd_rad[row])
+    if not math.isnan(range_m):
+        own_m = 0.0 if seen.range_sd_m is None else float(seen.range_sd_m[row])
+        scale = 0.0 if seen.range_scale_sd is None else float(seen.range_scale_sd[row])
+        sd_m = math.hypot(own_m, scale * range_m) if own_m > 0 else float(range_sd_m(params, range_m))
+    return float(seen.bearing_rad[row]), range_m, sd_rad, sd_m
+
+
+def with_true_sizes(log: Log) -> Log:
+    """The log with the distances to each beacon right in the median."""
+    assert log.truth is not None and log.beacons is not None
+    seen, range_m = log.sightings, log.sightings.range_m.copy()
+    at_m = truth_at(log.truth, seen.time_us)[0][:, :2]
+    places = zip(log.beacons.beacon_id, log.beacons.x_m, log.beacons.y_m, strict=True)
+    for beacon, x_m, y_m in places:
+        rows = (seen.beacon_id == beacon) & np.isfinite(range_m)
+        if rows.any():
+            true_m = np.hypot(x_m - at_m[rows, 0], y_m - at_m[rows, 1])
+            range_m[rows] /= np.median(range_m[rows] / true_m)
+    return replace(log, sightings=replace(seen, range_m=range_m, range_scale_sd=None))
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--sizes", action="store_true", help="distances to each beacon right in the median, by the truth"
+    )
+
+
+def main() -> int:
+    """Measures and prints."""
+    args = arguments(__doc__, range(1000, 1020), _add_arguments)
+    scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
+    options = RunOptions(association="known", sigma_mps=args.sigma)
+    errors_m: list[list[float]] = []
+    for count, seed in enumerate(args.seeds, 1):
+        log = camera_log(scenario, seed, args.sigma, None, rig, store)
+        params = Slam.defaults() | core_params(options, log)
+        log = with_true_sizes(log) if args.sizes else log
+        errors_m.append(
+            [float(best_errors_m(log, params, way, UNKNOWN_SD_M).mean()) for way in WAYS.values()]
+        )
+        print(f"{count} of {len(args.seeds)} drives", flush=True)
+    seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
+    sizes = ", sizes" if args.sizes else ""
+    print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}; told identities{sizes}")
+    for name, column in zip(WAYS, np.array(errors_m).T, strict=True):
+        print(f"{name}: {100 * column.mean():.1f} cm, worst drive {100 * column.max():.0f}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
