@@ -34,6 +34,7 @@ _Static_assert(sizeof uprights / sizeof uprights[0] == BSLAM_UPRIGHTS, "room for
 /// Few in a frame of up to so many columns, many in a wider one, which shows more.
 #define COLUMNS_FEW 80
 #define SIDES_MAX (BSLAM_COLUMNS_MAX > COLUMNS_FEW ? SIDES_MANY : SIDES_FEW)
+#define BOXES_MAX (BSLAM_COLUMNS_MAX > COLUMNS_FEW ? BOXES_MANY : BOXES_FEW)
 /// Boxes of a kind that the frame's left edge cuts off, and as many by its right one. What is left of them is
 /// at least this part of the kind's least width.
 #define CUT_BOXES_MAX 2
@@ -51,7 +52,7 @@ typedef struct side {
     int16_t top, bottom;  ///< rows of cells [top, bottom)
     float u_px[3], v_px[3];
     float metre_px;
-    float step;
+    int32_t step;
 } side_t;
 
 /// The column of cells that a line through foot, middle and top crosses in a row of cells; -1 where it goes
@@ -68,9 +69,7 @@ static int32_t column_at(const side_t *side, int32_t row)
 
 /// The sideways steps of four columns side by side, from their upper end to a row: of the even ones and of
 /// the odd ones, each two in the halves of a word; STEP_FREE more a cell, which is what STEP_MAX leaves free.
-typedef struct step_sums {
-    uint32_t even, odd;
-} step_sums_t;
+typedef uint32_t step_sums_t[2];
 
 #define STEP_FREE (255 - STEP_MAX)
 
@@ -84,22 +83,23 @@ static void sum_columns(const bslam_view_t *view, int32_t first, column_sums_t *
     const int32_t columns = view->frame->columns, rows = view->frame->rows;
     const uint8_t *step = view->step_x + first;
     uint32_t even = 0, odd = 0;
-    sums->to[0] = (step_sums_t){0, 0};
-    for (int32_t row = 1; row <= rows; row++, step += columns) {
+    step_sums_t *to = sums->to;
+    (*to)[0] = (*to)[1] = 0;
+    for (const step_sums_t *end = to + rows; to != end; step += columns) {
+        to++;
         const uint32_t four = bslam_bytes_plus(bslam_word_at(step), STEP_FREE * 0x01010101U);
         even = bslam_bytes_add_even(even, four);
         odd = bslam_bytes_add_odd(odd, four);
-        sums->to[row] = (step_sums_t){even, odd};
+        (*to)[0] = even;
+        (*to)[1] = odd;
     }
 }
 
 /// Of one of these columns, between two rows.
 static int32_t steps_between(const column_sums_t *sums, int32_t column, int32_t top, int32_t bottom)
 {
-    const bool is_even = column % 2 == 0;
-    const int32_t shift = column % 4 < 2 ? 0 : 16;
-    const uint32_t from = is_even ? sums->to[top].even : sums->to[top].odd;
-    const uint32_t to = is_even ? sums->to[bottom].even : sums->to[bottom].odd;
+    const uint32_t odd = (uint32_t)column & 1, shift = ((uint32_t)column & 2) * 8;
+    const uint32_t from = sums->to[top][odd], to = sums->to[bottom][odd];
     return (int32_t)(((to >> shift) - (from >> shift)) & 0xFFFFU) - STEP_FREE * (bottom - top);
 }
 
@@ -151,7 +151,9 @@ static void find_wall(const bslam_view_t *view, wall_t *wall)
 }
 
 /// A lens that bends uprights: foot, middle and top of the line that crosses the horizon in this column.
-static bool bend(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+/// Not to be inlined: what a straight side needs stays in registers.
+__attribute__((noinline)) static bool bend(const bslam_view_t *view, const wall_t *wall,
+                                           const upright_t *kind, side_t *side)
 {
     const bslam_camera_t *camera = view->camera;
     if (!wall->is_seen[side->column]) {
@@ -183,25 +185,31 @@ static bool begin_side(const bslam_view_t *view, const wall_t *wall, int32_t col
     return true;
 }
 
-/// Where the kind would stand in the side's column. False: it would leave the frame.
-static bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+/// The rows of cells of a side whose foot and top are known. False: it would leave the frame.
+static inline bool find_rows(const bslam_frame_t *frame, side_t *side)
 {
-    const float camera_m = (float)view->camera->z_m;
-    for (int32_t i = 0; i < 3; i++) {
-        side->v_px[i] = wall->horizon_px - side->metre_px * (kind->heights_m[i] - camera_m);
-    }
-    if (does_bend(view) && !bend(view, wall, kind, side)) {
-        return false;
-    }
     const float foot_px = side->v_px[0], top_px = side->v_px[2];
     // In positive form: a camera on the floor gives no number.
-    if (!(top_px >= -2.0f) || !(foot_px >= top_px) || !(foot_px <= (float)view->frame->height_px)) {
+    if (!(top_px >= -2.0f) || !(foot_px >= top_px) || !(foot_px <= (float)frame->height_px)) {
         return false;
     }
-    const int32_t end = (int32_t)(foot_px / BSLAM_CELL_PX + 0.5f), rows = view->frame->rows;
+    const int32_t end = (int32_t)(foot_px / BSLAM_CELL_PX + 0.5f), rows = frame->rows;
     side->top = (int16_t)(top_px < 0 ? 0 : (int32_t)(top_px / BSLAM_CELL_PX));
     side->bottom = (int16_t)(end < rows ? end : rows);
     return side->bottom - side->top >= 2;
+}
+
+/// Where the kind would stand in the side's column. False: it would leave the frame.
+static inline bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+{
+    if (does_bend(view)) {
+        return bend(view, wall, kind, side) && find_rows(view->frame, side);
+    }
+    const float camera_m = (float)view->camera->z_m;
+    // A straight side's middle is of no use.
+    side->v_px[0] = wall->horizon_px - side->metre_px * (kind->heights_m[0] - camera_m);
+    side->v_px[2] = wall->horizon_px - side->metre_px * (kind->heights_m[2] - camera_m);
+    return find_rows(view->frame, side);
 }
 
 static bool shows_much(const bslam_view_t *view)
@@ -209,8 +217,10 @@ static bool shows_much(const bslam_view_t *view)
     return view->frame->columns > COLUMNS_FEW;
 }
 
-/// How the colour steps where each kind would stand in each column; 0: it does not.
-static void find_steps(const bslam_view_t *view, const wall_t *wall, bslam_upright_steps_t *steps)
+/// How the colour steps where each kind would stand in each column; 0: it does not. Not to be
+/// inlined: its sums are off the stack when boxes are proposed.
+__attribute__((noinline)) static void find_steps(const bslam_view_t *view, const wall_t *wall,
+                                                 bslam_upright_steps_t *steps)
 {
     column_sums_t sums;
     side_t side = {0};
@@ -243,7 +253,7 @@ static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const up
             for (int32_t i = 0; i < count; i++) {
                 at = at == limit || sides[i].step < sides[at].step ? i : at;
             }
-            if (sides[at].step >= (float)step) {
+            if (sides[at].step >= step) {
                 continue;
             }
             memmove(&sides[at], &sides[at + 1], (size_t)(count - 1 - at) * sizeof sides[0]);
@@ -251,20 +261,22 @@ static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const up
         }
         (void)begin_side(view, wall, column, &sides[at]);
         (void)place(view, wall, kind, &sides[at]);
-        sides[at].step = (float)step;
+        sides[at].step = step;
         count++;
     }
     return count;
 }
 
-static float pair_score(const side_t *left, const side_t *right, const upright_t *kind)
+static int32_t least(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static bool is_as_wide(const side_t *left, const side_t *right, const upright_t *kind)
 {
     const float metre_px = 0.5f * (left->metre_px + right->metre_px);
     const float width_m = (float)((right->column - left->column) * BSLAM_CELL_PX) / metre_px;
-    if (width_m < kind->width_min_m || width_m > kind->width_max_m) {
-        return 0;
-    }
-    return left->step < right->step ? left->step : right->step;
+    return !(width_m < kind->width_min_m || width_m > kind->width_max_m);
 }
 
 static float least_of(const float values[3])
@@ -304,33 +316,55 @@ static bslam_proposal_t box_of(const bslam_view_t *view, const side_t *left, con
     return proposal;
 }
 
+/// Pairs by rank: of two the one whose weaker side is stronger, of equals the one further right. A rank holds
+/// that side's step and, in bits of INDEX_BITS each, both sides' places.
+#define INDEX_BITS 5
+#define INDEX_BELOW (1U << INDEX_BITS)
+_Static_assert(SIDES_MAX <= 1 << INDEX_BITS, "a place fits its bits");
+
+static uint32_t rank_of(const side_t *sides, int32_t left, int32_t right)
+{
+    const int32_t step = least(sides[left].step, sides[right].step);
+    return ((uint32_t)step << INDEX_BITS | (uint32_t)left) << INDEX_BITS | (uint32_t)right;
+}
+
+/// Puts a rank above the last one where it belongs, and drops the last one.
+static void put_rank(uint32_t *ranks, int32_t count, uint32_t rank)
+{
+    uint32_t *at = ranks + count - 1;
+    for (; at != ranks && at[-1] < rank; at--) {
+        *at = at[-1];
+    }
+    *at = rank;
+}
+
+/// The highest ranks of pairs as wide as the kind, in falling order; 0: there are no more.
+static void rank_pairs(const side_t *sides, int32_t count, const upright_t *kind, uint32_t *ranks,
+                       int32_t ranks_count)
+{
+    const uint32_t *last = ranks + ranks_count - 1;
+    for (int32_t i = 0; i < count; i++) {
+        for (int32_t k = i + 1; k < count; k++) {
+            // Most are not among the highest, which shows without a division.
+            const uint32_t rank = rank_of(sides, i, k);
+            if (rank > *last && is_as_wide(&sides[i], &sides[k], kind)) {
+                put_rank(ranks, ranks_count, rank);
+            }
+        }
+    }
+}
+
 /// Proposes the best pairs of a kind's sides.
 static void propose_pairs(bslam_proposals_t *proposals, const bslam_view_t *view, const side_t *sides,
                           int32_t count, int32_t kind)
 {
-    const int32_t boxes = shows_much(view) ? BOXES_MANY : BOXES_FEW;
-    float limit = 1e9f;
-    for (int32_t box = 0; box < boxes; box++) {
-        float best = 0;
-        int32_t best_left = 0, best_right = 0;
-        for (int32_t i = 0; i < count; i++) {
-            for (int32_t k = i + 1; k < count; k++) {
-                // Sums of all columns break ties between pairs that share their weaker side.
-                const float tie = 1e-3f * (float)(i * SIDES_MAX + k);
-                const float pair = pair_score(&sides[i], &sides[k], &uprights[kind]);
-                const float score = pair > 0 ? pair + tie : 0;
-                if (score > best && score < limit) {
-                    best = score;
-                    best_left = i;
-                    best_right = k;
-                }
-            }
-        }
-        if (!(best > 0)) {
-            return;
-        }
-        limit = best;
-        const bslam_proposal_t proposal = box_of(view, &sides[best_left], &sides[best_right], kind);
+    const int32_t boxes = shows_much(view) ? BOXES_MAX : BOXES_FEW;
+    uint32_t ranks[BOXES_MAX] = {0};
+    rank_pairs(sides, count, &uprights[kind], ranks, boxes);
+    for (int32_t box = 0; box < boxes && ranks[box] != 0; box++) {
+        const side_t *left = &sides[ranks[box] >> INDEX_BITS & (INDEX_BELOW - 1)];
+        const side_t *right = &sides[ranks[box] & (INDEX_BELOW - 1)];
+        const bslam_proposal_t proposal = box_of(view, left, right, kind);
         // Bent sides may meet, or leave the frame on the way.
         if (proposal.right - proposal.left >= SIDE_MIN && proposal.bottom - proposal.top >= SIDE_MIN) {
             bslam_proposals_add(proposals, view, &proposal);
@@ -347,7 +381,7 @@ static const side_t *end_of_cut(const bslam_view_t *view, const side_t *sides, i
     for (int32_t i = 0; i < count; i++) {
         const int32_t columns = left ? sides[i].column + 1 : view->frame->columns - sides[i].column;
         const float width_m = (float)(columns * BSLAM_CELL_PX) / sides[i].metre_px;
-        const float step = sides[i].step + 1e-3f * (float)i;  // of equals another one
+        const float step = (float)sides[i].step + 1e-3f * (float)i;  // of equals another one
         if (width_m > CUT_SHARE_MIN * kind->width_min_m && width_m < kind->width_max_m && step < limit &&
             (best == NULL || sides[i].step >= best->step)) {
             best = &sides[i];
@@ -366,7 +400,7 @@ static void propose_cut(bslam_proposals_t *proposals, const bslam_view_t *view, 
         if (end == NULL) {
             return;
         }
-        limit = end->step + 1e-3f * (float)(end - sides);
+        limit = (float)end->step + 1e-3f * (float)(end - sides);
         side_t edge = *end;
         edge.column = (int16_t)(left ? 0 : view->frame->columns - 1);
         edge.u_px[0] = edge.u_px[1] = edge.u_px[2] = (float)(edge.column * BSLAM_CELL_PX) + 1.5f;
