@@ -188,6 +188,8 @@ static inline uint32_t bslam_bytes_apart_sum(uint32_t a, uint32_t b)
 {
 #ifdef __ARM_FEATURE_SIMD32
     return __usad8(a, b);
+#elif BSLAM_HAS_SSE2
+    return (uint32_t)_mm_cvtsi128_si32(_mm_sad_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b)));
 #else
     return bslam_bytes_sum(bslam_bytes_apart(a, b), 0);
 #endif
@@ -310,6 +312,18 @@ static inline int32_t bslam_halves_dot(uint32_t a, uint32_t b, int32_t sum)
     return __smlad((int16x2_t)a, (int16x2_t)b, sum);
 #else
     return sum + (int16_t)a * (int16_t)b + (int16_t)(a >> 16) * (int16_t)(b >> 16);
+#endif
+}
+
+/// The sum and a product of 64 bits. The core has an instruction for it, of which a compiler that knows a
+/// factor to fit 16 bits makes several.
+static inline int64_t bslam_product_add(int32_t a, int32_t b, int64_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    __asm__("smlal %Q0, %R0, %1, %2" : "+r"(sum) : "r"(a), "r"(b));
+    return sum;
+#else
+    return sum + (int64_t)a * b;
 #endif
 }
 

@@ -92,21 +92,21 @@ static uint32_t shares_between(float x, float low, float high)
 
 _Static_assert(BSLAM_KNOTS == 9, "eight intervals, found by halves");
 
-/// Between which knots x lies, the lower one; beyond all of them in the outermost interval.
-static int32_t interval_of(float x, const float *knots)
+/// The lower one of the knots that x lies between; beyond all of them that of the outermost interval.
+static const float *knot_below(float x, const float *knots)
 {
-    int32_t k = x >= knots[4] ? 4 : 0;
-    k += x >= knots[k + 2] ? 2 : 0;
-    return k + (x >= knots[k + 1] ? 1 : 0);
+    knots = x >= knots[4] ? knots + 4 : knots;
+    knots = x >= knots[2] ? knots + 2 : knots;
+    return x >= knots[1] ? knots + 1 : knots;
 }
 
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place)
 {
     const float *knots = machine->knots;
     for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
-        const int32_t k = interval_of(x[i], knots);
-        place->curves[i].at = (uint32_t)(ROWS * (i * BSLAM_KNOTS + k));
-        place->curves[i].shares = shares_between(x[i], knots[k], knots[k + 1]);
+        const float *low = knot_below(x[i], knots);
+        place->curves[i].at = (uint32_t)(ROWS * (low - machine->knots));
+        place->curves[i].shares = shares_between(x[i], low[0], low[1]);
     }
     for (int32_t c = 0; c < machine->crossed_count; c++) {
         const int32_t i = machine->crossed[c];
@@ -145,13 +145,6 @@ static void sum_curves(const bslam_between_knots_t *place, int32_t features, con
     }
 }
 
-/// In two steps, so that a compiler takes one multiplication of 32 bits.
-static int64_t product(int32_t sum, uint32_t share)
-{
-    const int32_t of_it = (int16_t)share;
-    return (int64_t)sum * of_it;
-}
-
 /// Adds a pair's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
 static void add_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes,
                       int64_t sums[ROWS])
@@ -166,8 +159,10 @@ static void add_grids(const bslam_additive_place_t *place, int32_t crossed_count
             add_pair(grid + b->at + ROWS * BSLAM_GRID_KNOTS, b->shares, high);
             grid += GRID_BYTES;
         }
+        const int32_t low_share = (int16_t)a->shares, high_share = (int16_t)(a->shares >> 16);
         for (int32_t r = 0; r < ROWS; r++) {
-            sums[r] += product(low[r], a->shares) + product(high[r], a->shares >> 16);
+            sums[r] = bslam_product_add(low[r], low_share, sums[r]);
+            sums[r] = bslam_product_add(high[r], high_share, sums[r]);
         }
         bytes += (end - a - 1) * GRID_BYTES;
     }

@@ -1,5 +1,7 @@
 #include "bslam/vision/features.h"
 
+#include <string.h>
+
 #include "bslam/vision/box_sums.h"
 
 #define CONTRAST_FEATURES 6
@@ -55,20 +57,18 @@ static ray_t ray_at(const bslam_view_t *view, bslam_real_t u_px, bslam_real_t v_
     return ray;
 }
 
-/// Without libm: exponent by halving, then a parabola.
+/// Without libm: exponent, then a parabola.
 float bslam_log(float x)
 {
-    float halvings = 0;
+    enum { FRACTION_BITS = 23, EXPONENT_OF_ONE = 127 };
+    uint32_t bits;
     x = clampf(x, 1e-4f, 1e4f);
-    while (x >= 2.0f) {
-        x *= 0.5f;
-        halvings += 1.0f;
-    }
-    while (x < 1.0f) {
-        x *= 2.0f;
-        halvings -= 1.0f;
-    }
-    return 0.6931472f * (halvings + (x - 1.0f) * (1.6931106f - 0.3465553f * x));
+    memcpy(&bits, &x, sizeof bits);
+    const uint32_t exponent = bits >> FRACTION_BITS;  // of a positive number
+    const float doublings = (float)((int32_t)exponent - EXPONENT_OF_ONE);
+    bits += (EXPONENT_OF_ONE - exponent) << FRACTION_BITS;
+    memcpy(&x, &bits, sizeof x);
+    return 0.6931472f * (doublings + (x - 1.0f) * (1.6931106f - 0.3465553f * x));
 }
 
 /// Mean distance of the floor line over columns [first, end); 0, and *share 0, where no column knows it.

@@ -3,7 +3,9 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { CHANNELS = 3, STEP_MAX = 255, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
+#include "bslam/math/bytes.h"
+
+enum { CHANNELS = 3, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
 // Places for a side that does not turn away from the rough box.
 enum { STRAIGHT_PLACES = 15 };
 
@@ -71,11 +73,12 @@ static int32_t magnitude(int32_t x)
     return x < 0 ? -x : x;
 }
 
-// A colour in one word: channels of 6 bits each, 1/63 of their range, FIELD_BITS apart, so that two of them
-// add without meeting; BIAS keeps the differences of such sums positive.
-enum { FIELD_BITS = 10 };
-#define FIELD_MASK 1023U
-#define BIAS (512U | 512U << FIELD_BITS | 512U << 2 * FIELD_BITS)
+// A colour in one word: channels of 6 bits each, 1/63 of their range, a byte each, so that two of them add
+// without meeting; BIAS keeps the differences of such sums positive.
+enum { FIELD_BITS = 8 };
+#define FIELD_MASK 255U
+#define FIELD_ZERO 128
+#define BIAS 0x00808080U
 
 static uint32_t packed(uint16_t pixel)
 {
@@ -86,7 +89,7 @@ static uint32_t packed(uint16_t pixel)
 /// A channel of the difference of two words, or of two sums of two.
 static int32_t channel_of(uint32_t difference_and_bias, int32_t channel)
 {
-    return (int32_t)(difference_and_bias >> channel * FIELD_BITS & FIELD_MASK) - 512;
+    return (int32_t)(difference_and_bias >> channel * FIELD_BITS & FIELD_MASK) - FIELD_ZERO;
 }
 
 /// Reads `count` pixels inwards from `offset` inside place 0; beyond the frame, its last one is repeated.
@@ -118,12 +121,10 @@ static void fill_steps(bslam_side_t *side, int32_t index)
 {
     uint32_t strip[PLACES + 3];
     read_strip(side, index, -2, side->places + 3, strip);
+    uint8_t *steps = side->steps[index];
     for (int32_t place = 0; place < side->places; place++) {
         const uint32_t *at = strip + place;
-        const uint32_t step = at[2] + at[3] + BIAS - at[0] - at[1];
-        const int32_t sum =
-            magnitude(channel_of(step, 0)) + magnitude(channel_of(step, 1)) + magnitude(channel_of(step, 2));
-        side->steps[index][place] = (uint8_t)(sum > STEP_MAX ? STEP_MAX : sum);
+        steps[place] = bslam_byte_at_most(bslam_bytes_apart_sum(at[2] + at[3], at[0] + at[1]));
     }
 }
 

@@ -26,7 +26,14 @@ enum { COLUMNS_AT_ONCE = BSLAM_WORD_BYTES };
 static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t sums[COLUMNS_AT_ONCE])
 {
     uint32_t even = 0, odd = 0;
-    for (int32_t left = rows; left > 0; left--, steps += columns) {
+    int32_t left = rows;
+    for (; left > 1; left -= 2, steps += 2 * columns) {
+        const uint32_t four = bslam_bytes_plus(bslam_word_at(steps), ALL_FREE);
+        const uint32_t below = bslam_bytes_plus(bslam_word_at(steps + columns), ALL_FREE);
+        even = bslam_bytes_add_even(bslam_bytes_add_even(even, four), below);
+        odd = bslam_bytes_add_odd(bslam_bytes_add_odd(odd, four), below);
+    }
+    if (left > 0) {
         const uint32_t four = bslam_bytes_plus(bslam_word_at(steps), ALL_FREE);
         even = bslam_bytes_add_even(even, four);
         odd = bslam_bytes_add_odd(odd, four);
@@ -127,8 +134,10 @@ static void fill_columns(near_t *near, int32_t first)
     const int32_t start = lowest > 0 ? lowest : 0;
     uint16_t sums[COLUMNS_AT_ONCE];
     sum_down(near->view->step_x + box->top * columns + start, columns, near->cells, sums);
-    for (int32_t i = first; i < first + 4; i++) {
-        near->sums[i] = is_in_frame(near, i) ? sums[line_of(near, i) - start] : 0;
+    const bool are_in_frame = lowest >= 0 && lowest + 3 < near->view->frame->columns;
+    const uint16_t *sum = sums + line_of(near, first) - start;
+    for (int32_t i = first; i < first + 4; i++, sum += near->outside) {
+        near->sums[i] = are_in_frame || is_in_frame(near, i) ? *sum : 0;
     }
 }
 
