@@ -194,8 +194,9 @@ static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
 {
     const bslam_real_t off_x = SAME_SIDES * (box->right_px - box->left_px);
     const bslam_real_t off_y = SAME_SIDES * (box->bottom_px - box->top_px);
-    for (int32_t i = 0; i < proposals->count; i++) {
-        const bslam_box_t *known = &proposals->items[i].box;
+    const bslam_proposal_t *end = proposals->items + proposals->count;
+    for (const bslam_proposal_t *item = proposals->items; item != end; item++) {
+        const bslam_box_t *known = &item->box;
         if (is_within(known->left_px, box->left_px, off_x) && is_within(known->top_px, box->top_px, off_y) &&
             is_within(known->right_px, box->right_px, off_x) &&
             bslam_box_overlap(known, box) > SAME_OVERLAP) {
@@ -357,6 +358,30 @@ static void clear_cells(uint32_t *mask, int32_t first, int32_t end)
     }
 }
 
+/// Takes what is below the floor line out of a word's columns, from `first` on: of each column down to where
+/// the last one of them begins, from there on of all at once.
+static void clear_floor(uint32_t *mask, const bslam_view_t *view, int32_t first, int32_t words)
+{
+    const bslam_frame_t *frame = view->frame;
+    const int16_t *floor_row = view->floor_line->row + first;
+    const int32_t columns = least(frame->columns - first, BSLAM_MASK_BITS);
+    int32_t all_from = 0;
+    for (int32_t k = 0; k < columns; k++) {
+        all_from = most(all_from, floor_row[k] + 2);
+    }
+    all_from = least(all_from, frame->rows);
+    const uint32_t *all = mask + all_from * words, *end = mask + frame->rows * words;
+    for (int32_t k = 0; k < columns; k++) {
+        const uint32_t others = ~(1U << k);
+        for (uint32_t *at = mask + least(floor_row[k] + 2, all_from) * words; at != all; at += words) {
+            *at &= others;
+        }
+    }
+    for (uint32_t *at = mask + all_from * words; at != end; at += words) {
+        *at = 0;
+    }
+}
+
 /// From the components of the smooth cells: all that is not a face of the room, nor below the floor line.
 static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view, int32_t runs)
 {
@@ -373,12 +398,8 @@ static void mask_standing(bslam_proposals_t *proposals, const bslam_view_t *view
             clear_cells(mask + run->row * words, run->first, run->end);
         }
     }
-    for (int32_t column = 0; column < frame->columns; column++) {
-        const uint32_t others = ~(1U << column % BSLAM_MASK_BITS);
-        uint32_t *bits = mask + column / BSLAM_MASK_BITS;
-        for (int32_t row = view->floor_line->row[column] + 2; row < frame->rows; row++) {
-            bits[row * words] &= others;
-        }
+    for (int32_t word = 0; word < words; word++) {
+        clear_floor(mask + word, view, word * BSLAM_MASK_BITS, words);
     }
 }
 
