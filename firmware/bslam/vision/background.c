@@ -73,8 +73,8 @@ void bslam_background_init(bslam_background_t *background)
 
 static uint32_t logs_of(const uint8_t *channel)
 {
-    return tone_log[channel[0]] | (uint32_t)tone_log[channel[1]] << 8 | (uint32_t)tone_log[channel[2]] << 16 |
-           (uint32_t)tone_log[channel[3]] << 24;
+    const uint32_t upper = (uint32_t)tone_log[channel[3]] << 8 | tone_log[channel[2]];
+    return (upper << 8 | tone_log[channel[1]]) << 8 | tone_log[channel[0]];
 }
 
 /// Light and chroma of the frame's cells; tables have room for a whole word beyond them.

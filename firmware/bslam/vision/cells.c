@@ -62,6 +62,34 @@ static uint8_t difference(uint8_t a, uint8_t b)
     return (uint8_t)((a > b ? a : b) - (a < b ? a : b));
 }
 
+#if BSLAM_HAS_BYTES
+
+/// The colours of four cells and of those `apart` cells on, how far they are apart; green counts twice.
+static inline uint32_t four_steps(const uint8_t *red, const uint8_t *green, const uint8_t *blue,
+                                  int32_t apart)
+{
+    const uint32_t of_red = bslam_bytes_apart(bslam_word_at(red), bslam_word_at(red + apart));
+    const uint32_t of_green = bslam_bytes_apart(bslam_word_at(green), bslam_word_at(green + apart));
+    const uint32_t of_blue = bslam_bytes_apart(bslam_word_at(blue), bslam_word_at(blue + apart));
+    return bslam_bytes_plus(bslam_bytes_plus(of_red, of_green), bslam_bytes_plus(of_green, of_blue));
+}
+
+/// Not to be inlined: tables so far apart would be addressed from one base, with a sum for each access.
+__attribute__((noinline)) static void fill_words(const uint8_t *red, const uint8_t *green,
+                                                 const uint8_t *blue, int32_t apart, int32_t count,
+                                                 uint8_t *restrict into)
+{
+    const uint8_t *end = into + count;
+    for (; into < end; into += BSLAM_WORD_BYTES) {
+        bslam_word_put(into, four_steps(red, green, blue, apart));
+        red += BSLAM_WORD_BYTES;
+        green += BSLAM_WORD_BYTES;
+        blue += BSLAM_WORD_BYTES;
+    }
+}
+
+#endif
+
 /// Differences of the colours of cells `a` and `b` and those that follow, for at least `count` cells from
 /// `into` on; green counts twice. Whole steps: what is beyond is written over later, or lies in the tables'
 /// room.
@@ -69,16 +97,7 @@ static void fill_steps(const bslam_cells_t *cells, int32_t a, int32_t b, int32_t
                        uint8_t *restrict into)
 {
 #if BSLAM_HAS_BYTES
-    for (int32_t i = 0; i < count; i += BSLAM_WORD_BYTES) {
-        const uint32_t red =
-            bslam_bytes_apart(bslam_word_at(cells->red + a + i), bslam_word_at(cells->red + b + i));
-        const uint32_t green =
-            bslam_bytes_apart(bslam_word_at(cells->green + a + i), bslam_word_at(cells->green + b + i));
-        const uint32_t blue =
-            bslam_bytes_apart(bslam_word_at(cells->blue + a + i), bslam_word_at(cells->blue + b + i));
-        bslam_word_put(into + i,
-                       bslam_bytes_plus(bslam_bytes_plus(red, green), bslam_bytes_plus(green, blue)));
-    }
+    fill_words(cells->red + a, cells->green + a, cells->blue + a, b - a, count, into);
 #else
     for (int32_t i = 0; i < count; i += STEP) {
         const uint8_t *red_a = cells->red + a + i, *red_b = cells->red + b + i;
@@ -242,36 +261,38 @@ static void fill_channels(const bslam_background_t *background, const int16_t *w
     }
 }
 
-/// What textures weigh, and their words.
+/// What textures weigh.
 typedef struct texture {
     int32_t by_spread, by_step_x, by_step_y;
-    uint32_t spread, step_x, step_y;
 } texture_t;
 
-static inline int32_t texture_sum(const texture_t *t, int32_t k)
-{
-    return t->by_spread * bslam_byte_of(t->spread, k) + t->by_step_x * bslam_byte_of(t->step_x, k) +
-           t->by_step_y * bslam_byte_of(t->step_y, k);
-}
+/// The textures of a row of cells, and the row where the floor begins below each.
+typedef struct cell_row {
+    const uint8_t *spread, *step_x, *step_y;
+    const int16_t *floor_row;
+} cell_row_t;
 
-/// What a row of cells adds up to by texture and by the place: `places` of the present row, by where the
-/// floor begins.
-static void sum_texture(const bslam_view_t *view, const int16_t *w, int32_t first, const int32_t *places,
-                        int32_t of_row, int32_t *restrict sums)
+/// What each of `count` cells adds up to by texture and place: `places` by where the floor begins. Not to be
+/// inlined, for the registers' sake.
+__attribute__((noinline)) static void sum_row(cell_row_t row, const texture_t *by, const int32_t *places,
+                                              int32_t count, int32_t *restrict sums)
 {
-    const uint8_t *spread = view->tones->spread + first;
-    const uint8_t *step_x = view->step_x + first, *step_y = view->step_y + first;
-    const int16_t *floor_row = view->floor_line->row;
-    const int32_t columns = view->frame->columns;
-    texture_t t = {.by_spread = w[12], .by_step_x = w[13], .by_step_y = w[14]};
-    for (int32_t i = 0; i < columns; i += BSLAM_WORD_BYTES) {
-        t.spread = bslam_bytes_least(bslam_word_at(spread + i), FOUR * CHROMA_MAX);
-        t.step_x = bslam_bytes_least(bslam_word_at(step_x + i), FOUR * DISTANCE_MAX);
-        t.step_y = bslam_bytes_least(bslam_word_at(step_y + i), FOUR * DISTANCE_MAX);
-        sums[i] = of_row + places[floor_row[i]] + texture_sum(&t, 0);
-        sums[i + 1] = of_row + places[floor_row[i + 1]] + texture_sum(&t, 1);
-        sums[i + 2] = of_row + places[floor_row[i + 2]] + texture_sum(&t, 2);
-        sums[i + 3] = of_row + places[floor_row[i + 3]] + texture_sum(&t, 3);
+    const texture_t weights = *by;
+    const int32_t *end = sums + count;
+    for (; sums < end; sums += BSLAM_WORD_BYTES) {
+        const uint32_t spread = bslam_bytes_least(bslam_word_at(row.spread), FOUR * CHROMA_MAX);
+        const uint32_t step_x = bslam_bytes_least(bslam_word_at(row.step_x), FOUR * DISTANCE_MAX);
+        const uint32_t step_y = bslam_bytes_least(bslam_word_at(row.step_y), FOUR * DISTANCE_MAX);
+        row.spread += BSLAM_WORD_BYTES;
+        row.step_x += BSLAM_WORD_BYTES;
+        row.step_y += BSLAM_WORD_BYTES;
+        _Pragma("GCC unroll 4")
+        for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++) {
+            sums[k] = places[row.floor_row[k]] + weights.by_spread * bslam_byte_of(spread, k) +
+                      weights.by_step_x * bslam_byte_of(step_x, k) +
+                      weights.by_step_y * bslam_byte_of(step_y, k);
+        }
+        row.floor_row += BSLAM_WORD_BYTES;
     }
 }
 
@@ -315,7 +336,7 @@ static inline int32_t value_of(int32_t sum)
 }
 
 /// Values of a row's cells: by their tones, and the sums of the rest.
-static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, int32_t row,
+static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, int32_t row, int32_t of_row,
                        const int32_t *restrict sums, uint16_t *restrict frequent, int8_t *restrict values)
 {
     const int32_t first = row * view->frame->columns;
@@ -332,7 +353,7 @@ static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, 
             known = sum_tone(known, tone, machine);
         }
         frequent[i] = (uint16_t)known->frequent;
-        values[i] = (int8_t)value_of(sums[i] + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
+        values[i] = (int8_t)value_of(sums[i] + of_row + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
     }
 }
 
@@ -347,6 +368,7 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
     int32_t places[2 * ROWS_MAX + 1];  // what the place above the floor adds, from -ROWS_MAX rows on
     int32_t sums[BSLAM_COLUMNS_MAX + BSLAM_WORD_BYTES];
     const tone_machine_t tones = {.bins = tables, .weights = w, .channels = channels};
+    const texture_t texture = {.by_spread = w[12], .by_step_x = w[13], .by_step_y = w[14]};
     fill_bins(view->background, w, tables);
     fill_channels(view->background, w, channels);
     for (int32_t above = -ROWS_MAX; above <= ROWS_MAX; above++) {
@@ -356,7 +378,9 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
         const int32_t up = clamp(horizon - row, -30, 30);
         const int32_t of_row = bias + w[18] * up + w[19] * most(up, 0);
         const int32_t first = row * columns;
-        sum_texture(view, w, first, places + ROWS_MAX - row, of_row, sums);
-        decide_row(view, &tones, row, sums, frequent + first, values + first);
+        const cell_row_t cells = {view->tones->spread + first, view->step_x + first, view->step_y + first,
+                                  view->floor_line->row};
+        sum_row(cells, &texture, places + ROWS_MAX - row, columns, sums);
+        decide_row(view, &tones, row, of_row, sums, frequent + first, values + first);
     }
 }
