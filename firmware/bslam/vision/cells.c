@@ -286,8 +286,8 @@ __attribute__((noinline)) static void sum_row(cell_row_t row, const texture_t *b
         row.spread += BSLAM_WORD_BYTES;
         row.step_x += BSLAM_WORD_BYTES;
         row.step_y += BSLAM_WORD_BYTES;
-        _Pragma("GCC unroll 4")
-        for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++) {
+        _Pragma("GCC unroll 4") for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++)
+        {
             sums[k] = places[row.floor_row[k]] + weights.by_spread * bslam_byte_of(spread, k) +
                       weights.by_step_x * bslam_byte_of(step_x, k) +
                       weights.by_step_y * bslam_byte_of(step_y, k);
@@ -353,7 +353,8 @@ static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, 
             known = sum_tone(known, tone, machine);
         }
         frequent[i] = (uint16_t)known->frequent;
-        values[i] = (int8_t)value_of(sums[i] + of_row + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
+        values[i] =
+            (int8_t)value_of(sums[i] + of_row + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
     }
 }
 

@@ -29,6 +29,7 @@ static void test_bytes_are_each_as_a_number(void **state)
     for (int round = 0; round < ROUNDS; round++) {
         const uint32_t a = random_word(&random), b = random_word(&random);
         bool has_zero = false;
+        int apart_sum = 0;
         for (int k = 0; k < BSLAM_WORD_BYTES; k++) {
             const int x = (int)(a >> 8 * k & 255), y = (int)(b >> 8 * k & 255);
             assert_int_equal(bslam_byte_of(a, k), x);
@@ -41,7 +42,9 @@ static void test_bytes_are_each_as_a_number(void **state)
             const int32_t apart = least(x > y ? x - y : y - x, 127);
             assert_int_equal((int8_t)bslam_byte_of(bslam_bytes_difference(a, b), k), x > y ? apart : -apart);
             has_zero = has_zero || x == 0;
+            apart_sum += x > y ? x - y : y - x;
         }
+        assert_int_equal(bslam_bytes_apart_sum(a, b), apart_sum);
         assert_int_equal(bslam_has_zero_byte(a), has_zero);
     }
 }
