@@ -162,7 +162,7 @@ static void count_tones(uint8_t *counts, bslam_zone_rows_t span, int32_t columns
     for (int32_t row = span.first; row < span.end; row += 2) {
         for (int32_t column = row / 2 % 2; column < columns; column += 2) {
             uint8_t *count = &counts[bslam_tone_bin(bslam_tone_at(tones, row * columns + column))];
-            *count = (uint8_t)clamp(*count + weight, 0, 255);
+            *count = bslam_byte_at_most((uint32_t)(*count + weight));
         }
     }
 }

@@ -35,7 +35,9 @@ void bslam_detector_normalise(const bslam_detector_model_t *model, float feature
     const float *restrict offset = model->blob_offset, *restrict scale = model->blob_scale;
     float *restrict x = features;
     for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
-        x[i] = clamped((x[i] - offset[i]) * scale[i], BSLAM_FEATURE_LIMIT);
+        const float value = (x[i] - offset[i]) * scale[i];
+        // Most are within: one comparison.
+        x[i] = fabsf(value) <= BSLAM_FEATURE_LIMIT ? value : clamped(value, BSLAM_FEATURE_LIMIT);
     }
 }
 
