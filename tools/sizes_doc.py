@@ -294,12 +294,12 @@ def differences(stands: str, measured: str) -> Iterator[str]:
     if len(old) != len(new):
         yield f"{len(old)} lines stand, {len(new)} are measured"
         return
-    number = re.compile(r"\b\d+\b")
+    number = re.compile(r"\b\d+(?:\.\d+)?\b")
     for before, now in zip(old, new, strict=True):
         if number.sub("", before) != number.sub("", now):
             yield f"stands: {before}\n  now: {now}"
             continue
-        pairs = zip(map(int, number.findall(before)), map(int, number.findall(now)), strict=True)
+        pairs = zip(map(float, number.findall(before)), map(float, number.findall(now)), strict=True)
         if any(abs(a - b) > TOLERANCE * max(a, b) for a, b in pairs):
             yield f"stands: {before}\n  now: {now}"
 

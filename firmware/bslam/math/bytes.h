@@ -183,15 +183,26 @@ static inline uint32_t bslam_bytes_sum(uint32_t bytes, uint32_t sum)
 #endif
 }
 
-/// How far the bytes of a are from those of b, all four together.
+/// The sum and how far the bytes of a are from those of b, all four together.
+static inline uint32_t bslam_bytes_apart_add(uint32_t a, uint32_t b, uint32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __usada8(a, b, sum);
+#elif BSLAM_HAS_SSE2
+    const __m128i apart = _mm_sad_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b));
+    return sum + (uint32_t)_mm_cvtsi128_si32(apart);
+#else
+    return bslam_bytes_sum(bslam_bytes_apart(a, b), sum);
+#endif
+}
+
+/// The same without a sum before.
 static inline uint32_t bslam_bytes_apart_sum(uint32_t a, uint32_t b)
 {
 #ifdef __ARM_FEATURE_SIMD32
     return __usad8(a, b);
-#elif BSLAM_HAS_SSE2
-    return (uint32_t)_mm_cvtsi128_si32(_mm_sad_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b)));
 #else
-    return bslam_bytes_sum(bslam_bytes_apart(a, b), 0);
+    return bslam_bytes_apart_add(a, b, 0);
 #endif
 }
 

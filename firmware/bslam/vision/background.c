@@ -237,7 +237,7 @@ static uint32_t word_of_tone(bslam_tone_t tone)
 /// bslam_tone_distance() of two such words.
 static int32_t word_distance(uint32_t a, uint32_t b)
 {
-    return (int32_t)(bslam_bytes_apart_sum(a, b) + bslam_bytes_apart_sum(a & CHROMAS, b & CHROMAS));
+    return (int32_t)bslam_bytes_apart_add(a & CHROMAS, b & CHROMAS, bslam_bytes_apart_sum(a, b));
 }
 
 /// How much more a cell looks like floor than like wall, whose tones are given as words.
@@ -258,9 +258,9 @@ static int32_t floor_end(const bslam_background_t *background, const bslam_frame
     const uint32_t wall = word_of_tone(background->tone[BSLAM_ZONE_WALL]);
     const uint32_t floor = word_of_tone(background->tone[BSLAM_ZONE_FLOOR]);
     int32_t end = frame->rows;
-    for (int32_t row = frame->rows - 1; row >= stop && row >= end - 2; row--) {
-        const bslam_tone_t tone = bslam_tone_at(tones, row * frame->columns + column);
-        if (floor_evidence(background, tone, wall, floor) > 0) {
+    int32_t i = (end - 1) * frame->columns + column;
+    for (int32_t row = end - 1; row >= stop && row >= end - 2; row--, i -= frame->columns) {
+        if (floor_evidence(background, bslam_tone_at(tones, i), wall, floor) > 0) {
             end = row;
         }
     }

@@ -40,6 +40,10 @@ static bslam_real_t growth(const bslam_camera_t *camera, bslam_real_t r)
 static bool undistort(const bslam_camera_t *camera, bslam_real_t rd, bslam_real_t *r)
 {
     bslam_real_t x = rd;
+    if (camera->k1 == 0 && camera->k2 == 0) {  // what the first step would find
+        *r = rd;
+        return bslam_is_number(rd) && rd >= 0;
+    }
     for (int i = 0; i < NEWTON_STEPS_MAX; i++) {
         const bslam_real_t slope = growth(camera, x);
         if (!(slope > BSLAM_R(1e-3))) {
