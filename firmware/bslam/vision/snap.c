@@ -135,9 +135,9 @@ static void fill_columns(near_t *near, int32_t first)
     uint16_t sums[COLUMNS_AT_ONCE];
     sum_down(near->view->step_x + box->top * columns + start, columns, near->cells, sums);
     const bool are_in_frame = lowest >= 0 && lowest + 3 < near->view->frame->columns;
-    const uint16_t *sum = sums + line_of(near, first) - start;
-    for (int32_t i = first; i < first + 4; i++, sum += near->outside) {
-        near->sums[i] = are_in_frame || is_in_frame(near, i) ? *sum : 0;
+    int32_t at = line_of(near, first) - start;
+    for (int32_t i = first; i < first + 4; i++, at += near->outside) {
+        near->sums[i] = are_in_frame || is_in_frame(near, i) ? sums[at] : 0;
     }
 }
 
