@@ -1,8 +1,6 @@
 /// Four bytes of a word at a time: what a Cortex-M4 and its elders have instructions for (SIMD32 of the
-/// ACLE), and the same for all others, to the bit: in portable C, or with SSE2.
-///
-/// Loops over cells are written twice where that pays: over words, by these, where BSLAM_HAS_BYTES is 1; and
-/// over arrays of constant length elsewhere, which a compiler turns into vector instructions.
+/// ACLE), and the same for all others, to the bit: in portable C, or with SSE2. Where that pays, loops over
+/// cells are written a second time for sixteen bytes at a time (lanes.h).
 #ifndef BSLAM_MATH_BYTES_H
 #define BSLAM_MATH_BYTES_H
 
@@ -10,20 +8,11 @@
 #include <stdint.h>
 #include <string.h>
 
-/// 1: the core has the instructions. A test may set it, to compare both ways on one machine.
-#ifndef BSLAM_HAS_BYTES
-#ifdef __ARM_FEATURE_SIMD32
-#define BSLAM_HAS_BYTES 1
-#else
-#define BSLAM_HAS_BYTES 0
-#endif
-#endif
-
 #ifdef __ARM_FEATURE_SIMD32
 #include <arm_acle.h>
 #endif
 
-/// 1: an x86 host has the two that all others are made of. A test may unset it, to try plain C.
+/// 1: an x86 host has the two that all others are made of, and lanes. A test may unset it, to try plain C.
 #ifndef BSLAM_HAS_SSE2
 #ifdef __SSE2__
 #define BSLAM_HAS_SSE2 1
@@ -38,6 +27,26 @@
 
 enum { BSLAM_WORD_BYTES = 4 };
 
+// A core that loads no words but where they belong would be made to call memcpy by a compiler.
+#if defined(__arm__) && !defined(__ARM_FEATURE_UNALIGNED)
+
+static inline uint32_t bslam_word_at(const void *bytes)
+{
+    const uint8_t *b = bytes;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static inline void bslam_word_put(void *bytes, uint32_t word)
+{
+    uint8_t *b = bytes;
+    b[0] = (uint8_t)word;
+    b[1] = (uint8_t)(word >> 8);
+    b[2] = (uint8_t)(word >> 16);
+    b[3] = (uint8_t)(word >> 24);
+}
+
+#else
+
 static inline uint32_t bslam_word_at(const void *bytes)
 {
     uint32_t word;
@@ -49,6 +58,8 @@ static inline void bslam_word_put(void *bytes, uint32_t word)
 {
     memcpy(bytes, &word, sizeof word);
 }
+
+#endif
 
 #define BSLAM_EVEN_BYTES 0x00FF00FFU
 #define BSLAM_TOP_BITS 0x80808080U
@@ -113,12 +124,6 @@ static inline uint32_t bslam_bytes_difference(uint32_t a, uint32_t b)
     // 0 - less in each byte, of which one of the two is 0: no borrow crosses bytes.
     return more | ((BSLAM_TOP_BITS - less) ^ BSLAM_TOP_BITS);
 #endif
-}
-
-/// 1 in each byte where that of a is larger than that of b, else 0.
-static inline uint32_t bslam_bytes_above(uint32_t a, uint32_t b)
-{
-    return bslam_bytes_least(bslam_bytes_less(a, b), 0x01010101U);
 }
 
 /// The top bits of eight bytes, the first word's lowest byte's first.

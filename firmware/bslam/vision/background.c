@@ -69,7 +69,7 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
-#if BSLAM_HAS_BYTES
+#if !BSLAM_HAS_SSE2
 
 static uint32_t logs_of(const uint8_t *channel)
 {

@@ -88,7 +88,7 @@ static void fill_strides(const grid_t *grid, const bslam_proposal_t *p, int32_t 
     }
 }
 
-#if BSLAM_HAS_BYTES
+#if !BSLAM_HAS_SSE2
 
 // --- By words, four cells at a time
 
@@ -151,10 +151,16 @@ static inline void add_strip(const bslam_tones_t *tones, int32_t i, uint32_t mas
     sums->spread = bslam_bytes_sum(bslam_word_at(tones->spread + i) & mask, sums->spread);
 }
 
+#if __has_attribute(noclone)
+#define AS_IT_STANDS __attribute__((noinline, noclone))
+#else
+#define AS_IT_STANDS __attribute__((noinline))
+#endif
+
 /// Of an area in a box, the spread aside. The tables come one by one, not to be known as parts of one: so
 /// each has a pointer in a register, where offsets from one would take sums out of theirs.
-__attribute__((noinline, noclone)) static tone_sums_t sum_tones(const uint8_t *light, const int8_t *reddish,
-                                                                const int8_t *bluish, const words_t *words)
+AS_IT_STANDS static tone_sums_t sum_tones(const uint8_t *light, const int8_t *reddish, const int8_t *bluish,
+                                          const words_t *words)
 {
     tone_sums_t sums = {0};
     const int32_t skip = words->apart - words->whole;

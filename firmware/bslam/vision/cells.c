@@ -62,7 +62,7 @@ static uint8_t difference(uint8_t a, uint8_t b)
     return (uint8_t)((a > b ? a : b) - (a < b ? a : b));
 }
 
-#if BSLAM_HAS_BYTES
+#if !BSLAM_HAS_SSE2
 
 /// The colours of four cells and of those `apart` cells on, how far they are apart; green counts twice.
 static inline uint32_t four_steps(const uint8_t *red, const uint8_t *green, const uint8_t *blue,
@@ -96,7 +96,7 @@ __attribute__((noinline)) static void fill_words(const uint8_t *red, const uint8
 static void fill_steps(const bslam_cells_t *cells, int32_t a, int32_t b, int32_t count,
                        uint8_t *restrict into)
 {
-#if BSLAM_HAS_BYTES
+#if !BSLAM_HAS_SSE2
     fill_words(cells->red + a, cells->green + a, cells->blue + a, b - a, count, into);
 #else
     for (int32_t i = 0; i < count; i += STEP) {

@@ -13,7 +13,7 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high)
     return value < low ? low : value > high ? high : value;
 }
 
-#if BSLAM_HAS_BYTES
+#if !BSLAM_HAS_SSE2
 
 /// What a step leaves free up to the largest byte: where it is added, sums stop at the limit, so much higher.
 #define FREE (255 - BSLAM_EDGE_STEP_MAX)

@@ -2,24 +2,10 @@
 
 #include <string.h>
 
-#include "bslam/math/bytes.h"
 #include "bslam/vision/spread.h"
 
 /// 2 in each channel: makes a quarter of a sum of four round to nearest.
 #define HALF_OF_FOUR (2U | 2U << BSLAM_SPREAD_RED | 2U << BSLAM_SPREAD_GREEN)
-/// Pixel pairs that are copied at once.
-#define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
-/// Pixel pairs that are summed at once, and cells that are made of them. A core without vectors takes two,
-/// and two steps before it asks whether a row ends; any other as many as a compiler makes a vector of.
-#if BSLAM_HAS_BYTES
-#define TWO_STEPS_A_LOOP _Pragma("GCC unroll 2")
-#define PAIRS_AT_ONCE 2
-#define CELLS_AT_ONCE 2
-#else
-#define TWO_STEPS_A_LOOP
-#define PAIRS_AT_ONCE 4
-#define CELLS_AT_ONCE 4
-#endif
 
 static bool size_is_allowed(int32_t size_px, int32_t size_max_px, int32_t step_px)
 {
@@ -49,6 +35,108 @@ static void pack_888(uint16_t *restrict packed, const uint8_t *restrict pixels, 
         packed[i] = (uint16_t)(rgb[0] >> 3 << 11 | rgb[1] >> 2 << 5 | rgb[2] >> 3);
     }
 }
+
+#if BSLAM_HAS_LANES
+
+// --- Sixteen bytes at a time
+
+/// Pixel pairs that are summed at once, and cells that are made of them.
+enum { PAIRS_AT_ONCE = 8, CELLS_AT_ONCE = 4 };
+
+/// The upper row of two as it comes: words of two pixels, until the lower one makes sums of them.
+static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, int32_t pairs)
+{
+    memcpy(words, pixels, (size_t)pairs * sizeof words[0]);
+}
+
+/// The means of 2x2 pixels in RGB565 from their sums, those of even and of odd places.
+static inline bslam_lanes_t means_565(bslam_lanes_t even, bslam_lanes_t odd)
+{
+    const bslam_lanes_t half = bslam_lanes_of(HALF_OF_FOUR), mask = bslam_lanes_of(BSLAM_SPREAD_MASK);
+    const bslam_lanes_t lower = bslam_lanes_of(0xFFFFU);
+    const bslam_lanes_t a = bslam_words_down(bslam_words_add(even, half), 2) & mask;
+    const bslam_lanes_t b = bslam_words_down(bslam_words_add(odd, half), 2) & mask;
+    return ((a | bslam_words_down(a, 16)) & lower) | ((b | bslam_words_up(b, 16)) & ~lower);
+}
+
+/// Makes eight words of the upper row the sums of 2x2 pixels, those of even places first; their means.
+static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, bslam_lanes_t below,
+                            bslam_lanes_t next_below)
+{
+    const bslam_lanes_t above = bslam_lanes_at(words), next_above = bslam_lanes_at(words + 4);
+    const bslam_lanes_t sums = bslam_words_add(bslam_spread_pairs(above), bslam_spread_pairs(below));
+    const bslam_lanes_t next_sums =
+        bslam_words_add(bslam_spread_pairs(next_above), bslam_spread_pairs(next_below));
+    const bslam_lanes_t even = bslam_words_even(sums, next_sums), odd = bslam_words_odd(sums, next_sums);
+    bslam_lanes_put(words, even);
+    bslam_lanes_put(words + 4, odd);
+    bslam_lanes_put(half, means_565(even, odd));
+}
+
+/// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means. Sums and means
+/// have room for whole steps, the row has not: what follows its last four pairs counts as 0.
+static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels,
+                      int32_t pairs)
+{
+    const uint32_t *end = words + pairs / PAIRS_AT_ONCE * PAIRS_AT_ONCE;
+    while (words != end) {
+        sum_some(words, half, bslam_lanes_at(pixels), bslam_lanes_at(pixels + 16));
+        words += PAIRS_AT_ONCE;
+        half += PAIRS_AT_ONCE;
+        pixels += 4 * PAIRS_AT_ONCE;
+    }
+    if (pairs % PAIRS_AT_ONCE != 0) {
+        sum_some(words, half, bslam_lanes_at(pixels), bslam_lanes_zero());
+    }
+}
+
+/// Brightness of 2x2 sums, 0 to 376: green counts twice as much as red, because it has a bit more.
+static inline bslam_lanes_t lumas(bslam_lanes_t quads)
+{
+    return bslam_words_add(bslam_words_down(quads, BSLAM_SPREAD_RED) & bslam_lanes_of(127),
+                           bslam_words_down(quads, BSLAM_SPREAD_GREEN));
+}
+
+/// A word of each channel's bytes, from the four that come.
+static inline void put_channels(bslam_cells_t *cells, int32_t i, bslam_lanes_t channels)
+{
+    bslam_word_put(cells->red + i, bslam_lanes_word(channels, 0));
+    bslam_word_put(cells->green + i, bslam_lanes_word(channels, 1));
+    bslam_word_put(cells->blue + i, bslam_lanes_word(channels, 2));
+    bslam_word_put(cells->spread + i, bslam_lanes_word(channels, 3));
+}
+
+/// Some cells of a row, from their quarters: left ones and right ones in turn, four each.
+static inline void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *above, const uint32_t *below)
+{
+    const bslam_lanes_t a = bslam_lanes_at(above), b = bslam_lanes_at(above + 4);
+    const bslam_lanes_t c = bslam_lanes_at(below), d = bslam_lanes_at(below + 4);
+    const bslam_lanes_t of_a = lumas(a), of_b = lumas(b), of_c = lumas(c), of_d = lumas(d);
+    const bslam_lanes_t highest =
+        bslam_halves_most_of(bslam_halves_most_of(of_a, of_b), bslam_halves_most_of(of_c, of_d));
+    const bslam_lanes_t lowest =
+        bslam_halves_least_of(bslam_halves_least_of(of_a, of_b), bslam_halves_least_of(of_c, of_d));
+    const bslam_lanes_t sum = bslam_words_add(bslam_words_add(a, b), bslam_words_add(c, d));
+    const bslam_lanes_t byte = bslam_lanes_of(255);
+    const bslam_lanes_t red = bslam_words_down(sum, BSLAM_SPREAD_RED + 1) & byte;
+    const bslam_lanes_t green = bslam_words_down(sum, BSLAM_SPREAD_GREEN + 2);
+    const bslam_lanes_t blue = bslam_words_down(sum, 1) & byte;
+    // Saturates what is beyond a byte: the spread.
+    put_channels(cells, i,
+                 bslam_halves_to_bytes(bslam_words_to_halves(red, green),
+                                       bslam_words_to_halves(blue, bslam_words_less(highest, lowest))));
+}
+
+#else
+
+// --- By words
+
+/// Pixel pairs that are copied at once.
+#define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
+/// Two steps before it is asked whether a row ends.
+#define TWO_STEPS_A_LOOP _Pragma("GCC unroll 2")
+/// Pixel pairs that are summed at once, and cells that are made of them.
+enum { PAIRS_AT_ONCE = 2, CELLS_AT_ONCE = 2 };
 
 /// Four bytes' boundaries let a core move several words at once.
 static inline const uint8_t *words_at(const void *bytes)
@@ -82,7 +170,6 @@ static inline uint16_t mean_565(uint32_t quad)
 /// Makes some words of the upper row the sums of 2x2 pixels; their means.
 static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels)
 {
-#if BSLAM_HAS_BYTES
     const uint32_t above = words[0], next_above = words[1];
     const uint32_t below = bslam_word_at(pixels), next_below = bslam_word_at(pixels + sizeof below);
     const uint32_t sum = quad_sum(above, below), next_sum = quad_sum(next_above, next_below);
@@ -90,14 +177,6 @@ static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, c
     words[1] = next_sum;
     half[0] = mean_565(sum);
     half[1] = mean_565(next_sum);
-#else
-    for (int32_t k = 0; k < PAIRS_AT_ONCE; k++) {
-        words[k] = quad_sum(words[k], bslam_word_at(pixels + 4 * k));
-    }
-    for (int32_t k = 0; k < PAIRS_AT_ONCE; k++) {
-        half[k] = mean_565(words[k]);
-    }
-#endif
 }
 
 /// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means.
@@ -119,8 +198,6 @@ static inline uint32_t luma(uint32_t quad)
 {
     return (quad >> BSLAM_SPREAD_RED & 127) + (quad >> BSLAM_SPREAD_GREEN);
 }
-
-#if BSLAM_HAS_BYTES
 
 /// Of two quarters, in halves of a word.
 static inline uint32_t two_lumas(uint32_t first, uint32_t second)
@@ -160,39 +237,6 @@ static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uin
     put_channel(cells->blue + i, sum, next_sum, 1);
 }
 
-#else
-
-static inline int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
-
-static inline int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-/// Some cells of a row, from their quarters.
-static void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *restrict above,
-                      const uint32_t *restrict below)
-{
-    uint32_t sum[CELLS_AT_ONCE];
-    int32_t spread[CELLS_AT_ONCE];
-    for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
-        const uint32_t a = above[2 * k], b = above[2 * k + 1], c = below[2 * k], d = below[2 * k + 1];
-        const int32_t of_a = (int32_t)luma(a), of_b = (int32_t)luma(b), of_c = (int32_t)luma(c);
-        const int32_t of_d = (int32_t)luma(d);
-        sum[k] = a + b + c + d;
-        spread[k] = least(
-            most(most(of_a, of_b), most(of_c, of_d)) - least(least(of_a, of_b), least(of_c, of_d)), 255);
-    }
-    for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
-        cells->red[i + k] = (uint8_t)(sum[k] >> (BSLAM_SPREAD_RED + 1));
-        cells->green[i + k] = (uint8_t)(sum[k] >> (BSLAM_SPREAD_GREEN + 2));
-        cells->blue[i + k] = (uint8_t)(sum[k] >> 1);
-        cells->spread[i + k] = (uint8_t)spread[k];
-    }
-}
 #endif
 
 /// A row of cells, from cell `first` on, from the sums of their quarters. Whole steps: what is beyond is

@@ -37,7 +37,6 @@ static void test_bytes_are_each_as_a_number(void **state)
             assert_int_equal(bslam_byte_of(bslam_bytes_plus(a, b), k), least(x + y, 255));
             assert_int_equal(bslam_byte_of(bslam_bytes_least(a, b), k), least(x, y));
             assert_int_equal(bslam_byte_of(bslam_bytes_apart(a, b), k), x > y ? x - y : y - x);
-            assert_int_equal(bslam_byte_of(bslam_bytes_above(a, b), k), x > y ? 1 : 0);
             assert_int_equal(bslam_byte_of(bslam_bytes_mean(a, b), k), (x + y) / 2);
             const int32_t apart = least(x > y ? x - y : y - x, 127);
             assert_int_equal((int8_t)bslam_byte_of(bslam_bytes_difference(a, b), k), x > y ? apart : -apart);
@@ -45,6 +44,7 @@ static void test_bytes_are_each_as_a_number(void **state)
             apart_sum += x > y ? x - y : y - x;
         }
         assert_int_equal(bslam_bytes_apart_sum(a, b), apart_sum);
+        assert_int_equal(bslam_bytes_apart_add(a, b, (uint32_t)round), apart_sum + round);
         assert_int_equal(bslam_has_zero_byte(a), has_zero);
     }
 }
@@ -96,6 +96,19 @@ static void test_numbers_become_the_nearest_byte(void **state)
     assert_int_equal(bslam_byte_at_most(INT32_MAX), 255);
 }
 
+static void test_product_add_is_exact_in_64_bits(void **state)
+{
+    static const int32_t ends[] = {0, 1, -1, INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN};
+    for (int i = 0; i < COUNT_OF(ends); i++) {
+        for (int j = 0; j < COUNT_OF(ends); j++) {
+            const int64_t product = (int64_t)ends[i] * ends[j];
+            assert_true(bslam_product_add(ends[i], ends[j], 0) == product);
+            assert_true(bslam_product_add(ends[i], ends[j], -1) == product - 1);
+            assert_true(bslam_product_add(ends[i], ends[j], 1LL << 40) == product + (1LL << 40));
+        }
+    }
+}
+
 static void test_bits_of_what_is_above(void **state)
 {
     enum { PLACES = 16 };
@@ -135,6 +148,7 @@ int main(void)
         cmocka_unit_test(test_bytes_are_each_as_a_number),
         cmocka_unit_test(test_sums_of_bytes_and_of_halves),
         cmocka_unit_test(test_numbers_become_the_nearest_byte),
+        cmocka_unit_test(test_product_add_is_exact_in_64_bits),
         cmocka_unit_test(test_bits_of_what_is_above),
         cmocka_unit_test(test_words_lie_anywhere),
     };

@@ -1,0 +1,115 @@
+/// Sixteen bytes at a time, or eight halves of words, or four words: what every x86 host has instructions for
+/// (SSE2). Elsewhere BSLAM_HAS_LANES is 0, and the same is done by words of four bytes (bytes.h), to the same
+/// bits.
+#ifndef BSLAM_MATH_LANES_H
+#define BSLAM_MATH_LANES_H
+
+#include "bslam/math/bytes.h"
+
+#define BSLAM_HAS_LANES BSLAM_HAS_SSE2
+
+#if BSLAM_HAS_LANES
+
+/// Bits of two are taken together by the operators & | ^, turned over by ~.
+typedef __m128i bslam_lanes_t;
+
+static inline bslam_lanes_t bslam_lanes_at(const void *bytes)
+{
+    return _mm_loadu_si128(bytes);
+}
+
+static inline void bslam_lanes_put(void *bytes, bslam_lanes_t lanes)
+{
+    _mm_storeu_si128(bytes, lanes);
+}
+
+static inline bslam_lanes_t bslam_lanes_zero(void)
+{
+    return _mm_setzero_si128();
+}
+
+/// The same word four times.
+static inline bslam_lanes_t bslam_lanes_of(uint32_t word)
+{
+    return _mm_set1_epi32((int)word);
+}
+
+/// Word k, counted from the lowest, a constant.
+static inline uint32_t bslam_lanes_word(bslam_lanes_t a, int k)
+{
+    return (uint32_t)_mm_cvtsi128_si32(k == 1   ? _mm_shuffle_epi32(a, 1)
+                                       : k == 2 ? _mm_shuffle_epi32(a, 2)
+                                       : k == 3 ? _mm_shuffle_epi32(a, 3)
+                                                : a);
+}
+
+// --- Words
+
+static inline bslam_lanes_t bslam_words_add(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_add_epi32(a, b);
+}
+
+static inline bslam_lanes_t bslam_words_less(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_sub_epi32(a, b);
+}
+
+/// Each word as an unsigned number, shifted to its lower bits; to its upper ones.
+static inline bslam_lanes_t bslam_words_down(bslam_lanes_t a, int bits)
+{
+    return _mm_srli_epi32(a, bits);
+}
+
+static inline bslam_lanes_t bslam_words_up(bslam_lanes_t a, int bits)
+{
+    return _mm_slli_epi32(a, bits);
+}
+
+/// Each word with its other half first.
+static inline bslam_lanes_t bslam_words_turned(bslam_lanes_t a)
+{
+    enum { OTHERS_FIRST = 1 << 0 | 0 << 2 | 3 << 4 | 2 << 6 };
+    return _mm_shufflehi_epi16(_mm_shufflelo_epi16(a, OTHERS_FIRST), OTHERS_FIRST);
+}
+
+/// Words 0 and 2 of a, then those of b; words 1 and 3.
+static inline bslam_lanes_t bslam_words_even(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_castps_si128(
+        _mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 0 << 0 | 2 << 2 | 0 << 4 | 2 << 6));
+}
+
+static inline bslam_lanes_t bslam_words_odd(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_castps_si128(
+        _mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 1 << 0 | 3 << 2 | 1 << 4 | 3 << 6));
+}
+
+/// Those of a, then those of b, as halves: signed numbers that fit these.
+static inline bslam_lanes_t bslam_words_to_halves(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_packs_epi32(a, b);
+}
+
+// --- Halves, signed numbers where that makes a difference
+
+static inline bslam_lanes_t bslam_halves_most_of(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_max_epi16(a, b);
+}
+
+static inline bslam_lanes_t bslam_halves_least_of(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_min_epi16(a, b);
+}
+
+/// Those of a, then those of b, as the bytes that are nearest.
+static inline bslam_lanes_t bslam_halves_to_bytes(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_packus_epi16(a, b);
+}
+
+#endif
+
+#endif
