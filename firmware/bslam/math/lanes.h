@@ -43,6 +43,13 @@ static inline uint32_t bslam_lanes_word(bslam_lanes_t a, int k)
                                                 : a);
 }
 
+/// Four words, the lowest first.
+static inline bslam_lanes_t bslam_lanes_of_words(uint32_t first, uint32_t second, uint32_t third,
+                                                 uint32_t fourth)
+{
+    return _mm_set_epi32((int)fourth, (int)third, (int)second, (int)first);
+}
+
 // --- Words
 
 static inline bslam_lanes_t bslam_words_add(bslam_lanes_t a, bslam_lanes_t b)
@@ -86,6 +93,30 @@ static inline bslam_lanes_t bslam_words_odd(bslam_lanes_t a, bslam_lanes_t b)
         _mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 1 << 0 | 3 << 2 | 1 << 4 | 3 << 6));
 }
 
+/// Word 1 twice, then word 3 twice.
+static inline bslam_lanes_t bslam_words_odd_twice(bslam_lanes_t a)
+{
+    return _mm_shuffle_epi32(a, 1 << 0 | 1 << 2 | 3 << 4 | 3 << 6);
+}
+
+/// The lower two words of a and of b in turn; the upper two.
+static inline bslam_lanes_t bslam_words_lower_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpacklo_epi32(a, b);
+}
+
+static inline bslam_lanes_t bslam_words_upper_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpackhi_epi32(a, b);
+}
+
+/// All four together.
+static inline int32_t bslam_words_sum(bslam_lanes_t a)
+{
+    const bslam_lanes_t pairs = bslam_words_add(a, _mm_shuffle_epi32(a, 2 << 0 | 3 << 2));
+    return (int32_t)(bslam_lanes_word(pairs, 0) + bslam_lanes_word(pairs, 1));
+}
+
 /// Those of a, then those of b, as halves: signed numbers that fit these.
 static inline bslam_lanes_t bslam_words_to_halves(bslam_lanes_t a, bslam_lanes_t b)
 {
@@ -104,10 +135,29 @@ static inline bslam_lanes_t bslam_halves_least_of(bslam_lanes_t a, bslam_lanes_t
     return _mm_min_epi16(a, b);
 }
 
+/// In each word the products of the lower halves of a and b and of the upper ones together.
+static inline bslam_lanes_t bslam_halves_dots(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_madd_epi16(a, b);
+}
+
 /// Those of a, then those of b, as the bytes that are nearest.
 static inline bslam_lanes_t bslam_halves_to_bytes(bslam_lanes_t a, bslam_lanes_t b)
 {
     return _mm_packus_epi16(a, b);
+}
+
+// --- Bytes
+
+/// Bytes 0, 2, 4 and so on, which stand for signed numbers, as halves; bytes 1, 3, 5 and so on.
+static inline bslam_lanes_t bslam_bytes_signed_evens(bslam_lanes_t a)
+{
+    return _mm_srai_epi16(_mm_slli_epi16(a, 8), 8);
+}
+
+static inline bslam_lanes_t bslam_bytes_signed_odds(bslam_lanes_t a)
+{
+    return _mm_srai_epi16(a, 8);
 }
 
 #endif

@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "bslam/math/bytes.h"
+#include "bslam/math/lanes.h"
 
 #define ROWS_MAX 255
 /// Of a pair.
@@ -130,6 +130,70 @@ static inline void add_pair(const int8_t *weights, uint32_t shares, int32_t sums
     sums[1] = bslam_halves_dot(bslam_bytes_signed_odd(word), shares, sums[1]);
 }
 
+#if BSLAM_HAS_LANES
+
+// --- Four words at a time
+
+/// Adds the same of four words, each with its own shares, to four sums of each row.
+static inline void add_pairs(bslam_lanes_t words, bslam_lanes_t shares, bslam_lanes_t sums[ROWS])
+{
+    sums[0] = bslam_words_add(sums[0], bslam_halves_dots(bslam_bytes_signed_evens(words), shares));
+    sums[1] = bslam_words_add(sums[1], bslam_halves_dots(bslam_bytes_signed_odds(words), shares));
+}
+
+/// Of a pair's curves, in steps of a byte, times -BSLAM_SHARE_ONE: 96 * 127 * 32768 fits.
+static void sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes,
+                       int32_t sums[ROWS])
+{
+    bslam_lanes_t all[ROWS] = {bslam_lanes_zero(), bslam_lanes_zero()};
+    sums[0] = sums[1] = 0;
+    for (const bslam_between_knots_t *end = place + features % 4; place != end; place++) {
+        add_pair(bytes + place->at, place->shares, sums);
+    }
+    for (const bslam_between_knots_t *end = place + features / 4 * 4; place != end; place += 4) {
+        const bslam_lanes_t words =
+            bslam_lanes_of_words(bslam_word_at(bytes + place[0].at), bslam_word_at(bytes + place[1].at),
+                                 bslam_word_at(bytes + place[2].at), bslam_word_at(bytes + place[3].at));
+        add_pairs(words, bslam_words_odd(bslam_lanes_at(place), bslam_lanes_at(place + 2)), all);
+    }
+    sums[0] += bslam_words_sum(all[0]);
+    sums[1] += bslam_words_sum(all[1]);
+}
+
+/// What all grids of a feature with those after it, [b, end), make along its lower knots and its upper ones.
+static inline void sum_grids(const bslam_between_knots_t *b, const bslam_between_knots_t *end,
+                             const int8_t *grid, int32_t low[ROWS], int32_t high[ROWS])
+{
+    enum { NEXT = ROWS * BSLAM_GRID_KNOTS };
+    bslam_lanes_t all[ROWS] = {bslam_lanes_zero(), bslam_lanes_zero()};
+    if ((end - b) % 2 != 0) {
+        const int8_t *at = grid + b->at;
+        add_pairs(bslam_lanes_of_words(bslam_word_at(at), bslam_word_at(at + NEXT), 0, 0),
+                  bslam_lanes_of(b->shares), all);
+        b++;
+        grid += GRID_BYTES;
+    }
+    for (; b != end; b += 2) {
+        const int8_t *at = grid + b[0].at, *next_at = grid + GRID_BYTES + b[1].at;
+        const bslam_lanes_t words =
+            bslam_lanes_of_words(bslam_word_at(at), bslam_word_at(at + NEXT), bslam_word_at(next_at),
+                                 bslam_word_at(next_at + NEXT));
+        const bslam_lanes_t places = bslam_lanes_at(b);
+        add_pairs(words, bslam_words_odd_twice(places), all);
+        grid += 2 * GRID_BYTES;
+    }
+    const bslam_lanes_t rows =
+        bslam_words_add(bslam_words_lower_in_turn(all[0], all[1]), bslam_words_upper_in_turn(all[0], all[1]));
+    low[0] = (int32_t)bslam_lanes_word(rows, 0);
+    low[1] = (int32_t)bslam_lanes_word(rows, 1);
+    high[0] = (int32_t)bslam_lanes_word(rows, 2);
+    high[1] = (int32_t)bslam_lanes_word(rows, 3);
+}
+
+#else
+
+// --- Word by word
+
 /// Of a pair's curves, in steps of a byte, times -BSLAM_SHARE_ONE: 96 * 127 * 32768 fits.
 static void sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes,
                        int32_t sums[ROWS])
@@ -145,20 +209,28 @@ static void sum_curves(const bslam_between_knots_t *place, int32_t features, con
     }
 }
 
+/// What all grids of a feature with those after it, [b, end), make along its lower knots and its upper ones.
+static inline void sum_grids(const bslam_between_knots_t *b, const bslam_between_knots_t *end,
+                             const int8_t *grid, int32_t low[ROWS], int32_t high[ROWS])
+{
+    low[0] = low[1] = high[0] = high[1] = 0;
+    for (; b != end; b++) {
+        add_pair(grid + b->at, b->shares, low);
+        add_pair(grid + b->at + ROWS * BSLAM_GRID_KNOTS, b->shares, high);
+        grid += GRID_BYTES;
+    }
+}
+
+#endif
+
 /// Adds a pair's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
 static void add_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes,
                       int64_t sums[ROWS])
 {
     const bslam_between_knots_t *end = place->grids + crossed_count;
     for (const bslam_between_knots_t *a = place->grids; a != end; a++) {
-        // Of all grids of this feature: along its lower knots and its upper ones.
-        const int8_t *grid = bytes + a->at * BSLAM_GRID_KNOTS;
-        int32_t low[ROWS] = {0}, high[ROWS] = {0};
-        for (const bslam_between_knots_t *b = a + 1; b != end; b++) {
-            add_pair(grid + b->at, b->shares, low);
-            add_pair(grid + b->at + ROWS * BSLAM_GRID_KNOTS, b->shares, high);
-            grid += GRID_BYTES;
-        }
+        int32_t low[ROWS], high[ROWS];
+        sum_grids(a + 1, end, bytes + a->at * BSLAM_GRID_KNOTS, low, high);
         const int32_t low_share = (int16_t)a->shares, high_share = (int16_t)(a->shares >> 16);
         for (int32_t r = 0; r < ROWS; r++) {
             sums[r] = bslam_product_add(low[r], low_share, sums[r]);
