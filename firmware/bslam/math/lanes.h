@@ -123,6 +123,13 @@ static inline bslam_lanes_t bslam_words_to_halves(bslam_lanes_t a, bslam_lanes_t
     return _mm_packs_epi32(a, b);
 }
 
+/// Quotients rounded down, of numbers of 15 bits by numbers of 1 to 500: what is short of a whole number is
+/// so by 1/500, twice the half step by which a float of 15 bits may be rounded up.
+static inline bslam_lanes_t bslam_words_quotients(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_cvttps_epi32(_mm_div_ps(_mm_cvtepi32_ps(a), _mm_cvtepi32_ps(b)));
+}
+
 // --- Halves, signed numbers where that makes a difference
 
 static inline bslam_lanes_t bslam_halves_most_of(bslam_lanes_t a, bslam_lanes_t b)
@@ -133,6 +140,27 @@ static inline bslam_lanes_t bslam_halves_most_of(bslam_lanes_t a, bslam_lanes_t 
 static inline bslam_lanes_t bslam_halves_least_of(bslam_lanes_t a, bslam_lanes_t b)
 {
     return _mm_min_epi16(a, b);
+}
+
+static inline bslam_lanes_t bslam_halves_add(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_add_epi16(a, b);
+}
+
+static inline bslam_lanes_t bslam_halves_up(bslam_lanes_t a, int bits)
+{
+    return _mm_slli_epi16(a, bits);
+}
+
+/// The lower four halves of a and of b in turn; the upper four.
+static inline bslam_lanes_t bslam_halves_lower_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpacklo_epi16(a, b);
+}
+
+static inline bslam_lanes_t bslam_halves_upper_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpackhi_epi16(a, b);
 }
 
 /// In each word the products of the lower halves of a and b and of the upper ones together.
@@ -148,6 +176,52 @@ static inline bslam_lanes_t bslam_halves_to_bytes(bslam_lanes_t a, bslam_lanes_t
 }
 
 // --- Bytes
+
+/// Each byte of a less that of b, at least 0.
+static inline bslam_lanes_t bslam_lanes_less(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_subs_epu8(a, b);
+}
+
+/// The same modulo 256.
+static inline bslam_lanes_t bslam_lanes_wrapped_less(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_sub_epi8(a, b);
+}
+
+/// Each byte of a and that of b together, at most 255.
+static inline bslam_lanes_t bslam_lanes_plus(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_adds_epu8(a, b);
+}
+
+static inline bslam_lanes_t bslam_lanes_least(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_min_epu8(a, b);
+}
+
+/// How far each byte of a is from that of b.
+static inline bslam_lanes_t bslam_lanes_apart(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_subs_epu8(a, b) | _mm_subs_epu8(b, a);
+}
+
+/// Half of each byte of a and that of b together, rounded down: the instruction rounds up.
+static inline bslam_lanes_t bslam_lanes_mean(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return ~_mm_avg_epu8(~a, ~b);
+}
+
+/// The lower eight bytes of a and of b in turn; the upper eight.
+static inline bslam_lanes_t bslam_bytes_lower_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpacklo_epi8(a, b);
+}
+
+static inline bslam_lanes_t bslam_bytes_upper_in_turn(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_unpackhi_epi8(a, b);
+}
 
 /// Bytes 0, 2, 4 and so on, which stand for signed numbers, as halves; bytes 1, 3, 5 and so on.
 static inline bslam_lanes_t bslam_bytes_signed_evens(bslam_lanes_t a)

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/math/bytes.h"
+#include "bslam/math/lanes.h"
 #include "bslam/vision/spread.h"
 
 /// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
@@ -69,7 +69,74 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
-#if !BSLAM_HAS_SSE2
+#if BSLAM_HAS_LANES
+
+// --- Sixteen cells at a time; tables have room for all of them beyond the last cell
+
+static inline bslam_lanes_t logs_of(const uint8_t *channel)
+{
+    uint8_t logs[BSLAM_CELL_STEP];
+    _Pragma("GCC unroll 16") for (int32_t k = 0; k < BSLAM_CELL_STEP; k++)
+    {
+        logs[k] = tone_log[channel[k]];
+    }
+    return bslam_lanes_at(logs);
+}
+
+/// Chromas from the logarithms of two channels, within +-127.
+static inline bslam_lanes_t chromas_of(bslam_lanes_t colour, bslam_lanes_t green)
+{
+    const bslam_lanes_t limit = bslam_lanes_of(~BSLAM_TOP_BITS);
+    return bslam_lanes_wrapped_less(bslam_lanes_least(bslam_lanes_less(colour, green), limit),
+                                    bslam_lanes_least(bslam_lanes_less(green, colour), limit));
+}
+
+/// Light and chroma of the frame's cells.
+static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_t *tones)
+{
+    for (int32_t i = 0; i < count; i += BSLAM_CELL_STEP) {
+        const bslam_lanes_t red = logs_of(cells->red + i), green = logs_of(cells->green + i);
+        const bslam_lanes_t blue = logs_of(cells->blue + i);
+        bslam_lanes_put(tones->light + i, bslam_lanes_mean(bslam_lanes_mean(red, blue), green));
+        bslam_lanes_put(tones->reddish + i, chromas_of(red, green));
+        bslam_lanes_put(tones->bluish + i, chromas_of(blue, green));
+    }
+}
+
+/// Of eight cells, in halves: 128 times the spread as a part of luma + 8.
+static inline bslam_lanes_t spreads_of(bslam_lanes_t spread, bslam_lanes_t luma)
+{
+    const bslam_lanes_t zero = bslam_lanes_zero();
+    const bslam_lanes_t whole = bslam_halves_up(spread, 7);
+    const bslam_lanes_t part = bslam_halves_add(luma, bslam_lanes_of(8U | 8U << 16));
+    return bslam_words_to_halves(bslam_words_quotients(bslam_halves_lower_in_turn(whole, zero),
+                                                       bslam_halves_lower_in_turn(part, zero)),
+                                 bslam_words_quotients(bslam_halves_upper_in_turn(whole, zero),
+                                                       bslam_halves_upper_in_turn(part, zero)));
+}
+
+static void fill_spreads(const bslam_cells_t *cells, int32_t count, uint8_t *spreads)
+{
+    const bslam_lanes_t zero = bslam_lanes_zero();
+    for (int32_t i = 0; i < count; i += BSLAM_CELL_STEP) {
+        const bslam_lanes_t spread = bslam_lanes_at(cells->spread + i);
+        const bslam_lanes_t green = bslam_lanes_at(cells->green + i);
+        // As thumbnail.c weighs them for the spread.
+        const bslam_lanes_t red =
+            bslam_words_down(bslam_lanes_at(cells->red + i), 1) & bslam_lanes_of(~BSLAM_TOP_BITS);
+        const bslam_lanes_t luma =
+            bslam_halves_add(bslam_bytes_lower_in_turn(green, zero), bslam_bytes_lower_in_turn(red, zero));
+        const bslam_lanes_t next_luma =
+            bslam_halves_add(bslam_bytes_upper_in_turn(green, zero), bslam_bytes_upper_in_turn(red, zero));
+        bslam_lanes_put(spreads + i, bslam_halves_to_bytes(
+                                         spreads_of(bslam_bytes_lower_in_turn(spread, zero), luma),
+                                         spreads_of(bslam_bytes_upper_in_turn(spread, zero), next_luma)));
+    }
+}
+
+#else
+
+// --- Four cells at a time
 
 static uint32_t logs_of(const uint8_t *channel)
 {
@@ -89,24 +156,12 @@ static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_
     }
 }
 
-#else
-
-/// Chroma from the logarithms of two channels, within +-127.
-static int8_t chroma_of(int32_t colour, int32_t green)
+static void fill_spreads(const bslam_cells_t *cells, int32_t count, uint8_t *spreads)
 {
-    const int32_t chroma = clamp(colour - green, -128, 127);
-    return (int8_t)(chroma < -127 ? -127 : chroma);
-}
-
-/// Light and chroma of the frame's cells.
-static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_t *tones)
-{
-    const uint8_t *reds = cells->red, *greens = cells->green, *blues = cells->blue;
     for (int32_t i = 0; i < count; i++) {
-        const int32_t red = tone_log[reds[i]], green = tone_log[greens[i]], blue = tone_log[blues[i]];
-        tones->light[i] = (uint8_t)((red + 2 * green + blue) >> 2);
-        tones->reddish[i] = chroma_of(red, green);
-        tones->bluish[i] = chroma_of(blue, green);
+        const uint32_t luma =
+            cells->green[i] + cells->red[i] / 2U;  // as thumbnail.c weighs it for the spread
+        spreads[i] = bslam_byte_at_most(128U * cells->spread[i] / (luma + 8));
     }
 }
 
@@ -115,13 +170,8 @@ static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_
 void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
 {
     const int32_t count = frame->rows * frame->columns;
-    const uint8_t *reds = frame->cells->red, *greens = frame->cells->green;
-    const uint8_t *spreads = frame->cells->spread;
     fill_colours(frame->cells, count, tones);
-    for (int32_t i = 0; i < count; i++) {
-        const uint32_t luma = greens[i] + reds[i] / 2U;  // as thumbnail.c weighs it for the spread
-        tones->spread[i] = bslam_byte_at_most(128U * spreads[i] / (luma + 8));
-    }
+    fill_spreads(frame->cells, count, tones->spread);
 }
 
 /// Index of the row that looks `up_rad` above the horizontal in the middle of the frame.
