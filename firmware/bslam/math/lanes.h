@@ -80,6 +80,13 @@ static inline bslam_lanes_t bslam_words_turned(bslam_lanes_t a)
     return _mm_shufflehi_epi16(_mm_shufflelo_epi16(a, OTHERS_FIRST), OTHERS_FIRST);
 }
 
+/// Each word as a signed number over 2^bits, rounded towards 0.
+static inline bslam_lanes_t bslam_words_shifted_to_zero(bslam_lanes_t a, int bits)
+{
+    const bslam_lanes_t if_below_zero = _mm_srli_epi32(_mm_srai_epi32(a, 31), 32 - bits);
+    return _mm_srai_epi32(_mm_add_epi32(a, if_below_zero), bits);
+}
+
 /// Words 0 and 2 of a, then those of b; words 1 and 3.
 static inline bslam_lanes_t bslam_words_even(bslam_lanes_t a, bslam_lanes_t b)
 {
@@ -147,6 +154,42 @@ static inline bslam_lanes_t bslam_halves_add(bslam_lanes_t a, bslam_lanes_t b)
     return _mm_add_epi16(a, b);
 }
 
+static inline bslam_lanes_t bslam_halves_minus(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_sub_epi16(a, b);
+}
+
+/// All bits of a half that is below 0, else none.
+static inline bslam_lanes_t bslam_halves_are_negative(bslam_lanes_t a)
+{
+    return _mm_srai_epi16(a, 15);
+}
+
+/// Each half within [low, high].
+static inline bslam_lanes_t bslam_halves_within(bslam_lanes_t a, int16_t low, int16_t high)
+{
+    return _mm_min_epi16(_mm_max_epi16(a, _mm_set1_epi16(low)), _mm_set1_epi16(high));
+}
+
+/// Each half over 2^bits, rounded towards 0.
+static inline bslam_lanes_t bslam_halves_shifted_to_zero(bslam_lanes_t a, int bits)
+{
+    const bslam_lanes_t if_below_zero = _mm_srli_epi16(_mm_srai_epi16(a, 15), 16 - bits);
+    return _mm_srai_epi16(_mm_add_epi16(a, if_below_zero), bits);
+}
+
+/// Each half times a factor, modulo 65536.
+static inline bslam_lanes_t bslam_halves_times(bslam_lanes_t a, int16_t factor)
+{
+    return _mm_mullo_epi16(a, _mm_set1_epi16(factor));
+}
+
+/// Each half as an unsigned number, shifted to its lower bits; to its upper ones.
+static inline bslam_lanes_t bslam_halves_down(bslam_lanes_t a, int bits)
+{
+    return _mm_srli_epi16(a, bits);
+}
+
 static inline bslam_lanes_t bslam_halves_up(bslam_lanes_t a, int bits)
 {
     return _mm_slli_epi16(a, bits);
@@ -173,6 +216,11 @@ static inline bslam_lanes_t bslam_halves_dots(bslam_lanes_t a, bslam_lanes_t b)
 static inline bslam_lanes_t bslam_halves_to_bytes(bslam_lanes_t a, bslam_lanes_t b)
 {
     return _mm_packus_epi16(a, b);
+}
+
+static inline bslam_lanes_t bslam_halves_to_signed_bytes(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_packs_epi16(a, b);
 }
 
 // --- Bytes
@@ -221,6 +269,17 @@ static inline bslam_lanes_t bslam_bytes_lower_in_turn(bslam_lanes_t a, bslam_lan
 static inline bslam_lanes_t bslam_bytes_upper_in_turn(bslam_lanes_t a, bslam_lanes_t b)
 {
     return _mm_unpackhi_epi8(a, b);
+}
+
+/// The lower eight bytes, which stand for signed numbers, as halves; the upper eight.
+static inline bslam_lanes_t bslam_bytes_signed_lower(bslam_lanes_t a)
+{
+    return _mm_srai_epi16(_mm_unpacklo_epi8(a, a), 8);
+}
+
+static inline bslam_lanes_t bslam_bytes_signed_upper(bslam_lanes_t a)
+{
+    return _mm_srai_epi16(_mm_unpackhi_epi8(a, a), 8);
 }
 
 /// Bytes 0, 2, 4 and so on, which stand for signed numbers, as halves; bytes 1, 3, 5 and so on.

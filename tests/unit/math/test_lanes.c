@@ -54,6 +54,7 @@ static void test_words_are_each_as_a_number(void **state)
         const numbers_t turned = numbers_of(bslam_words_turned(lanes_a));
         const numbers_t even = numbers_of(bslam_words_even(lanes_a, lanes_b));
         const numbers_t odd = numbers_of(bslam_words_odd(lanes_a, lanes_b));
+        const numbers_t shifted = numbers_of(bslam_words_shifted_to_zero(lanes_a, 10));
         const numbers_t same = numbers_of(bslam_lanes_of(a.words[0]));
         const numbers_t twice = numbers_of(bslam_words_odd_twice(lanes_a));
         const numbers_t lower = numbers_of(bslam_words_lower_in_turn(lanes_a, lanes_b));
@@ -65,6 +66,7 @@ static void test_words_are_each_as_a_number(void **state)
             assert_int_equal(less.words[k], a.words[k] - b.words[k]);
             assert_int_equal(down.words[k], a.words[k] >> 11);
             assert_int_equal(up.words[k], a.words[k] << 16);
+            assert_int_equal((int32_t)shifted.words[k], (int32_t)a.words[k] / 1024);
             assert_int_equal(turned.words[k], a.words[k] >> 16 | a.words[k] << 16);
             assert_int_equal(even.words[k], (k < 2 ? a : b).words[k % 2 * 2]);
             assert_int_equal(odd.words[k], (k < 2 ? a : b).words[k % 2 * 2 + 1]);
@@ -96,6 +98,12 @@ static void test_halves_are_each_as_a_number(void **state)
         const numbers_t up = numbers_of(bslam_halves_up(lanes_a, 7));
         const numbers_t lower = numbers_of(bslam_halves_lower_in_turn(lanes_a, lanes_b));
         const numbers_t upper = numbers_of(bslam_halves_upper_in_turn(lanes_a, lanes_b));
+        const numbers_t minus = numbers_of(bslam_halves_minus(lanes_a, lanes_b));
+        const numbers_t negative = numbers_of(bslam_halves_are_negative(lanes_a));
+        const numbers_t within = numbers_of(bslam_halves_within(lanes_a, -8, 40));
+        const numbers_t shifted = numbers_of(bslam_halves_shifted_to_zero(lanes_a, 3));
+        const numbers_t times = numbers_of(bslam_halves_times(lanes_a, 171));
+        const numbers_t down = numbers_of(bslam_halves_down(lanes_a, 11));
         const numbers_t dots = numbers_of(bslam_halves_dots(lanes_a, lanes_b));
         for (int k = 0; k < WORDS; k++) {
             const int64_t dot = (int64_t)a.halves[2 * k] * b.halves[2 * k] +
@@ -104,6 +112,12 @@ static void test_halves_are_each_as_a_number(void **state)
         }
         for (int k = 0; k < HALVES; k++) {
             assert_int_equal(sum.halves[k], (int16_t)(a.halves[k] + b.halves[k]));
+            assert_int_equal(minus.halves[k], (int16_t)(a.halves[k] - b.halves[k]));
+            assert_int_equal(negative.halves[k], a.halves[k] < 0 ? -1 : 0);
+            assert_int_equal(within.halves[k], limited(a.halves[k], -8, 40));
+            assert_int_equal(shifted.halves[k], a.halves[k] / 8);
+            assert_int_equal(times.halves[k], (int16_t)(a.halves[k] * 171));
+            assert_int_equal(down.halves[k], (uint16_t)a.halves[k] >> 11);
             assert_int_equal(up.halves[k], (int16_t)((uint32_t)a.halves[k] << 7));
             assert_int_equal(lower.halves[k], (k % 2 == 0 ? a : b).halves[k / 2]);
             assert_int_equal(upper.halves[k], (k % 2 == 0 ? a : b).halves[4 + k / 2]);
@@ -128,6 +142,8 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
         const numbers_t lower = numbers_of(bslam_bytes_lower_in_turn(lanes_a, lanes_b));
         const numbers_t upper = numbers_of(bslam_bytes_upper_in_turn(lanes_a, lanes_b));
         const numbers_t evens = numbers_of(bslam_bytes_signed_evens(lanes_a));
+        const numbers_t signed_lower = numbers_of(bslam_bytes_signed_lower(lanes_a));
+        const numbers_t signed_upper = numbers_of(bslam_bytes_signed_upper(lanes_a));
         const numbers_t odds = numbers_of(bslam_bytes_signed_odds(lanes_a));
         for (int k = 0; k < BYTES; k++) {
             const int x = a.bytes[k], y = b.bytes[k];
@@ -139,6 +155,7 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
             assert_int_equal(mean.bytes[k], (x + y) / 2);
             assert_int_equal(lower.bytes[k], (k % 2 == 0 ? a : b).bytes[k / 2]);
             assert_int_equal(upper.bytes[k], (k % 2 == 0 ? a : b).bytes[8 + k / 2]);
+            assert_int_equal((k < 8 ? signed_lower : signed_upper).halves[k % 8], (int8_t)x);
             assert_int_equal((k % 2 == 0 ? evens : odds).halves[k / 2], (int8_t)x);
         }
     }
@@ -169,7 +186,10 @@ static void test_narrower_numbers_are_the_nearest(void **state)
             const int32_t word = (int32_t)(k < WORDS ? a : b).words[k % WORDS];
             assert_int_equal(halves.halves[k], limited(word, INT16_MIN, INT16_MAX));
         }
+        const numbers_t signed_bytes = numbers_of(bslam_halves_to_signed_bytes(lanes_a, lanes_b));
         for (int k = 0; k < BYTES; k++) {
+            const int16_t half = (k < HALVES ? a : b).halves[k % HALVES];
+            assert_int_equal((int8_t)signed_bytes.bytes[k], limited(half, -128, 127));
             assert_int_equal(bytes.bytes[k], limited((k < HALVES ? a : b).halves[k % HALVES], 0, 255));
         }
     }
