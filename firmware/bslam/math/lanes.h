@@ -154,6 +154,18 @@ static inline bslam_lanes_t bslam_halves_add(bslam_lanes_t a, bslam_lanes_t b)
     return _mm_add_epi16(a, b);
 }
 
+/// In each word the products of the lower halves of a and b and of the upper ones together.
+static inline bslam_lanes_t bslam_halves_dots(bslam_lanes_t a, bslam_lanes_t b)
+{
+    return _mm_madd_epi16(a, b);
+}
+
+/// All eight together.
+static inline int32_t bslam_halves_sum(bslam_lanes_t a)
+{
+    return bslam_words_sum(bslam_halves_dots(a, _mm_set1_epi16(1)));
+}
+
 static inline bslam_lanes_t bslam_halves_minus(bslam_lanes_t a, bslam_lanes_t b)
 {
     return _mm_sub_epi16(a, b);
@@ -206,12 +218,6 @@ static inline bslam_lanes_t bslam_halves_upper_in_turn(bslam_lanes_t a, bslam_la
     return _mm_unpackhi_epi16(a, b);
 }
 
-/// In each word the products of the lower halves of a and b and of the upper ones together.
-static inline bslam_lanes_t bslam_halves_dots(bslam_lanes_t a, bslam_lanes_t b)
-{
-    return _mm_madd_epi16(a, b);
-}
-
 /// Those of a, then those of b, as the bytes that are nearest.
 static inline bslam_lanes_t bslam_halves_to_bytes(bslam_lanes_t a, bslam_lanes_t b)
 {
@@ -258,6 +264,47 @@ static inline bslam_lanes_t bslam_lanes_apart(bslam_lanes_t a, bslam_lanes_t b)
 static inline bslam_lanes_t bslam_lanes_mean(bslam_lanes_t a, bslam_lanes_t b)
 {
     return ~_mm_avg_epu8(~a, ~b);
+}
+
+/// All bits of a byte that is above 0 as a signed number, else none.
+static inline bslam_lanes_t bslam_bytes_are_positive(bslam_lanes_t a)
+{
+    return _mm_cmpgt_epi8(a, _mm_setzero_si128());
+}
+
+/// Adds all sixteen bytes to sums, of which bslam_lanes_sum() makes one.
+static inline bslam_lanes_t bslam_lanes_sum_add(bslam_lanes_t bytes, bslam_lanes_t sums)
+{
+    return _mm_add_epi32(_mm_sad_epu8(bytes, _mm_setzero_si128()), sums);
+}
+
+static inline int32_t bslam_lanes_sum(bslam_lanes_t sums)
+{
+    return (int32_t)(bslam_lanes_word(sums, 0) + bslam_lanes_word(sums, 2));
+}
+
+/// All bits of the first `count` bytes, of none below 0, of all from 16 on.
+static inline bslam_lanes_t bslam_lanes_first(int32_t count)
+{
+    static const uint8_t masks[32] = {255, 255, 255, 255, 255, 255, 255, 255,
+                                      255, 255, 255, 255, 255, 255, 255, 255};
+    return bslam_lanes_at(masks + (count < 0 ? 16 : count < 16 ? 16 - count : 0));
+}
+
+static inline int16_t bslam_half_at(const uint8_t *bytes)
+{
+    int16_t half;
+    memcpy(&half, bytes, sizeof half);
+    return half;
+}
+
+/// Two bytes from each of eight places so far apart.
+static inline bslam_lanes_t bslam_lanes_of_pairs(const void *bytes, int32_t apart)
+{
+    const uint8_t *at = bytes, *next = at + 4 * apart;
+    return _mm_set_epi16(bslam_half_at(next + 3 * apart), bslam_half_at(next + 2 * apart),
+                         bslam_half_at(next + apart), bslam_half_at(next), bslam_half_at(at + 3 * apart),
+                         bslam_half_at(at + 2 * apart), bslam_half_at(at + apart), bslam_half_at(at));
 }
 
 /// The lower eight bytes of a and of b in turn; the upper eight.

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/math/bytes.h"
+#include "bslam/math/lanes.h"
 
 #define STRIP BSLAM_STRIP
 #define ZONES BSLAM_BOX_ZONES
@@ -88,7 +88,264 @@ static void fill_strides(const grid_t *grid, const bslam_proposal_t *p, int32_t 
     }
 }
 
-#if !BSLAM_HAS_SSE2
+#if BSLAM_HAS_LANES
+
+// --- Sixteen cells side by side at a time, or two of each of eight rows. Tables have room for all of them
+// beyond the last cell.
+
+/// Bytes that stand for signed numbers are 128 more while they are added up.
+#define SIGNED_ZERO 0x80808080U
+/// Rows of a strip that stands upright.
+#define ROWS_AT_ONCE 8
+
+/// An area's rows.
+typedef struct span {
+    int32_t first;        ///< its first cell
+    int32_t rows, apart;  ///< how many rows, and cells from one to the next
+    int32_t width;        ///< cells of a row
+} span_t;
+
+static span_t span_of(const bslam_view_t *view, const rows_t *rows)
+{
+    const int32_t columns = view->frame->columns, height = most(rows->end - rows->first, 0);
+    return (span_t){
+        .first = rows->first * columns + rows->left,
+        .rows = rows->stride == 1 ? height : (height + 1) / 2,
+        .apart = rows->stride * columns,
+        .width = rows->right - rows->left,
+    };
+}
+
+/// Sums of bytes, which bslam_lanes_sum() adds up.
+typedef struct byte_sums {
+    bslam_lanes_t light, reddish, bluish, spread, value;
+} byte_sums_t;
+
+static inline bslam_lanes_t from_zero(bslam_lanes_t signed_bytes)
+{
+    return signed_bytes ^ bslam_lanes_of(SIGNED_ZERO);
+}
+
+/// Adds eight halves of each, walls' and floors' numbers.
+typedef struct frequent_sums {
+    bslam_lanes_t walls, floors;
+} frequent_sums_t;
+
+static inline void add_frequent(bslam_lanes_t frequent, frequent_sums_t *sums)
+{
+    sums->walls = bslam_halves_add(sums->walls, frequent & bslam_lanes_of(BSLAM_EVEN_BYTES));
+    sums->floors = bslam_halves_add(sums->floors, bslam_halves_down(frequent, 8));
+}
+
+/// What does not count taken out.
+static inline void take_frequent(const frequent_sums_t *from, bslam_lanes_t mask, bslam_sums_t *sums)
+{
+    sums->wall += bslam_halves_sum(from->walls & mask);
+    sums->floor += bslam_halves_sum(from->floors & mask);
+}
+
+static void take_bytes(const byte_sums_t *from, bslam_sums_t *sums)
+{
+    sums->light += bslam_lanes_sum(from->light);
+    sums->reddish += bslam_lanes_sum(from->reddish);
+    sums->bluish += bslam_lanes_sum(from->bluish);
+    sums->spread += bslam_lanes_sum(from->spread);
+    sums->value += bslam_lanes_sum(from->value);
+}
+
+/// Adds 16 cells from the i-th on, as far as the mask has them.
+static inline void add_strip(const bslam_view_t *view, int32_t i, bslam_lanes_t mask, byte_sums_t *sums)
+{
+    const bslam_tones_t *tones = view->tones;
+    sums->light = bslam_lanes_sum_add(bslam_lanes_at(tones->light + i) & mask, sums->light);
+    sums->reddish = bslam_lanes_sum_add(from_zero(bslam_lanes_at(tones->reddish + i)) & mask, sums->reddish);
+    sums->bluish = bslam_lanes_sum_add(from_zero(bslam_lanes_at(tones->bluish + i)) & mask, sums->bluish);
+    sums->spread = bslam_lanes_sum_add(bslam_lanes_at(tones->spread + i) & mask, sums->spread);
+    sums->value = bslam_lanes_sum_add(from_zero(bslam_lanes_at(view->values + i)) & mask, sums->value);
+}
+
+/// All but what sum_upright() has of a strip.
+static void sum_level(const bslam_view_t *view, const span_t *span, bslam_sums_t *sums)
+{
+    byte_sums_t bytes = {0};
+    for (int32_t left = 0; left < span->width; left += BSLAM_CELL_STEP) {
+        const bslam_lanes_t mask = bslam_lanes_first(span->width - left);
+        frequent_sums_t low = {0}, high = {0};
+        int32_t i = span->first + left;
+        for (int32_t row = span->rows; row > 0; row--, i += span->apart) {
+            add_strip(view, i, mask, &bytes);
+            add_frequent(bslam_lanes_at(view->frequent + i), &low);
+            add_frequent(bslam_lanes_at(view->frequent + i + 8), &high);
+        }
+        take_frequent(&low, bslam_bytes_lower_in_turn(mask, mask), sums);
+        take_frequent(&high, bslam_bytes_upper_in_turn(mask, mask), sums);
+    }
+    take_bytes(&bytes, sums);
+}
+
+/// Takes ROWS_AT_ONCE rows of a strip at a time out of the span, if it is STRIP columns wide.
+static void sum_upright(const bslam_view_t *view, span_t *span, bslam_sums_t *sums)
+{
+    const bslam_tones_t *tones = view->tones;
+    const int32_t apart = span->apart;
+    byte_sums_t bytes = {0};
+    frequent_sums_t frequent = {0};
+    for (; span->width == STRIP && span->rows >= ROWS_AT_ONCE; span->rows -= ROWS_AT_ONCE) {
+        const int32_t i = span->first;
+        bytes.light = bslam_lanes_sum_add(bslam_lanes_of_pairs(tones->light + i, apart), bytes.light);
+        bytes.reddish =
+            bslam_lanes_sum_add(from_zero(bslam_lanes_of_pairs(tones->reddish + i, apart)), bytes.reddish);
+        bytes.bluish =
+            bslam_lanes_sum_add(from_zero(bslam_lanes_of_pairs(tones->bluish + i, apart)), bytes.bluish);
+        bytes.spread = bslam_lanes_sum_add(bslam_lanes_of_pairs(tones->spread + i, apart), bytes.spread);
+        bytes.value =
+            bslam_lanes_sum_add(from_zero(bslam_lanes_of_pairs(view->values + i, apart)), bytes.value);
+        for (int32_t k = 0; k < ROWS_AT_ONCE; k += 4) {
+            const uint16_t *at = view->frequent + i + k * apart;
+            add_frequent(bslam_lanes_of_words(bslam_word_at(at), bslam_word_at(at + apart),
+                                              bslam_word_at(at + 2 * apart), bslam_word_at(at + 3 * apart)),
+                         &frequent);
+        }
+        span->first += ROWS_AT_ONCE * apart;
+    }
+    take_bytes(&bytes, sums);
+    take_frequent(&frequent, ~bslam_lanes_zero(), sums);
+}
+
+bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
+{
+    const rows_t rows = rows_of(view, strip_of(box, side));
+    span_t span = span_of(view, &rows);
+    bslam_sums_t sums = {.cells = span.rows * span.width};
+    if (span.width == STRIP && span.rows >= ROWS_AT_ONCE) {
+        sum_upright(view, &span, &sums);
+    }
+    if (span.rows > 0) {
+        sum_level(view, &span, &sums);
+    }
+    sums.reddish -= 128 * sums.cells;
+    sums.bluish -= 128 * sums.cells;
+    sums.value -= 128 * sums.cells;
+    return sums;
+}
+
+/// The tones of a zone.
+static inline bslam_zone_sums_t sum_zone(const bslam_tones_t *tones, const span_t *zone)
+{
+    const int32_t cells = zone->rows * zone->width;
+    bslam_lanes_t light = bslam_lanes_zero(), reddish = light, bluish = light;
+    for (int32_t left = 0; left < zone->width; left += BSLAM_CELL_STEP) {
+        const bslam_lanes_t mask = bslam_lanes_first(zone->width - left);
+        int32_t i = zone->first + left;
+        for (int32_t row = zone->rows; row > 0; row--, i += zone->apart) {
+            light = bslam_lanes_sum_add(bslam_lanes_at(tones->light + i) & mask, light);
+            reddish = bslam_lanes_sum_add(from_zero(bslam_lanes_at(tones->reddish + i)) & mask, reddish);
+            bluish = bslam_lanes_sum_add(from_zero(bslam_lanes_at(tones->bluish + i)) & mask, bluish);
+        }
+    }
+    return (bslam_zone_sums_t){cells, bslam_lanes_sum(light), bslam_lanes_sum(reddish) - 128 * cells,
+                               bslam_lanes_sum(bluish) - 128 * cells};
+}
+
+/// Sums of squares.
+typedef struct square_sums {
+    bslam_lanes_t light, reddish, bluish;
+} square_sums_t;
+
+static inline bslam_lanes_t squares_add(bslam_lanes_t even, bslam_lanes_t odd, bslam_lanes_t sums)
+{
+    return bslam_words_add(bslam_words_add(bslam_halves_dots(even, even), sums), bslam_halves_dots(odd, odd));
+}
+
+static inline bslam_lanes_t signed_squares_add(bslam_lanes_t bytes, bslam_lanes_t sums)
+{
+    return squares_add(bslam_bytes_signed_evens(bytes), bslam_bytes_signed_odds(bytes), sums);
+}
+
+static inline void add_squares(const bslam_tones_t *tones, int32_t i, bslam_lanes_t mask, square_sums_t *sums)
+{
+    const bslam_lanes_t light = bslam_lanes_at(tones->light + i) & mask;
+    sums->light =
+        squares_add(light & bslam_lanes_of(BSLAM_EVEN_BYTES), bslam_halves_down(light, 8), sums->light);
+    sums->reddish = signed_squares_add(bslam_lanes_at(tones->reddish + i) & mask, sums->reddish);
+    sums->bluish = signed_squares_add(bslam_lanes_at(tones->bluish + i) & mask, sums->bluish);
+}
+
+/// Sums of texture and values; `likely` has a byte a column, which the rows of a frame do not fill.
+typedef struct texture_sums {
+    bslam_lanes_t spread, step_x, step_y, value, likely;
+} texture_sums_t;
+
+_Static_assert(BSLAM_IMAGE_HEIGHT_MAX / BSLAM_CELL_PX <= 255, "rows fit a byte");
+
+static inline void add_cells(const bslam_view_t *view, int32_t i, bslam_lanes_t mask, texture_sums_t *sums)
+{
+    const bslam_lanes_t values = bslam_lanes_at(view->values + i);
+    sums->spread = bslam_lanes_sum_add(bslam_lanes_at(view->tones->spread + i) & mask, sums->spread);
+    sums->step_x = bslam_lanes_sum_add(bslam_lanes_at(view->step_x + i) & mask, sums->step_x);
+    sums->step_y = bslam_lanes_sum_add(bslam_lanes_at(view->step_y + i) & mask, sums->step_y);
+    sums->value = bslam_lanes_sum_add(from_zero(values) & mask, sums->value);
+    sums->likely = bslam_lanes_wrapped_less(sums->likely, bslam_bytes_are_positive(values));
+}
+
+/// Adds the texture and the values of an area's cells, and the squares of their tones.
+static void add_texture(const bslam_view_t *view, const span_t *span, bslam_sums_t *sums)
+{
+    square_sums_t squares = {0};
+    texture_sums_t texture = {0};
+    for (int32_t left = 0; left < span->width; left += BSLAM_CELL_STEP) {
+        const bslam_lanes_t mask = bslam_lanes_first(span->width - left);
+        frequent_sums_t low = {0}, high = {0};
+        const int32_t first = span->first + left;
+        texture.likely = bslam_lanes_zero();
+        for (int32_t row = span->rows, i = first; row > 0; row--, i += span->apart) {
+            add_squares(view->tones, i, mask, &squares);
+        }
+        for (int32_t row = span->rows, i = first; row > 0; row--, i += span->apart) {
+            add_cells(view, i, mask, &texture);
+            add_frequent(bslam_lanes_at(view->frequent + i), &low);
+            add_frequent(bslam_lanes_at(view->frequent + i + 8), &high);
+        }
+        sums->likely += bslam_lanes_sum(bslam_lanes_sum_add(texture.likely & mask, bslam_lanes_zero()));
+        take_frequent(&low, bslam_bytes_lower_in_turn(mask, mask), sums);
+        take_frequent(&high, bslam_bytes_upper_in_turn(mask, mask), sums);
+    }
+    sums->light_sq += bslam_words_sum(squares.light);
+    sums->reddish_sq += bslam_words_sum(squares.reddish);
+    sums->bluish_sq += bslam_words_sum(squares.bluish);
+    sums->spread += bslam_lanes_sum(texture.spread);
+    sums->step_x += bslam_lanes_sum(texture.step_x);
+    sums->step_y += bslam_lanes_sum(texture.step_y);
+    sums->value += bslam_lanes_sum(texture.value) - 128 * span->rows * span->width;
+}
+
+/// Adds a row of zones: the texture, which nothing asks of single zones, across them where they have the same
+/// stride, else, 0, of each.
+static void add_zones(const bslam_view_t *view, const grid_t *grid, int32_t r, int32_t stride,
+                      bslam_zone_sums_t zones[ZONES], bslam_sums_t *sums)
+{
+    rows_t rows = {grid->top[r], grid->top[r + 1], stride, grid->left[0], grid->left[ZONES]};
+    if (stride != 0) {
+        const span_t span = span_of(view, &rows);
+        add_texture(view, &span, sums);
+    }
+    for (int32_t c = 0; c < ZONES; c++) {
+        rows.left = grid->left[c];
+        rows.right = grid->left[c + 1];
+        rows.stride = stride != 0 ? stride : stride_of((rows.right - rows.left) * (rows.end - rows.first));
+        const span_t span = span_of(view, &rows);
+        if (stride == 0) {
+            add_texture(view, &span, sums);
+        }
+        zones[c] = sum_zone(view->tones, &span);
+        sums->cells += zones[c].cells;
+        sums->light += zones[c].light;
+        sums->reddish += zones[c].reddish;
+        sums->bluish += zones[c].bluish;
+    }
+}
+
+#else
 
 // --- By words, four cells at a time
 
@@ -364,6 +621,8 @@ static void add_zones(const bslam_view_t *view, const grid_t *grid, int32_t r, i
     }
 }
 
+#endif
+
 void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
                    bslam_zone_sums_t zones[ZONES * ZONES], bslam_sums_t *inside)
 {
@@ -375,210 +634,3 @@ void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
         add_zones(view, &grid, r, strides[r], zones + ZONES * r, inside);
     }
 }
-
-#else
-
-// --- By columns
-
-bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
-{
-    bslam_sums_t sums = {0};
-    const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, strip_of(box, side));
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        const int32_t start = row * view->frame->columns, end = start + rows.right;
-        sums.cells += rows.right - rows.left;
-        for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t frequent = view->frequent[i];
-            sums.light += tones->light[i];
-            sums.reddish += tones->reddish[i];
-            sums.bluish += tones->bluish[i];
-            sums.spread += tones->spread[i];
-            sums.value += view->values[i];
-            sums.wall += frequent & 255;
-            sums.floor += frequent >> 8;
-        }
-    }
-    return sums;
-}
-
-static void merge(bslam_sums_t *into, const bslam_sums_t *from)
-{
-    int32_t *a = &into->cells;
-    const int32_t *b = &from->cells;
-    for (int32_t i = 0; i < (int32_t)(sizeof *into / sizeof *a); i++) {
-        a[i] += b[i];
-    }
-}
-
-static area_t zone_area(const grid_t *grid, int32_t row, int32_t column)
-{
-    return (area_t){grid->left[column], grid->top[row], grid->left[column + 1], grid->top[row + 1]};
-}
-
-static bslam_zone_sums_t zone_of(const bslam_sums_t *sums)
-{
-    return (bslam_zone_sums_t){sums->cells, sums->light, sums->reddish, sums->bluish};
-}
-
-static bslam_sums_t sum_inside(const bslam_view_t *view, area_t area)
-{
-    bslam_sums_t sums = {0};
-    const bslam_tones_t *tones = view->tones;
-    const rows_t rows = rows_of(view, area);
-    for (int32_t row = rows.first; row < rows.end; row += rows.stride) {
-        const int32_t start = row * view->frame->columns, end = start + rows.right;
-        sums.cells += rows.right - rows.left;
-        for (int32_t i = start + rows.left; i < end; i++) {
-            const int32_t light = tones->light[i];
-            const int32_t reddish = (int32_t)tones->reddish[i], bluish = (int32_t)tones->bluish[i];
-            const int32_t value = (int32_t)view->values[i], frequent = view->frequent[i];
-            sums.light += light;
-            sums.reddish += reddish;
-            sums.bluish += bluish;
-            sums.spread += tones->spread[i];
-            sums.value += value;
-            sums.wall += frequent & 255;
-            sums.floor += frequent >> 8;
-            sums.light_sq += light * light;
-            sums.reddish_sq += reddish * reddish;
-            sums.bluish_sq += bluish * bluish;
-            sums.step_x += view->step_x[i];
-            sums.step_y += view->step_y[i];
-            sums.likely += value > 0 ? 1 : 0;
-        }
-    }
-    return sums;
-}
-
-/// Columns of cells summed at a time; a constant, so that a compiler can use vector instructions.
-#define LANES 16
-
-/// Sums down LANES columns: of a row of zones, and of the whole box.
-typedef struct lanes {
-    int16_t light[LANES], reddish[LANES], bluish[LANES];
-    uint16_t spread[LANES], step_x[LANES], step_y[LANES], wall[LANES], floor[LANES];
-    int16_t value[LANES];
-    uint8_t likely[LANES];
-    uint32_t light_sq[LANES], reddish_sq[LANES], bluish_sq[LANES];
-} lanes_t;
-
-static void add_bytes(uint16_t *restrict sums, const uint8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] = (uint16_t)(sums[k] + bytes[k]);
-    }
-}
-
-static void add_signed(int16_t *restrict sums, const int8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] = (int16_t)(sums[k] + bytes[k]);
-    }
-}
-
-static void add_squares(uint32_t *restrict sums, const int8_t *restrict bytes)
-{
-    for (int32_t k = 0; k < LANES; k++) {
-        sums[k] += (uint16_t)(bytes[k] * bytes[k]);
-    }
-}
-
-/// Adds the cells from `i` on; what is beyond the box is not read out.
-static void add_row(lanes_t *restrict lanes, const bslam_view_t *view, int32_t i)
-{
-    const uint8_t *restrict light = view->tones->light + i;
-    const uint16_t *restrict frequent = view->frequent + i;
-    const int8_t *restrict values = view->values + i;
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->light[k] = (int16_t)(lanes->light[k] + light[k]);
-        lanes->light_sq[k] += (uint16_t)(light[k] * light[k]);
-    }
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->wall[k] = (uint16_t)(lanes->wall[k] + (frequent[k] & 255));
-        lanes->floor[k] = (uint16_t)(lanes->floor[k] + (frequent[k] >> 8));
-    }
-    for (int32_t k = 0; k < LANES; k++) {
-        lanes->likely[k] = (uint8_t)(lanes->likely[k] + (values[k] > 0 ? 1 : 0));
-    }
-    add_signed(lanes->reddish, view->tones->reddish + i);
-    add_signed(lanes->bluish, view->tones->bluish + i);
-    add_signed(lanes->value, values);
-    add_squares(lanes->reddish_sq, view->tones->reddish + i);
-    add_squares(lanes->bluish_sq, view->tones->bluish + i);
-    add_bytes(lanes->spread, view->tones->spread + i);
-    add_bytes(lanes->step_x, view->step_x + i);
-    add_bytes(lanes->step_y, view->step_y + i);
-}
-
-/// Adds what was summed of a row of zones down the columns from `first` on, and forgets it.
-static void take_zones(const grid_t *grid, int32_t first, lanes_t *lanes, bslam_zone_sums_t zones[ZONES])
-{
-    int32_t column = 0;
-    for (int32_t k = 0; k < LANES && first + k < grid->left[ZONES]; k++) {
-        while (first + k >= grid->left[column + 1]) {
-            column++;
-        }
-        zones[column].light += lanes->light[k];
-        zones[column].reddish += lanes->reddish[k];
-        zones[column].bluish += lanes->bluish[k];
-    }
-    memset(lanes->light, 0, sizeof lanes->light);
-    memset(lanes->reddish, 0, sizeof lanes->reddish);
-    memset(lanes->bluish, 0, sizeof lanes->bluish);
-}
-
-static void take_texture(const lanes_t *lanes, int32_t count, bslam_sums_t *inside)
-{
-    for (int32_t k = 0; k < count; k++) {
-        inside->spread += lanes->spread[k];
-        inside->value += lanes->value[k];
-        inside->wall += lanes->wall[k];
-        inside->floor += lanes->floor[k];
-        inside->light_sq += (int32_t)lanes->light_sq[k];
-        inside->reddish_sq += (int32_t)lanes->reddish_sq[k];
-        inside->bluish_sq += (int32_t)lanes->bluish_sq[k];
-        inside->step_x += lanes->step_x[k];
-        inside->step_y += lanes->step_y[k];
-        inside->likely += lanes->likely[k];
-    }
-}
-
-/// Sums of the zones, and of the whole box, which is within the frame.
-void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
-                   bslam_zone_sums_t zones[ZONES * ZONES], bslam_sums_t *inside)
-{
-    const int32_t columns = view->frame->columns;
-    const grid_t grid = grid_of(box);
-    int32_t strides[ZONES];
-    fill_strides(&grid, box, strides);
-    memset(inside, 0, sizeof *inside);
-    memset(zones, 0, ZONES * ZONES * sizeof zones[0]);
-    for (int32_t first = box->left; first < box->right; first += LANES) {
-        lanes_t lanes = {0};
-        for (int32_t r = 0; r < ZONES; r++) {
-            for (int32_t row = grid.top[r]; strides[r] > 0 && row < grid.top[r + 1]; row += strides[r]) {
-                add_row(&lanes, view, row * columns + first);
-            }
-            take_zones(&grid, first, &lanes, zones + ZONES * r);
-        }
-        take_texture(&lanes, least(LANES, box->right - first), inside);
-    }
-    for (int32_t z = 0; z < ZONES * ZONES; z++) {
-        const int32_t stride = strides[z / ZONES];
-        const area_t area = zone_area(&grid, z / ZONES, z % ZONES);
-        if (stride == 0) {
-            const bslam_sums_t sums = sum_inside(view, area);
-            zones[z] = zone_of(&sums);
-            merge(inside, &sums);
-            continue;
-        }
-        zones[z].cells = (area.bottom - area.top + stride - 1) / stride * (area.right - area.left);
-        inside->cells += zones[z].cells;
-        inside->light += zones[z].light;
-        inside->reddish += zones[z].reddish;
-        inside->bluish += zones[z].bluish;
-    }
-}
-
-#endif

@@ -104,6 +104,11 @@ static void test_halves_are_each_as_a_number(void **state)
         const numbers_t shifted = numbers_of(bslam_halves_shifted_to_zero(lanes_a, 3));
         const numbers_t times = numbers_of(bslam_halves_times(lanes_a, 171));
         const numbers_t down = numbers_of(bslam_halves_down(lanes_a, 11));
+        int halves_sum = 0;
+        for (int k = 0; k < HALVES; k++) {
+            halves_sum += a.halves[k];
+        }
+        assert_int_equal(bslam_halves_sum(lanes_a), halves_sum);
         const numbers_t dots = numbers_of(bslam_halves_dots(lanes_a, lanes_b));
         for (int k = 0; k < WORDS; k++) {
             const int64_t dot = (int64_t)a.halves[2 * k] * b.halves[2 * k] +
@@ -145,8 +150,17 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
         const numbers_t signed_lower = numbers_of(bslam_bytes_signed_lower(lanes_a));
         const numbers_t signed_upper = numbers_of(bslam_bytes_signed_upper(lanes_a));
         const numbers_t odds = numbers_of(bslam_bytes_signed_odds(lanes_a));
+        const numbers_t positive = numbers_of(bslam_bytes_are_positive(lanes_a));
+        const numbers_t pairs = numbers_of(bslam_lanes_of_pairs(a.bytes, round % 3));
+        const int count = round % 20 - 2;
+        const numbers_t first = numbers_of(bslam_lanes_first(count));
+        int bytes_sum = round;
         for (int k = 0; k < BYTES; k++) {
             const int x = a.bytes[k], y = b.bytes[k];
+            bytes_sum += x;
+            assert_int_equal(positive.bytes[k], (int8_t)x > 0 ? 255 : 0);
+            assert_int_equal(pairs.bytes[k], a.bytes[k / 2 * (round % 3) + k % 2]);
+            assert_int_equal(first.bytes[k], k < count ? 255 : 0);
             assert_int_equal(less.bytes[k], limited(x - y, 0, 255));
             assert_int_equal(wrapped.bytes[k], (uint8_t)(x - y));
             assert_int_equal(plus.bytes[k], limited(x + y, 0, 255));
@@ -158,6 +172,8 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
             assert_int_equal((k < 8 ? signed_lower : signed_upper).halves[k % 8], (int8_t)x);
             assert_int_equal((k % 2 == 0 ? evens : odds).halves[k / 2], (int8_t)x);
         }
+        const bslam_lanes_t before = bslam_lanes_of_words((uint32_t)round, 0, 0, 0);
+        assert_int_equal(bslam_lanes_sum(bslam_lanes_sum_add(lanes_a, before)), bytes_sum);
     }
 }
 
