@@ -90,6 +90,19 @@ static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const u
     }
 }
 
+/// Sums of 2x2 pixels that are the same, in whole steps, those of even places first.
+static void sum_fours(uint32_t *restrict words, const uint16_t *restrict pixels, int32_t count)
+{
+    const bslam_lanes_t mask = bslam_lanes_of(BSLAM_SPREAD_MASK);
+    for (int32_t i = 0; i < count; i += PAIRS_AT_ONCE) {
+        const bslam_lanes_t some = bslam_lanes_at(pixels + i);
+        const bslam_lanes_t sums = bslam_words_up(bslam_halves_lower_in_turn(some, some) & mask, 2);
+        const bslam_lanes_t next_sums = bslam_words_up(bslam_halves_upper_in_turn(some, some) & mask, 2);
+        bslam_lanes_put(words + i, bslam_words_even(sums, next_sums));
+        bslam_lanes_put(words + i + 4, bslam_words_odd(sums, next_sums));
+    }
+}
+
 /// Brightness of 2x2 sums, 0 to 376: green counts twice as much as red, because it has a bit more.
 static inline bslam_lanes_t lumas(bslam_lanes_t quads)
 {
@@ -193,6 +206,15 @@ static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const u
     }
 }
 
+/// Sums of 2x2 pixels that are the same.
+static void sum_fours(uint32_t *restrict words, const uint16_t *restrict pixels, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++) {
+        const uint32_t pixel = pixels[i];
+        words[i] = ((pixel | pixel << 16) & BSLAM_SPREAD_MASK) << 2;
+    }
+}
+
 /// Brightness of a 2x2 sum, 0 to 376: green counts twice as much as red, because it has a bit more.
 static inline uint32_t luma(uint32_t quad)
 {
@@ -278,15 +300,25 @@ bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_
     return BSLAM_OK;
 }
 
-void bslam_thumbnail_stretch(bslam_row_sums_t *sums, bslam_pixel_format_t format, const void *pixels,
-                             int32_t count)
+bslam_status_t bslam_thumbnail_row_doubled(bslam_thumbnail_t *thumbnail, bslam_row_sums_t *sums,
+                                           const void *pixels)
 {
-    if (format == BSLAM_PIXELS_RGB888) {
-        pack_888(sums->packed, pixels, count);
+    bslam_thumbnail_t *t = thumbnail;
+    const int32_t row = t->rows_seen, count = t->width_px / 2;
+    if (row >= t->height_px) {
+        return BSLAM_E_COUNT;
+    }
+    // What is four times the same pixel has that as its mean.
+    uint16_t *half = t->half + row / 2 * count;
+    if (t->format == BSLAM_PIXELS_RGB888) {
+        pack_888(half, pixels, count);
     } else {
-        memcpy(sums->packed, pixels, (size_t)count * sizeof sums->packed[0]);
+        memcpy(half, pixels, (size_t)count * sizeof half[0]);
     }
-    for (int32_t i = count - 1; i >= 0; i--) {  // from behind: none is written over before it is read
-        sums->packed[2 * i] = sums->packed[2 * i + 1] = sums->packed[i];
+    sum_fours(row % BSLAM_CELL_PX == 0 ? sums->upper : sums->lower, half, count);
+    if (row % BSLAM_CELL_PX != 0) {
+        fill_cells(&t->cells, row / BSLAM_CELL_PX * (count / 2), sums, count);
     }
+    t->rows_seen += 2;
+    return BSLAM_OK;
 }

@@ -24,7 +24,7 @@ typedef enum bslam_pixel_format {
 typedef struct bslam_row_sums {
     uint32_t upper[BSLAM_ROW_SUMS];          ///< of 2x2 pixels of its upper half,
     uint32_t lower[BSLAM_ROW_SUMS];          ///< of its lower one; two pixels, after the upper row of two
-    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];  ///< a row that came with 8 bits a channel, or is stretched
+    uint16_t packed[BSLAM_IMAGE_WIDTH_MAX];  ///< a row that came with 8 bits a channel, or off words
 } bslam_row_sums_t;
 
 typedef struct bslam_thumbnail {
@@ -50,8 +50,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_begin(bslam_thumbnail_t *thumbna
 BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row(bslam_thumbnail_t *thumbnail, bslam_row_sums_t *sums,
                                                     const void *pixels);
 
-/// A row of `count` pixels as one of RGB565, each pixel twice: in sums->packed, which has room for 2 count.
-void bslam_thumbnail_stretch(bslam_row_sums_t *sums, bslam_pixel_format_t format, const void *pixels,
-                             int32_t count);
+/// The next two rows, from a row of half as many pixels that each stand for 2x2; all rows of the frame are
+/// given so. BSLAM_E_COUNT, and nothing changed, if the frame has all its rows already.
+BSLAM_MUST_CHECK bslam_status_t bslam_thumbnail_row_doubled(bslam_thumbnail_t *thumbnail,
+                                                            bslam_row_sums_t *sums, const void *pixels);
 
 #endif

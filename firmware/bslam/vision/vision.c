@@ -10,6 +10,8 @@
 #include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
 
+_Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
+
 /// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
 /// than these shares of its cells are, in percent.
 #define BLACK_BELOW 16
@@ -135,8 +137,6 @@ bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_
     if (status != BSLAM_OK) {
         return status;
     }
-    vision->format = format;
-    vision->thumbnail.format = lens->zoom > 1 ? BSLAM_PIXELS_RGB565 : format;  // as stretched rows are
     vision->frames[BSLAM_VISION_UNFINISHED] += gives_up ? 1 : 0;
     vision->camera = camera;
     vision->candidate_count = 0;
@@ -147,18 +147,10 @@ bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_
 
 bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
 {
-    const int32_t zoom = vision->cameras[vision->camera].zoom;
-    if (zoom == 1 || vision->thumbnail.rows_seen >= vision->thumbnail.height_px) {
-        return bslam_thumbnail_row(&vision->thumbnail, &vision->row_sums, pixels);
-    }
-    bslam_row_sums_t *sums = &vision->row_sums;
-    bslam_thumbnail_stretch(sums, vision->format, pixels, vision->thumbnail.width_px / zoom);
-    bslam_status_t status = BSLAM_OK;
-    // There is room for all of them, or for none: the height is a multiple of the zoom.
-    for (int32_t i = 0; i < zoom; i++) {
-        status = bslam_thumbnail_row(&vision->thumbnail, sums, sums->packed);
-    }
-    return status;
+    bslam_thumbnail_t *thumbnail = &vision->thumbnail;
+    return vision->cameras[vision->camera].zoom > 1
+               ? bslam_thumbnail_row_doubled(thumbnail, &vision->row_sums, pixels)
+               : bslam_thumbnail_row(thumbnail, &vision->row_sums, pixels);
 }
 
 bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)

@@ -37,7 +37,6 @@ typedef struct bslam_vision {
     uint32_t frames[BSLAM_VISION_REASON_COUNT];  ///< finished or given up frames by what came of them
     uint32_t candidates_dropped;                 ///< BSLAM_CANDIDATES_MAX did not suffice
     bslam_camera_t cameras[BSLAM_CAMERAS_MAX];   ///< as they are looked at, zoomed
-    bslam_pixel_format_t format;                 ///< of the rows as they come
     bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
     bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
     union {
