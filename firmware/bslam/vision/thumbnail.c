@@ -262,8 +262,10 @@ static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uin
 #endif
 
 /// A row of cells, from cell `first` on, from the sums of their quarters. Whole steps: what is beyond is
-/// written over later, or lies in the tables' room.
-static void fill_cells(bslam_cells_t *cells, int32_t first, const bslam_row_sums_t *sums, int32_t pairs)
+/// written over later, or lies in the tables' room. Not to be inlined twice: then what fills some would not
+/// be.
+__attribute__((noinline)) static void fill_cells(bslam_cells_t *cells, int32_t first,
+                                                 const bslam_row_sums_t *sums, int32_t pairs)
 {
     for (int32_t i = 0; i < pairs / 2; i += CELLS_AT_ONCE) {
         fill_some(cells, first + i, sums->upper + 2 * i, sums->lower + 2 * i);
