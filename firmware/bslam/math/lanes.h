@@ -18,6 +18,12 @@ static inline bslam_lanes_t bslam_lanes_at(const void *bytes)
     return _mm_loadu_si128(bytes);
 }
 
+/// Eight bytes, the upper ones 0.
+static inline bslam_lanes_t bslam_lanes_half_at(const void *bytes)
+{
+    return _mm_loadl_epi64(bytes);
+}
+
 static inline void bslam_lanes_put(void *bytes, bslam_lanes_t lanes)
 {
     _mm_storeu_si128(bytes, lanes);

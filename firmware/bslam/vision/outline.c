@@ -211,7 +211,7 @@ static bool begin(search_t *search, const bslam_box_t *rough)
     const bslam_real_t u = (rough->left_px + rough->right_px) / 2;
     const bslam_real_t v = (rough->top_px + rough->bottom_px) / 2;
     bslam_direction_t centre;
-    if (bslam_camera_unproject(facing->camera, u, v, &centre) != BSLAM_OK) {
+    if (bslam_camera_unproject_as(facing->camera, &facing->mounting, u, v, &centre) != BSLAM_OK) {
         return false;
     }
     o->facing_rad = bslam_direction_bearing_rad(&centre);
@@ -256,7 +256,9 @@ bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera
                                   const bslam_box_t *rough, bslam_real_t depth, bslam_outline_t *outline)
 {
     bslam_outline_t found = {0};
-    search_t search = {.frame = frame, .facing = {.camera = camera}, .outline = &found};
+    search_t search = {.frame = frame,
+                       .facing = {.camera = camera, .mounting = bslam_camera_mounting(camera)},
+                       .outline = &found};
     if (!box_is_allowed(frame, rough) || !bslam_in_range(depth, 0, DEPTH_MAX) || !begin(&search, rough) ||
         !find_upright(&search, BSLAM_SIDE_LEFT, &found.left, &found.left_var) ||
         !find_upright(&search, BSLAM_SIDE_RIGHT, &found.right, &found.right_var) ||

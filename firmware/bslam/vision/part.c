@@ -65,7 +65,7 @@ bool bslam_outline_is_part(const bslam_frame_t *frame, const bslam_camera_t *cam
     if (!has_bottom || (!has_top && outline->bottom <= 0)) {
         return false;
     }
-    bslam_facing_t facing = {.camera = camera};
+    bslam_facing_t facing = {.camera = camera, .mounting = bslam_camera_mounting(camera)};
     bslam_sin_cos(outline->facing_rad, &facing.sine, &facing.cosine);
     const strip_t within = {outline->left, outline->right};
     const float top = has_top ? level_contrast(frame, &facing, outline, BSLAM_SIDE_TOP, within) : 0;

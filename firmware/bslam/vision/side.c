@@ -33,7 +33,7 @@ bool bslam_facing_from_frame(const bslam_facing_t *facing, bslam_real_t u_px, bs
                              bslam_plane_point_t *point)
 {
     bslam_direction_t direction;
-    if (bslam_camera_unproject(facing->camera, u_px, v_px, &direction) != BSLAM_OK) {
+    if (bslam_camera_unproject_as(facing->camera, &facing->mounting, u_px, v_px, &direction) != BSLAM_OK) {
         return false;
     }
     const bslam_real_t ahead = facing->cosine * direction.x + facing->sine * direction.y;
@@ -50,7 +50,7 @@ bool bslam_facing_to_frame(const bslam_facing_t *facing, bslam_plane_point_t poi
 {
     const bslam_direction_t direction = {facing->cosine - facing->sine * point.across,
                                          facing->sine + facing->cosine * point.across, point.up};
-    return bslam_camera_project(facing->camera, &direction, u_px, v_px) == BSLAM_OK &&
+    return bslam_camera_project_as(facing->camera, &facing->mounting, &direction, u_px, v_px) == BSLAM_OK &&
            bslam_abs(*u_px) <= COORDINATE_MAX_PX && bslam_abs(*v_px) <= COORDINATE_MAX_PX;
 }
 

@@ -27,7 +27,8 @@ typedef enum bslam_side_name {
 /// A plane that stands upright at unit distance before the camera and faces a bearing.
 typedef struct bslam_facing {
     const bslam_camera_t *camera;
-    bslam_real_t sine;  ///< of the bearing
+    bslam_mounting_t mounting;  ///< the camera's
+    bslam_real_t sine;          ///< of the bearing
     bslam_real_t cosine;
 } bslam_facing_t;
 

@@ -154,6 +154,7 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
         const numbers_t pairs = numbers_of(bslam_lanes_of_pairs(a.bytes, round % 3));
         const int count = round % 20 - 2;
         const numbers_t first = numbers_of(bslam_lanes_first(count));
+        const numbers_t half = numbers_of(bslam_lanes_half_at(a.bytes));
         int bytes_sum = round;
         for (int k = 0; k < BYTES; k++) {
             const int x = a.bytes[k], y = b.bytes[k];
@@ -161,6 +162,7 @@ static void test_lanes_bytes_are_each_as_a_number(void **state)
             assert_int_equal(positive.bytes[k], (int8_t)x > 0 ? 255 : 0);
             assert_int_equal(pairs.bytes[k], a.bytes[k / 2 * (round % 3) + k % 2]);
             assert_int_equal(first.bytes[k], k < count ? 255 : 0);
+            assert_int_equal(half.bytes[k], k < 8 ? x : 0);
             assert_int_equal(less.bytes[k], limited(x - y, 0, 255));
             assert_int_equal(wrapped.bytes[k], (uint8_t)(x - y));
             assert_int_equal(plus.bytes[k], limited(x + y, 0, 255));

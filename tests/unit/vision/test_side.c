@@ -16,7 +16,8 @@ static bslam_camera_t camera;
 static bslam_facing_t facing(void)
 {
     camera = unit_pinhole();
-    return (bslam_facing_t){.camera = &camera, .sine = 0, .cosine = 1};
+    return (bslam_facing_t){
+        .camera = &camera, .mounting = bslam_camera_mounting(&camera), .sine = 0, .cosine = 1};
 }
 
 /// A tangent as so many pixels of the frame.
