@@ -278,6 +278,12 @@ static inline bslam_lanes_t bslam_bytes_are_positive(bslam_lanes_t a)
     return _mm_cmpgt_epi8(a, _mm_setzero_si128());
 }
 
+/// A bit for each byte that is 0, the first one's lowest.
+static inline uint32_t bslam_bytes_are_zero(bslam_lanes_t a)
+{
+    return (uint32_t)_mm_movemask_epi8(_mm_cmpeq_epi8(a, _mm_setzero_si128()));
+}
+
 /// Adds all sixteen bytes to sums, of which bslam_lanes_sum() makes one.
 static inline bslam_lanes_t bslam_lanes_sum_add(bslam_lanes_t bytes, bslam_lanes_t sums)
 {
@@ -344,6 +350,43 @@ static inline bslam_lanes_t bslam_bytes_signed_evens(bslam_lanes_t a)
 static inline bslam_lanes_t bslam_bytes_signed_odds(bslam_lanes_t a)
 {
     return _mm_srai_epi16(a, 8);
+}
+
+// --- Floats: the operators + - * / are of each, rounded as of one alone
+
+typedef __m128 bslam_floats_t;
+
+static inline bslam_floats_t bslam_floats_at(const float *numbers)
+{
+    return _mm_loadu_ps(numbers);
+}
+
+static inline void bslam_floats_put(float *numbers, bslam_floats_t floats)
+{
+    _mm_storeu_ps(numbers, floats);
+}
+
+static inline bslam_floats_t bslam_floats_of(float number)
+{
+    return _mm_set1_ps(number);
+}
+
+/// The first lowest.
+static inline bslam_floats_t bslam_floats_of_four(float first, float second, float third, float fourth)
+{
+    return _mm_set_ps(fourth, third, second, first);
+}
+
+/// Each float within [low, high]; high where it is none.
+static inline bslam_floats_t bslam_floats_within(bslam_floats_t a, float low, float high)
+{
+    return _mm_max_ps(_mm_min_ps(a, _mm_set1_ps(high)), _mm_set1_ps(low));
+}
+
+/// Each float without what is behind the point; INT32_MIN where it is none, or beyond 32 bits.
+static inline bslam_lanes_t bslam_floats_to_words(bslam_floats_t a)
+{
+    return _mm_cvttps_epi32(a);
 }
 
 #endif

@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "bslam/math/bytes.h"
+#include "bslam/math/lanes.h"
 
 /// What is looked for: foot, middle and top are so high above the floor, and it is at least and at most so
 /// wide as it appears, slanted by up to 60 degrees.
@@ -55,18 +55,6 @@ typedef struct side {
     int32_t step;
 } side_t;
 
-/// The column of cells that a line through foot, middle and top crosses in a row of cells; -1 where it goes
-/// far outside, or nowhere, because two of them fall on one row.
-static int32_t column_at(const side_t *side, int32_t row)
-{
-    const float v_px = (float)(row * BSLAM_CELL_PX) + 1.5f;
-    const int32_t part = v_px > side->v_px[1] ? 0 : 1;
-    const float share = (v_px - side->v_px[part]) / (side->v_px[part + 1] - side->v_px[part]);
-    const float u_px = side->u_px[part] + share * (side->u_px[part + 1] - side->u_px[part]);
-    const bool is_near = u_px > (float)-BSLAM_FRAME_SIDE_MAX && u_px < (float)BSLAM_FRAME_SIDE_MAX;
-    return is_near ? (int32_t)(u_px / BSLAM_CELL_PX) : -1;
-}
-
 /// The sideways steps of four columns side by side, from their upper end to a row: of the even ones and of
 /// the odd ones, each two in the halves of a word; STEP_FREE more a cell, which is what STEP_MAX leaves free.
 typedef uint32_t step_sums_t[2];
@@ -103,20 +91,90 @@ static int32_t steps_between(const column_sums_t *sums, int32_t column, int32_t 
     return (int32_t)(((to >> shift) - (from >> shift)) & 0xFFFFU) - STEP_FREE * (bottom - top);
 }
 
+/// A straight part of a line, from foot to middle or from there to top: the column that it crosses changes by
+/// the same from row to row.
+typedef struct part {
+    float v_px, height_px;  ///< where it begins, and how far down and right it ends
+    float u_px, width_px;
+} part_t;
+
+static part_t part_of(const side_t *side, int32_t part)
+{
+    const float *v_px = side->v_px + part, *u_px = side->u_px + part;
+    return (part_t){v_px[0], v_px[1] - v_px[0], u_px[0], u_px[1] - u_px[0]};
+}
+
+static float middle_px(int32_t row)
+{
+    return (float)(row * BSLAM_CELL_PX) + 1.5f;
+}
+
+static int32_t limited_step(const bslam_view_t *view, int32_t row, int32_t column)
+{
+    const int32_t columns = view->frame->columns;
+    const int32_t step = column >= 0 && column < columns ? view->step_x[row * columns + column] : 0;
+    return step < STEP_MAX ? step : STEP_MAX;
+}
+
+#if BSLAM_HAS_LANES
+
+/// Sum of the sideways steps along a part, of rows [row, end).
+static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int32_t end)
+{
+    enum { ROWS_AT_ONCE = 4 };
+    const bslam_floats_t from = bslam_floats_of(part.v_px), height = bslam_floats_of(part.height_px);
+    const bslam_floats_t left = bslam_floats_of(part.u_px), width = bslam_floats_of(part.width_px);
+    int32_t sum = 0;
+    for (; row < end; row += ROWS_AT_ONCE) {
+        const bslam_floats_t v_px =
+            bslam_floats_of_four(middle_px(row), middle_px(row + 1), middle_px(row + 2), middle_px(row + 3));
+        const bslam_floats_t u_px = left + (v_px - from) / height * width;
+        int32_t columns[ROWS_AT_ONCE];
+        // What is no number, or too large for a word, becomes the least one.
+        bslam_lanes_put(columns, bslam_floats_to_words(u_px / bslam_floats_of(BSLAM_CELL_PX)));
+        for (int32_t k = 0; k < ROWS_AT_ONCE && row + k < end; k++) {
+            sum += limited_step(view, row + k, columns[k]);
+        }
+    }
+    return sum;
+}
+
+#else
+
+/// The column of cells that a part crosses in a row of them; -1 where it goes far outside, or nowhere,
+/// because both its ends fall on one row.
+static int32_t column_at(const part_t *part, int32_t row)
+{
+    const float u_px = part->u_px + (middle_px(row) - part->v_px) / part->height_px * part->width_px;
+    const bool is_near = u_px > (float)-BSLAM_FRAME_SIDE_MAX && u_px < (float)BSLAM_FRAME_SIDE_MAX;
+    return is_near ? (int32_t)(u_px / BSLAM_CELL_PX) : -1;
+}
+
+/// Sum of the sideways steps along a part, of rows [row, end).
+static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int32_t end)
+{
+    int32_t sum = 0;
+    for (; row < end; row++) {
+        sum += limited_step(view, row, column_at(&part, row));
+    }
+    return sum;
+}
+
+#endif
+
 /// Mean of the sideways steps along a line, in quarters.
 static uint8_t mean_step(const bslam_view_t *view, const column_sums_t *sums, const side_t *side)
 {
-    const int32_t columns = view->frame->columns;
     const int32_t top = side->top, bottom = side->bottom;
     if (side->u_px[0] == side->u_px[2]) {
         return (uint8_t)(4 * steps_between(sums, side->column, top, bottom) / (bottom - top));
     }
-    int32_t sum = 0;
-    for (int32_t row = top; row < bottom; row++) {
-        const int32_t column = column_at(side, row);
-        const int32_t step = column >= 0 && column < columns ? view->step_x[row * columns + column] : 0;
-        sum += step < STEP_MAX ? step : STEP_MAX;
+    int32_t middle = top;
+    while (middle < bottom && !(middle_px(middle) > side->v_px[1])) {
+        middle++;
     }
+    const int32_t sum =
+        sum_part(view, part_of(side, 1), top, middle) + sum_part(view, part_of(side, 0), middle, bottom);
     return (uint8_t)(4 * sum / (bottom - top));
 }
 

@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "bslam/math/bytes.h"
+#include "bslam/math/lanes.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/glance.h"
 #include "bslam/vision/uprights.h"
@@ -190,18 +190,42 @@ static void judge_cell(bslam_cell_t cell, light_t *light)
     light->saturated += is_saturated ? 1 : 0;
 }
 
-/// Cells are looked at one by one only where one of the four in a word has no bit above BLACK_BELOW, or all
-/// that SATURATED_FROM has: few are.
+#if BSLAM_HAS_LANES
+
+enum { CELLS_AT_ONCE = BSLAM_CELL_STEP };
+
+/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has.
+static inline bool may_count(const bslam_cells_t *cells, int32_t i)
+{
+    const bslam_lanes_t red = bslam_lanes_at(cells->red + i), green = bslam_lanes_at(cells->green + i);
+    const bslam_lanes_t blue = bslam_lanes_at(cells->blue + i), high = bslam_lanes_of(HIGH_BITS);
+    return (bslam_bytes_are_zero((red | green | blue) & high) |
+            bslam_bytes_are_zero(~(red & green & blue) & high)) != 0;
+}
+
+#else
+
+enum { CELLS_AT_ONCE = BSLAM_WORD_BYTES };
+
+/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has.
+static inline bool may_count(const bslam_cells_t *cells, int32_t i)
+{
+    const uint32_t red = bslam_word_at(cells->red + i), green = bslam_word_at(cells->green + i);
+    const uint32_t blue = bslam_word_at(cells->blue + i);
+    const uint32_t bright = (red | green | blue) & HIGH_BITS, dim = ~(red & green & blue) & HIGH_BITS;
+    return bslam_has_zero_byte(bright) || bslam_has_zero_byte(dim);
+}
+
+#endif
+
+/// Cells are looked at one by one only where one of some may count: few do.
 static light_t light_of(const bslam_cells_t *cells, int32_t count)
 {
     light_t light = {.varied = is_varied(cells->green, count)};
     int32_t i = 0;
-    for (; i + BSLAM_WORD_BYTES <= count; i += BSLAM_WORD_BYTES) {
-        const uint32_t red = bslam_word_at(cells->red + i), green = bslam_word_at(cells->green + i);
-        const uint32_t blue = bslam_word_at(cells->blue + i);
-        const uint32_t bright = (red | green | blue) & HIGH_BITS, dim = ~(red & green & blue) & HIGH_BITS;
-        if (bslam_has_zero_byte(bright) || bslam_has_zero_byte(dim)) {
-            for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++) {
+    for (; i + CELLS_AT_ONCE <= count; i += CELLS_AT_ONCE) {
+        if (may_count(cells, i)) {
+            for (int32_t k = 0; k < CELLS_AT_ONCE; k++) {
                 judge_cell(bslam_cell_at(cells, i + k), &light);
             }
         }
