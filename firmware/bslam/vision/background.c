@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 #include "bslam/vision/spread.h"
 
@@ -58,11 +59,6 @@ const uint8_t bslam_chroma_bins[256] = {
 #define FADE_MASK 0x1F1F1F1FU  // what the shift leaves of each byte of a word
 /// The running colours take a quarter of a new frame's.
 #define COLOUR_RATE 0.25f
-
-static int32_t clamp(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
 
 void bslam_background_init(bslam_background_t *background)
 {
@@ -196,12 +192,12 @@ static bslam_zone_rows_t zone_rows(const bslam_camera_t *camera, int32_t rows, b
 {
     bslam_zone_rows_t span = {0, rows};
     if (zone == BSLAM_ZONE_FLOOR) {
-        span.first = clamp(row_looking(camera, -FLOOR_BELOW_RAD), 0, rows - 1);
+        span.first = bslam_clamp(row_looking(camera, -FLOOR_BELOW_RAD), 0, rows - 1);
     } else if (zone == BSLAM_ZONE_CEILING) {
-        span.end = clamp(row_looking(camera, CEILING_ABOVE_RAD), 1, rows);
+        span.end = bslam_clamp(row_looking(camera, CEILING_ABOVE_RAD), 1, rows);
     } else {
-        span.first = clamp(row_looking(camera, WALL_ABOVE_RAD), 0, rows - 1);
-        span.end = clamp(row_looking(camera, -WALL_BELOW_RAD), span.first + 1, rows);
+        span.first = bslam_clamp(row_looking(camera, WALL_ABOVE_RAD), 0, rows - 1);
+        span.end = bslam_clamp(row_looking(camera, -WALL_BELOW_RAD), span.first + 1, rows);
     }
     return span;
 }
@@ -298,7 +294,7 @@ static int32_t floor_evidence(const bslam_background_t *background, bslam_tone_t
     const int32_t frequent = tone_log[background->counts[BSLAM_ZONE_FLOOR][bin]] -
                              tone_log[background->counts[BSLAM_ZONE_WALL][bin]];
     const uint32_t word = word_of_tone(tone);
-    return frequent + clamp(word_distance(word, wall) - word_distance(word, floor), -64, 64);
+    return frequent + bslam_clamp(word_distance(word, wall) - word_distance(word, floor), -64, 64);
 }
 
 /// The row of cells below which all of a column is floor.
@@ -447,7 +443,7 @@ void bslam_background_floor_line(const bslam_background_t *background, const bsl
                                  const bslam_camera_t *camera, const bslam_tones_t *tones,
                                  bslam_floor_line_t *line)
 {
-    const int32_t stop = clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
+    const int32_t stop = bslam_clamp(bslam_horizon_row(camera) + 1, 1, frame->rows);
     const bslam_mounting_t mounting = bslam_camera_mounting(camera);
     for (int32_t column = 0; column < frame->columns; column++) {
         const int32_t row = floor_end(background, frame, tones, column, stop);

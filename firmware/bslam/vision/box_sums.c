@@ -2,21 +2,12 @@
 
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 
 #define STRIP BSLAM_STRIP
 #define ZONES BSLAM_BOX_ZONES
 #define CELLS_ENOUGH 16
-
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
 
 /// A rectangle of cells: [left, right) by [top, bottom).
 typedef struct area {
@@ -38,9 +29,9 @@ static int32_t stride_of(int32_t cells)
 static rows_t rows_of(const bslam_view_t *view, area_t area)
 {
     const int32_t cells = (area.right - area.left) * (area.bottom - area.top);
-    const int32_t left = most(area.left, 0), right = least(area.right, view->frame->columns);
-    return (rows_t){.first = most(area.top, 0),
-                    .end = least(area.bottom, view->frame->rows),
+    const int32_t left = bslam_most(area.left, 0), right = bslam_least(area.right, view->frame->columns);
+    return (rows_t){.first = bslam_most(area.top, 0),
+                    .end = bslam_least(area.bottom, view->frame->rows),
                     .stride = stride_of(cells),
                     .left = left,
                     .right = right > left ? right : left};
@@ -107,7 +98,7 @@ typedef struct span {
 
 static span_t span_of(const bslam_view_t *view, const rows_t *rows)
 {
-    const int32_t columns = view->frame->columns, height = most(rows->end - rows->first, 0);
+    const int32_t columns = view->frame->columns, height = bslam_most(rows->end - rows->first, 0);
     return (span_t){
         .first = rows->first * columns + rows->left,
         .rows = rows->stride == 1 ? height : (height + 1) / 2,
@@ -365,7 +356,7 @@ typedef struct words {
 static inline words_t words_of(const bslam_view_t *view, const rows_t *rows)
 {
     const int32_t columns = view->frame->columns, width = rows->right - rows->left;
-    const int32_t rest = width & (BSLAM_WORD_BYTES - 1), height = most(rows->end - rows->first, 0);
+    const int32_t rest = width & (BSLAM_WORD_BYTES - 1), height = bslam_most(rows->end - rows->first, 0);
     return (words_t){
         .first = rows->first * columns + rows->left,
         .rows = rows->stride == 1 ? height : (height + 1) >> 1,

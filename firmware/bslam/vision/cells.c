@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 
 /// Limits of the features: beyond them a difference says no more.
@@ -16,26 +17,6 @@
 #define FOUR 0x01010101U
 /// The sum of all weights times features stays below 2^31 with it.
 #define BIAS_MAX 1.0e9f
-
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
-
-static int32_t clamp(int32_t value, int32_t low, int32_t high)
-{
-    return most(low, least(value, high));
-}
-
-static int32_t magnitude(int32_t value)
-{
-    return value < 0 ? -value : value;
-}
 
 /// A weight of a model as a whole number: a model may have any finite one.
 static int32_t whole(float value, float limit)
@@ -121,7 +102,7 @@ static uint8_t colour_step(const bslam_cells_t *cells, int32_t a, int32_t b)
     const int32_t step = difference(cells->red[a], cells->red[b]) +
                          2 * difference(cells->green[a], cells->green[b]) +
                          difference(cells->blue[a], cells->blue[b]);
-    return (uint8_t)least(step, 255);
+    return (uint8_t)bslam_least(step, 255);
 }
 
 void bslam_cells_step(const bslam_view_t *view, uint8_t *step_x, uint8_t *step_y)
@@ -158,28 +139,29 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
     const int32_t above_horizon = bslam_horizon_row(view->camera) - row;
     int16_t *x = features;
 
-    *x++ = (int16_t)clamp(tone.light - wall.light, -96, 96);
-    *x++ = (int16_t)clamp(magnitude(tone.light - wall.light), 0, 96);
-    *x++ = (int16_t)clamp(magnitude(tone.reddish - wall.reddish), 0, 64);
-    *x++ = (int16_t)clamp(magnitude(tone.bluish - wall.bluish), 0, 64);
-    *x++ = (int16_t)clamp(floor_distance, 0, 128);
-    *x++ = (int16_t)clamp(ceiling_distance, 0, 128);
-    *x++ = (int16_t)clamp(least(wall_distance, least(floor_distance, ceiling_distance)), 0, 128);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_WALL][bin], 32);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_WALL][bin], 6);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_FLOOR][bin], 32);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_FLOOR][bin], 6);
-    *x++ = (int16_t)least(background->counts[BSLAM_ZONE_CEILING][bin], 32);
-    *x++ = (int16_t)clamp(tone.spread, 0, 64);
-    *x++ = (int16_t)least(view->step_x[i], 128);
-    *x++ = (int16_t)least(view->step_y[i], 128);
-    *x++ = (int16_t)least(magnitude(tone.reddish) + magnitude(tone.bluish), 128);
-    *x++ = (int16_t)clamp(above_floor, -8, 40);
-    *x++ = (int16_t)clamp(above_floor, -3, 3);
-    *x++ = (int16_t)clamp(above_horizon, -30, 30);
-    *x++ = (int16_t)most(clamp(above_horizon, -30, 30), 0);
-    *x++ = (int16_t)(above_floor >= 0 ? least(wall_distance, 128) : 0);
-    *x++ = (int16_t)(above_floor >= 0 ? clamp(tone.light - wall.light, -96, 0) : 0);
+    *x++ = (int16_t)bslam_clamp(tone.light - wall.light, -96, 96);
+    *x++ = (int16_t)bslam_clamp(bslam_magnitude(tone.light - wall.light), 0, 96);
+    *x++ = (int16_t)bslam_clamp(bslam_magnitude(tone.reddish - wall.reddish), 0, 64);
+    *x++ = (int16_t)bslam_clamp(bslam_magnitude(tone.bluish - wall.bluish), 0, 64);
+    *x++ = (int16_t)bslam_clamp(floor_distance, 0, 128);
+    *x++ = (int16_t)bslam_clamp(ceiling_distance, 0, 128);
+    *x++ = (int16_t)bslam_clamp(bslam_least(wall_distance, bslam_least(floor_distance, ceiling_distance)), 0,
+                                128);
+    *x++ = (int16_t)bslam_least(background->counts[BSLAM_ZONE_WALL][bin], 32);
+    *x++ = (int16_t)bslam_least(background->counts[BSLAM_ZONE_WALL][bin], 6);
+    *x++ = (int16_t)bslam_least(background->counts[BSLAM_ZONE_FLOOR][bin], 32);
+    *x++ = (int16_t)bslam_least(background->counts[BSLAM_ZONE_FLOOR][bin], 6);
+    *x++ = (int16_t)bslam_least(background->counts[BSLAM_ZONE_CEILING][bin], 32);
+    *x++ = (int16_t)bslam_clamp(tone.spread, 0, 64);
+    *x++ = (int16_t)bslam_least(view->step_x[i], 128);
+    *x++ = (int16_t)bslam_least(view->step_y[i], 128);
+    *x++ = (int16_t)bslam_least(bslam_magnitude(tone.reddish) + bslam_magnitude(tone.bluish), 128);
+    *x++ = (int16_t)bslam_clamp(above_floor, -8, 40);
+    *x++ = (int16_t)bslam_clamp(above_floor, -3, 3);
+    *x++ = (int16_t)bslam_clamp(above_horizon, -30, 30);
+    *x++ = (int16_t)bslam_most(bslam_clamp(above_horizon, -30, 30), 0);
+    *x++ = (int16_t)(above_floor >= 0 ? bslam_least(wall_distance, 128) : 0);
+    *x++ = (int16_t)(above_floor >= 0 ? bslam_clamp(tone.light - wall.light, -96, 0) : 0);
 }
 
 /// Tables of the tones' bins; nearly all bins are empty.
@@ -194,10 +176,11 @@ static void fill_bins(const bslam_background_t *background, const int16_t *weigh
         tables->sums[bin] = 0;
         tables->frequent[bin] = 0;
         if ((wall | floor | ceiling) != 0) {
-            tables->sums[bin] = weights[7] * least(wall, OFTEN) + weights[8] * least(wall, SELDOM) +
-                                weights[9] * least(floor, OFTEN) + weights[10] * least(floor, SELDOM) +
-                                weights[11] * least(ceiling, OFTEN);
-            tables->frequent[bin] = (uint16_t)(least(wall, OFTEN) | least(floor, OFTEN) << 8);
+            tables->sums[bin] =
+                weights[7] * bslam_least(wall, OFTEN) + weights[8] * bslam_least(wall, SELDOM) +
+                weights[9] * bslam_least(floor, OFTEN) + weights[10] * bslam_least(floor, SELDOM) +
+                weights[11] * bslam_least(ceiling, OFTEN);
+            tables->frequent[bin] = (uint16_t)(bslam_least(wall, OFTEN) | bslam_least(floor, OFTEN) << 8);
         }
     }
 }
@@ -399,8 +382,8 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
     (void)channels;
     fill_bins(view->background, w, tables);
     for (by.row = 0; by.row < rows; by.row++) {
-        const int32_t up = clamp(horizon - by.row, -30, 30);
-        by.of_row = bslam_lanes_of((uint32_t)(machine->bias + w[18] * up + w[19] * most(up, 0)));
+        const int32_t up = bslam_clamp(horizon - by.row, -30, 30);
+        by.of_row = bslam_lanes_of((uint32_t)(machine->bias + w[18] * up + w[19] * bslam_most(up, 0)));
         for (int32_t column = 0; column < columns; column += STEP) {
             decide_some(view, &by, tables, by.row * columns + column, column, frequent, values);
         }
@@ -432,11 +415,11 @@ static void fill_lights(const bslam_background_t *background, const int16_t *w, 
                                    background->tone[BSLAM_ZONE_CEILING].light, 0);
     for (int32_t light = 0; light < BSLAM_LIGHTS; light++) {
         const uint32_t apart = bslam_bytes_apart((uint32_t)light * FOUR, tones) & ALL_BUT_GREY;
-        const int32_t brighter = clamp(light - wall, -LIGHT_MAX, LIGHT_MAX);
+        const int32_t brighter = bslam_clamp(light - wall, -LIGHT_MAX, LIGHT_MAX);
         terms[light] = (bslam_light_terms_t){
-            .value = w[0] * brighter + w[1] * magnitude(brighter),
+            .value = w[0] * brighter + w[1] * bslam_magnitude(brighter),
             .distances = bslam_bytes_least(apart, FOUR * DISTANCE_MAX) + FOUR * DISTANCE_ZERO,
-            .above_floor = w[21] * least(brighter, 0) - w[20] * DISTANCE_ZERO,
+            .above_floor = w[21] * bslam_least(brighter, 0) - w[20] * DISTANCE_ZERO,
         };
     }
 }
@@ -449,7 +432,7 @@ static void fill_chromas(uint32_t tones, int32_t weight, bslam_chroma_terms_t *t
         const uint32_t apart = bslam_bytes_apart((uint32_t)(chroma + 128) * FOUR, tones);
         const uint32_t twice = bslam_bytes_plus(apart, apart & ALL_BUT_GREY);
         terms[(uint8_t)chroma] = (bslam_chroma_terms_t){
-            .value = weight * least(bslam_byte_of(apart, TO_WALL), CHROMA_MAX),
+            .value = weight * bslam_least(bslam_byte_of(apart, TO_WALL), CHROMA_MAX),
             .distances = bslam_bytes_least(twice, FOUR * DISTANCE_MAX),
         };
     }
@@ -585,11 +568,11 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
     fill_bins(view->background, w, tables);
     fill_channels(view->background, w, channels);
     for (int32_t above = -ROWS_MAX; above <= ROWS_MAX; above++) {
-        places[ROWS_MAX + above] = w[16] * clamp(above, -8, 40) + w[17] * clamp(above, -3, 3);
+        places[ROWS_MAX + above] = w[16] * bslam_clamp(above, -8, 40) + w[17] * bslam_clamp(above, -3, 3);
     }
     for (int32_t row = 0; row < rows; row++) {
-        const int32_t up = clamp(horizon - row, -30, 30);
-        const int32_t of_row = bias + w[18] * up + w[19] * most(up, 0);
+        const int32_t up = bslam_clamp(horizon - row, -30, 30);
+        const int32_t of_row = bias + w[18] * up + w[19] * bslam_most(up, 0);
         const int32_t first = row * columns;
         const cell_row_t cells = {view->tones->spread + first, view->step_x + first, view->step_y + first,
                                   view->floor_line->row};

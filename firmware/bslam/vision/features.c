@@ -2,24 +2,10 @@
 
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/vision/box_sums.h"
 
 #define CONTRAST_FEATURES 6
-
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
-
-static float clampf(float value, float low, float high)
-{
-    return value < low ? low : value > high ? high : value;
-}
 
 static float mean(const bslam_sums_t *sums, int32_t sum)
 {
@@ -51,7 +37,7 @@ static ray_t ray_at(const bslam_view_t *view, bslam_real_t u_px, bslam_real_t v_
         return ray;
     }
     ray.exists = true;
-    ray.slope = clampf((float)(d.z / flat), -10.0f, 10.0f);
+    ray.slope = bslam_clampf((float)(d.z / flat), -10.0f, 10.0f);
     ray.x = (float)(d.x / flat);
     ray.y = (float)(d.y / flat);
     return ray;
@@ -62,7 +48,7 @@ float bslam_log(float x)
 {
     enum { FRACTION_BITS = 23, EXPONENT_OF_ONE = 127 };
     uint32_t bits;
-    x = clampf(x, 1e-4f, 1e4f);
+    x = bslam_clampf(x, 1e-4f, 1e4f);
     memcpy(&bits, &x, sizeof bits);
     const uint32_t exponent = bits >> FRACTION_BITS;  // of a positive number
     const float doublings = (float)((int32_t)exponent - EXPONENT_OF_ONE);
@@ -76,8 +62,8 @@ static float line_distance_m(const bslam_view_t *view, int32_t first, int32_t en
 {
     float inverse = 0;
     int32_t known = 0;
-    first = most(first, 0);
-    end = least(end, view->frame->columns);
+    first = bslam_most(first, 0);
+    end = bslam_least(end, view->frame->columns);
     for (int32_t column = first; column < end; column++) {
         const float distance_m = (float)view->floor_line->distance_m[column];
         if (distance_m > 0) {
@@ -131,14 +117,14 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     const float left_m = line_distance_m(view, p->left - BSLAM_STRIP, p->left + 1, &ignored);
     const float right_m = line_distance_m(view, p->right - 1, p->right + BSLAM_STRIP, &ignored);
     const bool known = wall_m > 0;
-    wall_m = known ? clampf(wall_m, 0.3f, 20.0f) : 1.0f;
+    wall_m = known ? bslam_clampf(wall_m, 0.3f, 20.0f) : 1.0f;
     const float width_px = (float)(p->box.right_px - p->box.left_px);
     const float height_px = (float)(p->box.bottom_px - p->box.top_px);
 
     *x++ = bslam_log(wall_m * chord_of(rays));
     *x++ = bslam_log(wall_m * (top - bottom));
-    *x++ = clampf(height_m + wall_m * bottom, -1.0f, 3.0f);
-    *x++ = clampf(height_m + wall_m * top, -1.0f, 4.0f);
+    *x++ = bslam_clampf(height_m + wall_m * bottom, -1.0f, 3.0f);
+    *x++ = bslam_clampf(height_m + wall_m * top, -1.0f, 4.0f);
     *x++ = bslam_log(height_px / width_px);
     *x++ = bslam_log(height_px * width_px);
     *x++ = (float)p->cells / (float)((p->right - p->left) * (p->bottom - p->top));
@@ -157,7 +143,7 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
 static float *upright_features(const bslam_view_t *view, const rays_t *rays, float *x)
 {
     const float top = rays->top.slope, bottom = rays->bottom.slope;
-    *x++ = top - bottom > 1e-3f ? clampf((top + bottom) / (2.0f * (top - bottom)), -3.0f, 8.0f) : 0.0f;
+    *x++ = top - bottom > 1e-3f ? bslam_clampf((top + bottom) / (2.0f * (top - bottom)), -3.0f, 8.0f) : 0.0f;
     *x++ = bslam_log(foot_m(view, rays) * chord_of(rays));
     return x;
 }

@@ -1,5 +1,6 @@
 #include "bslam/vision/glance.h"
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 #include "bslam/vision/features.h"
 
@@ -13,21 +14,6 @@
 /// Behind the numbers stand their squares: a thing is about so high, and a linear machine knows no band.
 #define SQUARES (BSLAM_GLANCE_FEATURES / 2)
 #define SIGNED_ZERO 0x80808080U
-
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
-
-static float clampf(float value, float low, float high)
-{
-    return value < low ? low : value > high ? high : value;
-}
 
 static float apart(float a, float b)
 {
@@ -107,8 +93,10 @@ static float *look_features(const bslam_view_t *view, const bslam_proposal_t *bo
 {
     const int32_t columns = view->frame->columns, rows = view->frame->rows;
     const int32_t width = box->right - box->left, height = box->bottom - box->top;
-    const int32_t left = most(box->left - BESIDE, 0), right = least(box->right + BESIDE, columns) - 1;
-    const int32_t top = most(box->top - BESIDE, 0), bottom = least(box->bottom + BESIDE, rows) - 1;
+    const int32_t left = bslam_most(box->left - BESIDE, 0),
+                  right = bslam_least(box->right + BESIDE, columns) - 1;
+    const int32_t top = bslam_most(box->top - BESIDE, 0),
+                  bottom = bslam_least(box->bottom + BESIDE, rows) - 1;
     glanced_t inside = {0}, sides[BSLAM_SIDES] = {0};
     for (int32_t i = 0; i < ROWS_LOOKED_AT; i++) {
         const int32_t first = (box->top + (2 * i + 1) * height / (2 * ROWS_LOOKED_AT)) * columns;
@@ -143,7 +131,7 @@ static bslam_edge_t edge_of(const uint8_t *step, int32_t count, int32_t apart_by
     uint32_t clear = 0;
     for (int32_t k = cells; k > 0; k--, step += every * apart_by) {
         const int32_t here = *step;
-        sum += least(here, BSLAM_EDGE_STEP_MAX);
+        sum += bslam_least(here, BSLAM_EDGE_STEP_MAX);
         clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
     }
     const float per_cell = 1.0f / (float)cells;
@@ -184,7 +172,7 @@ static float line_m(const bslam_view_t *view, const bslam_proposal_t *box)
             known += 1.0f;
         }
     }
-    return known > 0 ? clampf(known / inverse, 0.3f, 20.0f) : 0.0f;
+    return known > 0 ? bslam_clampf(known / inverse, 0.3f, 20.0f) : 0.0f;
 }
 
 /// Size and place, by the floor line. 11 numbers.
@@ -202,14 +190,14 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
     const float height_m = (float)camera->z_m;
     *x++ = log_wall + log_width;
     *x++ = log_wall + log_height;
-    *x++ = clampf(height_m + wall_m * bottom, -1.0f, 3.0f);
-    *x++ = clampf(height_m + wall_m * top, -1.0f, 4.0f);
+    *x++ = bslam_clampf(height_m + wall_m * bottom, -1.0f, 3.0f);
+    *x++ = bslam_clampf(height_m + wall_m * top, -1.0f, 4.0f);
     *x++ = log_height - log_width;
     *x++ = log_height + log_width;
     *x++ = (float)p->cells / (float)((p->right - p->left) * (p->bottom - p->top));
     *x++ = line > 0 ? 1.0f / line : 0.0f;
     *x++ = 0.5f * (top + bottom);
-    *x++ = height_px > 1.0f ? clampf(0.5f * (top + bottom) / (height_px * per_px), -3.0f, 8.0f) : 0.0f;
+    *x++ = height_px > 1.0f ? bslam_clampf(0.5f * (top + bottom) / (height_px * per_px), -3.0f, 8.0f) : 0.0f;
     *x++ = p->segmentation >= BSLAM_SEGMENTATIONS ? 1.0f : 0.0f;
     return x;
 }

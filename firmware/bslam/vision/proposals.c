@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/bytes.h"
 #include "bslam/vision/snap.h"
 
@@ -46,16 +47,6 @@ _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one num
 /// Boxes that overlap more than this are the same.
 #define SAME_OVERLAP BSLAM_R(0.85)
 #define SAME_SIDES BSLAM_R(0.2)  // above .15 / .85, with room for rounding
-
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
 
 // An extent holds left, top and how far right and bottom are from 255, a byte each: what two have together is
 // the least of each.
@@ -223,7 +214,7 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
     uint32_t clear = 0;
     for (int32_t left = end - first; left > 0; left--, step += stride) {
         const int32_t here = *step;
-        sum += least(here, BSLAM_EDGE_STEP_MAX);
+        sum += bslam_least(here, BSLAM_EDGE_STEP_MAX);
         clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
     }
     edge.step = (float)sum / (float)(end - first);
@@ -260,10 +251,10 @@ static void propose(bslam_proposals_t *proposals, const bslam_view_t *view, cons
 {
     const bslam_frame_t *frame = view->frame;
     const int32_t grow = passes[pass].grow;
-    const int32_t left = most(side_of(root->extent, LEFT) - grow, 0);
-    const int32_t right = least(side_of(root->extent, RIGHT) + grow, frame->columns);
-    const int32_t top = most(side_of(root->extent, TOP) - grow, 0);
-    const int32_t bottom = least(side_of(root->extent, BOTTOM) + grow, frame->rows);
+    const int32_t left = bslam_most(side_of(root->extent, LEFT) - grow, 0);
+    const int32_t right = bslam_least(side_of(root->extent, RIGHT) + grow, frame->columns);
+    const int32_t top = bslam_most(side_of(root->extent, TOP) - grow, 0);
+    const int32_t bottom = bslam_least(side_of(root->extent, BOTTOM) + grow, frame->rows);
     const int32_t cells_min = passes[pass].source == SMOOTH ? FACE_CELLS_MIN : CELLS_MIN;
     if (root->cells < cells_min || right - left < SIDE_MIN || bottom - top < SIDE_MIN ||
         right - left > frame->columns * SIDE_MAX_PERCENT / 100) {
@@ -364,16 +355,16 @@ static void clear_floor(uint32_t *mask, const bslam_view_t *view, int32_t first,
 {
     const bslam_frame_t *frame = view->frame;
     const int16_t *floor_row = view->floor_line->row + first;
-    const int32_t columns = least(frame->columns - first, BSLAM_MASK_BITS);
+    const int32_t columns = bslam_least(frame->columns - first, BSLAM_MASK_BITS);
     int32_t all_from = 0;
     for (int32_t k = 0; k < columns; k++) {
-        all_from = most(all_from, floor_row[k] + 2);
+        all_from = bslam_most(all_from, floor_row[k] + 2);
     }
-    all_from = least(all_from, frame->rows);
+    all_from = bslam_least(all_from, frame->rows);
     const uint32_t *all = mask + all_from * words, *end = mask + frame->rows * words;
     for (int32_t k = 0; k < columns; k++) {
         const uint32_t others = ~(1U << k);
-        for (uint32_t *at = mask + least(floor_row[k] + 2, all_from) * words; at != all; at += words) {
+        for (uint32_t *at = mask + bslam_least(floor_row[k] + 2, all_from) * words; at != all; at += words) {
             *at &= others;
         }
     }

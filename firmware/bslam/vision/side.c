@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/bytes.h"
 
 enum { CHANNELS = 3, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
@@ -66,11 +67,6 @@ static void begin(bslam_side_t *side, const bslam_frame_t *frame, bslam_side_nam
     side->along = side->level ? 1 : width;
     side->size = side->level ? height : width;
     side->lines = side->level ? width : height;
-}
-
-static int32_t magnitude(int32_t x)
-{
-    return x < 0 ? -x : x;
 }
 
 // A colour in one word: channels of 6 bits each, 1/63 of their range, a byte each, so that two of them add
@@ -274,7 +270,7 @@ bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *sta
     for (int32_t k = TAPS_OUTSIDE; k < end; k++) {
         const float share = bslam_falling(scores[best] - scores[k]);
         const float away =
-            magnitude(k - best) <= 1 ? 0.0f : (float)(k - best);  // neighbours are the same edge
+            bslam_magnitude(k - best) <= 1 ? 0.0f : (float)(k - best);  // neighbours are the same edge
         whole += share;
         first += share * away;
         second += share * away * away;
@@ -301,7 +297,7 @@ static bool edge_place(const bslam_side_t *side, int32_t index, float near_place
         whole += channel_of(change, c) * channel_of(change, c);
         moment += channel_of(change, c) * channel_of(shift, c);
     }
-    if (whole < CHANGE_MIN || magnitude(moment) > whole) {
+    if (whole < CHANGE_MIN || bslam_magnitude(moment) > whole) {
         return false;
     }
     *place = (bslam_real_t)middle + (bslam_real_t)moment / (bslam_real_t)whole;

@@ -2,16 +2,12 @@
 
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 
 /// Lines of cells about a side, in their order from inside: the side's own, those that it may snap to, one on
 /// either side of each.
 enum { SNAP_LINES = 5, OWN = 2, INNER = OWN - 1, OUTER = OWN + 1 };
-
-static int32_t clamp(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
 
 #if BSLAM_HAS_LANES
 
@@ -207,7 +203,7 @@ bslam_proposal_t bslam_snapped(const bslam_view_t *view, const bslam_proposal_t 
     for (int32_t side = 0; side < BSLAM_SIDES; side++) {
         float shift = 0;
         const int32_t line = snap_side(view, rough, (bslam_side_t)side, lines[side], &shift);
-        cells[side] = clamp(line, 0, ends[side] - 1);
+        cells[side] = bslam_clamp(line, 0, ends[side] - 1);
         edges_px[side] = ((bslam_real_t)cells[side] + (bslam_real_t)shift) * BSLAM_CELL_PX + BSLAM_R(1.5);
     }
     bslam_proposal_t box = *rough;

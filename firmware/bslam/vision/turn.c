@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/trig.h"
 
 enum { BANDS = BSLAM_TURN_BANDS, COLUMNS = BSLAM_TURN_COLUMNS, SHIFT_MAX = BSLAM_TURN_SHIFT_MAX };
@@ -27,18 +28,13 @@ static const bslam_real_t ROUNDING_VAR = BSLAM_R(0.17);  // of a residual, from 
 static const bslam_real_t USUAL_DISTANCE_M = 4;
 static const bslam_real_t LEAST_DISTANCE_M = BSLAM_R(0.5);
 
-static int32_t clamp(int32_t x, int32_t low, int32_t high)
-{
-    return x < low ? low : x > high ? high : x;
-}
-
 /// The row of the half-resolution copy where an elevation is, in the middle of the frame.
 static int16_t row_at(const bslam_camera_t *camera, bslam_real_t elevation_tangent)
 {
     const bslam_real_t v_px = bslam_horizon_px(camera) - camera->fy_px * elevation_tangent;
     const bslam_real_t row = (v_px + BSLAM_R(0.5)) / 2;
     const int32_t rows = camera->height_px / 2;
-    return (int16_t)clamp((int32_t)(row < 0 ? 0 : row), 0, rows);
+    return (int16_t)bslam_clamp((int32_t)(row < 0 ? 0 : row), 0, rows);
 }
 
 /// Bearing of a column of the frame at the horizon, from the camera's axis.
@@ -109,13 +105,14 @@ static void take_neighbours_off(const int32_t *at, int32_t columns, int8_t *valu
     const int32_t last = columns - 1;
     int32_t sum = 0;
     for (int32_t i = -NEIGHBOURS; i <= NEIGHBOURS; i++) {
-        sum += at[clamp(i, 0, last)];
+        sum += at[bslam_clamp(i, 0, last)];
     }
     for (int32_t i = 0; i < columns; i++) {
-        const int32_t smooth = (at[clamp(i - 1, 0, last)] + 2 * at[i] + at[clamp(i + 1, 0, last)]) / 4;
+        const int32_t smooth =
+            (at[bslam_clamp(i - 1, 0, last)] + 2 * at[i] + at[bslam_clamp(i + 1, 0, last)]) / 4;
         const int32_t value = (smooth - sum / (2 * NEIGHBOURS + 1)) * VALUE_STEPS / 16;
-        values[i] = (int8_t)clamp(value, -VALUE_MAX, VALUE_MAX);
-        sum += at[clamp(i + NEIGHBOURS + 1, 0, last)] - at[clamp(i - NEIGHBOURS, 0, last)];
+        values[i] = (int8_t)bslam_clamp(value, -VALUE_MAX, VALUE_MAX);
+        sum += at[bslam_clamp(i + NEIGHBOURS + 1, 0, last)] - at[bslam_clamp(i - NEIGHBOURS, 0, last)];
     }
 }
 

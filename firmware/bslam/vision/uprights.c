@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 
 /// What is looked for: foot, middle and top are so high above the floor, and it is at least and at most so
@@ -325,11 +326,6 @@ static int32_t find_sides(const bslam_view_t *view, const wall_t *wall, const up
     return count;
 }
 
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
-
 static bool is_as_wide(const side_t *left, const side_t *right, const upright_t *kind)
 {
     const float metre_px = 0.5f * (left->metre_px + right->metre_px);
@@ -382,7 +378,7 @@ _Static_assert(SIDES_MAX <= 1 << INDEX_BITS, "a place fits its bits");
 
 static uint32_t rank_of(const side_t *sides, int32_t left, int32_t right)
 {
-    const int32_t step = least(sides[left].step, sides[right].step);
+    const int32_t step = bslam_least(sides[left].step, sides[right].step);
     return ((uint32_t)step << INDEX_BITS | (uint32_t)left) << INDEX_BITS | (uint32_t)right;
 }
 
