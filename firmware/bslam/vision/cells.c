@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/vision/tone_lanes.h"
 
 /// Limits of the features: beyond them a difference says no more.
 #define LIGHT_MAX 96
@@ -164,23 +164,38 @@ void bslam_cell_features(const bslam_view_t *view, int32_t row, int32_t column,
     *x++ = (int16_t)(above_floor >= 0 ? bslam_clamp(tone.light - wall.light, -96, 0) : 0);
 }
 
-/// Tables of the tones' bins; nearly all bins are empty.
+static void fill_bin(const bslam_background_t *background, const int16_t *weights, int32_t bin,
+                     bslam_cell_tables_t *tables)
+{
+    const int32_t wall = background->counts[BSLAM_ZONE_WALL][bin];
+    const int32_t floor = background->counts[BSLAM_ZONE_FLOOR][bin];
+    const int32_t ceiling = background->counts[BSLAM_ZONE_CEILING][bin];
+    tables->sums[bin] = weights[7] * bslam_least(wall, OFTEN) + weights[8] * bslam_least(wall, SELDOM) +
+                        weights[9] * bslam_least(floor, OFTEN) + weights[10] * bslam_least(floor, SELDOM) +
+                        weights[11] * bslam_least(ceiling, OFTEN);
+    tables->frequent[bin] = (uint16_t)(bslam_least(wall, OFTEN) | bslam_least(floor, OFTEN) << 8);
+}
+
+/// Tables of the tones' bins; nearly all bins are empty, mostly four in a word.
 static void fill_bins(const bslam_background_t *background, const int16_t *weights,
                       bslam_cell_tables_t *tables)
 {
     const uint8_t *walls = background->counts[BSLAM_ZONE_WALL],
                   *floors = background->counts[BSLAM_ZONE_FLOOR];
     const uint8_t *ceilings = background->counts[BSLAM_ZONE_CEILING];
-    for (int32_t bin = 0; bin < BSLAM_TONE_BINS; bin++) {
-        const int32_t wall = walls[bin], floor = floors[bin], ceiling = ceilings[bin];
-        tables->sums[bin] = 0;
-        tables->frequent[bin] = 0;
-        if ((wall | floor | ceiling) != 0) {
-            tables->sums[bin] =
-                weights[7] * bslam_least(wall, OFTEN) + weights[8] * bslam_least(wall, SELDOM) +
-                weights[9] * bslam_least(floor, OFTEN) + weights[10] * bslam_least(floor, SELDOM) +
-                weights[11] * bslam_least(ceiling, OFTEN);
-            tables->frequent[bin] = (uint16_t)(bslam_least(wall, OFTEN) | bslam_least(floor, OFTEN) << 8);
+    for (int32_t first = 0; first < BSLAM_TONE_BINS; first += BSLAM_WORD_BYTES) {
+        const int32_t end = first + BSLAM_WORD_BYTES;
+        if ((bslam_word_at(walls + first) | bslam_word_at(floors + first) |
+             bslam_word_at(ceilings + first)) == 0) {
+            _Pragma("GCC unroll 4") for (int32_t bin = first; bin < end; bin++)
+            {
+                tables->sums[bin] = 0;
+                tables->frequent[bin] = 0;
+            }
+            continue;
+        }
+        for (int32_t bin = first; bin < end; bin++) {
+            fill_bin(background, weights, bin, tables);
         }
     }
 }
@@ -189,14 +204,9 @@ static void fill_bins(const bslam_background_t *background, const int16_t *weigh
 
 // --- Sixteen cells at a time, feature by feature
 
-/// A tone in all lanes; chromas are 128 more.
-typedef struct tone_lanes {
-    bslam_lanes_t light, reddish, bluish;
-} tone_lanes_t;
-
 /// What cells are looked at with: tones of the room, and weights in pairs, one in each half of a word.
 typedef struct cell_lanes {
-    tone_lanes_t wall, floor, ceiling, grey;
+    bslam_tone_lanes_t wall, floor, ceiling, grey;
     bslam_lanes_t by_light, by_contrast, by_chroma, by_distance, by_spread, by_step, by_wall, by_place;
     bslam_lanes_t of_row;  ///< what all cells of the row have in common
     int32_t row;
@@ -207,20 +217,13 @@ static bslam_lanes_t weights_of(int32_t even, int32_t odd)
     return bslam_lanes_of(bslam_halves(even, odd));
 }
 
-static tone_lanes_t tone_lanes(bslam_tone_t tone)
-{
-    return (tone_lanes_t){bslam_lanes_of(tone.light * FOUR),
-                          bslam_lanes_of((uint8_t)tone.reddish * FOUR ^ BSLAM_TOP_BITS),
-                          bslam_lanes_of((uint8_t)tone.bluish * FOUR ^ BSLAM_TOP_BITS)};
-}
-
 static cell_lanes_t cell_lanes(const bslam_background_t *background, const int16_t *w)
 {
     return (cell_lanes_t){
-        .wall = tone_lanes(background->tone[BSLAM_ZONE_WALL]),
-        .floor = tone_lanes(background->tone[BSLAM_ZONE_FLOOR]),
-        .ceiling = tone_lanes(background->tone[BSLAM_ZONE_CEILING]),
-        .grey = tone_lanes((bslam_tone_t){0}),
+        .wall = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_WALL]),
+        .floor = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_FLOOR]),
+        .ceiling = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_CEILING]),
+        .grey = bslam_tone_lanes_of((bslam_tone_t){0}),
         .by_light = weights_of(w[0], -w[0]),
         .by_contrast = weights_of(w[1], w[15]),
         .by_chroma = weights_of(w[2], w[3]),
@@ -238,7 +241,7 @@ static inline bslam_lanes_t at_most(bslam_lanes_t bytes, uint32_t limit)
 }
 
 /// bslam_tone_distance() of each cell from a tone, at most 255.
-static inline bslam_lanes_t distances(const tone_lanes_t *cells, const tone_lanes_t *tone)
+static inline bslam_lanes_t distances(const bslam_tone_lanes_t *cells, const bslam_tone_lanes_t *tone)
 {
     const bslam_lanes_t reddish = bslam_lanes_apart(cells->reddish, tone->reddish);
     const bslam_lanes_t bluish = bslam_lanes_apart(cells->bluish, tone->bluish);
@@ -276,10 +279,10 @@ static inline void add_places(bslam_lanes_t above, bslam_lanes_t weights, bslam_
 
 /// Adds what depends on a tone alone, but for its bin; on the wall's only where a cell is not below the floor
 /// line.
-static inline void add_tones(const tone_lanes_t *cells, bslam_lanes_t is_above, bslam_lanes_t spread,
+static inline void add_tones(const bslam_tone_lanes_t *cells, bslam_lanes_t is_above, bslam_lanes_t spread,
                              const cell_lanes_t *by, cell_sums_t *sums)
 {
-    const tone_lanes_t *wall = &by->wall;
+    const bslam_tone_lanes_t *wall = &by->wall;
     const bslam_lanes_t brighter = at_most(bslam_lanes_less(cells->light, wall->light), LIGHT_MAX);
     const bslam_lanes_t darker = at_most(bslam_lanes_less(wall->light, cells->light), LIGHT_MAX);
     const bslam_lanes_t reddish = at_most(bslam_lanes_apart(cells->reddish, wall->reddish), CHROMA_MAX);
@@ -298,33 +301,13 @@ static inline void add_tones(const tone_lanes_t *cells, bslam_lanes_t is_above, 
     add_features(from_wall & is_above, darker & is_above, by->by_wall, sums);
 }
 
-/// bslam_tone_bin() of eight tones: chromas are signed halves.
-static inline bslam_lanes_t bins_of(bslam_lanes_t light, bslam_lanes_t reddish, bslam_lanes_t bluish)
-{
-    const bslam_lanes_t middle = bslam_lanes_of(4U | 4U << 16);
-    // A twelfth, and an eighth rounded towards 0.
-    const bslam_lanes_t lights =
-        bslam_halves_within(bslam_halves_down(bslam_halves_times(light, 171), 11), 0, 15);
-    const bslam_lanes_t reds =
-        bslam_halves_add(bslam_halves_within(bslam_halves_shifted_to_zero(reddish, 3), -4, 3), middle);
-    const bslam_lanes_t blues =
-        bslam_halves_add(bslam_halves_within(bslam_halves_shifted_to_zero(bluish, 3), -4, 3), middle);
-    return bslam_halves_up(lights, 6) | bslam_halves_up(reds, 3) | blues;
-}
-
 /// Adds what the tones' bins add, and notes how frequent they are.
-static inline void add_bins(const tone_lanes_t *cells, const bslam_cell_tables_t *tables, uint16_t *frequent,
-                            cell_sums_t *sums)
+static inline void add_bins(const bslam_tone_lanes_t *cells, const bslam_cell_tables_t *tables,
+                            uint16_t *frequent, cell_sums_t *sums)
 {
-    const bslam_lanes_t zero = bslam_lanes_zero(), tops = bslam_lanes_of(BSLAM_TOP_BITS);
-    const bslam_lanes_t reddish = cells->reddish ^ tops, bluish = cells->bluish ^ tops;
     uint16_t bins[STEP];
     int32_t of_bins[STEP];
-    bslam_lanes_put(bins, bins_of(bslam_bytes_lower_in_turn(cells->light, zero),
-                                  bslam_bytes_signed_lower(reddish), bslam_bytes_signed_lower(bluish)));
-    bslam_lanes_put(bins + STEP / 2,
-                    bins_of(bslam_bytes_upper_in_turn(cells->light, zero), bslam_bytes_signed_upper(reddish),
-                            bslam_bytes_signed_upper(bluish)));
+    bslam_tone_bins(cells, bins);
     _Pragma("GCC unroll 16") for (int32_t k = 0; k < STEP; k++)
     {
         of_bins[k] = tables->sums[bins[k]];
@@ -350,9 +333,7 @@ static inline void decide_some(const bslam_view_t *view, const cell_lanes_t *by,
                                uint16_t *frequent, int8_t *values)
 {
     const bslam_tones_t *tones = view->tones;
-    const bslam_lanes_t tops = bslam_lanes_of(BSLAM_TOP_BITS);
-    const tone_lanes_t cells = {bslam_lanes_at(tones->light + i), bslam_lanes_at(tones->reddish + i) ^ tops,
-                                bslam_lanes_at(tones->bluish + i) ^ tops};
+    const bslam_tone_lanes_t cells = bslam_tone_lanes_at(tones, i);
     const int16_t *floor_row = view->floor_line->row + column;
     const bslam_lanes_t row = bslam_lanes_of(bslam_halves(by->row, by->row));
     const bslam_lanes_t above = bslam_halves_minus(bslam_lanes_at(floor_row), row);
