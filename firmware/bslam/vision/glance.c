@@ -3,6 +3,7 @@
 #include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 #include "bslam/vision/features.h"
+#include "bslam/vision/steps.h"
 
 /// Rows of cells that stand for a box, and lines of the floor that tell how far the wall behind it is.
 #define ROWS_LOOKED_AT 4
@@ -127,15 +128,9 @@ static bslam_edge_t edge_of(const uint8_t *step, int32_t count, int32_t apart_by
 {
     const int32_t every = count < 2 * SIDE_CELLS ? 1 : count / SIDE_CELLS;
     const int32_t cells = (count + every - 1) / every;
-    int32_t sum = 0;
-    uint32_t clear = 0;
-    for (int32_t k = cells; k > 0; k--, step += every * apart_by) {
-        const int32_t here = *step;
-        sum += bslam_least(here, BSLAM_EDGE_STEP_MAX);
-        clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
-    }
+    const bslam_step_sums_t sums = bslam_sum_steps(step, cells, every * apart_by);
     const float per_cell = 1.0f / (float)cells;
-    return (bslam_edge_t){(float)sum * per_cell, (float)clear * per_cell};
+    return (bslam_edge_t){(float)sums.sum * per_cell, (float)sums.clear * per_cell};
 }
 
 /// The box's sides. 8 numbers; of left and right mean and difference, since a room has neither.

@@ -6,6 +6,7 @@
 #include "bslam/math/bounds.h"
 #include "bslam/math/bytes.h"
 #include "bslam/vision/snap.h"
+#include "bslam/vision/steps.h"
 
 /// What cells a segmentation joins.
 typedef enum source {
@@ -209,16 +210,9 @@ bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *
     }
     const uint8_t *step =
         upright ? view->step_x + first * columns + line : view->step_y + line * columns + first;
-    const int32_t stride = upright ? columns : 1;
-    int32_t sum = 0;
-    uint32_t clear = 0;
-    for (int32_t left = end - first; left > 0; left--, step += stride) {
-        const int32_t here = *step;
-        sum += bslam_least(here, BSLAM_EDGE_STEP_MAX);
-        clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
-    }
-    edge.step = (float)sum / (float)(end - first);
-    edge.share = (float)clear / (float)(end - first);
+    const bslam_step_sums_t sums = bslam_sum_steps(step, end - first, upright ? columns : 1);
+    edge.step = (float)sums.sum / (float)(end - first);
+    edge.share = (float)sums.clear / (float)(end - first);
     return edge;
 }
 

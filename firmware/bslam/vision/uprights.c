@@ -110,10 +110,10 @@ static float middle_px(int32_t row)
     return (float)(row * BSLAM_CELL_PX) + 1.5f;
 }
 
-static int32_t limited_step(const bslam_view_t *view, int32_t row, int32_t column)
+/// Of a column in a row of so many; 0 outside.
+static inline int32_t limited_step(const uint8_t *steps, int32_t columns, int32_t column)
 {
-    const int32_t columns = view->frame->columns;
-    const int32_t step = column >= 0 && column < columns ? view->step_x[row * columns + column] : 0;
+    const int32_t step = column >= 0 && column < columns ? steps[column] : 0;
     return step < STEP_MAX ? step : STEP_MAX;
 }
 
@@ -125,16 +125,19 @@ static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int3
     enum { ROWS_AT_ONCE = 4 };
     const bslam_floats_t from = bslam_floats_of(part.v_px), height = bslam_floats_of(part.height_px);
     const bslam_floats_t left = bslam_floats_of(part.u_px), width = bslam_floats_of(part.width_px);
+    const int32_t columns = view->frame->columns;
+    const uint8_t *steps = view->step_x + row * columns;
     int32_t sum = 0;
     for (; row < end; row += ROWS_AT_ONCE) {
         const bslam_floats_t v_px =
             bslam_floats_of_four(middle_px(row), middle_px(row + 1), middle_px(row + 2), middle_px(row + 3));
         const bslam_floats_t u_px = left + (v_px - from) / height * width;
-        int32_t columns[ROWS_AT_ONCE];
+        int32_t crossed[ROWS_AT_ONCE];
         // What is no number, or too large for a word, becomes the least one.
-        bslam_lanes_put(columns, bslam_floats_to_words(u_px / bslam_floats_of(BSLAM_CELL_PX)));
-        for (int32_t k = 0; k < ROWS_AT_ONCE && row + k < end; k++) {
-            sum += limited_step(view, row + k, columns[k]);
+        bslam_lanes_put(crossed, bslam_floats_to_words(u_px / bslam_floats_of(BSLAM_CELL_PX)));
+        const int32_t count = bslam_least(end - row, ROWS_AT_ONCE);
+        for (int32_t k = 0; k < count; k++, steps += columns) {
+            sum += limited_step(steps, columns, crossed[k]);
         }
     }
     return sum;
@@ -154,9 +157,11 @@ static int32_t column_at(const part_t *part, int32_t row)
 /// Sum of the sideways steps along a part, of rows [row, end).
 static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int32_t end)
 {
+    const int32_t columns = view->frame->columns;
+    const uint8_t *steps = view->step_x + row * columns;
     int32_t sum = 0;
-    for (; row < end; row++) {
-        sum += limited_step(view, row, column_at(&part, row));
+    for (; row < end; row++, steps += columns) {
+        sum += limited_step(steps, columns, column_at(&part, row));
     }
     return sum;
 }
