@@ -100,24 +100,59 @@ static const float *knot_below(float x, const float *knots)
     return x >= knots[1] ? knots + 1 : knots;
 }
 
+#if BSLAM_HAS_LANES
+
+/// Places of four features, whose first weights stand so many bytes from where a pair's begin.
+static inline void locate_four(const float *x, const float *knots, uint32_t first,
+                               bslam_between_knots_t *places)
+{
+    const float *a = knot_below(x[0], knots), *b = knot_below(x[1], knots + BSLAM_KNOTS);
+    const float *c = knot_below(x[2], knots + 2 * BSLAM_KNOTS),
+                *d = knot_below(x[3], knots + 3 * BSLAM_KNOTS);
+    const bslam_floats_t from = bslam_floats_of_four(a[0], b[0], c[0], d[0]);
+    const bslam_floats_t to = bslam_floats_of_four(a[1], b[1], c[1], d[1]);
+    const bslam_lanes_t knot = bslam_lanes_of_words((uint32_t)(a - knots), (uint32_t)(b - knots),
+                                                    (uint32_t)(c - knots), (uint32_t)(d - knots));
+    _Static_assert(ROWS == 2, "a knot has two bytes");
+    const bslam_lanes_t at = bslam_words_add(bslam_words_add(knot, knot), bslam_lanes_of(first));
+    const bslam_floats_t shares = (bslam_floats_at(x) - from) / (to - from);
+    const bslam_floats_t within = bslam_floats_within(shares, 0.0f, 1.0f);
+    const bslam_lanes_t upper =
+        bslam_floats_to_words(within * bslam_floats_of((float)BSLAM_SHARE_ONE) + bslam_floats_of(0.5f));
+    const bslam_lanes_t lower =
+        bslam_words_less(upper, bslam_lanes_of(BSLAM_SHARE_ONE)) & bslam_lanes_of(0xFFFFU);
+    const bslam_lanes_t both = lower | bslam_words_up(bslam_words_less(bslam_lanes_zero(), upper), 16);
+    bslam_lanes_put(places, bslam_words_lower_in_turn(at, both));
+    bslam_lanes_put(places + 2, bslam_words_upper_in_turn(at, both));
+}
+
+#endif
+
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place)
 {
     const float *knots = machine->knots;
-    for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
+    int32_t i = 0;
+#if BSLAM_HAS_LANES
+    for (; i + 4 <= machine->features; i += 4, knots += 4 * BSLAM_KNOTS) {
+        locate_four(x + i, knots, (uint32_t)(ROWS * BSLAM_KNOTS * i), place->curves + i);
+    }
+#endif
+    for (; i < machine->features; i++, knots += BSLAM_KNOTS) {
         const float *low = knot_below(x[i], knots);
         place->curves[i].at = (uint32_t)(ROWS * (low - machine->knots));
         place->curves[i].shares = shares_between(x[i], low[0], low[1]);
     }
     for (int32_t c = 0; c < machine->crossed_count; c++) {
-        const int32_t i = machine->crossed[c];
-        const float *of_feature = machine->knots + i * BSLAM_KNOTS;
+        const int32_t feature = machine->crossed[c];
+        const float *of_feature = machine->knots + feature * BSLAM_KNOTS;
+        const float value = x[feature];
         int32_t k = 0;
-        while (k < BSLAM_GRID_KNOTS - 2 && x[i] >= of_feature[grid_knots[k + 1]]) {
+        while (k < BSLAM_GRID_KNOTS - 2 && value >= of_feature[grid_knots[k + 1]]) {
             k++;
         }
         place->grids[c].at = (uint32_t)(ROWS * k);
         place->grids[c].shares =
-            shares_between(x[i], of_feature[grid_knots[k]], of_feature[grid_knots[k + 1]]);
+            shares_between(value, of_feature[grid_knots[k]], of_feature[grid_knots[k + 1]]);
     }
 }
 
