@@ -5,12 +5,14 @@ count of beacons is exact; the error of the map; the error of the position, and 
 identity on the same drives; diverged runs. Beside each mean its 95 % interval over the seeds (Student's t).
 
 Two ablations of `svm` stand beside the methods: `untrained`, machines that are never trained
-(learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0).
+(learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0). A camera's sightings from a
+lower score on serve where identity is known; `same` has known identity of those that the others get.
 `--photographs`: simulated sightings whose signatures are of ETH-80's photographs, an object a beacon
 (tools/training/eth80.py). `--classes`, of a camera's sightings: as `seen`, `none`, or `usual`, what the
 beacon is called most often on the drive, with the distance that it would have had as that: what evidence over
 frames could reach at best. `--score`: what the detector is less sure of is left out where identity is not
-told. `--set` changes a parameter of `svm` and its ablations.
+told. `--without-clutter`: without a camera's sightings of no beacon, which only the truth tells. `--set`
+changes a parameter of `svm` and its ablations.
 `--looks` prints how alike simulated signatures are to a camera's instead: top-1 of LinearSVC, C = 10, by
 views a beacon, on the given worlds (the camera's: tools/measure_learner.py).
 `.venv/bin/python tools/measure_association.py pairs lookalikes --sigma 0.6,1.0 --seeds 100:110`
@@ -21,7 +23,7 @@ import itertools
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +44,7 @@ ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
     "untrained": (("learn_budget", 0),),
     "position": (("looks_weight", 0.0),),
 }
-METHODS = ("known", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
+METHODS = ("known", "same", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
 VIEWS = (1, 2, 4, 10)
 TEST_VIEWS, FAR_M = 30, 6.5
 
@@ -56,12 +58,24 @@ class ClassedSource(CameraSource):
     """A camera's drive with other classes than its detector's."""
 
     classes: str = "seen"
+    clutter: bool = True
 
     def load(self) -> Log:
         log = super().load()
+        if not self.clutter:
+            log = replace(log, sightings=without_clutter(log.sightings))
         if self.classes == "none":
             return replace(log, sightings=replace(log.sightings, beacon_class=None))
         return replace(log, sightings=as_usual(log.sightings)) if self.classes == "usual" else log
+
+
+def without_clutter(seen: Sightings) -> Sightings:
+    """Those that show a beacon."""
+    shows = seen.beacon_id >= 0
+    columns = {one.name: getattr(seen, one.name) for one in fields(seen)}
+    return replace(
+        seen, **{name: column[shows] for name, column in columns.items() if isinstance(column, np.ndarray)}
+    )
 
 
 def as_usual(seen: Sightings) -> Sightings:
@@ -82,7 +96,7 @@ def options_of(
     method: str, sensor: str, sigma_mps: float, seed: int, changes: Sequence[tuple[str, Number]] = ()
 ) -> RunOptions:
     """One run of a method; an ablation is `svm` with a parameter changed. `changes`: others, of `svm`."""
-    association = "svm" if method in ABLATIONS else method
+    association = "svm" if method in ABLATIONS else "known" if method == "same" else method
     return RunOptions(
         association=association,
         sensor=sensor,
@@ -102,7 +116,9 @@ def source_of(
         return PhotographedSource(*drive)
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if method == "known" else Threshold(arguments.score, arguments.score)
-        return ClassedSource(*drive, arguments.rig, arguments.store, threshold, arguments.classes)
+        return ClassedSource(
+            *drive, arguments.rig, arguments.store, threshold, arguments.classes, arguments.clutter
+        )
     return ScenarioSource(*drive)
 
 
@@ -200,6 +216,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--looks", action="store_true")
     parser.add_argument("--photographs", action="store_true")
     parser.add_argument("--classes", choices=CLASSES, default="seen")
+    parser.add_argument("--without-clutter", dest="clutter", action="store_false")
     parser.add_argument(
         "--set", dest="changes", action="append", default=[], type=change, metavar="NAME=VALUE"
     )

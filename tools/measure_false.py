@@ -8,7 +8,8 @@ of way apart, has what a rule could go by: from how many places it was seen, how
 in the median, how large it is beside its kind, which the true path tells, how far off its sightings were from
 where the filter expected them (the mean of D^2 over the gate), and its kind. A judge that sees all of this
 after the drive, and is taught with the truth of these very drives, says what is a beacon. What it gets wrong,
-no rule of that form gets right while it drives. `--set` changes a parameter.
+no rule of that form gets right while it drives. The third is what can be learned beforehand: a linear machine
+that judges each drive and was taught with the truth of the others. `--set` changes a parameter.
 `.venv/bin/python tools/measure_false.py --seeds 1000:1020`
 """
 
@@ -22,6 +23,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.tree import DecisionTreeClassifier
 
 from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
@@ -30,6 +34,7 @@ from bslam.experiment.runner import run_log
 from bslam.experiment.truth import truth_at
 from bslam.log import Log
 from bslam.rig import load_rig
+from bslam.world.kinds import KINDS
 from bslam.world.simulate import load_scenario
 from camera_drives import arguments
 from measure_association import change, options_of
@@ -38,6 +43,14 @@ PLACE_M = 0.1
 LEAST_PLACES = 10
 JUDGES = {"places": [0], "score": [1], "size": [2], "offsets": [3], "all and the kind": [0, 1, 2, 3, 4]}
 DEPTH = 3  # of a judge's tree: with one question it is a threshold
+MACHINES = {
+    "places": ["places"],
+    "places, offsets": ["places", "offsets"],
+    "places, kind": ["places", "kind"],
+    "places, offsets, kind": ["places", "offsets", "kind"],
+    "places, offsets, score, kind": ["places", "offsets", "score", "kind"],
+}
+MACHINE_C = 3.0
 
 
 @dataclass
@@ -167,7 +180,6 @@ def print_wrong(drives: Sequence[Drive]) -> None:
 
 def print_bound(drives: Sequence[Drive]) -> None:
     truth = [are_beacons(one) for one in drives]
-    total = sum(one.books.sightings for one in drives)
     all_features, all_truth = np.concatenate([one.features for one in drives]), np.concatenate(truth)
     unseen = sum(len(one.true_ids) - int(np.sum(there)) for one, there in zip(drives, truth, strict=True))
     print(
@@ -179,13 +191,50 @@ def print_bound(drives: Sequence[Drive]) -> None:
     for name, columns in JUDGES.items():
         tree = DecisionTreeClassifier(max_depth=1 if len(columns) == 1 else DEPTH, random_state=0)
         tree.fit(all_features[:, columns], all_truth)
-        exact = lost = kept = wrong = 0
-        for one, there in zip(drives, truth, strict=True):
-            said = tree.predict(one.features[:, columns])
-            exact += int(np.all(said == there)) and int(np.sum(there)) == len(one.true_ids)
-            lost, kept = lost + int(np.sum(there & ~said)), kept + int(np.sum(~there & said))
-            wrong += sum(len(one.things[false].rows) for false in np.flatnonzero(~there & said))
-        print(f"| {name} | {lost} | {kept} | {exact} of {len(drives)} | {100.0 * wrong / total:.2f} |")
+        print(verdict_row(name, drives, truth, [tree.predict(one.features[:, columns]) for one in drives]))
+
+
+def print_machines(drives: Sequence[Drive]) -> None:
+    truth = [are_beacons(one) for one in drives]
+    print(
+        "\n| a linear machine taught with the truth of the other drives, by | beacons lost | others kept "
+        "| exact drives | wrong % |\n|---|---|---|---|---|"
+    )
+    for name, cues in MACHINES.items():
+        tables = [cues_of(one.features, cues) for one in drives]
+        said = []
+        for k, table in enumerate(tables):
+            machine = make_pipeline(StandardScaler(), LogisticRegression(C=MACHINE_C))
+            others = [i for i in range(len(drives)) if i != k]
+            machine.fit(
+                np.concatenate([tables[i] for i in others]), np.concatenate([truth[i] for i in others])
+            )
+            said.append(machine.predict(table))
+        print(verdict_row(name, drives, truth, said))
+
+
+def cues_of(features: NDArray[np.float64], cues: Sequence[str]) -> NDArray[np.float64]:
+    """What a linear machine weighs: places and offsets by their logarithms, a bit for each kind."""
+    columns = {
+        "places": np.log(features[:, :1]),
+        "score": features[:, 1:2],
+        "offsets": np.log(0.01 + features[:, 3:4]),
+        "kind": features[:, 4:5] == np.arange(1, len(KINDS) + 1),
+    }
+    return np.hstack([columns[one] for one in cues])
+
+
+def verdict_row(
+    name: str, drives: Sequence[Drive], truth: Sequence[NDArray[np.bool_]], said: Sequence[NDArray[np.bool_]]
+) -> str:
+    """What becomes of the counts by what a judge says of each drive's things."""
+    total = sum(one.books.sightings for one in drives)
+    exact = lost = kept = wrong = 0
+    for one, there, says in zip(drives, truth, said, strict=True):
+        exact += int(np.all(says == there)) and int(np.sum(there)) == len(one.true_ids)
+        lost, kept = lost + int(np.sum(there & ~says)), kept + int(np.sum(~there & says))
+        wrong += sum(len(one.things[false].rows) for false in np.flatnonzero(~there & says))
+    return f"| {name} | {lost} | {kept} | {exact} of {len(drives)} | {100.0 * wrong / total:.2f} |"
 
 
 def add_changes(parser: argparse.ArgumentParser) -> None:
@@ -199,6 +248,7 @@ def main() -> None:
     drives = [drive_of(words, seed) for seed in words.seeds]
     print_wrong(drives)
     print_bound(drives)
+    print_machines(drives)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 
 from bslam.log import Truth
-from measure_false import Books, Drive, Thing, are_beacons, print_bound, print_wrong, size_error
+from measure_false import (
+    Books,
+    Drive,
+    Thing,
+    are_beacons,
+    cues_of,
+    print_bound,
+    print_machines,
+    print_wrong,
+    size_error,
+)
 
 
 @dataclass(frozen=True)
@@ -87,3 +97,19 @@ def test_the_judge_gets_right_what_a_threshold_parts_and_no_more(capsys):
     )
     assert rows["score"] == "0 | 0 | 2 of 2 | 0.00"
     assert "0 of 2" in rows["places"]
+
+
+def test_a_machine_is_taught_by_the_other_drives_alone(capsys):
+    beacon, false = [60.0, 1.0, 0.0, 0.02, 1.0], [12.0, 1.0, 0.0, 0.02, 6.0]
+    odd = [12.0, 1.0, 0.0, 0.02, 6.0]  # a beacon that has the cues of the others' clutter: nothing tells it
+    plain = [drive_of((1, 40, beacon), (-1, 10, false)) for _ in range(3)]
+    print_machines([*plain, drive_of((1, 40, beacon), (2, 40, odd))])
+    rows = dict(
+        line.strip("| ").split(" | ", 1) for line in capsys.readouterr().out.splitlines() if " | " in line
+    )
+    assert rows["places"] == "1 | 0 | 3 of 4 | 0.00"
+
+
+def test_a_machine_weighs_logarithms_and_a_bit_for_each_kind():
+    table = cues_of(np.array([[20.0, 0.5, 0.3, 0.99, 2.0]]), ["places", "score", "offsets", "kind"])
+    assert np.allclose(table, [[np.log(20.0), 0.5, 0.0, 0, 1, 0, 0, 0, 0, 0]])
