@@ -21,7 +21,7 @@ BUILD = ROOT / "build" / "bench"
 WIDTHS = (320, 160)
 PER_PIXEL_MAX = 32
 STAGES = {
-    "rows": ("bslam_thumbnail_row",),
+    "rows": ("bslam_thumbnail_row", "bslam_thumbnail_row_doubled"),
     "room": ("bslam_background_tones", "bslam_background_learn", "bslam_background_floor_line"),
     "cells": ("bslam_cells_step", "bslam_cells_decide"),
     "boxes": ("bslam_proposals_find", "bslam_uprights_propose"),
