@@ -25,13 +25,13 @@ def parameters(**changes):
     return Slam.defaults() | MOUNT | changes
 
 
-def drive(p, steps, seed=4, has_range=True, has_gyro=False, sds=()):
+def drive(p, steps, seed=4, has_range=True, has_gyro=False, sds=(), first_range_ln=None):
     """A smoother fed with a noisy curve through three beacons, every one seen at every third step.
 
     sds: of direction and distance, as sightings tell them; the first two beacons are known then.
     """
     rng = np.random.default_rng(seed)
-    smoother = Smoother(p)
+    smoother = Smoother(p, first_range_ln)
     true = guess = (0.0, 0.0, 0.0)
     if sds:
         assert [smoother.add_beacon(*place, 1e-3) for place in PLACES[:2]] == [0, 1]
@@ -65,14 +65,14 @@ def look(smoother, p, pose, step, rng, has_range, sds=()):
 
 
 @pytest.mark.parametrize("velocity_states", [0, 1])
-@pytest.mark.parametrize("has_range", [True, False])
-def test_gradient_and_step_are_those_of_finite_differences(velocity_states, has_range):
+@pytest.mark.parametrize(("has_range", "first_range_ln"), [(True, None), (False, None), (False, (0.5, 0.3))])
+def test_gradient_and_step_are_those_of_finite_differences(velocity_states, has_range, first_range_ln):
     p = parameters(velocity_states=velocity_states)
-    smoother = drive(p, 9, has_range=has_range)
+    smoother = drive(p, 9, has_range=has_range, first_range_ln=first_range_ln)
     rng = np.random.default_rng(1)
     poses = smoother.poses + 0.01 * rng.standard_normal(smoother.poses.shape)
     beacons = smoother.beacons + 0.1 * rng.standard_normal(smoother.beacons.shape)
-    problem = _Problem(p, smoother._steps, smoother._seen, smoother._priors)
+    problem = _Problem(p, smoother._steps, smoother._seen, smoother._priors, smoother._guesses)
     weights = problem.weights(poses, beacons)
     _, normal = problem.linearise(poses, beacons, weights)
 
@@ -246,3 +246,13 @@ def test_bound_that_is_asked_rarely_does_not_start_from_odometry_alone():
         *(poses[100::100, :2] - np.column_stack([log.truth.x_m, log.truth.y_m])[100:1001:100]).T
     )
     assert error_m.max() < 0.3
+
+
+def test_first_distance_is_guessed_from_where_the_beacon_was_first_seen():
+    p = parameters()
+    smoother = Smoother(p, first_range_ln=(1.2, 0.5))
+    look(smoother, p, (0.0, 0.0, 0.0), 0, np.random.default_rng(3), False)
+    smoother.solve()  # nothing else tells of it
+    np.testing.assert_allclose(
+        np.hypot(*(smoother.beacons - smoother.first_eyes()).T), math.exp(1.2), rtol=1e-6
+    )
