@@ -174,14 +174,14 @@ static void sum_level(const bslam_view_t *view, const span_t *span, bslam_sums_t
     take_bytes(&bytes, sums);
 }
 
-/// Takes ROWS_AT_ONCE rows of a strip at a time out of the span, if it is STRIP columns wide.
+/// Takes ROWS_AT_ONCE rows at a time out of the span of a strip that is STRIP columns wide.
 static void sum_upright(const bslam_view_t *view, span_t *span, bslam_sums_t *sums)
 {
     const bslam_tones_t *tones = view->tones;
     const int32_t apart = span->apart;
     byte_sums_t bytes = {0};
     frequent_sums_t frequent = {0};
-    for (; span->width == STRIP && span->rows >= ROWS_AT_ONCE; span->rows -= ROWS_AT_ONCE) {
+    for (; span->rows >= ROWS_AT_ONCE; span->rows -= ROWS_AT_ONCE) {
         const int32_t i = span->first;
         bytes.light = bslam_lanes_sum_add(bslam_lanes_of_pairs(tones->light + i, apart), bytes.light);
         bytes.reddish =
