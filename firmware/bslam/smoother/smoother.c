@@ -50,6 +50,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->seen_count = 0;
     smoother->to_middle = (bslam_motion_t){0};
     smoother->from_middle = (bslam_motion_t){0};
+    smoother->gap_s = 0;
     clear_block(smoother);
     bslam_smoother_begin(smoother);
 }
@@ -199,6 +200,7 @@ void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, con
         close_block(smoother);
     }
     bslam_smoother_add_motion(&smoother->from_middle, motion);
+    smoother->gap_s += motion->dt_s;
     if (smoother->frames > 0) {
         smoother->block_s += motion->dt_s;
     } else if (smoother->from_middle.dt_s >= BLOCK_MAX_S) {
@@ -323,7 +325,11 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
     if (smoother->frames <= BSLAM_SMOOTHER_FRAMES / 2 + 1) {
         set_middle(smoother, ekf);
     }
-    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES;
+    // Where frames are so rare that the block will not hold the next one, it waits for none: a cycle ends with
+    // a block.
+    const bool is_last = smoother->block_s + smoother->gap_s > BLOCK_MAX_S;
+    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES || is_last;
+    smoother->gap_s = 0;
     if (is_whole) {
         close_block(smoother);
     }

@@ -33,14 +33,25 @@ static bslam_pose_t pose_at(const bslam_real_t *at)
 
 // ---- the way ----------------------------------------------------------------------------------------------
 
-/// How the chord from `from` to the node differs from that of the arc at its speeds. Odometry's increments
-/// say as much where there are none.
+/// How far the node's speeds drive it and turn it; odometry's increments, times their scales, where there are
+/// no speeds.
+static void arc_to(const bslam_params_t *model, const bslam_smoother_node_t *node, bslam_real_t *forward_m,
+                   bslam_real_t *turn_rad)
+{
+    const bslam_motion_t *motion = &node->motion;
+    const bool scales = model->velocity_states == 0 && model->scale_states == 0;
+    *forward_m = scales ? model->forward_scale : node->at[BSLAM_STATE_FORWARD];
+    *turn_rad = scales ? model->turn_scale : node->at[BSLAM_STATE_TURN];
+    *forward_m *= model->velocity_states != 0 ? motion->dt_s : motion->forward_m;
+    *turn_rad *= model->velocity_states != 0 ? motion->dt_s : motion->turn_rad;
+}
+
+/// How the chord from `from` to the node differs from that of the arc that its speeds or odometry tell.
 static void bend_way(const bslam_params_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
 {
-    const bool speeds = model->velocity_states != 0;
-    const bslam_motion_t *motion = &node->motion;
-    const bslam_real_t forward_m = speeds ? node->at[BSLAM_STATE_FORWARD] * motion->dt_s : motion->forward_m;
-    const bslam_real_t turn_rad = speeds ? node->at[BSLAM_STATE_TURN] * motion->dt_s : motion->turn_rad;
+    bslam_real_t forward_m;
+    bslam_real_t turn_rad;
+    arc_to(model, node, &forward_m, &turn_rad);
     const bslam_pose_t start = pose_at(from);
     bslam_motion_jacobian_t unused;
     const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, forward_m, turn_rad, &unused);

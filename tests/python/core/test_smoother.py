@@ -60,8 +60,8 @@ def see(slam, step, bearings):
     slam.sightings(step * STEP_US, bearings, [math.nan] * count, list(range(count)), [True] * count)
 
 
-def run(steps, real="double", noise=1.0, seed=0, exact=None):
-    """The core after a drive, and the drive; `exact` is fed alike."""
+def run(steps, real="double", noise=1.0, seed=0, exact=None, every=1):
+    """The core after a drive, a frame at every so many steps, and the drive; `exact` is fed alike."""
     drive, slam = Drive(noise, seed), Slam(PARAMS, beacons_max=4, real=real)
     for step in range(steps + 1):
         if step:
@@ -70,6 +70,8 @@ def run(steps, real="double", noise=1.0, seed=0, exact=None):
             if exact is not None:
                 exact.add_step(0.04, left_m, right_m, move_on_arc(exact.last_pose, left_m, right_m, 0.4))
         bearings = drive.look()
+        if step % every:
+            continue
         see(slam, step, bearings)
         for beacon, bearing_rad in enumerate(bearings if exact is not None else []):
             exact.add_sighting(step, beacon, bearing_rad, math.nan)
@@ -96,11 +98,44 @@ def test_smoother_is_near_the_exact_map_of_the_whole_drive(seed):
     assert off @ np.linalg.solve(slam.pose_covariance(), off) < 1.0
 
 
+@pytest.mark.parametrize("every", [2, 3, 6, 10])
+def test_smoother_smooths_where_frames_are_rare(every):
+    """A block holds less than its three frames there, and a cycle ends with it all the same."""
+    exact = Smoother(Slam.defaults() | PARAMS)
+    slam, _ = run(900, exact=exact, every=every)
+    exact.solve()
+    assert slam._smoother.cycles > 5
+    assert np.max(np.abs(places_of(slam) - exact.beacons) / sd_of_places(slam)) < 1.0
+
+
 def test_drive_without_noise_is_recovered():
     slam, drive = run(600, noise=0.0)
     # The prior of 4 m +- 2.5 m pulls at the scale, which directions leave to the wheels.
     assert np.abs(places_of(slam) - PLACES).max() < 0.1
     assert math.dist(slam.pose()[:2], drive.pose[:2]) < 0.06, "0.6 % of the way"
+
+
+@pytest.mark.parametrize(
+    ("scales", "size_off_max"),
+    [({"forward_scale": 0.8, "turn_scale": 0.8}, 0.01), ({"scale_states": 1}, 0.2)],
+    ids=["given", "estimated"],
+)
+def test_wheels_that_read_too_much_bend_no_way_that_is_joined(scales, size_off_max):
+    """Without speeds, ways are odometry's times its scales; joined nodes' ways are told against that.
+
+    Estimated scales start at 1, so the map has the size that was thought at first for a good part.
+    """
+    params = PARAMS | {"velocity_states": 0} | scales
+    drive, slam = Drive(0.0), Slam(params, beacons_max=4, real="double")
+    for step in range(1500):
+        if step:
+            left_m, right_m = drive.go()
+            slam.odometry("wheels", step * STEP_US, left_m / 0.8, right_m / 0.8)
+        see(slam, step, drive.look())
+    assert slam._smoother.levels[1] > 0
+    size = np.mean(np.linalg.norm(places_of(slam), axis=1) / np.linalg.norm(PLACES, axis=1))
+    assert abs(size - 1.0) < size_off_max
+    assert np.abs(places_of(slam) / size - PLACES).max() < 0.05
 
 
 def test_float_is_double_within_a_share_of_the_doubt():
