@@ -37,8 +37,9 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->path_walk = params->path_walk_mps_sqrt_s;
     smoother->model.bearing_only_variance_factor = 1;
     smoother->model.bearing_only_curvature_factor = 0;
+    // A model without a gate rests on Huber's rule, and keeps its own.
+    smoother->model.huber_d = params->gate_d2 > 0 || params->huber_d <= 0 ? HUBER_D : params->huber_d;
     smoother->model.gate_d2 = 0;
-    smoother->model.huber_d = HUBER_D;
     smoother->base = *ekf;
     memset(smoother->base.correction, 0, sizeof smoother->base.correction);
     smoother->base.has_correction = true;
@@ -51,6 +52,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->to_middle = (bslam_motion_t){0};
     smoother->from_middle = (bslam_motion_t){0};
     smoother->gap_s = 0;
+    smoother->gap_before_s = 0;
     clear_block(smoother);
     bslam_smoother_begin(smoother);
 }
@@ -319,16 +321,23 @@ static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, 
     smoother->cycles++;
 }
 
+/// Frames come so rarely that the block will not hold the next one: two gaps say so, for one may be a moment
+/// without a beacon. A cycle ends with a block.
+static bool is_last_of_block(const bslam_smoother_t *smoother)
+{
+    const bslam_real_t gap_s =
+        smoother->gap_s < smoother->gap_before_s ? smoother->gap_s : smoother->gap_before_s;
+    return smoother->block_s + gap_s > BLOCK_MAX_S;
+}
+
 void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
 {
     smoother->frames++;
     if (smoother->frames <= BSLAM_SMOOTHER_FRAMES / 2 + 1) {
         set_middle(smoother, ekf);
     }
-    // Where frames are so rare that the block will not hold the next one, it waits for none: a cycle ends with
-    // a block.
-    const bool is_last = smoother->block_s + smoother->gap_s > BLOCK_MAX_S;
-    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES || is_last;
+    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES || is_last_of_block(smoother);
+    smoother->gap_before_s = smoother->gap_s;
     smoother->gap_s = 0;
     if (is_whole) {
         close_block(smoother);
