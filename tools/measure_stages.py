@@ -2,14 +2,16 @@
 
 Walks through worlds of style "test" with the built-in model and says of the objects that count, by kind (what
 counts: tools/training/truth.py): of how many a proposal overlaps by half and by .7; how many are still among
-the candidates when every score is taken; and how many are found at a precision. `--coarse` looks at pixels as
-they are where the rig says doubled.
+the candidates when every score is taken; and how many are found at a precision. Then the same by the object's
+shorter side in pixels of the picture. `--coarse` looks at pixels as they are where the rig says doubled.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 NEAR_M = {"pinhole": 6.0, "wide": 5.0}
 OVERLAP_GOOD = 0.7
 PRECISIONS = (0.95, 0.90)
+SIZES_PX = (0.0, 10.0, 14.0, 20.0, 28.0, 40.0, np.inf)
 
 
 def best_boxes(world: World, camera: Camera) -> NDArray[np.float64]:
@@ -40,8 +43,24 @@ def best_boxes(world: World, camera: Camera) -> NDArray[np.float64]:
     return best
 
 
-def report(seen: Sightings, best: NDArray[np.float64], near_m: float) -> None:
-    """Prints shares of the objects, near ones by kind, then all."""
+def shorter_sides(objects: NDArray[np.void], worlds: Sequence[World]) -> NDArray[np.float64]:
+    """The shorter side of each object's box, in pixels of the picture."""
+    boxes = {world.seed: world.seen["box"] for world in worlds}
+    sides = [boxes[int(one["world"])][one["row"]] for one in objects]
+    return np.array([min(box[2] - box[0], box[3] - box[1]) for box in sides])
+
+
+def size_rows(side_px: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
+    """Which objects are of which size, by the sizes' names."""
+    rows = {}
+    for low, high in pairwise(SIZES_PX):
+        name = f"{low:g} to {high:g} px" if np.isfinite(high) else f"from {low:g} px"
+        rows[name] = (side_px >= low) & (side_px < high)
+    return rows
+
+
+def report(seen: Sightings, best: NDArray[np.float64], side_px: NDArray[np.float64], near_m: float) -> None:
+    """Prints shares of the objects, near ones by kind and by size, then all."""
     stages = [best >= OVERLAP_MIN, best >= OVERLAP_GOOD, is_found(seen.objects, seen.detections)]
     stages += [score(seen, precision).found for precision in PRECISIONS]
     titles = ("a box", "a good one", "any score", *(f"at {precision:.2f}" for precision in PRECISIONS))
@@ -49,6 +68,7 @@ def report(seen: Sightings, best: NDArray[np.float64], near_m: float) -> None:
     near = seen.objects["range_m"] < near_m
     rows = {f"to {near_m:g} m": near, "all": np.ones_like(near)}
     rows |= {kind: near & (seen.objects["kind"] == index) for index, kind in enumerate(KINDS)}
+    rows |= {name: near & chosen for name, chosen in size_rows(side_px).items()}
     for name, chosen in rows.items():
         if chosen.any():
             shares = " ".join(f"{stage[chosen].mean():>10.3f}" for stage in stages)
@@ -73,7 +93,7 @@ def main() -> int:
     seen = look_at_worlds(options.folder, lens, "test", seeds, None, options.processes)
     worlds = [read_world(options.folder, lens, "test", seed) for seed in seeds]
     best = np.concatenate([best_boxes(world, camera_of(lens, world.seed)) for world in worlds])
-    report(seen, best, NEAR_M[lens])
+    report(seen, best, shorter_sides(seen.objects, worlds), NEAR_M[lens])
     return 0
 
 
