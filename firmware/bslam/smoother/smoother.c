@@ -8,6 +8,9 @@
 
 /// A block lasts no longer, nor does a node's motion where nothing is seen.
 static const bslam_real_t BLOCK_MAX_S = BSLAM_R(0.2);
+/// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
+/// last moment before nothing is in view.
+enum { UNFILLED_MIN = 5 };
 /// How a bearing changes besides by the turn that the filter has, rad/s: by the way, and by an error of that.
 static const bslam_real_t SLOPE_SD_RADPS = BSLAM_R(0.5);
 /// A beacon in direction only is first thought to be so far away.
@@ -52,7 +55,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->to_middle = (bslam_motion_t){0};
     smoother->from_middle = (bslam_motion_t){0};
     smoother->gap_s = 0;
-    smoother->gap_before_s = 0;
+    smoother->unfilled = 0;
     clear_block(smoother);
     bslam_smoother_begin(smoother);
 }
@@ -164,6 +167,9 @@ static void make_room(bslam_smoother_t *smoother, int seen)
 /// The open block becomes a node.
 static void close_block(bslam_smoother_t *smoother)
 {
+    if (smoother->frames > 0) {
+        smoother->unfilled = smoother->frames == BSLAM_SMOOTHER_FRAMES ? 0 : smoother->unfilled + 1;
+    }
     const int seen = seen_of_block(smoother);
     make_room(smoother, seen);
     bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->node_count);
@@ -321,13 +327,10 @@ static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, 
     smoother->cycles++;
 }
 
-/// Frames come so rarely that the block will not hold the next one: two gaps say so, for one may be a moment
-/// without a beacon. A cycle ends with a block.
+/// Frames have come so rarely for a while that the block will not hold the next one. Cycles end with a block.
 static bool is_last_of_block(const bslam_smoother_t *smoother)
 {
-    const bslam_real_t gap_s =
-        smoother->gap_s < smoother->gap_before_s ? smoother->gap_s : smoother->gap_before_s;
-    return smoother->block_s + gap_s > BLOCK_MAX_S;
+    return smoother->unfilled >= UNFILLED_MIN && smoother->block_s + smoother->gap_s > BLOCK_MAX_S;
 }
 
 void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
@@ -337,7 +340,6 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
         set_middle(smoother, ekf);
     }
     const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES || is_last_of_block(smoother);
-    smoother->gap_before_s = smoother->gap_s;
     smoother->gap_s = 0;
     if (is_whole) {
         close_block(smoother);

@@ -118,8 +118,8 @@ typedef struct bslam_smoother {
     bslam_real_t middle[BSLAM_ROBOT_DIM_MAX];
     bslam_real_t middle_s;  ///< since the block's first frame
     bslam_real_t block_s;
-    bslam_real_t gap_s;         ///< since the frame before
-    bslam_real_t gap_before_s;  ///< from the one before that to it
+    bslam_real_t gap_s;  ///< since the frame before
+    int32_t unfilled;    ///< blocks in a row that held fewer frames than a node is made of
     int32_t frames;
     uint32_t cycles;    ///< that took the filter's place
     uint32_t insane;    ///< that did not, because they came out not finite
