@@ -82,8 +82,8 @@ def _best(
     assert log.beacons is not None
     smoother = Smoother(params, FIRST_RANGE_LN)
     poses = np.column_stack([true[:, :2], np.unwrap(true[:, 2])])
-    gaps_s = np.diff(time_us).tolist()
-    wheels = zip(gaps_s, log.odometry.a.tolist(), log.odometry.b.tolist(), poses[1:].tolist(), strict=False)
+    gaps_us = np.diff(time_us).tolist()
+    wheels = zip(gaps_us, log.odometry.a.tolist(), log.odometry.b.tolist(), poses[1:].tolist(), strict=False)
     for gap_us, left_m, right_m, (x_m, y_m, theta_rad) in wheels:
         smoother.add_step(1e-6 * gap_us, left_m, right_m, (x_m, y_m, theta_rad))
     at_m = np.column_stack([log.beacons.x_m, log.beacons.y_m])

@@ -159,9 +159,8 @@ class Smoother:
             cost, normal = problem.linearise(poses, beacons, weights)
             trial = problem.lower(poses, beacons, *normal.solve(), weights, cost)
             largest = max(np.abs(trial[0] - poses).max(), np.abs(trial[1] - beacons).max(initial=0.0))
-            settled = largest < _SETTLED or cost - problem.cost(*trial, weights) < _SETTLED_COST * cost
             poses, beacons = trial
-            if settled:
+            if largest < _SETTLED or cost - problem.cost(*trial, weights) < _SETTLED_COST * cost:
                 self._poses, self._beacons = poses, beacons
                 return iteration
         raise ArithmeticError(f"{self.steps} poses have not settled in {_ITERATIONS_MAX} iterations")
