@@ -15,9 +15,12 @@ enum { UP_COST = 8, BACK_COST = 12 };
 /// What may come in while a cycle lasts.
 #define SLACK_NODES (BSLAM_SMOOTHER_NODES_MAX / 16 + 2)
 #define SLACK_SEEN (BSLAM_SMOOTHER_SEEN_MAX / 12)
-/// Places move no farther at once, as a share of the distance from the robot: beyond that the model is far
-/// from linear, and a beacon must not jump to the robot.
+/// Places move no farther at once, as a share of the distance from the robot, and of the least distance that
+/// they were seen from: beyond that the model is far from linear, and a beacon must neither jump to the robot
+/// nor over the robot's way, for directions from there would point the other way then.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
+static const bslam_real_t NEAREST_STEP_MAX = BSLAM_R(0.6);
+static const bslam_real_t NEVER_SEEN_M2 = BSLAM_R(1e6);
 /// The logarithm of 4.7 m, and its standard deviation: 2.9 to 7.8 m. Rather too far than too near: directions
 /// are the more linear the farther a beacon is.
 static const bslam_real_t LN_GUESS_M = BSLAM_R(1.55);
@@ -120,6 +123,12 @@ void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
     smoother->seen_count -= node->seen;
     smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;
     smoother->node_count--;
+    if (smoother->anchors > 0) {
+        smoother->anchors--;
+    }
+    if (smoother->anchors > 0) {
+        return;
+    }
     int level = BSLAM_SMOOTHER_LEVELS - 1;
     while (level > 0 && smoother->levels[level] == 0) {
         level--;
@@ -137,21 +146,50 @@ void bslam_smoother_begin(bslam_smoother_t *smoother)
     smoother->run = smoother->base;
     smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
     smoother->phase = BSLAM_SMOOTHER_FORTH;
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        smoother->nearest_m2[b] = NEVER_SEEN_M2;
+    }
     smoother->at = 0;
     smoother->at_seen = 0;
     smoother->work = 0;
 }
 
-/// How much of its correction a beacon may take.
-static bslam_real_t share_of_step(const bslam_ekf_t *run, int at)
+static bslam_real_t smaller(bslam_real_t a, bslam_real_t b)
 {
-    const bslam_real_t dx = run->correction[at];
-    const bslam_real_t dy = run->correction[at + 1];
-    const bslam_real_t ex = run->mean[at] - run->mean[BSLAM_STATE_X];
-    const bslam_real_t ey = run->mean[at + 1] - run->mean[BSLAM_STATE_Y];
-    const bslam_real_t way_m = bslam_sqrt(dx * dx + dy * dy);
-    const bslam_real_t most_m = STEP_MAX * bslam_sqrt(ex * ex + ey * ey);
-    return way_m > most_m ? most_m / way_m : 1;
+    return a < b ? a : b;
+}
+
+static bslam_real_t square_between(const bslam_real_t a[2], const bslam_real_t b[2])
+{
+    const bslam_real_t dx = a[0] - b[0];
+    const bslam_real_t dy = a[1] - b[1];
+    return dx * dx + dy * dy;
+}
+
+/// Notes how near the beacons were that are seen from a node.
+static void note_nearest(bslam_smoother_t *smoother, const bslam_smoother_node_t *node, int first_seen)
+{
+    for (int k = 0; k < node->seen; k++) {
+        const int b = bslam_smoother_seen(smoother, first_seen + k)->beacon;
+        if (b != BSLAM_SMOOTHER_RANGE && smoother->run.beacons[b].kind != BSLAM_BEACON_KNOWN) {
+            const bslam_real_t *place = &smoother->place[smoother->run.beacons[b].at];
+            const bslam_real_t m2 = square_between(place, &node->at[BSLAM_STATE_X]);
+            smoother->nearest_m2[b] = smaller(smoother->nearest_m2[b], m2);
+        }
+    }
+}
+
+/// How much of its correction beacon `b` may take.
+static bslam_real_t share_of_step(const bslam_smoother_t *smoother, int b)
+{
+    const bslam_ekf_t *run = &smoother->run;
+    const int at = run->beacons[b].at;
+    const bslam_real_t *step = &run->correction[at];
+    const bslam_real_t way2 = step[0] * step[0] + step[1] * step[1];
+    const bslam_real_t far2 = square_between(&run->mean[at], &run->mean[BSLAM_STATE_X]);
+    const bslam_real_t most2 =
+        smaller(STEP_MAX * STEP_MAX * far2, NEAREST_STEP_MAX * NEAREST_STEP_MAX * smoother->nearest_m2[b]);
+    return way2 > most2 ? bslam_sqrt(most2 / way2) : 1;
 }
 
 /// Where a point is linearised about: where it is, or behind that where the robot is too near.
@@ -174,8 +212,7 @@ static void end_forth(bslam_smoother_t *smoother)
     bslam_real_t least = 1;
     for (int b = 0; b < run->beacon_count; b++) {
         if (run->beacons[b].kind != BSLAM_BEACON_KNOWN) {
-            const bslam_real_t share = share_of_step(run, run->beacons[b].at);
-            least = share < least ? share : least;
+            least = smaller(least, share_of_step(smoother, b));
         }
     }
     for (int i = 0; i < run->dim; i++) {
@@ -373,7 +410,9 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
 static void advance(bslam_smoother_t *smoother)
 {
     const bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->at);
-    if (smoother->phase == BSLAM_SMOOTHER_UP && smoother->at % BSLAM_SMOOTHER_PART == 0) {
+    if (smoother->phase == BSLAM_SMOOTHER_FORTH) {
+        note_nearest(smoother, node, smoother->at_seen);
+    } else if (smoother->at % BSLAM_SMOOTHER_PART == 0) {
         note_mark(&smoother->run, &smoother->marks[smoother->at / BSLAM_SMOOTHER_PART]);
     }
     pass_node(smoother, &smoother->run, node, smoother->at_seen);

@@ -49,6 +49,8 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     memcpy(smoother->place, ekf->mean, sizeof smoother->place);
     smoother->first_node = 0;
     smoother->node_count = 0;
+    smoother->anchors = 0;
+    smoother->anchors_to_come = BSLAM_SMOOTHER_ANCHORS;
     memset(smoother->levels, 0, sizeof smoother->levels);
     smoother->first_seen = 0;
     smoother->seen_count = 0;
@@ -164,11 +166,29 @@ static void make_room(bslam_smoother_t *smoother, int seen)
     }
 }
 
+/// How many frames the open block is to hold.
+static int frames_wanted(const bslam_smoother_t *smoother)
+{
+    return smoother->anchors_to_come > 0 ? 1 : BSLAM_SMOOTHER_FRAMES;
+}
+
+/// A node has come at the new end. The oldest one belongs to no level.
+static void count_node(bslam_smoother_t *smoother)
+{
+    if (smoother->anchors_to_come > 0) {
+        smoother->anchors_to_come--;
+        smoother->anchors++;
+    } else {
+        smoother->levels[0] += smoother->node_count > 0 ? 1 : 0;
+    }
+    smoother->node_count++;
+}
+
 /// The open block becomes a node.
 static void close_block(bslam_smoother_t *smoother)
 {
     if (smoother->frames > 0) {
-        smoother->unfilled = smoother->frames == BSLAM_SMOOTHER_FRAMES ? 0 : smoother->unfilled + 1;
+        smoother->unfilled = smoother->frames == frames_wanted(smoother) ? 0 : smoother->unfilled + 1;
     }
     const int seen = seen_of_block(smoother);
     make_room(smoother, seen);
@@ -187,8 +207,7 @@ static void close_block(bslam_smoother_t *smoother)
             push_seen(smoother, range_of(line));
         }
     }
-    smoother->levels[0] += smoother->node_count > 0 ? 1 : 0;
-    smoother->node_count++;
+    count_node(smoother);
     smoother->to_middle = (bslam_motion_t){0};
     clear_block(smoother);
 }
@@ -339,7 +358,7 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
     if (smoother->frames <= BSLAM_SMOOTHER_FRAMES / 2 + 1) {
         set_middle(smoother, ekf);
     }
-    const bool is_whole = smoother->frames == BSLAM_SMOOTHER_FRAMES || is_last_of_block(smoother);
+    const bool is_whole = smoother->frames == frames_wanted(smoother) || is_last_of_block(smoother);
     smoother->gap_s = 0;
     if (is_whole) {
         close_block(smoother);

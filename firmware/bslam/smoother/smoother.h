@@ -29,6 +29,11 @@
 #define BSLAM_SMOOTHER_PART 20
 #define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
 
+/// So many of the first frames are nodes of their own, and are not joined. Only there is the heading known
+/// without any beacon, so what is seen there tells how the map lies; a node's heading, which is that of its
+/// middle, would tell it as badly as that one is known.
+#define BSLAM_SMOOTHER_ANCHORS 12
+
 /// Two nodes of a level become one of the next where room is wanted: 1, 2, 4 and 8 times so many frames.
 #define BSLAM_SMOOTHER_LEVELS 4
 
@@ -100,7 +105,9 @@ typedef struct bslam_smoother {
     bslam_smoother_seen_t seen[BSLAM_SMOOTHER_SEEN_MAX];
     int32_t first_node;  ///< rings: where the oldest stands, and how many
     int32_t node_count;
-    int32_t levels[BSLAM_SMOOTHER_LEVELS];  ///< nodes of each, the newest ones' first
+    int32_t anchors;                        ///< the oldest nodes that are one of the first frames each
+    int32_t anchors_to_come;                ///< frames that will be such nodes yet
+    int32_t levels[BSLAM_SMOOTHER_LEVELS];  ///< nodes of each behind these, the newest ones' first
     int32_t first_seen;
     int32_t seen_count;
     bslam_smoother_phase_t phase;
@@ -111,6 +118,7 @@ typedef struct bslam_smoother {
     bslam_smoother_mark_t marks[BSLAM_SMOOTHER_PARTS];
     bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
     bslam_smoother_seen_t joined[2 * BSLAM_BEACONS_MAX];  ///< scratch: too much for a stack
+    bslam_real_t nearest_m2[BSLAM_BEACONS_MAX];  ///< of the way forth: squares of how near it was seen from
     // The open block.
     bslam_smoother_line_t lines[BSLAM_BEACONS_MAX];
     bslam_motion_t to_middle;    ///< from the newest node to the block's middle

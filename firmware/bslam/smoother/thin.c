@@ -330,6 +330,9 @@ void bslam_smoother_thin(bslam_smoother_t *smoother, int nodes_max)
     closing_t at = {0};
     memcpy(at.from, smoother->base.mean, sizeof at.from);
     keep_node(smoother, &at);
+    for (int k = 1; k < smoother->anchors; k++) {
+        keep_node(smoother, &at);
+    }
     for (int l = BSLAM_SMOOTHER_LEVELS - 1; l >= 0; l--) {
         for (int k = 0; k < pairs[l]; k++) {
             join_nodes(smoother, &at);

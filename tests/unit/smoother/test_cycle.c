@@ -473,6 +473,56 @@ static void test_beacon_near_the_robot_is_linearised_about_a_metre_off(void **st
     }
 }
 
+// ---- how far the map moves at once ------------------------------------------------------------------------
+
+/// A way forth that ends 2.5 m from beacon 2 and moves it by 1 m, if it may; how far it does.
+static double moved_m(double nearest_m)
+{
+    make_window(11, 1);
+    bslam_ekf_t *run = &smoother.run;
+    const int at = run->beacons[2].at;
+    smoother.at = smoother.node_count;
+    smoother.nearest_m2[2] = real(nearest_m * nearest_m);
+    memset(run->correction, 0, sizeof run->correction);
+    run->mean[at] = run->mean[BSLAM_STATE_X] + BSLAM_R(1.5);
+    run->mean[at + 1] = run->mean[BSLAM_STATE_Y] + 2;
+    const double before = (double)run->mean[at];
+    run->correction[at] = 1;
+    go_forth();
+    return (double)run->mean[at] - before;
+}
+
+static void test_beacon_moves_by_a_part_of_its_least_distance_at_most(void **state)
+{
+    assert_near(moved_m(100), 0.3 * 2.5, 1e-5);
+    assert_near(moved_m(0.4), 0.6 * 0.4, 1e-5);
+}
+
+static void test_way_forth_notes_how_near_beacons_were_seen_from(void **state)
+{
+    double least2[BEACONS];
+    for (int b = 0; b < BEACONS; b++) {
+        least2[b] = HUGE_VAL;
+    }
+    make_window(9, 8);
+    for (int k = 0, at = 0; k < smoother.node_count; k++) {
+        const bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
+        for (const int end = at + node->seen; at < end; at++) {
+            const int b = bslam_smoother_seen(&smoother, at)->beacon;
+            if (b != BSLAM_SMOOTHER_RANGE) {
+                const bslam_real_t *place = &smoother.place[smoother.base.beacons[b].at];
+                const double dx = (double)(place[0] - node->at[BSLAM_STATE_X]);
+                const double dy = (double)(place[1] - node->at[BSLAM_STATE_Y]);
+                least2[b] = fmin(least2[b], dx * dx + dy * dy);
+            }
+        }
+    }
+    go_forth();
+    for (int b = 0; b < BEACONS; b++) {
+        assert_near((double)smoother.nearest_m2[b], least2[b], 1e-5 * least2[b]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -482,6 +532,8 @@ int main(void)
         cmocka_unit_test(test_old_end_leaves_into_the_base_without_loss),
         cmocka_unit_test(test_sighting_from_the_beacon_s_own_place_is_left_out_and_counted),
         cmocka_unit_test(test_beacon_near_the_robot_is_linearised_about_a_metre_off),
+        cmocka_unit_test(test_beacon_moves_by_a_part_of_its_least_distance_at_most),
+        cmocka_unit_test(test_way_forth_notes_how_near_beacons_were_seen_from),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

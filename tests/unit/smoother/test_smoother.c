@@ -140,6 +140,7 @@ static void test_node_is_the_line_through_its_bearings(void **state)
     assert_in_range(BSLAM_SMOOTHER_FRAMES, 1, COUNT_OF(bearing));
     drive_curve(3);
     bslam_smoother_restart(&smoother, &slam.params, &slam.ekf);
+    smoother.anchors_to_come = 0;
     bslam_ekf_t filter = slam.ekf;
     filter.mean[BSLAM_STATE_TURN] = real(omega);
     double a[3] = {1 / (0.5 * 0.5), 0, 0};  // of slope²; of slope, offset; of offset²
@@ -172,6 +173,29 @@ static void test_node_is_the_line_through_its_bearings(void **state)
     const double sd_rad = sqrt(a[0] / determinant);
     const double last_bit_rad = 1e-6 * exp2(floor(log2(sd_rad * 1e6)) - 4);
     assert_near((double)bslam_smoother_sd_rad(seen), sd_rad, 0.51 * last_bit_rad);
+}
+
+static void test_first_frames_stay_nodes_of_their_own(void **state)
+{
+    drive_curve(BSLAM_SMOOTHER_ANCHORS - 1);  // and the frame at the start
+    assert_int_equal(smoother.node_count, BSLAM_SMOOTHER_ANCHORS);
+    drive_curve(BSLAM_SMOOTHER_FRAMES);
+    assert_int_equal(smoother.node_count, BSLAM_SMOOTHER_ANCHORS + 1);
+    drive_curve(2 * BSLAM_SMOOTHER_NODES_MAX * BSLAM_SMOOTHER_FRAMES);
+    assert_true(smoother.levels[1] > 0);
+    assert_int_equal(smoother.anchors, BSLAM_SMOOTHER_ANCHORS);
+    for (int k = 1; k < smoother.anchors; k++) {
+        assert_near((double)bslam_smoother_node(&smoother, k)->motion.dt_s, 1e-6 * STEP_US, 1e-6);
+    }
+    while (smoother.node_count > 1) {
+        const int anchors = smoother.anchors;
+        bslam_smoother_drop_oldest(&smoother);
+        int nodes = anchors > 2 ? anchors - 1 : 1;
+        for (int l = 0; l < BSLAM_SMOOTHER_LEVELS; l++) {
+            nodes += smoother.levels[l];
+        }
+        assert_int_equal(smoother.node_count, nodes);
+    }
 }
 
 static void test_deviation_is_kept_within_three_percent_and_one_radian_at_most(void **state)
@@ -347,7 +371,12 @@ static void test_robot_that_only_turns_learns_no_distance(void **state)
     }
     assert_sound();
     for (int b = 0; b < LABELS; b++) {
-        assert_true(sd_along(b) > 1);
+        // Half of the doubt of a first guess is left at least, which is half of the distance; and it is true.
+        bslam_beacon_view_t view;
+        assert_int_equal(bslam_slam_beacon(&slam, b, &view), BSLAM_OK);
+        const double distance_m = hypot((double)view.x_m, (double)view.y_m);
+        assert_true(sd_along(b) > 0.25 * distance_m);
+        assert_near(distance_m, hypot(places[b][0], places[b][1]), 2.5 * sd_along(b));
     }
 }
 
@@ -402,6 +431,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_node_is_the_line_through_its_bearings, setup),
+        cmocka_unit_test_setup(test_first_frames_stay_nodes_of_their_own, setup),
         cmocka_unit_test(test_deviation_is_kept_within_three_percent_and_one_radian_at_most),
         cmocka_unit_test_setup(test_windows_of_any_length_stay_within_their_room, setup),
         cmocka_unit_test_setup(test_more_beacons_than_the_window_holds_push_the_oldest_out, setup),

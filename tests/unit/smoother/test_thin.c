@@ -99,6 +99,8 @@ static void fill(int nodes)
         }
     }
     smoother.node_count = nodes;
+    smoother.anchors = 0;
+    smoother.anchors_to_come = 0;
     smoother.levels[0] = nodes - 1;
 }
 
