@@ -193,10 +193,12 @@ typedef struct bslam_transition {
 } bslam_transition_t;
 
 /// How a way of changing speeds differs from the arc at their means: its chord is turned to the left, and
-/// stretched.
+/// stretched. By how much it then still misses the next point, times doubt_of_miss, is its standard
+/// deviation.
 typedef struct bslam_bend {
     bslam_real_t turned_rad;
     bslam_real_t stretch;
+    bslam_real_t doubt_of_miss;
 } bslam_bend_t;
 
 /// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the

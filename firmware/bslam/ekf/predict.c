@@ -381,6 +381,17 @@ static void drive_about(const moving_t *state, const bslam_params_t *params, bsl
     move_covariance(state, &transition);
 }
 
+/// The way is as doubtful as it misses the next point, times `share`, both axes.
+static void doubt_way(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
+{
+    const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
+    const bslam_real_t y_m = share * (ekf->mean[BSLAM_STATE_Y] - next[BSLAM_STATE_Y]);
+    for (int i = BSLAM_STATE_X; i <= BSLAM_STATE_Y; i++) {
+        const bslam_real_t variance = bslam_symmat_get(ekf->covariance, i, i);
+        bslam_symmat_set(ekf->covariance, i, i, variance + x_m * x_m + y_m * y_m);
+    }
+}
+
 void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
                              const bslam_bend_t *bend, const bslam_real_t *next,
                              bslam_transition_t *transition)
@@ -396,6 +407,7 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, con
         drive_about(&state, params, motion->dt_s, bend->stretch, next);
     }
     ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
+    doubt_way(ekf, next, bend->doubt_of_miss);
     for (int i = 0; i < ekf->base_dim; i++) {
         const bslam_real_t left = ekf->mean[i] - next[i];
         ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;

@@ -20,6 +20,11 @@ enum { UP_COST = 8, BACK_COST = 12 };
 /// nor over the robot's way, for directions from there would point the other way then.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
 static const bslam_real_t NEAREST_STEP_MAX = BSLAM_R(0.6);
+/// Sightings that fit worse by more than this than on the last way forth, or than they should, tell of a step
+/// that was too long. Halving it more often than this is of no use: then it is the readings that changed.
+static const bslam_real_t FIT_RATIO_MAX = BSLAM_R(1.5);
+static const bslam_real_t FIT_MIN = BSLAM_R(1.0);
+enum { HALVINGS_MAX = 4 };
 static const bslam_real_t NEVER_SEEN_M2 = BSLAM_R(1e6);
 /// The logarithm of 4.7 m, and its standard deviation: 2.9 to 7.8 m. Rather too far than too near: directions
 /// are the more linear the farther a beacon is.
@@ -66,20 +71,19 @@ static bslam_status_t guess_range(bslam_innovation_t *innovation)
     return BSLAM_OK;
 }
 
-/// What was seen of a beacon, into a filter. False if it cannot be used.
+/// What was seen of a beacon, into a filter, and how it fitted. False if it cannot be used.
 static bool take_seen(const bslam_params_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
-                      const bslam_smoother_seen_t *range)
+                      const bslam_smoother_seen_t *range, bslam_fusion_t *fusion)
 {
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
     const bslam_sighting_t sighting = sighting_of(model, direction, range);
     bslam_innovation_t innovation;
-    bslam_fusion_t unused;
     bslam_status_t status =
         bslam_ekf_innovation(ekf, model, &mount, &sighting, direction->beacon, &innovation);
     if (status == BSLAM_OK && range != NULL && range->weight == BSLAM_SMOOTHER_FIRST) {
         status = guess_range(&innovation);
     }
-    return status == BSLAM_OK && bslam_ekf_fuse(ekf, model, &innovation, &unused) == BSLAM_OK;
+    return status == BSLAM_OK && bslam_ekf_fuse(ekf, model, &innovation, fusion) == BSLAM_OK;
 }
 
 /// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
@@ -97,7 +101,13 @@ static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_
             k++;
             range = bslam_smoother_seen(smoother, first_seen + k);
         }
-        smoother->left_out += take_seen(&smoother->model, ekf, direction, range) ? 0u : 1u;
+        bslam_fusion_t fusion;
+        if (take_seen(&smoother->model, ekf, direction, range, &fusion)) {
+            smoother->misfit += fusion.weight * fusion.distance2;
+            smoother->fitted++;
+        } else {
+            smoother->left_out++;
+        }
     }
     bslam_ekf_settle(ekf);
 }
@@ -149,6 +159,8 @@ void bslam_smoother_begin(bslam_smoother_t *smoother)
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
         smoother->nearest_m2[b] = NEVER_SEEN_M2;
     }
+    smoother->misfit = 0;
+    smoother->fitted = 0;
     smoother->at = 0;
     smoother->at_seen = 0;
     smoother->work = 0;
@@ -204,6 +216,24 @@ static void keep_off(const bslam_ekf_t *run, bslam_real_t place[2])
     }
 }
 
+/// The map is linearised about where the filter of now has it.
+static void move_places(bslam_smoother_t *smoother)
+{
+    const bslam_ekf_t *run = &smoother->run;
+    for (int i = run->base_dim; i < run->dim; i++) {
+        smoother->place_moved[i] = smoother->place[i];
+        smoother->place[i] = run->mean[i];
+    }
+    for (int b = 0; b < run->beacon_count; b++) {
+        if (run->beacons[b].kind == BSLAM_BEACON_POINT) {
+            keep_off(run, &smoother->place[run->beacons[b].at]);
+        }
+    }
+    for (int i = run->base_dim; i < run->dim; i++) {
+        smoother->place_moved[i] = smoother->place[i] - smoother->place_moved[i];
+    }
+}
+
 /// The filter of now takes its correction, or as much of it, all values alike, as no beacon refuses. The map
 /// that comes of it is linearised about from then on.
 static void end_forth(bslam_smoother_t *smoother)
@@ -223,14 +253,35 @@ static void end_forth(bslam_smoother_t *smoother)
         }
     }
     bslam_ekf_correct(run, &smoother->model);
-    for (int i = run->base_dim; i < run->dim; i++) {
-        smoother->place[i] = run->mean[i];
+    move_places(smoother);
+    smoother->fit = smoother->fitted > 0 ? smoother->misfit / (bslam_real_t)smoother->fitted : 0;
+    smoother->halvings = 0;
+}
+
+/// The way forth was linear about points that the last cycle changed. If its sightings fit worse by much than
+/// on the way before, a change was too large for the model to be linear on: all points go back half of it.
+static bool is_worse(const bslam_smoother_t *smoother)
+{
+    const bslam_real_t most = FIT_RATIO_MAX * (smoother->fit > FIT_MIN ? smoother->fit : FIT_MIN);
+    return smoother->halvings < HALVINGS_MAX && smoother->misfit > most * (bslam_real_t)smoother->fitted;
+}
+
+static void go_half_back(bslam_smoother_t *smoother)
+{
+    for (int i = smoother->base.base_dim; i < smoother->base.dim; i++) {
+        smoother->place_moved[i] /= 2;
+        smoother->place[i] -= smoother->place_moved[i];
     }
-    for (int b = 0; b < run->beacon_count; b++) {
-        if (run->beacons[b].kind == BSLAM_BEACON_POINT) {
-            keep_off(run, &smoother->place[run->beacons[b].at]);
+    for (int k = 0; k < smoother->node_count; k++) {
+        bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
+        for (int i = 0; i < smoother->base.base_dim; i++) {
+            node->moved[i] = (int16_t)(node->moved[i] / 2);
+            node->at[i] -= node->moved[i] * BSLAM_SMOOTHER_MOVED;
         }
+        node->at[BSLAM_STATE_THETA] = bslam_angle_wrap(node->at[BSLAM_STATE_THETA]);
     }
+    smoother->halvings++;
+    smoother->halved++;
 }
 
 // ---- up and back: the robot alone -------------------------------------------------------------------------
@@ -366,6 +417,13 @@ static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *nex
     }
 }
 
+/// As a node has it. What is too far to note is not taken back.
+static int16_t note_moved(bslam_real_t moved)
+{
+    const bslam_real_t units = moved / BSLAM_SMOOTHER_MOVED;
+    return (int16_t)(units < INT16_MAX && units > -INT16_MAX ? units : 0);
+}
+
 /// The nodes of a part, which begins at `first`, move to where they fit best.
 static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
 {
@@ -399,6 +457,7 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
         for (int i = 0; i < n; i++) {
             change[i] = moved[i];
             node->at[i] += moved[i];
+            node->moved[i] = note_moved(moved[i]);
         }
         node->at[BSLAM_STATE_THETA] = bslam_angle_wrap(node->at[BSLAM_STATE_THETA]);
     }
@@ -443,6 +502,11 @@ bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole)
                 break;
             }
             smoother->work = 0;
+            if (is_whole && is_worse(smoother)) {
+                go_half_back(smoother);
+                bslam_smoother_begin(smoother);
+                return false;
+            }
             if (is_whole) {
                 end_forth(smoother);
             }

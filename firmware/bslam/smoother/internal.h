@@ -8,6 +8,13 @@
 #define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-6)
 #define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
 #define BSLAM_SMOOTHER_BEND BSLAM_R(5e-5)
+#define BSLAM_SMOOTHER_MOVED BSLAM_R(1e-3)
+
+/// A block lasts no longer, nor does a node's motion where nothing is seen.
+#define BSLAM_SMOOTHER_BLOCK_MAX_S BSLAM_R(0.2)
+/// How a longer way was driven is known as well as it was when its nodes were joined, and where the robot
+/// turned on the spot, not at all. A filter that took it for certain would shrink the map until it fits.
+#define BSLAM_SMOOTHER_DOUBT_OF_MISS BSLAM_R(0.5)
 
 /// Node k, counted from the oldest.
 static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoother, int k)
@@ -28,7 +35,11 @@ static inline bslam_real_t bslam_smoother_bearing_rad(const bslam_smoother_seen_
 
 static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node)
 {
-    const bslam_bend_t bend = {node->turned * BSLAM_SMOOTHER_BEND, 1 + node->stretched * BSLAM_SMOOTHER_BEND};
+    const bslam_bend_t bend = {
+        .turned_rad = node->turned * BSLAM_SMOOTHER_BEND,
+        .stretch = 1 + node->stretched * BSLAM_SMOOTHER_BEND,
+        .doubt_of_miss = node->motion.dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S ? BSLAM_SMOOTHER_DOUBT_OF_MISS : 0,
+    };
     return bend;
 }
 

@@ -6,8 +6,6 @@
 #include "bslam/model/noise.h"
 #include "bslam/smoother/internal.h"
 
-/// A block lasts no longer, nor does a node's motion where nothing is seen.
-static const bslam_real_t BLOCK_MAX_S = BSLAM_R(0.2);
 /// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
 /// last moment before nothing is in view.
 enum { UNFILLED_MIN = 5 };
@@ -47,6 +45,9 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     memset(smoother->base.correction, 0, sizeof smoother->base.correction);
     smoother->base.has_correction = true;
     memcpy(smoother->place, ekf->mean, sizeof smoother->place);
+    memset(smoother->place_moved, 0, sizeof smoother->place_moved);
+    smoother->fit = 0;
+    smoother->halvings = 0;
     smoother->first_node = 0;
     smoother->node_count = 0;
     smoother->anchors = 0;
@@ -194,6 +195,7 @@ static void close_block(bslam_smoother_t *smoother)
     make_room(smoother, seen);
     bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->node_count);
     memcpy(node->at, smoother->middle, sizeof node->at);
+    memset(node->moved, 0, sizeof node->moved);
     node->motion = smoother->to_middle;
     node->seen = (int16_t)seen;
     node->turned = 0;
@@ -223,14 +225,14 @@ static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
 
 void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion)
 {
-    if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BLOCK_MAX_S) {
+    if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S) {
         close_block(smoother);
     }
     bslam_smoother_add_motion(&smoother->from_middle, motion);
     smoother->gap_s += motion->dt_s;
     if (smoother->frames > 0) {
         smoother->block_s += motion->dt_s;
-    } else if (smoother->from_middle.dt_s >= BLOCK_MAX_S) {
+    } else if (smoother->from_middle.dt_s >= BSLAM_SMOOTHER_BLOCK_MAX_S) {
         set_middle(smoother, ekf);
         close_block(smoother);
     }
@@ -274,6 +276,8 @@ bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf, 
     const int at = smoother->base.dim;
     smoother->place[at] = point.x_m;
     smoother->place[at + 1] = point.y_m;
+    smoother->place_moved[at] = 0;
+    smoother->place_moved[at + 1] = 0;
     int same;
     smoother->lines[*index].is_first = true;
     smoother->base.correction[at] = 0;
@@ -321,6 +325,7 @@ void bslam_smoother_remove(bslam_smoother_t *smoother, int index)
     if (dim > 0) {
         const size_t behind = (size_t)(smoother->base.dim - at - dim) * sizeof smoother->place[0];
         memmove(&smoother->place[at], &smoother->place[at + dim], behind);
+        memmove(&smoother->place_moved[at], &smoother->place_moved[at + dim], behind);
         memmove(&smoother->base.correction[at], &smoother->base.correction[at + dim], behind);
     }
     memmove(&smoother->lines[index], &smoother->lines[index + 1],
@@ -349,7 +354,8 @@ static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, 
 /// Frames have come so rarely for a while that the block will not hold the next one. Cycles end with a block.
 static bool is_last_of_block(const bslam_smoother_t *smoother)
 {
-    return smoother->unfilled >= UNFILLED_MIN && smoother->block_s + smoother->gap_s > BLOCK_MAX_S;
+    return smoother->unfilled >= UNFILLED_MIN &&
+           smoother->block_s + smoother->gap_s > BSLAM_SMOOTHER_BLOCK_MAX_S;
 }
 
 void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)

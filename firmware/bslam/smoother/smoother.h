@@ -58,6 +58,7 @@ typedef struct bslam_smoother_node {
     int16_t seen;                          ///< directions and distances
     int16_t turned;                        ///< how its way differs from an arc: bslam_bend_t, in units of
     int16_t stretched;                     ///< BSLAM_SMOOTHER_BEND, the latter less 1
+    int16_t moved[BSLAM_ROBOT_DIM_MAX];  ///< what the last way back changed, in units of BSLAM_SMOOTHER_MOVED
 } bslam_smoother_node_t;
 
 /// Sums over the sightings of a beacon in the open block, for a line of bearing over time.
@@ -95,12 +96,13 @@ typedef enum bslam_smoother_phase {
 
 /// All members are the smoother's own.
 typedef struct bslam_smoother {
-    bslam_params_t model;                    ///< the pipeline's, without gate and with Huber's rule
-    bslam_real_t free_walk;                  ///< of v: what the estimate rests on
-    bslam_real_t path_walk;                  ///< of v: where the models are linearised
-    bslam_ekf_t base;                        ///< before the first node, a correction about its mean
-    bslam_ekf_t run;                         ///< the present phase's
-    bslam_real_t place[BSLAM_STATE_PADDED];  ///< the map's values that the models are linearised about
+    bslam_params_t model;                          ///< the pipeline's, without gate and with Huber's rule
+    bslam_real_t free_walk;                        ///< of v: what the estimate rests on
+    bslam_real_t path_walk;                        ///< of v: where the models are linearised
+    bslam_ekf_t base;                              ///< before the first node, a correction about its mean
+    bslam_ekf_t run;                               ///< the present phase's
+    bslam_real_t place[BSLAM_STATE_PADDED];        ///< the map's values that the models are linearised about
+    bslam_real_t place_moved[BSLAM_STATE_PADDED];  ///< what the last cycle changed of them
     bslam_smoother_node_t nodes[BSLAM_SMOOTHER_NODES_MAX];
     bslam_smoother_seen_t seen[BSLAM_SMOOTHER_SEEN_MAX];
     int32_t first_node;  ///< rings: where the oldest stands, and how many
@@ -119,6 +121,10 @@ typedef struct bslam_smoother {
     bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
     bslam_smoother_seen_t joined[2 * BSLAM_BEACONS_MAX];  ///< scratch: too much for a stack
     bslam_real_t nearest_m2[BSLAM_BEACONS_MAX];  ///< of the way forth: squares of how near it was seen from
+    bslam_real_t misfit;  ///< of the phase: sum of d² over its sightings, by Huber's rule
+    int32_t fitted;       ///< and how many these are
+    bslam_real_t fit;     ///< mean of d² on the last way forth that was taken; 0 before the first
+    int32_t halvings;     ///< in a row, of the last cycle's changes
     // The open block.
     bslam_smoother_line_t lines[BSLAM_BEACONS_MAX];
     bslam_motion_t to_middle;    ///< from the newest node to the block's middle
@@ -131,6 +137,7 @@ typedef struct bslam_smoother {
     int32_t frames;
     uint32_t cycles;    ///< that took the filter's place
     uint32_t insane;    ///< that did not, because they came out not finite
+    uint32_t halved;    ///< ways forth that were gone again, about points half as far from the old ones
     uint32_t left_out;  ///< sightings that a phase could not use, each time it met them
 } bslam_smoother_t;
 

@@ -275,6 +275,9 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
                    {0, 0, 0},
                    {at->seen, at->seen + older.seen, at->seen + older.seen + joined.seen}};
     go_half_way(older.at, joined.at);
+    for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+        joined.moved[i] = (int16_t)((older.moved[i] + joined.moved[i]) / 2);
+    }
     pair.mean = pose_at(joined.at);
     int count = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {

@@ -347,6 +347,7 @@ static void assert_forth_is_the_batch(uint64_t seed, int nodes)
         }
     }
     assert_int_equal(smoother.left_out, 0);
+    assert_int_equal(smoother.halved, 0);
 }
 
 static void test_forth_is_the_batch_least_squares(void **state)
@@ -432,6 +433,7 @@ static void go_forth_over_a_beacon(uint16_t direction)
     bslam_smoother_seen_t *seen = bslam_smoother_seen(&smoother, 2 * BEACONS + 1);
     assert_int_equal(seen->beacon, 1);
     seen->value = direction;
+    smoother.fit = BSLAM_R(1e6);  // however it fits, it is not gone again
     bslam_smoother_begin(&smoother);
     go_forth();
 }
@@ -523,6 +525,155 @@ static void test_way_forth_notes_how_near_beacons_were_seen_from(void **state)
     }
 }
 
+// ---- ways forth that are gone again -----------------------------------------------------------------------
+
+enum { NODES = 8 };
+
+static const double LEAP_M[2] = {-3.0, 2.5};
+
+/// After a cycle, which has moved beacon 2 and the nodes, readings fit badly. before[NODES] and place are the
+/// points that these were moved from.
+static void fit_badly(bslam_real_t before[NODES][BASE], bslam_real_t place[2])
+{
+    make_window(9, NODES);
+    go_forth();
+    go_up_and_back();
+    memset(smoother.place_moved, 0, sizeof smoother.place_moved);
+    for (int i = 0; i < 2; i++) {
+        const int at = smoother.base.beacons[2].at + i;
+        place[i] = smoother.place[at];
+        smoother.place_moved[at] = real(LEAP_M[i]);
+        smoother.place[at] += real(LEAP_M[i]);
+    }
+    for (int k = 0; k < NODES; k++) {
+        bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
+        memcpy(before[k], node->at, sizeof before[k]);
+        for (int i = 0; i < BASE; i++) {
+            node->moved[i] = (int16_t)(16 * (i + 1));
+            node->at[i] += real(16e-3 * (i + 1));
+        }
+    }
+    for (int k = 0; k < smoother.seen_count; k += 2) {
+        bslam_smoother_seen(&smoother, k)->value =
+            (uint16_t)(bslam_smoother_seen(&smoother, k)->value + 9000);
+    }
+    bslam_smoother_begin(&smoother);
+}
+
+static void test_way_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back(void **state)
+{
+    bslam_real_t before[NODES][BASE];
+    bslam_real_t place[2];
+    fit_badly(before, place);
+    double share = 1;
+    for (uint32_t halved = 1; halved <= 4; halved++) {
+        share /= 2;
+        while (smoother.halved < halved) {
+            assert_false(bslam_smoother_work(&smoother, 1, true));
+        }
+        for (int i = 0; i < 2; i++) {
+            const double moved_m = (double)(smoother.place[smoother.base.beacons[2].at + i] - place[i]);
+            assert_near(moved_m, share * LEAP_M[i], 1e-5);
+        }
+        for (int k = 0; k < NODES * BASE; k++) {
+            const int i = k % BASE;
+            const double moved =
+                (double)(bslam_smoother_node(&smoother, k / BASE)->at[i] - before[k / BASE][i]);
+            const double off = moved - share * 16e-3 * (i + 1);
+            assert_near(i == BSLAM_STATE_THETA ? unit_angle_between(off, 0) : off, 0, 1e-5);
+        }
+        assert_int_equal(smoother.phase, BSLAM_SMOOTHER_FORTH);
+        assert_int_equal(smoother.at, 0);
+    }
+    go_forth();
+    assert_int_equal(smoother.halved, 4);
+    assert_int_equal(smoother.halvings, 0);  // the next cycle begins anew
+    assert_true(smoother.fit > BSLAM_R(1.5));
+}
+
+static void test_way_forth_that_fits_as_the_last_one_is_taken(void **state)
+{
+    bslam_real_t before[NODES][BASE];
+    bslam_real_t place[2];
+    fit_badly(before, place);
+    smoother.halvings = 4;
+    go_forth();
+    const bslam_real_t fit = smoother.fit;
+    fit_badly(before, place);
+    smoother.fit = fit / BSLAM_R(1.49);
+    go_forth();
+    assert_int_equal(smoother.halved, 0);
+    fit_badly(before, place);
+    smoother.fit = fit / BSLAM_R(1.51);
+    go_forth();
+    assert_true(smoother.halved > 0);
+}
+
+static void test_what_moved_belongs_to_its_beacon_when_others_come_and_leave(void **state)
+{
+    make_window(9, NODES);
+    const int at[2] = {smoother.base.beacons[0].at, smoother.base.beacons[1].at};
+    for (int i = 0; i < BSLAM_STATE_PADDED; i++) {
+        smoother.place_moved[i] = real(i);
+    }
+    bslam_smoother_remove(&smoother, 0);
+    assert_near((double)smoother.place_moved[at[0]], at[1], 0);
+    assert_near((double)smoother.place_moved[at[0] + 1], at[1] + 1, 0);
+    const int next = smoother.base.dim;
+    smoother.place_moved[next] = 1;
+    smoother.place_moved[next + 1] = 1;
+    const bslam_pose_t mount = {0, 0, 0};
+    const bslam_sighting_t seen = unit_direction(0.5, 9);
+    int index;
+    bslam_ekf_remove(&filter, 0);
+    assert_int_equal(bslam_smoother_add(&smoother, &filter, &mount, &seen, &index), BSLAM_OK);
+    assert_true(smoother.place_moved[next] == 0 && smoother.place_moved[next + 1] == 0);
+}
+
+// ---- long ways --------------------------------------------------------------------------------------------
+
+static void test_long_way_is_as_doubtful_as_half_of_what_it_misses_by(void **state)
+{
+    make_window(12, 2);
+    bslam_smoother_node_t node = *bslam_smoother_node(&smoother, 0);
+    node.at[BSLAM_STATE_X] += BSLAM_R(0.3);
+    node.at[BSLAM_STATE_Y] -= BSLAM_R(0.2);
+    double point[ARGUMENTS];
+    double end[BASE];
+    point_before(0, point);
+    bslam_real_t added[2][BSLAM_SYMMAT_LENGTH(DIM)];
+    for (int is_long = 0; is_long < 2; is_long++) {
+        // As long as a block may last, and a little longer.
+        node.motion.dt_s = is_long ? BSLAM_R(0.201) : BSLAM_R(0.2);
+        bslam_bend_t bend = bslam_smoother_bend(&node);
+        assert_near((double)bend.doubt_of_miss, is_long ? 0.5 : 0, 0);
+        step(point, end, &node);
+        const bslam_real_t doubt = bend.doubt_of_miss;
+        for (int doubts = 0; doubts < 2; doubts++) {
+            bend.doubt_of_miss = doubts ? doubt : 0;
+            bslam_ekf_t ekf = smoother.base;
+            bslam_ekf_predict_about(&ekf, &smoother.model, &node.motion, &bend, node.at, NULL);
+            memcpy(added[doubts], ekf.covariance, sizeof added[doubts]);
+        }
+        // It is linear about the speeds of the node.
+        point[V_WALK] = (double)node.at[V] - end[V];
+        point[OMEGA_WALK] = (double)node.at[OMEGA] - end[OMEGA];
+        step(point, end, &node);
+        const double miss_m = hypot(end[BSLAM_STATE_X] - (double)node.at[BSLAM_STATE_X],
+                                    end[BSLAM_STATE_Y] - (double)node.at[BSLAM_STATE_Y]);
+        assert_true(miss_m > 0.1);
+        for (int i = 0; i < DIM; i++) {
+            for (int j = 0; j <= i; j++) {
+                const double more =
+                    (double)(bslam_symmat_get(added[1], i, j) - bslam_symmat_get(added[0], i, j));
+                const bool is_place = i == j && (i == BSLAM_STATE_X || i == BSLAM_STATE_Y);
+                assert_near(more, is_place && is_long ? 0.25 * miss_m * miss_m : 0, 1e-6);
+            }
+        }
+        point[V_WALK] = point[OMEGA_WALK] = 0;
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -534,6 +685,10 @@ int main(void)
         cmocka_unit_test(test_beacon_near_the_robot_is_linearised_about_a_metre_off),
         cmocka_unit_test(test_beacon_moves_by_a_part_of_its_least_distance_at_most),
         cmocka_unit_test(test_way_forth_notes_how_near_beacons_were_seen_from),
+        cmocka_unit_test(test_way_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back),
+        cmocka_unit_test(test_way_forth_that_fits_as_the_last_one_is_taken),
+        cmocka_unit_test(test_what_moved_belongs_to_its_beacon_when_others_come_and_leave),
+        cmocka_unit_test(test_long_way_is_as_doubtful_as_half_of_what_it_misses_by),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

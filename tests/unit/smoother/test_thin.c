@@ -234,6 +234,21 @@ static void test_bent_way_leads_from_a_node_to_the_next(void **state)
     assert_true(bent > 2);
 }
 
+static void test_joined_node_has_moved_by_the_mean_of_what_its_nodes_have(void **state)
+{
+    for (int k = 0; k < NODES; k++) {
+        for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+            bslam_smoother_node(&smoother, k)->moved[i] = (int16_t)(32767 - 10 * k - 100 * i);
+        }
+    }
+    bslam_smoother_thin(&smoother, NODES - 1);
+    for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
+        assert_int_equal(bslam_smoother_node(&smoother, 0)->moved[i], 32767 - 100 * i);
+        assert_int_equal(bslam_smoother_node(&smoother, 1)->moved[i], 32767 - 15 - 100 * i);
+        assert_int_equal(bslam_smoother_node(&smoother, 2)->moved[i], 32767 - 30 - 100 * i);
+    }
+}
+
 static void test_way_shorter_than_a_centimetre_has_no_bend(void **state)
 {
     // The speeds say 12 mm straight ahead, where it is 9 or 11 mm and half a radian to the left of that.
@@ -401,6 +416,7 @@ int main(void)
         cmocka_unit_test_setup(test_where_all_levels_are_full_the_oldest_leave, setup),
         cmocka_unit_test_setup(test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end, setup),
         cmocka_unit_test_setup(test_bent_way_leads_from_a_node_to_the_next, setup),
+        cmocka_unit_test_setup(test_joined_node_has_moved_by_the_mean_of_what_its_nodes_have, setup),
         cmocka_unit_test_setup(test_way_shorter_than_a_centimetre_has_no_bend, setup),
         cmocka_unit_test_setup(test_directions_are_those_from_where_the_node_is_and_weigh_as_many, setup),
         cmocka_unit_test_setup(test_directions_that_differ_become_their_weighted_mean, setup),
