@@ -3,7 +3,7 @@
 #ifndef UNIT_DENSE_H
 #define UNIT_DENSE_H
 
-#define DENSE_MAX 64
+#define DENSE_MAX 96
 
 typedef struct dense {
     int rows;

@@ -12,9 +12,11 @@
 
 /// A block lasts no longer, nor does a node's motion where nothing is seen.
 #define BSLAM_SMOOTHER_BLOCK_MAX_S BSLAM_R(0.2)
-/// How a longer way was driven is known as well as it was when its nodes were joined, and where the robot
-/// turned on the spot, not at all. A filter that took it for certain would shrink the map until it fits.
-#define BSLAM_SMOOTHER_DOUBT_OF_MISS BSLAM_R(0.5)
+/// How a joined node's way was driven is known as well as it was when it was joined, and where the robot
+/// turned on the spot, hardly at all. A filter that took it for certain would shrink the map until it fits.
+#define BSLAM_SMOOTHER_JOINED_DOUBT BSLAM_R(0.5)
+/// The way within a block is an arc, as far as the points are right that it is to lead to.
+#define BSLAM_SMOOTHER_BLOCK_DOUBT BSLAM_R(0.2)
 
 /// Node k, counted from the oldest.
 static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoother, int k)
@@ -38,7 +40,8 @@ static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node
     const bslam_bend_t bend = {
         .turned_rad = node->turned * BSLAM_SMOOTHER_BEND,
         .stretch = 1 + node->stretched * BSLAM_SMOOTHER_BEND,
-        .doubt_of_miss = node->motion.dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S ? BSLAM_SMOOTHER_DOUBT_OF_MISS : 0,
+        .doubt_of_miss = node->motion.dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S ? BSLAM_SMOOTHER_JOINED_DOUBT
+                                                                        : BSLAM_SMOOTHER_BLOCK_DOUBT,
     };
     return bend;
 }

@@ -40,6 +40,8 @@ SMOOTHER: Final[dict[str, int | float]] = {
     "velocity_walk_mps_sqrt_s": 30.0,
     "turn_rate_walk_radps_sqrt_s": 1.0,
     "turn_rate_decay_s": 1.0,
+    # From one pass to the next the filter goes on alone; what it has learned wrong by then is forgotten.
+    "bearing_only_variance_factor": 1.0,
 }
 
 # A filter that knows how the scale of its map may be wrong needs no further doubt of directions.
