@@ -59,7 +59,7 @@ class Moment:
 
 
 def moments(log: Log, options: RunOptions, times_s: Array, drawn: int) -> list[Moment]:
-    """Of one drive. `drawn`: maps for the mean, 0 without."""
+    """Of one drive. `drawn`: maps for the mean, 0 without. Without those at which the MAP does not settle."""
     assert log.truth is not None
     params = Slam.defaults() | core_params(options, log)
     time_us = step_times_us(log)
@@ -69,7 +69,10 @@ def moments(log: Log, options: RunOptions, times_s: Array, drawn: int) -> list[M
     found = []
     for time_s in times_s.tolist():
         steps = int(np.searchsorted(time_us, round(1e6 * time_s), "right"))
-        place, mean, sd_m = _best(log, time_us[:steps], true[:steps], params, drawn)
+        try:
+            place, mean, sd_m = _best(log, time_us[:steps], true[:steps], params, drawn)
+        except ArithmeticError:
+            continue
         off_m = [float(np.hypot(*(one - true[steps - 1, :2]))) for one in (place, mean)]
         found.append(Moment(time_s, bound_m[steps - 1], core_m[steps - 1], off_m[0], off_m[1], sd_m))
     return found
@@ -134,18 +137,22 @@ def main() -> int:
     args = _arguments()
     scenario = load_scenario(args.scenario)
     found: list[Moment] = []
+    asked = 0
     for count, seed in enumerate(args.seeds, 1):
         log = simulate(scenario, seed, args.sigma)
         options = RunOptions(observation="direction", association="known", filter="smoother", seed=seed)
         end_s = min(args.until, 1e-6 * float(log.odometry.time_us[-1]))
         times_s = np.arange(args.every, end_s + 1e-6, args.every)
         found += moments(log, options, times_s, args.mean)
+        asked += len(times_s)
         print(f"{count} of {len(args.seeds)} drives", end="\r", flush=True)
     seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
     print(f"{args.scenario}, {seeds}, sigma {args.sigma}, every {args.every:g} s")
     _print_row(f"to {EARLY_S:g} s", [one for one in found if one.time_s <= EARLY_S])
     _print_row("later", [one for one in found if one.time_s > EARLY_S])
     _print_row("all", found)
+    if len(found) < asked:
+        print(f"left out: {asked - len(found)} of {asked} moments, at which the MAP did not settle")
     return 0
 
 
