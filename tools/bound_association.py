@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from booked_run import BookedRun
 from bslam.commands.arguments import seeds_range
 from bslam.experiment.align import wrap_angle
 from bslam.experiment.camera import UNTOLD_THRESHOLD
-from bslam.experiment.ledger import CLUTTER, Ledger
+from bslam.experiment.ledger import CLUTTER
 from bslam.experiment.runner import run_log
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.experiment.trace import Trace
@@ -32,34 +33,21 @@ from measure_association import options_of
 POSES = ("of the run itself", "of a filter told all identities", "true")
 
 
-class Confusions:
-    """Sightings of a beacon that were matched with another: a `Watcher`."""
+class Confusions(BookedRun):
+    """Sightings of a beacon that were matched with another."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.rows: list[tuple[int, int, int]] = []  # of the log's sightings; true identity, that matched
-        self.sightings = 0
-        self._slam: Any = None
-        self._ledger = Ledger(lambda: [] if self._slam is None else [one.uid for one in self._slam.beacons()])
 
-    def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
-        """Keeps hold of the filter."""
-        del time_us, pose
-        self._slam = slam
-
-    def frame(
-        self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
-    ) -> None:
-        """Enters a frame."""
-        del time_us, columns
-        first = self.sightings
-        self.sightings += len(true_id)
-        for row, (identity, account) in enumerate(zip(true_id, accounts or (), strict=False), first):
+    def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
+        """Notes those of a frame."""
+        del time_us
+        for row, (identity, account) in enumerate(zip(true_id, accounts, strict=False), self.sightings):
             if account.result == "matched":
-                matched = self._ledger.identity(account.beacon_uid)
+                matched = self.ledger.identity(account.beacon_uid)
                 if matched != identity and CLUTTER not in (matched, identity):
                     self.rows.append((row, identity, matched))
-        if accounts is not None:
-            self._ledger.book(true_id, [True] * len(true_id), accounts)
 
 
 def offset2(

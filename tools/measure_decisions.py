@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.experiment.ledger import Ledger
+from booked_run import BookedRun
 from bslam.experiment.runner import run_log
 from bslam.experiment.truth import truth_at
 from bslam.log import Log
@@ -31,49 +31,35 @@ RIGHT, WRONG, WAITS = range(3)
 VIEW_M = 0.1
 
 
-class Decisions:
-    """Counts decisions by class of views (classes, 3) while a run goes on: a `Watcher`."""
+class Decisions(BookedRun):
+    """Counts decisions by class of views (classes, 3) while a run goes on."""
 
     def __init__(self, log: Log) -> None:
+        super().__init__()
         self.counts = np.zeros((len(FIRST_VIEWS), 3), np.int64)
         self._way_m = _way_m(log)
         self._times_us = log.odometry.time_us
         self._views: Counter[int] = Counter()
         self._viewed_m: defaultdict[int, float] = defaultdict(lambda: -np.inf)
-        self._slam: Any = None
-        self._ledger = Ledger(self._uids)
 
-    def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
-        """Keeps hold of the filter."""
-        del time_us, pose
-        self._slam = slam
-
-    def frame(
-        self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
-    ) -> None:
-        """Counts a frame's decisions, then enters it in the books."""
-        del columns
+    def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
+        """Counts a frame's decisions."""
         way_m = float(self._way_m[np.searchsorted(self._times_us, time_us)])
-        for identity, account in zip(true_id, accounts or (), strict=False):
+        for identity, account in zip(true_id, accounts, strict=False):
             group = int(np.searchsorted(FIRST_VIEWS, self._views[identity], side="right")) - 1
             self.counts[group, self._judge(identity, account)] += 1
         for identity in true_id:
             if way_m - self._viewed_m[identity] >= VIEW_M:
                 self._viewed_m[identity] = way_m
                 self._views[identity] += 1
-        if accounts is not None:
-            self._ledger.book(true_id, [True] * len(true_id), accounts)
 
     def _judge(self, identity: int, account: Any) -> int:
         if account.result == "matched":
-            return RIGHT if self._ledger.identity(account.beacon_uid) == identity else WRONG
+            return RIGHT if self.ledger.identity(account.beacon_uid) == identity else WRONG
         if account.result == "new":
-            mapped = {self._ledger.identity(uid) for uid in self._uids() if uid != account.beacon_uid}
+            mapped = {self.ledger.identity(uid) for uid in self.uids() if uid != account.beacon_uid}
             return WRONG if identity in mapped else RIGHT
         return WAITS
-
-    def _uids(self) -> list[int]:
-        return [] if self._slam is None else [one.uid for one in self._slam.beacons()]
 
 
 def _way_m(log: Log) -> NDArray[np.float64]:

@@ -28,8 +28,9 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.tree import DecisionTreeClassifier
 
+from booked_run import BookedRun
 from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
-from bslam.experiment.ledger import CLUTTER, Ledger
+from bslam.experiment.ledger import CLUTTER
 from bslam.experiment.runner import run_log
 from bslam.experiment.truth import truth_at
 from bslam.log import Log
@@ -62,43 +63,29 @@ class Thing:
     test_ratio: list[float] = field(default_factory=list)  # of those but the first: how far off each was
 
 
-class Books:
-    """Which sightings went to which beacon of the map, and what the wrong ones were: a `Watcher`."""
+class Books(BookedRun):
+    """Which sightings went to which beacon of the map, and what the wrong ones were."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.wrong: Counter[str] = Counter()
-        self.sightings = 0
         self._rows: defaultdict[int, list[int]] = defaultdict(list)
         self._test_ratio: defaultdict[int, list[float]] = defaultdict(list)
-        self._slam: Any = None
-        self._ledger = Ledger(self._uids)
 
-    def step(self, time_us: int, pose: tuple[float, float, float], slam: Any) -> None:
-        """Keeps hold of the filter."""
-        del time_us, pose
-        self._slam = slam
-
-    def frame(
-        self, time_us: int, true_id: Sequence[int], columns: Sequence[Any], accounts: Sequence[Any] | None
-    ) -> None:
-        """Enters a frame."""
-        del time_us, columns
-        first = self.sightings
-        self.sightings += len(true_id)
-        if accounts is None:
-            return
-        for row, (identity, account) in enumerate(zip(true_id, accounts, strict=True), first):
+    def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
+        """Notes a frame."""
+        del time_us
+        for row, (identity, account) in enumerate(zip(true_id, accounts, strict=False), self.sightings):
             if account.result in ("matched", "new"):
                 self._rows[account.beacon_uid].append(row)
             if account.result == "matched":
                 self._test_ratio[account.beacon_uid].append(account.test_ratio)
-                self._judge(identity, self._ledger.identity(account.beacon_uid))
-        self._ledger.book(true_id, [True] * len(true_id), accounts)
+                self._judge(identity, self.ledger.identity(account.beacon_uid))
 
     def things(self) -> list[Thing]:
         """What is in the map."""
         return [
-            Thing(self._ledger.identity(uid), self._rows[uid], self._test_ratio[uid]) for uid in self._uids()
+            Thing(self.ledger.identity(uid), self._rows[uid], self._test_ratio[uid]) for uid in self.uids()
         ]
 
     def _judge(self, identity: int, matched: int) -> None:
@@ -106,9 +93,6 @@ class Books:
             self.wrong["clutter, its own beacon" if matched == CLUTTER else "clutter, a beacon"] += 1
         elif matched != identity:
             self.wrong["a beacon, false one" if matched == CLUTTER else "a beacon, another"] += 1
-
-    def _uids(self) -> list[int]:
-        return [] if self._slam is None else [one.uid for one in self._slam.beacons()]
 
 
 def size_error(log: Log, rows: NDArray[np.int64]) -> float:
