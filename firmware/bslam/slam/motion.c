@@ -62,6 +62,9 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
             return status;
         }
         queue_motion(slam, (int32_t)(odometry.time_us - slam->odometry.time_us), &motion);
+        if (slam->smoother != NULL) {
+            slam->smoothing->rest(slam->smoother, &slam->params, &slam->ekf, motion.dt_s);
+        }
     }
     slam->odometry = odometry;
     return BSLAM_OK;

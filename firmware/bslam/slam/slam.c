@@ -80,9 +80,9 @@ void bslam_slam_lose_pose(bslam_slam_t *slam)
 
 void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
 {
-    static const bslam_smoothing_t smoothing = {bslam_smoother_restart, bslam_smoother_move,
-                                                bslam_smoother_see,     bslam_smoother_add,
-                                                bslam_smoother_remove,  bslam_smoother_frame};
+    static const bslam_smoothing_t smoothing = {
+        bslam_smoother_restart, bslam_smoother_move,   bslam_smoother_rest, bslam_smoother_see,
+        bslam_smoother_add,     bslam_smoother_remove, bslam_smoother_frame};
     slam->smoothing = &smoothing;
     slam->smoother = slam->params.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
     bslam_slam_restart_smoother(slam);

@@ -68,6 +68,8 @@ typedef struct bslam_account {
 typedef struct bslam_smoothing {
     void (*restart)(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf);
     void (*move)(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
+    void (*rest)(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+                 bslam_real_t dt_s);
     void (*see)(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
     bslam_status_t (*add)(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_pose_t *mount,
                           const bslam_sighting_t *sighting, int *index);

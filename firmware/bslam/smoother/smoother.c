@@ -9,6 +9,9 @@
 /// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
 /// last moment before nothing is in view.
 enum { UNFILLED_MIN = 5 };
+/// Where nothing is seen a node ends after so long: ways that odometry alone tells add up, and are not to
+/// fill the window. Speeds that are states are read once a node, and no such node lasts longer than a block.
+static const bslam_real_t UNSEEN_MAX_S = BSLAM_R(0.6);
 /// How a bearing changes besides by the turn that the filter has, rad/s: by the way, and by an error of that.
 static const bslam_real_t SLOPE_SD_RADPS = BSLAM_R(0.5);
 /// A beacon in direction only is first thought to be so far away.
@@ -59,6 +62,8 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
     smoother->from_middle = (bslam_motion_t){0};
     smoother->gap_s = 0;
     smoother->unfilled = 0;
+    smoother->idle_s = 0;
+    smoother->rested = false;
     clear_block(smoother);
     bslam_smoother_begin(smoother);
 }
@@ -223,21 +228,6 @@ static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
     memcpy(smoother->middle, ekf->mean, (size_t)ekf->base_dim * sizeof smoother->middle[0]);
 }
 
-void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion)
-{
-    if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S) {
-        close_block(smoother);
-    }
-    bslam_smoother_add_motion(&smoother->from_middle, motion);
-    smoother->gap_s += motion->dt_s;
-    if (smoother->frames > 0) {
-        smoother->block_s += motion->dt_s;
-    } else if (smoother->from_middle.dt_s >= BSLAM_SMOOTHER_BLOCK_MAX_S) {
-        set_middle(smoother, ekf);
-        close_block(smoother);
-    }
-}
-
 // ---- sightings and beacons --------------------------------------------------------------------------------
 
 void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index)
@@ -336,7 +326,7 @@ void bslam_smoother_remove(bslam_smoother_t *smoother, int index)
     bslam_smoother_begin(smoother);
 }
 
-// ---- the end of a frame -----------------------------------------------------------------------------------
+// ---- as time goes on --------------------------------------------------------------------------------------
 
 /// The filter becomes what a cycle has made of it, and goes on to now.
 static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
@@ -358,6 +348,56 @@ static bool is_last_of_block(const bslam_smoother_t *smoother)
            smoother->block_s + smoother->gap_s > BSLAM_SMOOTHER_BLOCK_MAX_S;
 }
 
+static bslam_real_t unseen_max_s(const bslam_smoother_t *smoother)
+{
+    return smoother->model.velocity_states != 0 ? BSLAM_SMOOTHER_BLOCK_MAX_S : UNSEEN_MAX_S;
+}
+
+/// Does a bounded piece of work. Where a cycle ends, the filter is replaced by what came of it.
+static void work(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf, bool is_whole)
+{
+    const int units = UNITS_FIRST - smoother->node_count / NODES_A_UNIT_LESS;
+    if (!bslam_smoother_work(smoother, units, is_whole)) {
+        return;
+    }
+    if (bslam_ekf_is_sane(&smoother->run)) {
+        take_over(smoother, params, ekf);
+        bslam_smoother_turn(smoother);
+    } else {
+        smoother->insane++;
+        bslam_smoother_restart(smoother, params, ekf);
+    }
+}
+
+void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion)
+{
+    if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S) {
+        close_block(smoother);
+    }
+    bslam_smoother_add_motion(&smoother->from_middle, motion);
+    smoother->gap_s += motion->dt_s;
+    if (smoother->frames > 0) {
+        smoother->block_s += motion->dt_s;
+    } else if (smoother->from_middle.dt_s >= unseen_max_s(smoother)) {
+        set_middle(smoother, ekf);
+        close_block(smoother);
+    }
+}
+
+void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+                         bslam_real_t dt_s)
+{
+    smoother->idle_s += dt_s;
+    smoother->rested = smoother->idle_s >= BSLAM_SMOOTHER_BLOCK_MAX_S;
+    if (smoother->rested) {
+        smoother->idle_s = 0;
+        if (smoother->frames > 0) {
+            close_block(smoother);
+        }
+        work(smoother, params, ekf, true);
+    }
+}
+
 void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
 {
     smoother->frames++;
@@ -369,13 +409,9 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
     if (is_whole) {
         close_block(smoother);
     }
-    if (bslam_smoother_work(smoother, UNITS_FIRST - smoother->node_count / NODES_A_UNIT_LESS, is_whole)) {
-        if (bslam_ekf_is_sane(&smoother->run)) {
-            take_over(smoother, params, ekf);
-            bslam_smoother_turn(smoother);
-        } else {
-            smoother->insane++;
-            bslam_smoother_restart(smoother, params, ekf);
-        }
+    if (!smoother->rested) {  // else this step of the robot's has done its work
+        work(smoother, params, ekf, is_whole);
     }
+    smoother->rested = false;
+    smoother->idle_s = 0;
 }

@@ -135,10 +135,12 @@ typedef struct bslam_smoother {
     bslam_real_t gap_s;  ///< since the frame before
     int32_t unfilled;    ///< blocks in a row that held fewer frames than a node is made of
     int32_t frames;
-    uint32_t cycles;    ///< that took the filter's place
-    uint32_t insane;    ///< that did not, because they came out not finite
-    uint32_t halved;    ///< ways forth that were gone again, about points half as far from the old ones
-    uint32_t left_out;  ///< sightings that a phase could not use, each time it met them
+    bslam_real_t idle_s;  ///< odometry since the last frame, or since it worked without one
+    bool rested;          ///< it worked at the latest odometry
+    uint32_t cycles;      ///< that took the filter's place
+    uint32_t insane;      ///< that did not, because they came out not finite
+    uint32_t halved;      ///< ways forth that were gone again, about points half as far from the old ones
+    uint32_t left_out;    ///< sightings that a phase could not use, each time it met them
 } bslam_smoother_t;
 
 /// Starts anew from what the filter knows now: it becomes the base, and all nodes are forgotten.
@@ -146,6 +148,11 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *pa
 
 /// The filter has gone through this motion (as odometry reported it, before any scale). O(1).
 void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
+
+/// Odometry was read over so much time. Where no frame has come for a while, works as bslam_smoother_frame
+/// does, so that what was seen last is settled before something is seen again.
+void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+                         bslam_real_t dt_s);
 
 /// A sighting of the present frame was taken for beacon `index` of the filter. O(1).
 void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);

@@ -60,7 +60,11 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "looks and the map is not known, else known)"
     )
     add("association", _association, None, associations, meaning)
-    add("filter", _word(FILTERS), "invariant", _names(FILTERS), "kind of Kalman filter (default: invariant)")
+    meaning = (
+        "what estimates (default: invariant; smoother where sightings tell a direction only and the map is "
+        "not known)"
+    )
+    add("filter", _word(FILTERS), None, _names(FILTERS), meaning)
     meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
     add("sigma", _sigma_mps, None, "M/S", meaning)
     group.add_argument("--motion", choices=MOTIONS, default="arc", help="odometry step (default: arc)")
@@ -243,7 +247,11 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "recovery": arguments.recovery or arguments.map is not None,
         "parameters": tuple(core_parameters(arguments).items()),
     }
-    return RunOptions(association=name, wrong_identity_rate=rate, **(values | changes))
+    values |= changes
+    if values["filter"] is None:
+        has_map = values["known_map"] or values["kept_map"] is not None
+        values["filter"] = "smoother" if values["observation"] == "direction" and not has_map else "invariant"
+    return RunOptions(association=name, wrong_identity_rate=rate, **values)
 
 
 def core_parameters(arguments: argparse.Namespace) -> dict[str, Number]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from bslam.commands.arguments import run_options, scenario_source
 from bslam.commands.drawing import draw
@@ -14,21 +14,23 @@ from bslam.experiment.options import RunOptions
 from bslam.experiment.sources import Source
 from bslam.world.simulate import load_scenario
 
-BEST_FILTERS: Final = {"distance": ["invariant"], "direction": ["invariant", "similarity", "smoother"]}
-"""Those worth a column where a command is told none (`--filter` None), by observation."""
+Filters = Mapping[str, Sequence[str]]
 
 
-def grid_jobs(arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None) -> list[Job]:
+def grid_jobs(
+    arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None, filters: Filters | None = None
+) -> list[Job]:
     """The grid as jobs; the first arguments.pictures of them are drawn."""
-    return make_jobs(*grid(arguments, sigmas_mps), draw, arguments.pictures)
+    return make_jobs(*grid(arguments, sigmas_mps, filters), draw, arguments.pictures)
 
 
 def grid(
-    arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None
+    arguments: argparse.Namespace, sigmas_mps: Sequence[float] | None, filters: Filters | None = None
 ) -> tuple[list[Source], list[RunOptions]]:
     """Simulated runs of arguments.scenario: sigma x observation x filter x association x seed.
 
-    `sigmas_mps` None: what the scenario says.
+    `sigmas_mps` None: what the scenario says. `filters`: by observation, where arguments.filter is None.
+    None: the default one.
     """
     wheels = load_scenario(arguments.scenario).wheels
     noise = arguments.noise or wheels.noise
@@ -46,7 +48,7 @@ def grid(
             sigmas_mps or (wheels.sigma_mps,), _values(arguments.observation)
         )
         for filter_name, association, seed in itertools.product(
-            _values(arguments.filter or BEST_FILTERS[observation]),
+            _values(arguments.filter or (filters or {}).get(observation)),
             _values(arguments.association),
             arguments.seeds,
         )

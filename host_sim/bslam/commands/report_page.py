@@ -151,7 +151,7 @@ def _tables(maker: _Maker) -> Section:
     """Tables I to III, Figures 6 to 9, NEES."""
     words = ["tables", "--scenario", maker.scenario, "--association", "known", *_seed_words(maker.seeds)]
     options = maker.parse(tables, words, "tables")
-    jobs = tables.grid_jobs(options, options.sigma)
+    jobs = tables.table_jobs(options)
     result = maker.run(jobs, "tables")
     by_cell = tables.group(jobs, result.outcomes)
     cells = [cell for key, group in by_cell.items() if (cell := make_cell(*key, group)) is not None]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
-from bslam.commands.grid import grid_jobs
+from bslam.commands.grid import Filters, grid_jobs
 from bslam.commands.report import finish, table_of
 from bslam.experiment.batch import Job, Outcome, run_batch
 from bslam.experiment.consistency import nees_band_95
@@ -30,6 +31,12 @@ from bslam.view.style import png
 
 Key = tuple[float, str, str]
 """Sigma in m/s, observation and filter of a cell."""
+
+BEST_FILTERS: Final[Filters] = {
+    "distance": ["invariant"],
+    "direction": ["invariant", "similarity", "smoother"],
+}
+"""Those worth a column, by observation."""
 
 SUMMARY = "the paper's Tables I to III and Fig. 6 to 9, with this estimator's figures beside"
 EXAMPLES = """examples:
@@ -52,13 +59,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_sensor_options(parser)
     add_filter_options(parser, lists=("observation", "filter", "sigma"))
-    parser.set_defaults(filter=None, sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
+    parser.set_defaults(sigma=list(SIGMAS_MPS), observation=list(OBSERVATIONS))
     add_batch_options(parser, "tables", seeds="0:10", pictures=1)
+
+
+def table_jobs(arguments: argparse.Namespace) -> list[Job]:
+    """The runs of the tables."""
+    return grid_jobs(arguments, arguments.sigma, BEST_FILTERS)
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    jobs = grid_jobs(arguments, arguments.sigma)
+    jobs = table_jobs(arguments)
     result = run_batch(jobs, arguments.out, arguments.jobs)
     by_cell = group(jobs, result.outcomes)
     cells = [cell for key, outcomes in by_cell.items() if (cell := make_cell(*key, outcomes)) is not None]

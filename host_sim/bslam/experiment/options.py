@@ -119,6 +119,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
             params |= defaults.CAMERA_UNKNOWN_IDENTITY
     if log.collection == "mrclam":
         params |= defaults.REAL_LOG
+        if options.filter == "smoother" and options.observation == "direction":
+            params |= defaults.REAL_LOG_SMOOTHER
         if options.association != "known":
             params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
         if options.velocity_states:

@@ -46,8 +46,8 @@ def test_flash_is_what_was_measured():
     ("told", "measured"),
     [
         ("bslam on given reference logs, distance and direction", "none: velocity states"),
-        ("bslam on given reference logs, direction only", "`--observation direction`"),
-        ("the same, `--filter smoother`", "given logs: smoother"),
+        ("the same, `--filter invariant`", "`--observation direction --filter invariant`"),
+        ("bslam on given reference logs, direction only: the smoother", "given logs: smoother"),
     ],
 )
 def test_errors_on_the_given_logs_are_those_of_the_experiments(told, measured):

@@ -335,3 +335,18 @@ def test_the_module_runs_as_a_program():
     )
     assert done.returncode == 2
     assert "'nothing' does not exist; allowed: run" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([], "invariant"),
+        (["--observation", "direction"], "smoother"),
+        (["--observation", "direction", "--known-map"], "invariant"),
+        (["--observation", "direction", "--filter", "similarity"], "similarity"),
+    ],
+)
+def test_direction_only_has_the_smoother_unless_the_map_is_known(log_folder, tmp_path, words, expected):
+    out = tmp_path / "out"
+    assert main(["replay", "csv", str(log_folder), "--pictures", "0", "--out", str(out), *words]) == 0
+    assert runs(out)[0]["filter"] == expected

@@ -142,6 +142,8 @@ def test_real_logs_have_their_own_set(made):
     assert core_params(RunOptions(), own)["left_speed_sd_mps"] == own.robot.wheel_speed_sigma_mps
     asked = core_params(RunOptions(velocity_states=True), log)
     assert (asked["velocity_states"], asked["scale_states"]) == (1, 0)
+    directions = core_params(RunOptions(observation="direction", filter="smoother"), log)
+    assert directions["bearing_sd_rad"] == 2 * params["bearing_sd_rad"]
 
 
 @pytest.mark.parametrize(

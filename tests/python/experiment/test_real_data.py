@@ -56,3 +56,14 @@ def test_a_real_robot_is_not_lost_and_its_map_is_right():
     )  # plain EKF-SLAM with calibrated odometry: 0.04 to 0.13 m over these sets
     assert entry["position_error_m"]["rmse"] < 0.48  # the same: 0.06 to 0.48 m
     assert entry["dead_reckoning_error_m"] > 1.0
+
+
+@pytest.mark.parametrize(("data_set", "robot"), [(2, 1), (2, 2), (6, 1)])
+def test_a_real_robot_that_sees_directions_for_seconds_minutes_apart_is_not_lost(data_set, robot):
+    """What was seen last is settled while nothing is seen: with work in frames alone maps shrank."""
+    log = load_mrclam(ROOT / "mrclam" / f"MRCLAM_Dataset{data_set}", robot)
+    entry = replay(log, RunOptions(observation="direction", filter="smoother"), align=True)
+    assert entry["diverged"] is False
+    assert entry["beacons_mapped"] == 15
+    assert entry["map_scale"] == pytest.approx(1.0, abs=0.4)
+    assert entry["map_rmse_scaled_m"] < 0.35

@@ -249,6 +249,43 @@ static void test_frames_that_show_one_beacon_fill_the_window_with_nodes(void **s
     assert_true(bslam_smoother_node(&smoother, 0)->seen == 1);
 }
 
+/// Drives on unseen until this much of time has gone, and says how many nodes came of it.
+static int nodes_of_unseen_s(int seconds)
+{
+    const int before = smoother.node_count;
+    const int first = step;
+    while (step - first < seconds * 1000000 / STEP_US) {
+        drive(0.016, 0.016);
+    }
+    return smoother.node_count - before;
+}
+
+static void test_where_nothing_is_seen_cycles_end_too(void **state)
+{
+    drive_curve(60);
+    const uint32_t cycles = smoother.cycles;
+    const int nodes = nodes_of_unseen_s(20);
+    assert_in_range(nodes, 80, 100);  // five steps each, or six as 0.04 s is rounded
+    assert_true(smoother.cycles > cycles + 5);
+    assert_sound();
+    // The filter is what the last cycle made of it at the newest node, and has gone on to now.
+    look(0, LABELS);
+    assert_sound();
+}
+
+static void test_ways_of_odometry_alone_make_longer_nodes(void **state)
+{
+    bslam_params_t params = smoother_params();
+    params.velocity_states = 0;
+    int bad_id;
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    bslam_slam_attach_smoother(&slam, &smoother);
+    drive_curve(60);
+    const int nodes = nodes_of_unseen_s(20);
+    assert_in_range(nodes, 28, 34);  // fifteen steps each, or sixteen
+    assert_sound();
+}
+
 static void test_beacon_leaves_in_any_phase(void **state)
 {
     bool met[3] = {false, false, false};
@@ -436,6 +473,8 @@ int main(void)
         cmocka_unit_test_setup(test_windows_of_any_length_stay_within_their_room, setup),
         cmocka_unit_test_setup(test_more_beacons_than_the_window_holds_push_the_oldest_out, setup),
         cmocka_unit_test_setup(test_frames_that_show_one_beacon_fill_the_window_with_nodes, setup),
+        cmocka_unit_test_setup(test_where_nothing_is_seen_cycles_end_too, setup),
+        cmocka_unit_test_setup(test_ways_of_odometry_alone_make_longer_nodes, setup),
         cmocka_unit_test_setup(test_beacon_leaves_in_any_phase, setup),
         cmocka_unit_test_setup(test_refusals_leave_smoother_and_filter_as_they_are_in_any_phase, setup),
         cmocka_unit_test_setup(test_full_map_takes_no_beacon_and_says_so, setup),
