@@ -113,8 +113,8 @@ def take_signatures(scene: Scene, seed: int, light: int, views: int) -> Signatur
     return taken
 
 
-def measure_scene(name: str, seed: int, views: int) -> None:
-    """Prints the line of one dressed scenario."""
+def measure_scene(name: str, seed: int, views: int) -> tuple[float, float]:
+    """Prints the line of one dressed scenario; the shares in it."""
     scenario = load_scenario(name)
     scene = dress(scenario, seed)
     other = replace(scene, lighting=dress(scenario, seed + OTHER_LIGHT).lighting)
@@ -128,6 +128,7 @@ def measure_scene(name: str, seed: int, views: int) -> None:
         f"{name}:{seed}  {len(kept)} beacons, {count} views   {100 * robot:6.2f} {100 * offline:6.2f}",
         flush=True,
     )
+    return robot, offline
 
 
 # --- Photographs
@@ -216,9 +217,13 @@ def main() -> None:
     parser.add_argument("--photographs", action="store_true", help="ETH-80 besides")
     arguments = parser.parse_args()
     print("right names, %                     as on a robot  offline")
+    shares: dict[str, list[tuple[float, float]]] = {}
     for scene in arguments.scenes:
         name, seed = scene.rsplit(":", 1)
-        measure_scene(name, int(seed), arguments.views)
+        shares.setdefault(name, []).append(measure_scene(name, int(seed), arguments.views))
+    for name, found in shares.items():
+        robot, offline = np.mean(found, axis=0)
+        print(f"{name}, mean of {len(found)}   {100 * robot:6.2f} {100 * offline:6.2f}")
     if arguments.photographs:
         views = read_photographs(archive_path())
         for own_ground in (False, True):
