@@ -26,6 +26,7 @@ CALLED_BY_POINTER = (
         r"bslam_slam_|associate_ticks",
         r"bslam_associate_|bslam_slam_learn_looks|bslam_looks_(clear|forget)|bslam_smoother_\w+",
     ),
+    (r"weigh|find_best|decide_rest|bslam_associate_svm", r"bslam_looks_(ask|class_odds|has_waited)"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
     (r"read_head|kept_|port_(save|load)|look_at|flush|read_map|bslam_slots_", r"(erase|write|read)$"),

@@ -17,6 +17,7 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     match->score = 0;
     match->lead = 0;
     match->sure = false;
+    match->waits_for = -1;
     return mappable;
 }
 

@@ -13,6 +13,9 @@ bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seed
 {
     const bslam_status_t status = bslam_learner_init(&looks->learner, seeds, seed_count);
     if (status == BSLAM_OK) {
+        static const bslam_looks_answers_t answers = {bslam_looks_ask, bslam_looks_class_odds,
+                                                      bslam_looks_has_waited};
+        looks->answers = &answers;
         looks->counters = (bslam_looks_counters_t){0};
         looks->left_rad = 0;
         looks->right_rad = 0;
@@ -125,6 +128,29 @@ static void note_class(bslam_look_t *look, uint8_t beacon_class)
         }
     }
     look->seen_as[beacon_class - 1]++;
+}
+
+// ---- waiting ----------------------------------------------------------------------------------------------
+
+/// How long matches with a beacon have waited; 0 if not, or if none did within the last wait_us.
+static uint32_t waited_us(const bslam_look_t *look, const bslam_params_t *params, int64_t time_us)
+{
+    const uint32_t pause_us = (uint32_t)time_us - look->waits_us;
+    return look->waited_us == 0 || pause_us > (uint32_t)params->wait_us ? 0 : look->waited_us + pause_us;
+}
+
+void bslam_looks_note_wait(bslam_looks_t *looks, const bslam_params_t *params, int index, int64_t time_us)
+{
+    bslam_look_t *look = &looks->of[index];
+    const uint32_t so_far_us = waited_us(look, params, time_us);
+    look->waited_us = so_far_us > 0 ? so_far_us : 1;  // 0 says that none waits
+    look->waits_us = (uint32_t)time_us;
+}
+
+bool bslam_looks_has_waited(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                            int64_t time_us)
+{
+    return waited_us(&looks->of[index], params, time_us) >= (uint32_t)params->wait_us;
 }
 
 // ---- learning ---------------------------------------------------------------------------------------------

@@ -43,7 +43,27 @@ typedef struct bslam_look {
     uint32_t missed_um;                      ///< the robot's way when it was seen last, or not expected
     uint8_t missed;                          ///< from how many directions, since it was seen last
     uint8_t seen_from[BSLAM_LOOKS_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
+    uint32_t waited_us;                      ///< how long matches with it had waited by then; 0: not
+    uint32_t waits_us;                       ///< when the last one did, modulo 72 minutes
 } bslam_look_t;
+
+/// What the looks of a sighting say of a beacon.
+typedef struct bslam_opinion {
+    float value;   ///< the machine's decision value
+    float weight;  ///< 0: it knows nothing yet; towards 1 with the samples it keeps
+} bslam_opinion_t;
+
+/// What association asks. Private: reached by bslam_looks_t alone, so that a linker leaves looks out where
+/// there are none.
+struct bslam_looks;
+typedef struct bslam_looks_answers {
+    bslam_opinion_t (*ask)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
+                           const bslam_sample_t *sample);
+    bslam_real_t (*class_odds)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
+                               uint8_t beacon_class);
+    bool (*has_waited)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
+                       int64_t time_us);
+} bslam_looks_answers_t;
 
 /// Private but for the counters.
 typedef struct bslam_looks {
@@ -51,14 +71,9 @@ typedef struct bslam_looks {
     bslam_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
     bslam_real_t left_rad;               ///< how far to the left of the robot a beacon was seen
     bslam_real_t right_rad;              ///< and to the right, below 0
+    const bslam_looks_answers_t *answers;
     bslam_learner_t learner;
 } bslam_looks_t;
-
-/// What the looks of a sighting say of a beacon.
-typedef struct bslam_opinion {
-    float value;   ///< the machine's decision value
-    float weight;  ///< 0: it knows nothing yet; towards 1 with the samples it keeps
-} bslam_opinion_t;
 
 /// Nothing known. Seeds and errors as bslam_learner_init has them.
 BSLAM_MUST_CHECK bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds,
@@ -81,6 +96,13 @@ bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_para
 /// found for a beacon that has none. O(machines).
 void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
                        uint32_t way_um, const bslam_sighting_t *sighting);
+
+/// A match with beacon `index` waits at this moment: association.h, `waits_for`.
+void bslam_looks_note_wait(bslam_looks_t *looks, const bslam_params_t *params, int index, int64_t time_us);
+
+/// Whether matches with beacon `index` have waited for `wait_us` by now, without a longer pause.
+bool bslam_looks_has_waited(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                            int64_t time_us);
 
 /// Beacon `index` of `count` leaves the map; those behind it move up.
 void bslam_looks_forget(bslam_looks_t *looks, int index, int count);

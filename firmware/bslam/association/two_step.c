@@ -35,16 +35,21 @@ static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinio
 static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                int beacon)
 {
-    return frame->looks == NULL
-               ? 0
-               : bslam_looks_class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
+    return frame->looks == NULL ? 0
+                                : frame->looks->answers->class_odds(frame->looks, frame->params, beacon,
+                                                                    sighting->beacon_class);
+}
+
+static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
+{
+    return frame->time_us - frame->ekf->beacons[beacon].last_seen_us;
 }
 
 /// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
 /// its sighting is this one or was missed.
 static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, int beacon)
 {
-    const int64_t ago_us = frame->time_us - frame->ekf->beacons[beacon].last_seen_us;
+    const int64_t ago_us = seen_ago_us(frame, beacon);
     return ago_us > 0 && ago_us <= frame->params->again_us ? frame->params->again_odds : 0;
 }
 
@@ -64,7 +69,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     found->distance2 = weight.distance2;
     found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
-        found->opinion = bslam_looks_ask(frame->looks, frame->params, beacon, sample);
+        found->opinion = frame->looks->answers->ask(frame->looks, frame->params, beacon, sample);
     }
     found->score = weight.log_density - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
@@ -101,6 +106,17 @@ static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam
     return best->distance2 <= params->learn_d2 && lead >= params->learn_lead && looks_right;
 }
 
+/// Whether a match has to wait: a machine of few samples is against it, and its beacon is not in view. It may
+/// be another one that stands near, and the two are told apart once both are in view; or else the machine has
+/// not seen that side of its beacon yet.
+static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+{
+    const bool is_young = best->opinion.weight < 0.5f;
+    return best->score > 0 && is_young && looks_score(frame->params, &best->opinion) < 0 &&
+           seen_ago_us(frame, beacon) > frame->params->wait_us &&
+           !frame->looks->answers->has_waited(frame->looks, frame->params, beacon, frame->time_us);
+}
+
 /// Finds the best beacon of a sighting among those that are not taken.
 static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
                       bslam_match_t *matches)
@@ -134,6 +150,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
     // Another beacon, or a new one, whose score is 0.
     match->lead = best.score - (has_second && second > 0 ? second : 0);
     match->sure = match->beacon >= 0 && is_sure(frame->params, &best, match->lead);
+    match->waits_for = match->beacon >= 0 && has_to_wait(frame, match->beacon, &best) ? match->beacon : -1;
 }
 
 static bool is_open(const bslam_match_t *match)
@@ -141,12 +158,13 @@ static bool is_open(const bslam_match_t *match)
     return match->verdict == BSLAM_VERDICT_DEFER && match->reason != BSLAM_REASON_AMBIGUOUS;
 }
 
-/// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0.
+/// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0, or
+/// it waits.
 static int next_to_settle(const bslam_match_t *matches, int count)
 {
     int next = -1;
     for (int i = 0; i < count; i++) {
-        const bool fits = is_open(&matches[i]) && matches[i].beacon >= 0 && matches[i].score > 0;
+        const bool fits = is_open(&matches[i]) && matches[i].score > 0 && matches[i].waits_for < 0;
         if (fits && (next < 0 || matches[i].lead > matches[next].lead)) {
             next = i;
         }

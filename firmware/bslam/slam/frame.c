@@ -199,8 +199,21 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 
 // ---- looks ------------------------------------------------------------------------------------------------
 
+static void note_waits(bslam_slam_t *slam, int64_t time_us, int count)
+{
+    for (int i = 0; i < count; i++) {
+        if (slam->matches[i].waits_for >= 0) {
+            bslam_looks_note_wait(slam->looks, &slam->params, slam->matches[i].waits_for, time_us);
+        }
+    }
+}
+
 void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
+    note_waits(slam, time_us, count);
+    if (slam->is_frozen) {
+        return;
+    }
     bool all_matched = count > 0;
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
@@ -331,7 +344,7 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         const bslam_associate_fn associate = bslam_associate_method(&slam->params);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        if (slam->looks != NULL && !slam->is_frozen && slam->params.association == BSLAM_ASSOCIATION_SVM) {
+        if (slam->looks != NULL && slam->params.association == BSLAM_ASSOCIATION_SVM) {
             slam->learning->learn(slam, time_us, sightings, count);
         }
     } else {

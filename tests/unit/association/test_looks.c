@@ -297,6 +297,27 @@ static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)
     assert_memory_equal(&looks, &before, sizeof looks);
 }
 
+static void test_a_wait_lasts_from_its_first_moment_unless_it_paused_too_long(void **state)
+{
+    params.wait_us = 1000000;
+    const int64_t start_us = ((int64_t)1 << 32) - 500000;  // the clock of the wait turns over within it
+    assert_false(bslam_looks_has_waited(&looks, &params, 2, 0));
+    assert_false(bslam_looks_has_waited(&looks, &params, 2, start_us));
+    for (int64_t ago_us = 0; ago_us < 900000; ago_us += 300000) {
+        bslam_looks_note_wait(&looks, &params, 2, start_us + ago_us);
+        assert_false(bslam_looks_has_waited(&looks, &params, 2, start_us + ago_us));
+    }
+    assert_false(bslam_looks_has_waited(&looks, &params, 2, start_us + 999998));
+    assert_true(bslam_looks_has_waited(&looks, &params, 2, start_us + 1000000));
+    assert_true(bslam_looks_has_waited(&looks, &params, 2, start_us + 1600000));
+    assert_false(bslam_looks_has_waited(&looks, &params, 1, start_us + 1000000));
+    bslam_looks_note_wait(&looks, &params, 2, start_us + 1600001);  // the last was over a second before
+    assert_false(bslam_looks_has_waited(&looks, &params, 2, start_us + 1600001));
+    assert_true(bslam_looks_has_waited(&looks, &params, 2, start_us + 2600001));
+    bslam_looks_forget(&looks, 2, 3);
+    assert_false(bslam_looks_has_waited(&looks, &params, 2, start_us + 2600001));
+}
+
 static void test_clear_forgets_all(void **state)
 {
     learn_two(4);
@@ -330,6 +351,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_teaches_nothing, setup),
         cmocka_unit_test_setup(test_without_a_free_slot_a_beacon_goes_without, setup),
         cmocka_unit_test_setup(test_init_refuses_too_many_seeds_and_changes_nothing, setup),
+        cmocka_unit_test_setup(test_a_wait_lasts_from_its_first_moment_unless_it_paused_too_long, setup),
         cmocka_unit_test_setup(test_clear_forgets_all, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -45,6 +45,7 @@ static bslam_params_t svm_params(void)
     params.learn_d2 = 9;
     params.learn_lead = 4;
     params.learn_margin = 0;
+    params.wait_us = 1000000;
     return params;
 }
 
@@ -292,6 +293,91 @@ static void test_alike_but_where_the_robot_stands_is_new(void **state)
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
+// ---- waiting ----------------------------------------------------------------------------------------------
+
+static const float ALIKE[BSLAM_SAMPLE_FEATURES] = {1.0f};
+
+/// Where a match waits, and where nothing in the way of it does: a sighting in the beacon's place, 9 s after
+/// that was seen last, when a machine of so many samples has such a value.
+static void assert_waits(double value, int samples, int32_t wait_us, bool waits)
+{
+    bslam_params_t params = svm_params();
+    params.wait_us = wait_us;
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    give_machine(0, value, samples);
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
+    const decision_t d = decide_at(9000000, &ekf, &params, &seen, 1);
+    assert_int_equal(d.matches[0].waits_for, waits ? 0 : -1);
+    if (waits) {
+        unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    } else {
+        unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    }
+    bslam_looks_forget(&looks, 0, 1);
+}
+
+static void test_a_match_waits_where_a_young_machine_is_against_it(void **state)
+{
+    assert_waits(0.1, 2, 1000000, true);
+    assert_waits(0.15, 2, 1000000, false);  // for it: 4 * 0.15 - 0.5 > 0
+    assert_waits(-0.1, 3, 1000000, false);  // old enough to be weighed
+    assert_waits(-0.1, 2, 0, false);
+}
+
+static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
+{
+    const bslam_params_t params = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    give_machine(0, -0.1, 2);
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
+    ekf.beacons[0].last_seen_us = 5000000;
+    const int64_t times_us[] = {4900000, 5000000, 6000000, 6000001};
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(decide_at(times_us[i], &ekf, &params, &seen, 1).matches[0].waits_for,
+                         i < 3 ? -1 : 0);
+    }
+}
+
+static void test_a_match_that_has_waited_is_made(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    give_machine(0, -0.1, 2);
+    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
+    bslam_looks_note_wait(&looks, &params, 0, 9000000);
+    unit_assert_decided(&decide_at(9999998, &ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_DEFER,
+                        BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&decide_at(10000000, &ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_MATCH,
+                        BSLAM_REASON_NONE, 0);
+}
+
+static void test_what_matches_no_beacon_waits_for_none(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    give_machine(0, -0.1, 2);
+    const bslam_sighting_t near = seen_with(unit_polar(0.1, 4.4, -1), ALIKE);
+    assert_true(position_score(&params, 4.4, 0.1) < 0.0);
+    assert_int_equal(decide_at(9000000, &ekf, &params, &near, 1).matches[0].waits_for, -1);
+}
+
+/// What waits holds no beacon for itself.
+static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const float other[BSLAM_SAMPLE_FEATURES] = {-1.0f};
+    give_machine(0, -1.5, 2);
+    const bslam_sighting_t seen[] = {seen_with(unit_polar(0, 4, -1), ALIKE),
+                                     seen_with(unit_polar(0.01, 4, -1), other)};
+    const decision_t d = decide_at(9000000, &ekf, &params, seen, 2);
+    assert_int_not_equal(d.matches[0].verdict, BSLAM_VERDICT_MATCH);
+    assert_int_equal(d.matches[0].waits_for, -1);
+    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+}
+
+// ---- several ----------------------------------------------------------------------------------------------
+
 static const double pair[2][2] = {{4, 0}, {4, 0.4}};
 
 static void test_one_to_one_the_clearest_choice_first(void **state)
@@ -457,6 +543,11 @@ int main(void)
         cmocka_unit_test_setup(test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another,
                                setup),
         cmocka_unit_test_setup(test_alike_but_where_the_robot_stands_is_new, setup),
+        cmocka_unit_test_setup(test_a_match_waits_where_a_young_machine_is_against_it, setup),
+        cmocka_unit_test_setup(test_a_match_does_not_wait_for_what_is_in_view, setup),
+        cmocka_unit_test_setup(test_a_match_that_has_waited_is_made, setup),
+        cmocka_unit_test_setup(test_what_matches_no_beacon_waits_for_none, setup),
+        cmocka_unit_test_setup(test_a_beacon_that_one_sighting_waits_for_goes_to_another, setup),
         cmocka_unit_test_setup(test_one_to_one_the_clearest_choice_first, setup),
         cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),
         cmocka_unit_test_setup(test_two_sightings_that_want_a_beacon_alike_both_wait, setup),

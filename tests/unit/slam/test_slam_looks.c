@@ -213,6 +213,45 @@ static void test_a_neighbour_seen_with_the_other_stays(void **state)
     assert_int_equal(looks.counters.retired, 0);
 }
 
+/// Object 1, where beacon 0 of object 0 has not been seen for long, in this many frames; how many were kept
+/// from that beacon.
+static uint32_t waits_of_another(int frames)
+{
+    const uint32_t before = slam.counters.deferred;
+    for (int view = 0; view < frames; view++) {
+        see_object(1, view, 0);
+    }
+    return slam.counters.deferred - before;
+}
+
+/// Two beacons are known and out of view for long, their machines of few samples.
+static void start_to_wait(void)
+{
+    bslam_params_t params = svm_params();
+    params.looks_samples = 10;
+    params.wait_us = 1000000;
+    start(params);
+    see_two(6);
+    for (int i = 0; i < 50; i++) {
+        see(NULL, 0);
+    }
+}
+
+static void test_a_match_that_a_young_machine_is_against_waits_for_a_second(void **state)
+{
+    start_to_wait();
+    const uint32_t matched = slam.counters.matched;
+    assert_int_equal(waits_of_another(40), 1000000 / STEP_US);
+    assert_int_equal(slam.counters.matched - matched, 40 - 1000000 / STEP_US);
+}
+
+static void test_in_a_frozen_map_it_waits_no_longer(void **state)
+{
+    start_to_wait();
+    slam.is_frozen = true;
+    assert_int_equal(waits_of_another(40), 1000000 / STEP_US);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -226,6 +265,8 @@ int main(void)
         cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
+        cmocka_unit_test_setup(test_a_match_that_a_young_machine_is_against_waits_for_a_second, setup),
+        cmocka_unit_test_setup(test_in_a_frozen_map_it_waits_no_longer, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
