@@ -142,7 +142,8 @@ static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
         for (int i = 0; i < SEEN; i++) {
             seen[i] = see((k * SEEN + i) % beacons);
         }
-        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.params, &looks, &mount, seen, SEEN, 0};
+        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.params, &looks, &bslam_looks_answers,
+                                              &mount,    seen,         SEEN,   0};
         const uint32_t began = port_ticks();
         associate(&frame, matches);
         ticks += port_ticks() - began;

@@ -21,7 +21,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_CLASS,        ///< its class is BSLAM_CLASS_NOT_MAPPABLE
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
-    BSLAM_REASON_AMBIGUOUS,    ///< neither near enough to a beacon to match nor far enough to be new
+    BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or waits
     BSLAM_REASON_FAR,          ///< it may be new, but its distance is too doubtful to start a beacon
     BSLAM_REASON_LOOKS,        ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
@@ -55,8 +55,9 @@ typedef struct bslam_match {
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
     const bslam_params_t *params;
-    const bslam_looks_t *looks;  ///< what the beacons look like; NULL: nobody knows
-    const bslam_pose_t *mount;   ///< the sensor relative to the robot's present pose
+    const bslam_looks_t *looks;            ///< what the beacons look like; NULL: nobody knows
+    const bslam_looks_answers_t *answers;  ///< how looks are asked
+    const bslam_pose_t *mount;             ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
     int64_t time_us;

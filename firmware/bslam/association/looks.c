@@ -7,15 +7,15 @@
 static const bslam_look_t BLANK = {.machine = BSLAM_NO_MACHINE, .twin = BSLAM_NO_MACHINE};
 static const uint32_t MICROMETRES_PER_M = 1000000;
 
+const bslam_looks_answers_t bslam_looks_answers = {bslam_looks_ask, bslam_looks_class_odds,
+                                                   bslam_looks_has_waited};
+
 enum { SEEN_AS_MAX = 32 };
 
 bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds, int32_t seed_count)
 {
     const bslam_status_t status = bslam_learner_init(&looks->learner, seeds, seed_count);
     if (status == BSLAM_OK) {
-        static const bslam_looks_answers_t answers = {bslam_looks_ask, bslam_looks_class_odds,
-                                                      bslam_looks_has_waited};
-        looks->answers = &answers;
         looks->counters = (bslam_looks_counters_t){0};
         looks->left_rad = 0;
         looks->right_rad = 0;

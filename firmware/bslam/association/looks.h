@@ -53,27 +53,26 @@ typedef struct bslam_opinion {
     float weight;  ///< 0: it knows nothing yet; towards 1 with the samples it keeps
 } bslam_opinion_t;
 
-/// What association asks. Private: reached by bslam_looks_t alone, so that a linker leaves looks out where
-/// there are none.
-struct bslam_looks;
-typedef struct bslam_looks_answers {
-    bslam_opinion_t (*ask)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
-                           const bslam_sample_t *sample);
-    bslam_real_t (*class_odds)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
-                               uint8_t beacon_class);
-    bool (*has_waited)(const struct bslam_looks *looks, const bslam_params_t *params, int index,
-                       int64_t time_us);
-} bslam_looks_answers_t;
-
 /// Private but for the counters.
 typedef struct bslam_looks {
     bslam_looks_counters_t counters;
     bslam_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
     bslam_real_t left_rad;               ///< how far to the left of the robot a beacon was seen
     bslam_real_t right_rad;              ///< and to the right, below 0
-    const bslam_looks_answers_t *answers;
     bslam_learner_t learner;
 } bslam_looks_t;
+
+/// What association asks: functions below. It reaches them by this alone, so that a linker leaves looks out
+/// where none are attached.
+typedef struct bslam_looks_answers {
+    bslam_opinion_t (*ask)(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                           const bslam_sample_t *sample);
+    bslam_real_t (*class_odds)(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                               uint8_t beacon_class);
+    bool (*has_waited)(const bslam_looks_t *looks, const bslam_params_t *params, int index, int64_t time_us);
+} bslam_looks_answers_t;
+
+extern const bslam_looks_answers_t bslam_looks_answers;
 
 /// Nothing known. Seeds and errors as bslam_learner_init has them.
 BSLAM_MUST_CHECK bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds,

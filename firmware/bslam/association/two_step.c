@@ -35,9 +35,9 @@ static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinio
 static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                int beacon)
 {
-    return frame->looks == NULL ? 0
-                                : frame->looks->answers->class_odds(frame->looks, frame->params, beacon,
-                                                                    sighting->beacon_class);
+    return frame->looks == NULL
+               ? 0
+               : frame->answers->class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
 }
 
 static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
@@ -69,7 +69,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     found->distance2 = weight.distance2;
     found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
-        found->opinion = frame->looks->answers->ask(frame->looks, frame->params, beacon, sample);
+        found->opinion = frame->answers->ask(frame->looks, frame->params, beacon, sample);
     }
     found->score = weight.log_density - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
@@ -114,7 +114,7 @@ static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const c
     const bool is_young = best->opinion.weight < 0.5f;
     return best->score > 0 && is_young && looks_score(frame->params, &best->opinion) < 0 &&
            seen_ago_us(frame, beacon) > frame->params->wait_us &&
-           !frame->looks->answers->has_waited(frame->looks, frame->params, beacon, frame->time_us);
+           !frame->answers->has_waited(frame->looks, frame->params, beacon, frame->time_us);
 }
 
 /// Finds the best beacon of a sighting among those that are not taken.

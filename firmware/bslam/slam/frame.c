@@ -339,8 +339,9 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
                             const bslam_pose_t *mount, bool use)
 {
     if (use && !slam->is_lost) {
-        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks, mount,
-                                              sightings,  count,         time_us};
+        const bslam_looks_answers_t *answers = slam->looks != NULL ? slam->learning->answers : NULL;
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks, answers,
+                                              mount,      sightings,     count,       time_us};
         const bslam_associate_fn associate = bslam_associate_method(&slam->params);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);

@@ -90,7 +90,8 @@ void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
 
 void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
 {
-    static const bslam_learning_t learning = {bslam_looks_clear, bslam_looks_forget, bslam_slam_learn_looks};
+    static const bslam_learning_t learning = {bslam_looks_clear, bslam_looks_forget, bslam_slam_learn_looks,
+                                              &bslam_looks_answers};
     slam->looks = looks;
     slam->learning = &learning;
     if (looks != NULL) {

@@ -84,6 +84,7 @@ typedef struct bslam_learning {
     void (*clear)(bslam_looks_t *looks);
     void (*forget)(bslam_looks_t *looks, int beacon, int count);
     void (*learn)(struct bslam_slam *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
+    const bslam_looks_answers_t *answers;
 } bslam_learning_t;
 
 /// All members are the pipeline's own; read them through the functions below.

@@ -15,7 +15,7 @@ typedef struct decision {
 static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_params_t *params,
                          const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, params, NULL, mount, sightings, count, 0};
+    const bslam_sighting_frame_t frame = {ekf, params, NULL, NULL, mount, sightings, count, 0};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     method(&frame, decision.matches);

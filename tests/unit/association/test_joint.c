@@ -121,7 +121,7 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
             continue;
         }
         bslam_match_t matches[SIGHTINGS];
-        const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, SIGHTINGS, 0};
+        const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, SIGHTINGS, 0};
         bslam_associate_joint(&frame, matches);
         for (int i = 0; i < SIGHTINGS; i++) {
             assert_int_equal(matches[i].beacon, expected.beacon[i]);
@@ -144,7 +144,7 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
         seen[i] = unit_polar(atan2(places[i][1], places[i][0]) + 0.15, hypot(places[i][0], places[i][1]), -1);
     }
     bslam_match_t matches[3];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, 3, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 3, 0};
     bslam_associate_mahalanobis(&frame, matches);
     assert_int_not_equal(matches[0].beacon, 0);
     bslam_associate_joint(&frame, matches);
@@ -166,7 +166,7 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
         bslam_symmat_set(ekf.covariance, at, at, -1);
     }
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 2, 0};
     bslam_match_t matches[2];
     bslam_associate_joint(&frame, matches);
     unit_assert_decided(&matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -181,7 +181,7 @@ static void test_joint_out_of_nodes_still_decides_all(void **state)
     const bslam_ekf_t ekf = map_of(&params, places, 1);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(2, 4, -1)};
     bslam_match_t matches[2];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 2, 0};
     bslam_associate_joint(&frame, matches);
     assert_int_equal(matches[0].verdict, BSLAM_VERDICT_REJECT);
     assert_int_equal(matches[0].reason, BSLAM_REASON_AMBIGUOUS);
@@ -201,7 +201,7 @@ static void test_joint_more_sightings_than_are_paired_together(void **state)
     seen[6] = seen[2];  // the same beacon again, in the second group
     const bslam_ekf_t ekf = map_of(&params, places, 8);
     bslam_match_t matches[8];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, &on_axle, seen, 8, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 8, 0};
     bslam_associate_joint(&frame, matches);
     for (int i = 0; i < 8; i++) {
         assert_int_equal(matches[i].beacon, i == 6 ? -1 : i);

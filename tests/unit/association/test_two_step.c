@@ -56,7 +56,8 @@ typedef struct decision {
 static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_params_t *params,
                             const bslam_sighting_t *seen, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, params, &looks, &on_axle, seen, count, time_us};
+    const bslam_sighting_frame_t frame = {ekf,      params, &looks, &bslam_looks_answers,
+                                          &on_axle, seen,   count,  time_us};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     bslam_associate_svm(&frame, decision.matches);
