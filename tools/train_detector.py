@@ -1,7 +1,8 @@
 """Trains the beacon detectors on rendered worlds and writes firmware/models/beacons.h: `make train`.
 
 For each kind of lens: render, take the front end's cells and fit the cell machine; take its proposals with
-that and fit screen, kinds and fusion; choose the threshold on worlds left out. Rendered worlds are kept under
+that and fit screen, kinds and fusion; then the first glance, and last the closer look and the verdict. All
+thresholds are chosen on worlds left out. Rendered worlds are kept under
 build/training, so an interrupted run goes on where it was. Nothing here looks at the style "test".
 """
 
@@ -14,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from bslam.core.vision import BeaconModel, DetectorModel
 from training.built_in import built_in_detector
+from training.closer import choose_fusion_threshold, fit_close, fit_verdict, gather_close
 from training.detector_export import beacons_header
 from training.detector_fit import (
     choose_thresholds,
@@ -46,18 +48,20 @@ class Plan:
     cells_step: int  # every so many worlds give cells,
     cells: int  # and so many are taken
     halves: bool  # each frame is looked at once, not twice: a wide one shows thrice as many beacons
+    glance_loss: float  # the share of objects with a sure box that may lose it at the first glance
 
 
-PLANS = {"pinhole": Plan(1056, 4, 200_000, False), "wide": Plan(900, 6, 80_000, True)}
+PLANS = {"pinhole": Plan(1056, 4, 200_000, False, 0.004), "wide": Plan(900, 6, 80_000, True, 0.001)}
 
 
-def train(folder: Path, lens: str, worlds: int, validation: int, processes: int) -> tuple[DetectorModel, str]:
+def train(
+    folder: Path, lens: str, detector: DetectorModel, worlds: int, validation: int, processes: int
+) -> tuple[DetectorModel, str]:
     """The detector for a kind of lens, and what it reaches on worlds left out."""
     plan, seeds, left_out = PLANS[lens], range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
     started = time.monotonic()
     for some in (seeds, left_out):
         render_set(folder, lens, "train", some, processes)
-    detector = blank_detector()
     cells = gather_cells(folder, lens, "train", seeds[:: plan.cells_step], processes)
     detector = replace(detector, cell=fit_cells(cells, plan.cells))
     boxes = gather_boxes(folder, lens, "train", seeds, detector, processes, plan.halves)
@@ -73,7 +77,7 @@ def train(folder: Path, lens: str, worlds: int, validation: int, processes: int)
 def finish(
     folder: Path, lens: str, detector: DetectorModel, worlds: int, validation: int, processes: int
 ) -> tuple[DetectorModel, str]:
-    """What depends on the other machines, hence comes last: the first glance, and all thresholds."""
+    """What depends on the other machines: the first glance, and thresholds; then the closer look."""
     plan, left_out = PLANS[lens], range(VALIDATION_FROM, VALIDATION_FROM + validation)
     some = range(min(worlds, GLANCE_WORLDS))
     for seeds in (some, left_out):
@@ -81,8 +85,26 @@ def finish(
     boxes = gather_boxes(folder, lens, "train", some, detector, processes, plan.halves)
     detector = fit_glance(boxes, detector)
     boxes = gather_boxes(folder, lens, "train", left_out, detector, processes, plan.halves)
-    detector = choose_thresholds(boxes, detector)
+    detector = choose_thresholds(boxes, detector, plan.glance_loss)
     print(f"{lens}: {shares(boxes, detector)}", flush=True)
+    return look_closer(folder, lens, detector, worlds, validation, processes)
+
+
+def look_closer(
+    folder: Path, lens: str, detector: DetectorModel, worlds: int, validation: int, processes: int
+) -> tuple[DetectorModel, str]:
+    """What depends on all that, hence comes last: the closer look, the verdict, and their thresholds."""
+    seeds, left_out = range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
+    for some in (seeds, left_out):
+        render_set(folder, lens, "train", some, processes)
+    boxes = gather_close(folder, lens, "train", seeds, detector, processes)
+    print(f"{lens}, closer: {summary(boxes.boxes)}", flush=True)
+    for fit in (fit_close, fit_verdict):
+        detector = fit(boxes, detector)
+    boxes = gather_close(folder, lens, "train", left_out, detector, processes)
+    detector = choose_fusion_threshold(boxes, detector)
+    looked_at = int((boxes.said[:, 0] >= detector.fusion_threshold).sum())
+    print(f"{lens}: a closer look at {looked_at} of {len(boxes.said)} boxes", flush=True)
     seen = look_at_worlds(folder, lens, "train", left_out, detector, processes)
     result = score(seen, PRECISION)
     detector = replace(detector, threshold=result.threshold)
@@ -90,6 +112,10 @@ def finish(
         f"worlds 0 to {worlds - 1} of style train, {FRAMES_A_WORLD} frames each; recall {result.recall:.3f} "
         f"at precision {PRECISION} on worlds {left_out[0]} to {left_out[-1]}, which gave the threshold"
     )
+
+
+STAGES = {"cells": train, "glance": finish, "closer": look_closer}
+"""Where training may begin, each going on to the end."""
 
 
 def note_of(header: Path, lens: str) -> str:
@@ -105,10 +131,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lens", choices=tuple(RIGS), help="that one alone; the other stays as built in")
     parser.add_argument(
-        "--finish",
-        action="store_true",
-        help="keep the machines that are built in; only the first glance and the thresholds come anew, as at "
-        "the end of a whole training",
+        "--from",
+        dest="stage",
+        choices=tuple(STAGES),
+        default="cells",
+        help="keep the machines that are built in before this stage (default: cells, the first)",
     )
     parser.add_argument("--worlds", type=int, help="to train on, a lens (default: as the model was made)")
     parser.add_argument("--validation", type=int, default=40, help="worlds left out (default: 40)")
@@ -124,12 +151,8 @@ def main() -> int:
             # order, and the fits would end in other bits.
             with threadpool_limits(1):
                 where = options.folder, lens
-                if options.finish:
-                    made = finish(
-                        *where, built_in_detector(lens), worlds, options.validation, options.processes
-                    )
-                else:
-                    made = train(*where, worlds, options.validation, options.processes)
+                start = blank_detector() if options.stage == "cells" else built_in_detector(lens)
+                made = STAGES[options.stage](*where, start, worlds, options.validation, options.processes)
                 detectors[lens], notes[lens] = made
         else:
             detectors[lens], notes[lens] = built_in_detector(lens), note_of(HEADER, lens)

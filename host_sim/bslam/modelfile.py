@@ -72,6 +72,30 @@ class AdditiveSvm:
 
 
 @dataclass(frozen=True)
+class HingedSvm:
+    """A machine as bslam_hinged_t takes it: each byte counts, and by how much it exceeds a knot."""
+
+    knots: NDArray[np.uint8]  # (features,)
+    weights: NDArray[np.int8]  # (rows, features, 2): of the byte, of what is above the knot
+    byte_scale: NDArray[np.float32]  # (rows,)
+    bias: NDArray[np.float32]  # (rows,)
+
+    @property
+    def rows(self) -> int:
+        return len(self.bias)
+
+    @property
+    def features(self) -> int:
+        return len(self.knots)
+
+    @property
+    def paired(self) -> NDArray[np.int8]:
+        """The weights as BSLAM_HINGED_BYTES has them: (pairs of rows, features, 2, 2)."""
+        rows = np.concatenate([self.weights, np.zeros((self.rows % 2, self.features, 2), np.int8)])
+        return np.ascontiguousarray(rows.reshape(-1, 2, self.features, 2).transpose(0, 2, 3, 1))
+
+
+@dataclass(frozen=True)
 class BeaconClass:
     """A kind of beacon, or one object of a user's.
 

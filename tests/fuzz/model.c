@@ -13,7 +13,7 @@ enum {
     OBJECTS = 3,
     KNOTS = BSLAM_BLOB_FEATURES * BSLAM_KNOTS,
     ROWS = BSLAM_CLASSES_MAX + 2,
-    FUSED = BSLAM_CLASSES_MAX + 3
+    FUSED = BSLAM_CLASSES_MAX + 4  // of the verdict; the fusion has one less
 };
 
 /// A model in memory that may be written to. Tables are as long as the counts of any model that the check
@@ -31,9 +31,14 @@ static struct {
     float byte_scale[ROWS];
     float bias[ROWS];
     uint8_t crossed[BSLAM_CROSSED_MAX];
+    uint8_t close_knots[BSLAM_CLOSE_FEATURES];
+    float close_scale[ROWS];
+    float close_bias[ROWS];
 } made, whole;
 static int8_t kinds_bytes[BSLAM_ADDITIVE_BYTES(ROWS, BSLAM_BLOB_FEATURES, BSLAM_CROSSED_MAX)];
 static float fusion_weights[BSLAM_SVM_WEIGHTS(FUSED, true)];
+static int8_t close_bytes[BSLAM_HINGED_BYTES(ROWS, BSLAM_CLOSE_FEATURES)];
+static float verdict_weights[BSLAM_SVM_WEIGHTS(FUSED, true)];
 static float object_weights[BSLAM_SVM_ROWS_MAX * BSLAM_SIGNATURE_SIZE];
 static float object_bias[BSLAM_SVM_ROWS_MAX];
 
@@ -57,6 +62,14 @@ static void prepare(void)
     memcpy(fusion_weights, from->fusion.weights,
            (size_t)BSLAM_SVM_WEIGHTS(from->fusion.features, from->fusion.quadratic) *
                sizeof fusion_weights[0]);
+    memcpy(verdict_weights, from->verdict.weights,
+           (size_t)BSLAM_SVM_WEIGHTS(from->verdict.features, from->verdict.quadratic) *
+               sizeof verdict_weights[0]);
+    memcpy(close_bytes, from->close.bytes,
+           (size_t)BSLAM_HINGED_BYTES(from->close.rows, BSLAM_CLOSE_FEATURES));
+    memcpy(whole.close_knots, from->close.knots, sizeof whole.close_knots);
+    memcpy(whole.close_scale, from->close.byte_scale, rows * sizeof whole.close_scale[0]);
+    memcpy(whole.close_bias, from->close.bias, rows * sizeof whole.close_bias[0]);
     bslam_detector_model_t *detector = &whole.model.pinhole;
     whole.model.classes = made.classes;
     detector->cell.weights = made.cell_weights;
@@ -69,6 +82,11 @@ static void prepare(void)
     detector->kinds.crossed = made.crossed;
     detector->kinds.bytes = kinds_bytes;
     detector->fusion.weights = fusion_weights;
+    detector->close.bytes = close_bytes;
+    detector->close.knots = made.close_knots;
+    detector->close.byte_scale = made.close_scale;
+    detector->close.bias = made.close_bias;
+    detector->verdict.weights = verdict_weights;
     whole.recogniser = (bslam_recogniser_t){.svm = {.rows = OBJECTS,
                                                     .features = BSLAM_SIGNATURE_SIZE,
                                                     .weights = object_weights,
@@ -151,6 +169,33 @@ static void change_additive(fuzz_input_t *input, bslam_additive_t *machine)
     }
 }
 
+static void change_hinged(fuzz_input_t *input, bslam_hinged_t *machine)
+{
+    switch (fuzz_u8(input) % 7) {
+    case 0:
+        machine->rows = (int32_t)fuzz_u8(input) - 1;
+        break;
+    case 1:
+        machine->features = (int32_t)fuzz_u16(input);
+        break;
+    case 2:
+        machine->knots = NULL;
+        break;
+    case 3:
+        machine->bytes = NULL;
+        break;
+    case 4:
+        machine->byte_scale = NULL;
+        break;
+    case 5:
+        machine->bias = NULL;
+        break;
+    default:
+        made.close_knots[fuzz_u16(input) % BSLAM_CLOSE_FEATURES] = fuzz_u8(input);
+        break;
+    }
+}
+
 static void change_table(fuzz_input_t *input)
 {
     const struct {
@@ -168,6 +213,9 @@ static void change_table(fuzz_input_t *input)
         {&made.model.pinhole.threshold, 1},
         {&made.recogniser.reject_margin, 1},
         {&made.model.pinhole.glance_threshold, 1},
+        {&made.model.pinhole.fusion_threshold, 1},
+        {made.close_scale, (unsigned)bslam_beacons_model.class_count + 2},
+        {made.close_bias, (unsigned)bslam_beacons_model.class_count + 2},
     };
     const unsigned which = fuzz_u8(input) % (sizeof tables / sizeof tables[0]);
     const unsigned at = fuzz_u16(input) % tables[which].count;
@@ -177,7 +225,7 @@ static void change_table(fuzz_input_t *input)
 static void change(fuzz_input_t *input)
 {
     bslam_detector_model_t *detector = &made.model.pinhole;
-    switch (fuzz_u8(input) % 12) {
+    switch (fuzz_u8(input) % 14) {
     case 0:
         made.model.class_count = (int32_t)fuzz_u8(input) - 1;
         break;
@@ -207,6 +255,12 @@ static void change(fuzz_input_t *input)
         break;
     case 9:
         change_svm(input, &detector->glance);
+        break;
+    case 10:
+        change_svm(input, &detector->verdict);
+        break;
+    case 11:
+        change_hinged(input, &detector->close);
         break;
     default:
         change_table(input);

@@ -25,6 +25,7 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
             d->knots[i * BSLAM_KNOTS + k] = (float)k;
         }
     }
+    d->verdict_weights[0] = 1;
     const bslam_detector_model_t views = {
         .cell = machine(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
         .glance = machine(1, BSLAM_GLANCE_FEATURES, false, d->glance_weights, &d->glance_bias),
@@ -41,6 +42,14 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
                   .byte_scale = d->kind_scale,
                   .bias = d->kind_bias},
         .fusion = machine(1, UNIT_MODEL_CLASSES + 3, false, d->fusion_weights, &d->fusion_bias),
+        .fusion_threshold = -1e6f,
+        .close = {.rows = UNIT_MODEL_CLASSES + 2,
+                  .features = BSLAM_CLOSE_FEATURES,
+                  .knots = d->close_knots,
+                  .bytes = d->close_weights,
+                  .byte_scale = d->close_scale,
+                  .bias = d->close_bias},
+        .verdict = machine(1, UNIT_MODEL_CLASSES + 4, false, d->verdict_weights, &d->verdict_bias),
         .threshold = 0,
     };
     const bslam_beacon_model_t model = {

@@ -17,11 +17,16 @@ typedef struct unit_detector {
     float kind_scale[UNIT_MODEL_CLASSES + 2];
     float kind_bias[UNIT_MODEL_CLASSES + 2];
     float fusion_weights[UNIT_MODEL_CLASSES + 3];
-    float cell_bias, glance_bias, screen_bias, fusion_bias;
+    uint8_t close_knots[BSLAM_CLOSE_FEATURES];
+    int8_t close_weights[BSLAM_HINGED_BYTES(UNIT_MODEL_CLASSES + 2, BSLAM_CLOSE_FEATURES)];
+    float close_scale[UNIT_MODEL_CLASSES + 2];
+    float close_bias[UNIT_MODEL_CLASSES + 2];
+    float verdict_weights[UNIT_MODEL_CLASSES + 4];
+    float cell_bias, glance_bias, screen_bias, fusion_bias, verdict_bias;
 } unit_detector_t;
 
 /// Machines that view the tables of `detector`, which are set to 0, scales to 1; both lenses share it.
-/// Everything passes the glance and the screen, and the threshold is 0.
+/// Everything passes the glance, the screen and the fusion, whose value is the verdict; its threshold is 0.
 bslam_beacon_model_t unit_blank_model(unit_detector_t *detector);
 
 #endif

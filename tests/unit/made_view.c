@@ -30,6 +30,7 @@ void unit_made_view(made_view_t *made, float wall_m)
         .height_px = MADE_ROWS * BSLAM_CELL_PX,
         .columns = MADE_COLUMNS,
         .rows = MADE_ROWS,
+        .half = made->half,
     };
     made->view = (bslam_view_t){
         .frame = &made->frame,

@@ -19,6 +19,7 @@ typedef struct made_view {
     uint8_t step_y[BSLAM_CELLS_ROOM];
     uint16_t frequent[BSLAM_CELLS_ROOM];
     int8_t values[BSLAM_CELLS_ROOM];
+    uint16_t half[MADE_COLUMNS * 2 * MADE_ROWS * 2];
     bslam_background_t background;
     bslam_floor_line_t floor_line;
     bslam_camera_t camera;

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bslam.core.raw import vision_library
 from bslam.core.vision import DetectorModel
-from bslam.modelfile import AdditiveSvm, Svm, weights_in_row
+from bslam.modelfile import AdditiveSvm, HingedSvm, Svm, weights_in_row
 from training.additive import KNOTS, weights_of
 
 
@@ -29,6 +29,9 @@ def built_in_detector(lens: str) -> DetectorModel:
         any_threshold=made.any_threshold,
         kinds=_additive(made.kinds),
         fusion=_svm(made.fusion),
+        fusion_threshold=made.fusion_threshold,
+        close=_hinged(made.close),
+        verdict=_svm(made.verdict),
         threshold=made.threshold,
     )
 
@@ -53,6 +56,17 @@ def _additive(made: Any) -> AdditiveSvm:
         _copy(made.knots, made.features * KNOTS, np.float32).reshape(-1, KNOTS),
         _copy(made.crossed, made.crossed_count, np.uint8),
         pairs.transpose(0, 2, 1).reshape(-1, row)[: made.rows],
+        _copy(made.byte_scale, made.rows, np.float32),
+        _copy(made.bias, made.rows, np.float32),
+    )
+
+
+def _hinged(made: Any) -> HingedSvm:
+    pair_count = (made.rows + 1) // 2
+    pairs = _copy(made.bytes, 4 * pair_count * made.features, np.int8).reshape(pair_count, -1, 2, 2)
+    return HingedSvm(
+        _copy(made.knots, made.features, np.uint8),
+        pairs.transpose(0, 3, 1, 2).reshape(2 * pair_count, -1, 2)[: made.rows],
         _copy(made.byte_scale, made.rows, np.float32),
         _copy(made.bias, made.rows, np.float32),
     )

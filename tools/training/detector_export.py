@@ -34,6 +34,9 @@ def _detector(header: Header, name: str, detector: DetectorModel) -> str:
             "any_threshold": c_float(detector.any_threshold),
             "kinds": header.additive(f"{name}_kinds", detector.kinds),
             "fusion": header.svm(f"{name}_fusion", detector.fusion),
+            "fusion_threshold": c_float(detector.fusion_threshold),
+            "close": header.hinged(f"{name}_close", detector.close),
+            "verdict": header.svm(f"{name}_verdict", detector.verdict),
             "threshold": c_float(detector.threshold),
         }
     )

@@ -29,8 +29,9 @@ SCREEN_RECALL = 0.99
 GLANCE_COST = 0.01
 SURE = -0.5
 """Objects whose best box scores this or more are those that the stages before it are to keep."""
-STAGE_LOSSES = {"glance": 0.001, "screen": 0.0025, "any": 0.0025}
-"""The share of these objects whose best box a stage may drop."""
+STAGES = ("glance", "screen", "any")
+STAGE_LOSS = 0.0025
+"""The share of these objects whose best box a stage after the glance may drop."""
 OVERLAP_FOUND = 0.5  # as OVERLAP_MIN of truth.py
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
@@ -217,9 +218,9 @@ def fit_glance(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     return replace(detector, glance=svm)
 
 
-def choose_thresholds(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
+def choose_thresholds(samples: BoxSamples, detector: DetectorModel, glance_loss: float) -> DetectorModel:
     """The thresholds of the stages before the score, from boxes that nothing was fitted to: each drops the
-    best box of so few of the objects that have a sure one."""
+    best box of so few of the objects that have a sure one, the glance `glance_loss` of them."""
     on_object = samples.of(samples.overlap >= OVERLAP_FOUND)
     values = machine_values(on_object, detector)
     best: dict[tuple[int, int], int] = {}
@@ -228,7 +229,8 @@ def choose_thresholds(samples: BoxSamples, detector: DetectorModel) -> DetectorM
             best[key] = i
     kept = values[list(best.values())]
     glance, screen, first = (
-        float(np.quantile(kept[:, stage], loss)) for stage, loss in enumerate(STAGE_LOSSES.values())
+        float(np.quantile(kept[:, stage], loss))
+        for stage, loss in enumerate((glance_loss, STAGE_LOSS, STAGE_LOSS))
     )
     return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
 
@@ -239,7 +241,7 @@ def shares(samples: BoxSamples, detector: DetectorModel) -> str:
     limits = detector.glance_threshold, detector.screen_threshold, detector.any_threshold
     left = np.cumprod([values[:, i] >= limit for i, limit in enumerate(limits)], axis=0).sum(axis=1)
     return f"of {len(values)} boxes " + ", ".join(
-        f"{name} leaves {count}" for name, count in zip(STAGE_LOSSES, left.tolist(), strict=True)
+        f"{name} leaves {count}" for name, count in zip(STAGES, left.tolist(), strict=True)
     )
 
 

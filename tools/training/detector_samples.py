@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, Proposals, feature_counts
-from bslam.modelfile import AdditiveSvm, BeaconClass, Svm, weights_in_row
+from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm, weights_in_row
 from training.additive import KNOTS
 from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from training.truth import NOTHING, areas, owners, teaches
@@ -102,9 +102,15 @@ def blank_additive(rows: int, features: int) -> AdditiveSvm:
     return AdditiveSvm(knots, np.zeros(0, np.uint8), weights, zeros, zeros)
 
 
+def blank_hinged(rows: int, features: int) -> HingedSvm:
+    """One that decides 0."""
+    zeros = np.zeros(rows, np.float32)
+    return HingedSvm(np.zeros(features, np.uint8), np.zeros((rows, features, 2), np.int8), zeros, zeros)
+
+
 def blank_detector() -> DetectorModel:
     """A detector that proposes nothing and accepts nothing: what training starts with."""
-    cells, glances, blobs = feature_counts()
+    cells, glances, blobs, closer = feature_counts()
     return DetectorModel(
         cell=Svm(cells, False, np.zeros((1, cells), np.float32), np.array([-4.0], np.float32)),
         glance=blank_svm(1, glances),
@@ -116,6 +122,9 @@ def blank_detector() -> DetectorModel:
         any_threshold=1.0,
         kinds=blank_additive(len(KINDS) + 2, blobs),
         fusion=blank_svm(1, len(KINDS) + 3, quadratic=True),
+        fusion_threshold=1.0,
+        close=blank_hinged(len(KINDS) + 2, closer),
+        verdict=blank_svm(1, len(KINDS) + 4, quadratic=True),
         threshold=1.0,
     )
 
@@ -128,7 +137,7 @@ def model_of(detector: DetectorModel) -> BeaconModel:
 def gather_cells(folder: Path, lens: str, style: str, seeds: Iterable[int], processes: int) -> CellSamples:
     """Cells of the worlds' frames."""
     work = partial(_cells_of_world, folder, lens, style, model_of(blank_detector()))
-    return _joined(CellSamples, work, seeds, processes, f"cells {lens}")
+    return _gathered(CellSamples, work, seeds, processes, f"cells {lens}")
 
 
 def gather_boxes(
@@ -150,13 +159,17 @@ def gather_boxes(
     seeds += [seed + RECOLOURED for seed in seeds]
     model = None if detector is None else model_of(detector)
     work = partial(_boxes_of_world, folder, lens, style, model, halves)
-    return _joined(BoxSamples, work, seeds, processes, f"proposals {lens}")
+    return _gathered(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
 
-def _joined(kind, work, seeds: Iterable[int], processes: int, title: str):  # type: ignore[no-untyped-def]
+def _gathered(kind, work, seeds: Iterable[int], processes: int, title: str):  # type: ignore[no-untyped-def]
     seeds = list(seeds)
     with ProcessPoolExecutor(processes) as pool:
-        parts = list(tqdm(pool.map(work, seeds), total=len(seeds), desc=title, unit="world"))
+        return joined(kind, list(tqdm(pool.map(work, seeds), total=len(seeds), desc=title, unit="world")))
+
+
+def joined(kind, parts):  # type: ignore[no-untyped-def]
+    """Samples of some parts as one; `kind` is their dataclass."""
     return kind(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(kind)))
 
 
@@ -184,19 +197,25 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
 def _boxes_of_world(
     folder: Path, lens: str, style: str, model: BeaconModel | None, halves: bool, seed: int
 ) -> BoxSamples:
-    world = replace(read_world(folder, lens, style, seed % RECOLOURED), seed=seed)
-    camera = camera_of(lens, seed % RECOLOURED)
-    front_end = FrontEnd([camera], model)
-    parts = []
+    number = seed % RECOLOURED
+    front_end = FrontEnd([camera_of(lens, number)], model)
+    parts = list(boxes_of_world(folder, lens, style, front_end, number, seed >= RECOLOURED, halves))
+    return joined(BoxSamples, parts)
+
+
+def boxes_of_world(
+    folder: Path, lens: str, style: str, front_end: FrontEnd, seed: int, recolour: bool, halves: bool
+) -> Iterator[BoxSamples]:
+    """Proposals of a world's frames, one after the other, as gather_boxes has them; the front end has then
+    seen the frame."""
+    world = read_world(folder, lens, style, seed)
+    world = replace(world, seed=seed + RECOLOURED) if recolour else world
+    cell_px = CELL_PX / camera_of(lens, seed).zoom
     for index, picture in enumerate(world.pictures):
-        if halves and (index % 2 == 0) == (seed < RECOLOURED):
+        if halves and (index % 2 == 0) != recolour:
             continue
-        front_end.see(picture if seed < RECOLOURED else recoloured(picture, seed))
-        found = front_end.proposals()
-        parts.append(_label_boxes(world, index, found, CELL_PX / camera.zoom))
-    return BoxSamples(
-        *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(BoxSamples))
-    )
+        front_end.see(recoloured(picture, world.seed) if recolour else picture)
+        yield _label_boxes(world, index, front_end.proposals(), cell_px)
 
 
 def _label_boxes(world: World, index: int, found: Proposals, cell_px: float) -> BoxSamples:

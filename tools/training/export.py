@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.modelfile import AdditiveSvm, BeaconClass, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
 
 COLUMNS = 110
 NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -77,6 +77,19 @@ class Header:
         fields["byte_scale"] = self.array(f"{name}_byte_scale", machine.byte_scale)
         fields["bias"] = self.array(f"{name}_bias", machine.bias)
         return initialiser(fields)
+
+    def hinged(self, name: str, machine: HingedSvm) -> str:
+        """Add the tables of a hinged machine; the initialiser of its bslam_hinged_t."""
+        return initialiser(
+            {
+                "rows": str(machine.rows),
+                "features": str(machine.features),
+                "knots": self.array(f"{name}_knots", machine.knots),
+                "bytes": self.array(f"{name}_bytes", machine.paired),
+                "byte_scale": self.array(f"{name}_byte_scale", machine.byte_scale),
+                "bias": self.array(f"{name}_bias", machine.bias),
+            }
+        )
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
         """Add a table of kinds or objects; its name."""

@@ -31,10 +31,9 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
         int32_t features;
         bool may_be_quadratic;
     } parts[] = {
-        {&detector->cell, BSLAM_CELL_FEATURES, false},
-        {&detector->glance, BSLAM_GLANCE_FEATURES, false},
-        {&detector->screen, BSLAM_BLOB_FEATURES, false},
-        {&detector->fusion, class_count + 3, true},
+        {&detector->cell, BSLAM_CELL_FEATURES, false},   {&detector->glance, BSLAM_GLANCE_FEATURES, false},
+        {&detector->screen, BSLAM_BLOB_FEATURES, false}, {&detector->fusion, class_count + 3, true},
+        {&detector->verdict, class_count + 4, true},
     };
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
         const bslam_status_t status = check_svm(parts[i].svm, parts[i].features, parts[i].may_be_quadratic);
@@ -42,16 +41,20 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
             return status;
         }
     }
-    if (detector->kinds.rows != class_count + 2) {
+    if (detector->kinds.rows != class_count + 2 || detector->close.rows != class_count + 2) {
         return BSLAM_E_COUNT;
     }
-    const bslam_status_t status = bslam_additive_check(&detector->kinds, BSLAM_BLOB_FEATURES);
+    bslam_status_t status = bslam_additive_check(&detector->kinds, BSLAM_BLOB_FEATURES);
+    if (status == BSLAM_OK) {
+        status = bslam_hinged_check(&detector->close, BSLAM_CLOSE_FEATURES);
+    }
     if (status != BSLAM_OK) {
         return status;
     }
     const float limits[] = {detector->glance_threshold, detector->screen_threshold, detector->any_threshold,
-                            detector->threshold};
-    if (!are_numbers(limits, 4) || !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
+                            detector->fusion_threshold, detector->threshold};
+    if (!are_numbers(limits, sizeof limits / sizeof limits[0]) ||
+        !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
         !are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
         return BSLAM_E_NOT_FINITE;
     }

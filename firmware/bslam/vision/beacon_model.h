@@ -5,14 +5,17 @@
 
 #include "bslam/base/status.h"
 #include "bslam/svm/additive.h"
+#include "bslam/svm/hinged.h"
 #include "bslam/svm/svm.h"
 
-/// Lengths of the feature vectors (cells.h, features.h, glance.h); a model of other lengths is refused. Not
-/// macros, so that Python sees them.
+/// Lengths of the feature vectors (cells.h, features.h, glance.h, patch.h); a model of other lengths is
+/// refused. Not macros, so that Python sees them.
 enum {
     BSLAM_CELL_FEATURES = 22,
     BSLAM_BLOB_FEATURES = 82,
     BSLAM_GLANCE_FEATURES = 56,
+    BSLAM_PATCH_FEATURES = 288,
+    BSLAM_CLOSE_FEATURES = BSLAM_PATCH_FEATURES + BSLAM_BLOB_FEATURES,
 };
 
 #define BSLAM_CLASSES_MAX 16
@@ -35,7 +38,8 @@ typedef struct bslam_beacon_class {
 /// The detector for one kind of lens.
 ///
 /// Kinds' rows: 0 any beacon, 1 to class_count a kind each, last clutter. The fusion's inputs are those rows'
-/// values followed by the screen's.
+/// values followed by the screen's. The closer look has the same rows; the verdict's inputs are the fusion's
+/// value, that of kinds' first row, and the closer look's rows.
 typedef struct bslam_detector_model {
     bslam_svm_t cell;          ///< 1 row, linear, BSLAM_CELL_FEATURES: beacon or surroundings
     bslam_svm_t glance;        ///< 1 row, linear, BSLAM_GLANCE_FEATURES
@@ -47,7 +51,10 @@ typedef struct bslam_detector_model {
     float any_threshold;       ///< and one whose first row is below this before the other rows
     bslam_additive_t kinds;    ///< class_count + 2 rows, BSLAM_BLOB_FEATURES
     bslam_svm_t fusion;        ///< 1 row, linear or quadratic, class_count + 3 inputs
-    float threshold;           ///< a proposal whose fusion value is below it is no candidate
+    float fusion_threshold;    ///< a proposal whose fusion value is below it gets no closer look
+    bslam_hinged_t close;      ///< class_count + 2 rows, BSLAM_CLOSE_FEATURES
+    bslam_svm_t verdict;       ///< 1 row, linear or quadratic, class_count + 4 inputs
+    float threshold;           ///< a proposal whose verdict is below it is no candidate
 } bslam_detector_model_t;
 
 /// Objects of a user's own, recognised by their signatures.

@@ -11,6 +11,8 @@
 /// one stays.
 #define OVERLAP_MAX BSLAM_R(0.3)
 #define WITHIN_MAX BSLAM_R(0.7)
+/// A box gets no closer look where the fusion is surer by so much of another one in its place.
+#define SURER_BY 0.7f
 /// What a kind's value loses where the box is not as high as the kind: so much for each unit of the natural
 /// logarithm beyond SIZE_FREE, SIZE_LOSS_MAX at most, since the floor line errs too. tools/training takes off
 /// the same before it fits the fusion.
@@ -99,12 +101,6 @@ static bool is_worth_a_look(const bslam_detector_model_t *model, const bslam_vie
     return value >= model->glance_threshold;
 }
 
-/// What the machines say of a proposal.
-typedef struct opinion {
-    float values[BSLAM_CLASSES_MAX + 3];
-    float score;
-} opinion_t;
-
 /// The additive machines' values; false if the first one refuses it. Not to be inlined: the sample's place
 /// takes a kilobyte of stack.
 __attribute__((noinline)) static bool ask_additive(const bslam_detector_model_t *model, const float *features,
@@ -120,11 +116,18 @@ __attribute__((noinline)) static bool ask_additive(const bslam_detector_model_t 
     return true;
 }
 
+void bslam_detector_tell(const float normalised[BSLAM_BLOB_FEATURES], uint8_t told[BSLAM_BLOB_FEATURES])
+{
+    for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
+        told[i] = (uint8_t)(normalised[i] * BSLAM_CLOSE_STEPS + 128.5f);
+    }
+}
+
 /// False if a machine refuses it. Not to be inlined: its kilobyte of stack is then free for what follows.
 __attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t *model,
                                                    const bslam_beacon_class_t *classes, int32_t class_count,
                                                    const bslam_view_t *view, const bslam_proposal_t *proposal,
-                                                   opinion_t *opinion)
+                                                   bslam_box_opinion_t *opinion)
 {
     float features[BSLAM_BLOB_FEATURES];
     float *values = opinion->values;
@@ -144,24 +147,66 @@ __attribute__((noinline)) static bool ask_machines(const bslam_detector_model_t 
     }
     clamp_all(values, class_count + 3, BSLAM_FUSION_LIMIT);
     bslam_svm_decide(&model->fusion, values, &opinion->score);
-    return opinion->score >= model->threshold;
+    opinion->proposal = proposal;
+    bslam_detector_tell(features, opinion->told);
+    return opinion->score >= model->fusion_threshold;
 }
 
-/// True if the proposal is a candidate: its score, class and outline are then written.
-static bool judge_one(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
-                      int32_t class_count, const bslam_view_t *view, const bslam_proposal_t *proposal,
-                      bslam_candidate_t *candidate)
+/// Holds an opinion; where there is no room, in place of the least sure. Returns how many there are then.
+static int32_t hold(bslam_box_opinion_t *opinions, int32_t count, const bslam_box_opinion_t *opinion,
+                    uint32_t *dropped)
 {
-    opinion_t opinion;
-    if (!is_worth_a_look(model, view, proposal) ||
-        !ask_machines(model, classes, class_count, view, proposal, &opinion)) {
-        return false;
+    if (count < BSLAM_OPINIONS_MAX) {
+        opinions[count] = *opinion;
+        return count + 1;
     }
-    memset(candidate, 0, sizeof *candidate);
-    candidate->outline = proposal->box;
-    candidate->score = opinion.score;
-    choose_class(opinion.values + 1, class_count, candidate);
-    return true;
+    int32_t least = 0;
+    for (int32_t i = 1; i < count; i++) {
+        least = opinions[i].score < opinions[least].score ? i : least;
+    }
+    if (opinion->score > opinions[least].score) {
+        opinions[least] = *opinion;
+    }
+    (*dropped)++;
+    return count;
+}
+
+/// What all proposals are, as far as their cells tell. Returns how many may be beacons.
+static int32_t look(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
+                    int32_t class_count, const bslam_view_t *view, const bslam_proposals_t *proposals,
+                    bslam_box_opinion_t *opinions, uint32_t *dropped)
+{
+    int32_t held = 0;
+    for (int32_t i = 0; i < proposals->count; i++) {
+        const bslam_proposal_t *proposal = &proposals->items[i];
+        bslam_box_opinion_t opinion;
+        if (is_worth_a_look(model, view, proposal) &&
+            ask_machines(model, classes, class_count, view, proposal, &opinion)) {
+            held = hold(opinions, held, &opinion, dropped);
+        }
+    }
+    return held;
+}
+
+/// The verdict on an opinion by what the pixels show; kinds' values become the mean of both looks. Not to be
+/// inlined: what the pixels show takes a kilobyte of stack.
+__attribute__((noinline)) static float look_closer(const bslam_detector_model_t *model, int32_t class_count,
+                                                   const bslam_frame_t *frame, bslam_box_opinion_t *opinion)
+{
+    uint8_t told[BSLAM_CLOSE_FEATURES];
+    float inputs[BSLAM_CLASSES_MAX + 4], verdict = 0;
+    float *seen = inputs + 2;
+    bslam_patch_features(frame, &opinion->proposal->box, told);
+    memcpy(told + BSLAM_PATCH_FEATURES, opinion->told, BSLAM_BLOB_FEATURES);
+    bslam_hinged_decide(&model->close, told, seen);
+    inputs[0] = opinion->score;
+    inputs[1] = opinion->values[0];
+    clamp_all(inputs, class_count + 4, BSLAM_FUSION_LIMIT);
+    bslam_svm_decide(&model->verdict, inputs, &verdict);
+    for (int32_t c = 1; c <= class_count; c++) {
+        opinion->values[c] = 0.5f * (opinion->values[c] + seen[c]);
+    }
+    return verdict;
 }
 
 static bslam_real_t area_px2(const bslam_box_t *box)
@@ -176,6 +221,18 @@ static bool is_same_thing(const bslam_box_t *a, const bslam_box_t *b)
     const bslam_real_t smaller = area_a < area_b ? area_a : area_b;
     const bslam_real_t both = overlap * (area_a + area_b) / (1 + overlap);
     return overlap > OVERLAP_MAX || both > WITHIN_MAX * smaller;
+}
+
+/// Whether one in its place is so much surer that no closer look will turn them round.
+static bool is_beaten(const bslam_box_opinion_t *opinions, int32_t count, const bslam_box_opinion_t *opinion)
+{
+    for (int32_t i = 0; i < count; i++) {
+        if (opinions[i].score > opinion->score + SURER_BY &&
+            is_same_thing(&opinions[i].proposal->box, &opinion->proposal->box)) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /// Puts a candidate among those known, surest first, unless a surer one stands in its place; takes out those
@@ -210,13 +267,21 @@ static int32_t insert(bslam_candidate_t *candidates, int32_t count, const bslam_
 
 int32_t bslam_detector_judge(const bslam_detector_model_t *model, const bslam_beacon_class_t *classes,
                              int32_t class_count, const bslam_view_t *view,
-                             const bslam_proposals_t *proposals, bslam_candidate_t *candidates,
+                             const bslam_proposals_t *proposals,
+                             bslam_box_opinion_t opinions[BSLAM_OPINIONS_MAX], bslam_candidate_t *candidates,
                              uint32_t *dropped)
 {
+    const int32_t held = look(model, classes, class_count, view, proposals, opinions, dropped);
     int32_t count = 0;
-    for (int32_t i = 0; i < proposals->count; i++) {
-        bslam_candidate_t candidate;
-        if (judge_one(model, classes, class_count, view, &proposals->items[i], &candidate)) {
+    for (int32_t i = 0; i < held; i++) {
+        bslam_box_opinion_t *opinion = &opinions[i];
+        if (is_beaten(opinions, held, opinion)) {
+            continue;
+        }
+        const float verdict = look_closer(model, class_count, view->frame, opinion);
+        if (verdict >= model->threshold) {
+            bslam_candidate_t candidate = {.outline = opinion->proposal->box, .score = verdict};
+            choose_class(opinion->values + 1, class_count, &candidate);
             count = insert(candidates, count, &candidate, dropped);
         }
     }

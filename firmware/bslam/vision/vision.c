@@ -393,9 +393,9 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
                        notes->frequent, notes->values);
     bslam_proposals_find(&vision->proposals, &view, vision->runs, notes->masks);
     bslam_uprights_propose(&vision->proposals, &view, &notes->steps);
-    vision->candidate_count =
-        bslam_detector_judge(detector, vision->model->classes, vision->model->class_count, &view,
-                             &vision->proposals, vision->candidates, &vision->candidates_dropped);
+    vision->candidate_count = bslam_detector_judge(
+        detector, vision->model->classes, vision->model->class_count, &view, &vision->proposals,
+        vision->opinions, vision->candidates, &vision->candidates_dropped);
     measure(vision, frame);
 }
 
@@ -444,6 +444,17 @@ void bslam_vision_glance(const bslam_vision_t *vision, int32_t index, float glan
     const bslam_frame_t frame = finished_frame(vision);
     const bslam_view_t view = view_of(vision, &frame);
     bslam_box_glance(&view, &vision->proposals.items[index], glance);
+}
+
+void bslam_vision_close_features(const bslam_vision_t *vision, int32_t index,
+                                 uint8_t features[BSLAM_CLOSE_FEATURES])
+{
+    const bslam_frame_t frame = finished_frame(vision);
+    float blob[BSLAM_BLOB_FEATURES];
+    bslam_vision_blob_features(vision, index, blob);
+    bslam_detector_normalise(detector_for(vision->model, &vision->cameras[vision->camera]), blob);
+    bslam_patch_features(&frame, &vision->proposals.items[index].box, features);
+    bslam_detector_tell(blob, features + BSLAM_PATCH_FEATURES);
 }
 
 void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,

@@ -40,10 +40,13 @@ typedef struct bslam_vision {
     bslam_background_t backgrounds[BSLAM_CAMERAS_MAX];
     bslam_cell_machine_t machines[BSLAM_CAMERAS_MAX];
     union {
-        bslam_row_sums_t row_sums;                           ///< while a frame streams in,
-        bslam_channel_tables_t channel_tables;               ///< while its cells are looked at,
-        bslam_run_t runs[BSLAM_RUNS_MAX];                    ///< while they are joined,
-        bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];  ///< and of a frame that has been looked at
+        bslam_row_sums_t row_sums;              ///< while a frame streams in,
+        bslam_channel_tables_t channel_tables;  ///< while its cells are looked at,
+        bslam_run_t runs[BSLAM_RUNS_MAX];       ///< while they are joined,
+        struct {
+            bslam_candidate_t candidates[BSLAM_CANDIDATES_MAX];  ///< and of a frame that has been looked at;
+            bslam_box_opinion_t opinions[BSLAM_OPINIONS_MAX];    ///< while these are found
+        };
     };
     bslam_thumbnail_t thumbnail;
     bslam_proposals_t proposals;
@@ -94,6 +97,8 @@ bslam_box_t bslam_vision_proposal_box(const bslam_vision_t *vision, int32_t inde
 void bslam_vision_blob_features(const bslam_vision_t *vision, int32_t index,
                                 float features[BSLAM_BLOB_FEATURES]);
 void bslam_vision_glance(const bslam_vision_t *vision, int32_t index, float glance[BSLAM_GLANCE_FEATURES]);
+void bslam_vision_close_features(const bslam_vision_t *vision, int32_t index,
+                                 uint8_t features[BSLAM_CLOSE_FEATURES]);
 void bslam_vision_cell_features(const bslam_vision_t *vision, int32_t row, int32_t column,
                                 int16_t features[BSLAM_CELL_FEATURES]);
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
-from bslam.modelfile import AdditiveSvm, Svm
+from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
 
 
 class Library:
@@ -150,6 +150,20 @@ class VisionLibrary:
         keep.append(made)
         return made[0]
 
+    def hinged(self, machine: HingedSvm, keep: list[Any]) -> Any:
+        """A bslam_hinged_t; `keep` keeps its tables alive."""
+        made = self.new_filled(
+            "bslam_hinged_t",
+            rows=machine.rows,
+            features=machine.features,
+            knots=self.table("uint8_t", machine.knots, keep),
+            bytes=self.table("int8_t", machine.paired, keep),
+            byte_scale=self.table("float", machine.byte_scale, keep),
+            bias=self.table("float", machine.bias, keep),
+        )
+        keep.append(made)
+        return made[0]
+
     def pixels(self, rgb: NDArray[Any]) -> Any:
         """The bytes of a C-contiguous picture, good as long as the array is."""
         return self.ffi.cast("uint8_t *", rgb.ctypes.data)
@@ -157,6 +171,10 @@ class VisionLibrary:
     def floats(self, array: NDArray[np.float32]) -> Any:
         """The numbers of a C-contiguous float32 array, to be written by C."""
         return self.ffi.cast("float *", array.ctypes.data)
+
+    def bytes(self, array: NDArray[np.uint8]) -> Any:
+        """The numbers of a C-contiguous uint8 array, to be written by C."""
+        return self.ffi.cast("uint8_t *", array.ctypes.data)
 
     def shorts(self, array: NDArray[np.int16]) -> Any:
         """The numbers of a C-contiguous int16 array, to be written by C."""

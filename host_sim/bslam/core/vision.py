@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bslam.core.raw import vision_library
 from bslam.errors import BslamError
-from bslam.modelfile import AdditiveSvm, BeaconClass, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
 from bslam.rig import Camera
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
@@ -50,6 +50,9 @@ class DetectorModel:
     any_threshold: float
     kinds: AdditiveSvm
     fusion: Svm
+    fusion_threshold: float
+    close: HingedSvm
+    verdict: Svm
     threshold: float
 
 
@@ -266,6 +269,14 @@ class FrontEnd:
             glances=glances,
         )
 
+    def close_features(self, chosen: Sequence[int]) -> NDArray[np.uint8]:
+        """What the closer look's machine would be told (n, close features) of chosen proposals of the last
+        frame."""
+        features = np.empty((len(chosen), self._library.lib.BSLAM_CLOSE_FEATURES), dtype=np.uint8)
+        for row, index in zip(features, chosen, strict=True):
+            self._library.lib.bslam_vision_close_features(self._vision, index, self._library.bytes(row))
+        return features
+
     def cell_features(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.int16]:
         """Features (n, cell features) of cells of the last frame."""
         features = np.empty((len(rows), self._library.lib.BSLAM_CELL_FEATURES), dtype=np.int16)
@@ -392,13 +403,17 @@ class FrontEnd:
             any_threshold=model.any_threshold,
             kinds=library.additive(model.kinds, keep),
             fusion=library.svm(model.fusion, keep),
+            fusion_threshold=model.fusion_threshold,
+            close=library.hinged(model.close, keep),
+            verdict=library.svm(model.verdict, keep),
             threshold=model.threshold,
         )
         keep.append(made)
         return made[0]
 
 
-def feature_counts() -> tuple[int, int, int]:
-    """Features of a cell, of a glance at a proposal, and of a proposal."""
+def feature_counts() -> tuple[int, int, int, int]:
+    """Features of a cell, of a glance at a proposal, of a proposal, and of a closer look at it."""
     lib = vision_library().lib
-    return int(lib.BSLAM_CELL_FEATURES), int(lib.BSLAM_GLANCE_FEATURES), int(lib.BSLAM_BLOB_FEATURES)
+    counts = lib.BSLAM_CELL_FEATURES, lib.BSLAM_GLANCE_FEATURES, lib.BSLAM_BLOB_FEATURES
+    return *map(int, counts), int(lib.BSLAM_CLOSE_FEATURES)  # type: ignore[return-value]

@@ -75,12 +75,26 @@ static void test_model_check_refuses_machines_of_another_size(void **state)
     model = unit_blank_model(&detector);
     model.wide.kinds.knots = NULL;
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_PARAMETER);
+    model = unit_blank_model(&detector);
+    model.pinhole.close.rows--;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
+    model = unit_blank_model(&detector);
+    model.pinhole.close.features--;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
+    model = unit_blank_model(&detector);
+    model.wide.verdict.features--;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_COUNT);
 }
 
 static void test_model_check_refuses_numbers_that_are_not_finite(void **state)
 {
-    float *const tables[] = {&detector.blob_offset[BSLAM_BLOB_FEATURES - 1], &detector.blob_scale[0],
-                             &detector.cell_weights[3], &detector.kind_bias[0]};
+    float *const tables[] = {&detector.blob_offset[BSLAM_BLOB_FEATURES - 1],
+                             &detector.blob_scale[0],
+                             &detector.cell_weights[3],
+                             &detector.kind_bias[0],
+                             &detector.close_bias[0],
+                             &detector.close_scale[1],
+                             &detector.verdict_weights[0]};
     for (int i = 0; i < COUNT_OF(tables); i++) {
         const bslam_beacon_model_t model = unit_blank_model(&detector);
         *tables[i] = i % 2 == 0 ? NAN : INFINITY;
@@ -91,6 +105,9 @@ static void test_model_check_refuses_numbers_that_are_not_finite(void **state)
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_NOT_FINITE);
     model = unit_blank_model(&detector);
     model.pinhole.glance_threshold = NAN;
+    assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_NOT_FINITE);
+    model = unit_blank_model(&detector);
+    model.pinhole.fusion_threshold = INFINITY;
     assert_int_equal(bslam_beacon_model_check(&model), BSLAM_E_NOT_FINITE);
 }
 

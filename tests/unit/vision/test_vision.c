@@ -380,6 +380,8 @@ static void test_end_of_a_model_of_one_kind_there_is_no_second(void **state)
     for (int i = 0; i < 2; i++) {
         lenses[i]->kinds.rows = 1 + 2;
         lenses[i]->fusion.features = 1 + 3;
+        lenses[i]->close.rows = 1 + 2;
+        lenses[i]->verdict.features = 1 + 4;
     }
     take_all(1);
     start_with(&camera);
