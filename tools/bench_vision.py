@@ -27,6 +27,7 @@ STAGES = {
     "boxes": ("bslam_proposals_find", "bslam_uprights_propose"),
     "features": ("bslam_box_glance", "bslam_blob_features", "bslam_detector_normalise"),
     "machines": ("bslam_svm_decide", "bslam_additive_locate", "bslam_additive_decide"),
+    "pixels": ("bslam_patch_features", "bslam_hinged_decide"),
     "measuring": ("bslam_measure",),
 }
 """Functions of the core whose instructions, with those of what they call, make up a stage."""
