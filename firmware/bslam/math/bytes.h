@@ -126,6 +126,13 @@ static inline uint32_t bslam_bytes_difference(uint32_t a, uint32_t b)
 #endif
 }
 
+/// All bits of each byte whose top bit is set, else none.
+static inline uint32_t bslam_bytes_filled(uint32_t bytes)
+{
+    const uint32_t ones = bytes >> 7 & 0x01010101U;
+    return (ones << 8) - ones;
+}
+
 /// The top bits of eight bytes, the first word's lowest byte's first.
 static inline uint32_t bslam_top_bits(uint32_t first, uint32_t next)
 {

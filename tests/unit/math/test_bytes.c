@@ -38,6 +38,7 @@ static void test_bytes_are_each_as_a_number(void **state)
             assert_int_equal(bslam_byte_of(bslam_bytes_least(a, b), k), least(x, y));
             assert_int_equal(bslam_byte_of(bslam_bytes_apart(a, b), k), x > y ? x - y : y - x);
             assert_int_equal(bslam_byte_of(bslam_bytes_mean(a, b), k), (x + y) / 2);
+            assert_int_equal(bslam_byte_of(bslam_bytes_filled(a), k), x >= 128 ? 255 : 0);
             const int32_t apart = least(x > y ? x - y : y - x, 127);
             assert_int_equal((int8_t)bslam_byte_of(bslam_bytes_difference(a, b), k), x > y ? apart : -apart);
             has_zero = has_zero || x == 0;
