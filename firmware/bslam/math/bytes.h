@@ -338,6 +338,26 @@ static inline int32_t bslam_halves_dot(uint32_t a, uint32_t b, int32_t sum)
 #endif
 }
 
+/// The sum and the product of the lower half of a word and a factor of 16 bits, as signed numbers.
+static inline int32_t bslam_low_half_times(uint32_t halves, int32_t factor, int32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __smlabb((int32_t)halves, factor, sum);
+#else
+    return sum + (int16_t)halves * factor;
+#endif
+}
+
+/// The same of the upper half.
+static inline int32_t bslam_high_half_times(uint32_t halves, int32_t factor, int32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    return __smlatb((int32_t)halves, factor, sum);
+#else
+    return sum + (int16_t)(halves >> 16) * factor;
+#endif
+}
+
 /// The sum and a product of 64 bits. The core has an instruction for it, of which a compiler that knows a
 /// factor to fit 16 bits makes several.
 static inline int64_t bslam_product_add(int32_t a, int32_t b, int64_t sum)

@@ -62,14 +62,13 @@ static void fill_words(const uint8_t *red, const uint8_t *green, const uint8_t *
 
 #else
 
-/// The colours of four cells and of those `apart` cells on, how far they are apart; green counts twice.
-static inline uint32_t four_steps(const uint8_t *red, const uint8_t *green, const uint8_t *blue,
-                                  int32_t apart)
+/// How far four bytes of a channel and those `apart` bytes on are apart; steps on, which costs nothing where
+/// the word that is stepped over is loaded last.
+static inline uint32_t step_of(const uint8_t **channel, int32_t apart)
 {
-    const uint32_t of_red = bslam_bytes_apart(bslam_word_at(red), bslam_word_at(red + apart));
-    const uint32_t of_green = bslam_bytes_apart(bslam_word_at(green), bslam_word_at(green + apart));
-    const uint32_t of_blue = bslam_bytes_apart(bslam_word_at(blue), bslam_word_at(blue + apart));
-    return bslam_bytes_plus(bslam_bytes_plus(of_red, of_green), bslam_bytes_plus(of_green, of_blue));
+    const uint32_t there = bslam_word_at(*channel + apart), here = bslam_word_at(*channel);
+    *channel += BSLAM_WORD_BYTES;
+    return bslam_bytes_apart(there, here);
 }
 
 /// Not to be inlined: tables so far apart would be addressed from one base, with a sum for each access.
@@ -79,10 +78,10 @@ __attribute__((noinline)) static void fill_words(const uint8_t *red, const uint8
 {
     const uint8_t *end = into + count;
     for (; into < end; into += BSLAM_WORD_BYTES) {
-        bslam_word_put(into, four_steps(red, green, blue, apart));
-        red += BSLAM_WORD_BYTES;
-        green += BSLAM_WORD_BYTES;
-        blue += BSLAM_WORD_BYTES;
+        const uint32_t of_red = step_of(&red, apart), of_green = step_of(&green, apart);
+        const uint32_t of_blue = step_of(&blue, apart);
+        bslam_word_put(
+            into, bslam_bytes_plus(bslam_bytes_plus(of_red, of_green), bslam_bytes_plus(of_green, of_blue)));
     }
 }
 
@@ -448,10 +447,22 @@ typedef struct cell_row {
     const int16_t *floor_row;
 } cell_row_t;
 
-/// What each of `count` cells adds up to by texture and place: `places` by where the floor begins. Not to be
-/// inlined, for the registers' sake.
+/// Adds to the sums of two cells, the first and the third of some, what their textures count, which come in
+/// the halves of words.
+static inline void add_textures(uint32_t spread, uint32_t step_x, uint32_t step_y, const texture_t *by,
+                                int32_t sums[3])
+{
+    const int32_t first = bslam_low_half_times(spread, by->by_spread, sums[0]);
+    const int32_t third = bslam_high_half_times(spread, by->by_spread, sums[2]);
+    sums[0] = bslam_low_half_times(step_y, by->by_step_y, bslam_low_half_times(step_x, by->by_step_x, first));
+    sums[2] =
+        bslam_high_half_times(step_y, by->by_step_y, bslam_high_half_times(step_x, by->by_step_x, third));
+}
+
+/// What each of `count` cells adds up to by texture and place: `places` by where the floor begins, `of_row`
+/// of all. Not to be inlined, for the registers' sake.
 __attribute__((noinline)) static void sum_row(cell_row_t row, const texture_t *by, const int32_t *places,
-                                              int32_t count, int32_t *restrict sums)
+                                              int32_t of_row, int32_t count, int32_t *restrict sums)
 {
     const texture_t weights = *by;
     const int32_t *end = sums + count;
@@ -464,10 +475,12 @@ __attribute__((noinline)) static void sum_row(cell_row_t row, const texture_t *b
         row.step_y += BSLAM_WORD_BYTES;
         _Pragma("GCC unroll 4") for (int32_t k = 0; k < BSLAM_WORD_BYTES; k++)
         {
-            sums[k] = places[row.floor_row[k]] + weights.by_spread * bslam_byte_of(spread, k) +
-                      weights.by_step_x * bslam_byte_of(step_x, k) +
-                      weights.by_step_y * bslam_byte_of(step_y, k);
+            sums[k] = of_row + places[row.floor_row[k]];
         }
+        add_textures(bslam_bytes_even(spread), bslam_bytes_even(step_x), bslam_bytes_even(step_y), &weights,
+                     sums);
+        add_textures(bslam_bytes_odd(spread), bslam_bytes_odd(step_x), bslam_bytes_odd(step_y), &weights,
+                     sums + 1);
         row.floor_row += BSLAM_WORD_BYTES;
     }
 }
@@ -512,7 +525,7 @@ static inline int32_t value_of(int32_t sum)
 }
 
 /// Values of a row's cells: by their tones, and the sums of the rest.
-static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, int32_t row, int32_t of_row,
+static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, int32_t row,
                        const int32_t *restrict sums, uint16_t *restrict frequent, int8_t *restrict values)
 {
     const int32_t first = row * view->frame->columns;
@@ -524,13 +537,14 @@ static void decide_row(const bslam_view_t *view, const tone_machine_t *machine, 
     const int32_t columns = view->frame->columns;
     for (int32_t i = 0; i < columns; i++) {
         const uint32_t tone = lights[i] | (uint32_t)reddish[i] << 8 | (uint32_t)bluish[i] << 16;
-        bslam_tone_sum_t *known = &kept[(tone ^ tone >> 5 ^ tone >> 10) % BSLAM_TONES_KEPT];
+        // One place serves few of a room's tones: all channels' bits are mixed.
+        _Static_assert(BSLAM_TONES_KEPT == 1 << 8, "8 bits tell the place");
+        bslam_tone_sum_t *known = &kept[tone * 0x10042108U >> 24];
         if (known->tone != tone) {
             known = sum_tone(known, tone, machine);
         }
         frequent[i] = (uint16_t)known->frequent;
-        values[i] =
-            (int8_t)value_of(sums[i] + of_row + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
+        values[i] = (int8_t)value_of(sums[i] + (floor_row[i] >= row ? known->sum_above_floor : known->sum));
     }
 }
 
@@ -557,8 +571,8 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
         const int32_t first = row * columns;
         const cell_row_t cells = {view->tones->spread + first, view->step_x + first, view->step_y + first,
                                   view->floor_line->row};
-        sum_row(cells, &texture, places + ROWS_MAX - row, columns, sums);
-        decide_row(view, &tones, row, of_row, sums, frequent + first, values + first);
+        sum_row(cells, &texture, places + ROWS_MAX - row, of_row, columns, sums);
+        decide_row(view, &tones, row, sums, frequent + first, values + first);
     }
 }
 

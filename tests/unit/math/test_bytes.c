@@ -75,6 +75,9 @@ static void test_sums_of_bytes_and_of_halves(void **state)
         if (dot < INT32_MAX - round) {
             assert_int_equal(bslam_halves_dot(a, b, round), dot + round);
         }
+        // A factor of 16 bits; the sum stays within 32.
+        assert_int_equal(bslam_low_half_times(a, high_b, round), low_a * high_b + round);
+        assert_int_equal(bslam_high_half_times(a, high_b, round), high_a * high_b + round);
         assert_int_equal(bslam_halves(low_a, high_a), a);
         const int lower = least((int)(a & 0xFFFF), (int)(b & 0xFFFF));
         const int upper = least((int)(a >> 16), (int)(b >> 16));
