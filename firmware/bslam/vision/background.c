@@ -152,12 +152,25 @@ static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_
     }
 }
 
+/// Two numbers in halves of words over two others, at most 255.
+static inline uint32_t quotients(uint32_t numbers, uint32_t by)
+{
+    const uint32_t low = (numbers & 0xFFFFU) / (by & 0xFFFFU), high = (numbers >> 16) / (by >> 16);
+    return bslam_halves_least(low | high << 16, BSLAM_EVEN_BYTES);
+}
+
+/// 128 times the spread as a part of luma + 8.
 static void fill_spreads(const bslam_cells_t *cells, int32_t count, uint8_t *spreads)
 {
-    for (int32_t i = 0; i < count; i++) {
-        const uint32_t luma =
-            cells->green[i] + cells->red[i] / 2U;  // as thumbnail.c weighs it for the spread
-        spreads[i] = bslam_byte_at_most(128U * cells->spread[i] / (luma + 8));
+    const uint32_t eights = 8U | 8U << 16, whole = BSLAM_EVEN_BYTES << 7;
+    for (int32_t i = 0; i < count; i += BSLAM_WORD_BYTES) {
+        const uint32_t spread = bslam_word_at(cells->spread + i), green = bslam_word_at(cells->green + i);
+        // As thumbnail.c weighs them for the spread.
+        const uint32_t red = bslam_word_at(cells->red + i) >> 1 & ~BSLAM_TOP_BITS;
+        const uint32_t even = bslam_bytes_add_even(bslam_bytes_add_even(eights, green), red);
+        const uint32_t odd = bslam_bytes_add_odd(bslam_bytes_add_odd(eights, green), red);
+        bslam_word_put(spreads + i, quotients(spread << 7 & whole, even) | quotients(spread >> 1 & whole, odd)
+                                                                               << 8);
     }
 }
 
@@ -249,6 +262,18 @@ static void mix(bslam_rgb_t *colour, const zone_sums_t *sums, float rate)
     colour->blue += rate * (sums->colour.blue / sums->weight - colour->blue);
 }
 
+/// Nearly all bins are empty, mostly eight in two words.
+static void fade(uint8_t counts[BSLAM_TONE_BINS])
+{
+    for (uint8_t *at = counts; at != counts + BSLAM_TONE_BINS; at += 2 * BSLAM_WORD_BYTES) {
+        const uint32_t four = bslam_word_at(at), next = bslam_word_at(at + BSLAM_WORD_BYTES);
+        if ((four | next) != 0) {
+            bslam_word_put(at, four - (four >> FADE_SHIFT & FADE_MASK));
+            bslam_word_put(at + BSLAM_WORD_BYTES, next - (next >> FADE_SHIFT & FADE_MASK));
+        }
+    }
+}
+
 void bslam_background_learn(bslam_background_t *background, const bslam_frame_t *frame,
                             const bslam_camera_t *camera, const bslam_tones_t *tones)
 {
@@ -257,10 +282,7 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
     for (int32_t z = 0; z < BSLAM_ZONE_COUNT; z++) {
         uint8_t *counts = background->counts[z];
         const bslam_zone_rows_t span = zone_rows(camera, frame->rows, (bslam_zone_t)z);
-        for (int32_t i = 0; i < BSLAM_TONE_BINS; i += BSLAM_WORD_BYTES) {
-            const uint32_t four = bslam_word_at(counts + i);
-            bslam_word_put(counts + i, four - (four >> FADE_SHIFT & FADE_MASK));
-        }
+        fade(counts);
         count_tones(counts, span, frame->columns, tones, known->known ? 1 : FIRST_WEIGHT);
         const zone_sums_t sums = sum_zone(counts, span, frame, tones);
         mix(colours[z], &sums, known->known ? COLOUR_RATE : 1.0f);
@@ -368,14 +390,14 @@ static void fill_ends(const bslam_background_t *background, const bslam_frame_t 
 
 // --- Column by column
 
-/// A tone in a word, its chromas moved above 0; and where these stand.
+/// A tone in a word, its chromas moved above 0; and where these stand: constants that fit an instruction.
 static uint32_t word_of_tone(bslam_tone_t tone)
 {
-    return (tone.light | (uint32_t)(uint8_t)tone.reddish << 8 | (uint32_t)(uint8_t)tone.bluish << 16) ^
-           0x808000U;
+    return ((uint8_t)tone.reddish | (uint32_t)tone.light << 8 | (uint32_t)(uint8_t)tone.bluish << 16) ^
+           0x800080U;
 }
 
-#define CHROMAS 0xFFFF00U
+#define CHROMAS BSLAM_EVEN_BYTES
 
 /// bslam_tone_distance() of two such words.
 static int32_t word_distance(uint32_t a, uint32_t b)
@@ -452,15 +474,36 @@ typedef struct strip {
     uint32_t pairs[FINE_ROWS];
 } strip_t;
 
-static void fill_strip(const bslam_frame_t *frame, int32_t column, int32_t first, int32_t end, strip_t *strip)
+/// The mean of two rows, whose pairs add up to this, times SHARP: a byte a channel.
+static uint32_t mean_of_two(uint32_t pairs)
 {
+    return (pairs & 127) | (pairs >> BSLAM_SPREAD_RED & 127) << 8 | pairs >> (BSLAM_SPREAD_GREEN + 1) << 16;
+}
+
+/// Fills a strip, and, for each boundary that has SHARP rows above and below, how much their means differ,
+/// times SHARP; 0 before the first and after the last of these. Returns the largest.
+static int32_t fill_strip(const bslam_frame_t *frame, int32_t column, int32_t first, int32_t end,
+                          strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
+{
+    _Static_assert(SHARP == 2, "rows whose means are kept");
     const int32_t width = frame->width_px / 2;
     const uint16_t *at = frame->half + first * width + 2 * column;
+    uint32_t before = 0, above = 0, next_above = 0;
+    int32_t sharpest = 0;
     strip->first = first;
     strip->rows = end - first < FINE_ROWS ? end - first : FINE_ROWS;
     for (int32_t i = 0; i < strip->rows; i++, at += width) {
-        strip->pairs[i] = bslam_spread_pair(bslam_word_at(at));
+        const uint32_t pair = bslam_spread_pair(bslam_word_at(at)), mean = mean_of_two(before + pair);
+        strip->pairs[i] = before = pair;
+        if (i > SHARP) {
+            contrasts[i - 1] = (int32_t)bslam_bytes_apart_sum(above, mean);
+            sharpest = bslam_most(contrasts[i - 1], sharpest);
+        }
+        above = next_above;
+        next_above = mean;
     }
+    contrasts[SHARP - 1] = contrasts[bslam_most(strip->rows - SHARP + 1, SHARP)] = 0;
+    return sharpest;
 }
 
 /// Sums of rows [first, end): green, which has a bit more than red and blue, counts half as much.
@@ -488,29 +531,6 @@ static int32_t difference(const strip_t *strip, int32_t first, int32_t at, int32
     return sum;
 }
 
-/// The means of two rows, times SHARP: a byte a channel.
-static uint32_t mean_of_two(const uint32_t *pairs)
-{
-    const uint32_t sum = pairs[0] + pairs[1];
-    return (sum & 127) | (sum >> BSLAM_SPREAD_RED & 127) << 8 | sum >> (BSLAM_SPREAD_GREEN + 1) << 16;
-}
-
-/// The same of the SHARP rows above and below each boundary that has so many; 0 before the first and after
-/// the last of them.
-static void fill_contrasts(const strip_t *strip, int32_t contrasts[FINE_ROWS + 2])
-{
-    uint32_t means[FINE_ROWS];
-    int32_t i = 0;
-    contrasts[SHARP - 1] = 0;
-    for (; i <= strip->rows - SHARP; i++) {
-        means[i] = mean_of_two(strip->pairs + i);
-        if (i >= SHARP) {
-            contrasts[i] = (int32_t)bslam_bytes_apart_sum(means[i - SHARP], means[i]);
-        }
-    }
-    contrasts[i < SHARP ? SHARP : i] = 0;
-}
-
 /// True if it is sharp, and what lies between it and the coarse end differs from what lies below it: a line
 /// on the floor has floor on both sides.
 static bool is_boundary(const strip_t *strip, const int32_t *contrasts, int32_t i, int32_t coarse,
@@ -528,16 +548,12 @@ static bool is_boundary(const strip_t *strip, const int32_t *contrasts, int32_t 
 /// what is floor and what is not, down to `lowest`; the coarse one where there is none.
 static int32_t fine_end(const bslam_frame_t *frame, int32_t column, int32_t coarse, int32_t lowest)
 {
-    strip_t strip = {0};
+    strip_t strip;
     int32_t contrasts[FINE_ROWS + 2];
     const int32_t half_rows = frame->height_px / 2;
     const int32_t first = coarse > WIDE ? coarse - WIDE : 0;
-    fill_strip(frame, column, first, lowest + WIDE < half_rows ? lowest + WIDE : half_rows, &strip);
-    fill_contrasts(&strip, contrasts);
-    int32_t sharpest = 0;
-    for (int32_t i = SHARP; i <= strip.rows - SHARP; i++) {
-        sharpest = contrasts[i] > sharpest ? contrasts[i] : sharpest;
-    }
+    const int32_t end = lowest + WIDE < half_rows ? lowest + WIDE : half_rows;
+    const int32_t sharpest = fill_strip(frame, column, first, end, &strip, contrasts);
     for (int32_t i = strip.rows - SHARP; i >= SHARP && sharpest >= BOUNDARY_MIN; i--) {
         if (is_boundary(&strip, contrasts, i, coarse - first, sharpest)) {
             return first + i;
