@@ -146,8 +146,8 @@ static inline void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *ab
 
 /// Pixel pairs that are copied at once.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
-/// Two steps before it is asked whether a row ends.
-#define TWO_STEPS_A_LOOP _Pragma("GCC unroll 2")
+/// Bytes that a core copies by loading and storing several words each time.
+#define COPIED_AT_ONCE 64
 /// Pixel pairs that are summed at once, and cells that are made of them.
 enum { PAIRS_AT_ONCE = 2, CELLS_AT_ONCE = 2 };
 
@@ -161,9 +161,12 @@ static inline const uint8_t *words_at(const void *bytes)
 static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, int32_t pairs)
 {
     uint8_t *kept = __builtin_assume_aligned(words, sizeof(uint32_t));
-    TWO_STEPS_A_LOOP
-    for (int32_t i = 0; i < 4 * pairs; i += 4 * PAIRS_A_STEP) {
-        memcpy(kept + i, words_at(pixels + i), 4 * PAIRS_A_STEP);
+    const uint8_t *end = pixels + 4 * pairs;
+    for (; end - pixels >= COPIED_AT_ONCE; pixels += COPIED_AT_ONCE, kept += COPIED_AT_ONCE) {
+        memcpy(kept, words_at(pixels), COPIED_AT_ONCE);
+    }
+    for (; pixels != end; pixels += 4 * PAIRS_A_STEP, kept += 4 * PAIRS_A_STEP) {
+        memcpy(kept, words_at(pixels), 4 * PAIRS_A_STEP);
     }
 }
 
@@ -192,17 +195,32 @@ static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, c
     half[1] = mean_565(next_sum);
 }
 
-/// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means.
+/// The same of the pairs of a step.
+static inline void sum_step(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels)
+{
+    _Static_assert(PAIRS_A_STEP == 2 * PAIRS_AT_ONCE, "a step is two of these");
+    sum_some(words, half, words_at(pixels));
+    sum_some(words + PAIRS_AT_ONCE, half + PAIRS_AT_ONCE, words_at(pixels + 4 * PAIRS_AT_ONCE));
+}
+
+/// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means. Two steps
+/// before it is asked whether the row ends.
 static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels,
                       int32_t pairs)
 {
     const uint32_t *end = words + pairs;
-    TWO_STEPS_A_LOOP
+    if (pairs % (2 * PAIRS_A_STEP) != 0) {
+        sum_step(words, half, pixels);
+        words += PAIRS_A_STEP;
+        half += PAIRS_A_STEP;
+        pixels += 4 * PAIRS_A_STEP;
+    }
     while (words != end) {
-        sum_some(words, half, words_at(pixels));
-        words += PAIRS_AT_ONCE;
-        half += PAIRS_AT_ONCE;
-        pixels += 4 * PAIRS_AT_ONCE;
+        sum_step(words, half, pixels);
+        sum_step(words + PAIRS_A_STEP, half + PAIRS_A_STEP, pixels + 4 * PAIRS_A_STEP);
+        words += 2 * PAIRS_A_STEP;
+        half += 2 * PAIRS_A_STEP;
+        pixels += 8 * PAIRS_A_STEP;
     }
 }
 
