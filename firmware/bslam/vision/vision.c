@@ -18,6 +18,8 @@ _Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
 #define SATURATED_FROM 244
 /// Bits of a word's bytes of which a black cell has none, a saturated one all.
 #define HIGH_BITS 0xF0F0F0F0U
+/// Where these bits differ from the next lower one, in a byte with itself shifted: nowhere in either cell.
+#define HIGH_TURNS 0xE0E0E0E0U
 #define BLACK_PERCENT 95
 #define SATURATED_PERCENT 60
 /// A frame whose cells' green differs by at most this is of one colour.
@@ -194,11 +196,17 @@ static void judge_cell(bslam_cell_t cell, light_t *light)
 
 enum { CELLS_AT_ONCE = BSLAM_CELL_STEP };
 
-/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has.
+/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has. Most have not in
+/// their green already.
 static inline bool may_count(const bslam_cells_t *cells, int32_t i)
 {
-    const bslam_lanes_t red = bslam_lanes_at(cells->red + i), green = bslam_lanes_at(cells->green + i);
-    const bslam_lanes_t blue = bslam_lanes_at(cells->blue + i), high = bslam_lanes_of(HIGH_BITS);
+    const bslam_lanes_t green = bslam_lanes_at(cells->green + i);
+    const bslam_lanes_t turns = (green ^ bslam_words_up(green, 1)) & bslam_lanes_of(HIGH_TURNS);
+    if (bslam_bytes_are_zero(turns) == 0) {
+        return false;
+    }
+    const bslam_lanes_t red = bslam_lanes_at(cells->red + i), blue = bslam_lanes_at(cells->blue + i);
+    const bslam_lanes_t high = bslam_lanes_of(HIGH_BITS);
     return (bslam_bytes_are_zero((red | green | blue) & high) |
             bslam_bytes_are_zero(~(red & green & blue) & high)) != 0;
 }
@@ -207,11 +215,15 @@ static inline bool may_count(const bslam_cells_t *cells, int32_t i)
 
 enum { CELLS_AT_ONCE = BSLAM_WORD_BYTES };
 
-/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has.
+/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has. Most have not in
+/// their green already.
 static inline bool may_count(const bslam_cells_t *cells, int32_t i)
 {
-    const uint32_t red = bslam_word_at(cells->red + i), green = bslam_word_at(cells->green + i);
-    const uint32_t blue = bslam_word_at(cells->blue + i);
+    const uint32_t green = bslam_word_at(cells->green + i);
+    if (!bslam_has_zero_byte((green ^ green << 1) & HIGH_TURNS)) {
+        return false;
+    }
+    const uint32_t red = bslam_word_at(cells->red + i), blue = bslam_word_at(cells->blue + i);
     const uint32_t bright = (red | green | blue) & HIGH_BITS, dim = ~(red & green & blue) & HIGH_BITS;
     return bslam_has_zero_byte(bright) || bslam_has_zero_byte(dim);
 }
