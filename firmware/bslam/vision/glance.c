@@ -203,7 +203,8 @@ void bslam_box_glance(const bslam_view_t *view, const bslam_proposal_t *box,
     float *x = place_features(view, box, glance);
     x = side_features(view, box, x);
     (void)look_features(view, box, x);
-    for (int32_t i = 0; i < SQUARES; i++) {
+    _Pragma("GCC unroll 3") for (int32_t i = 0; i < SQUARES; i++)
+    {
         glance[SQUARES + i] = glance[i] * glance[i];
     }
 }

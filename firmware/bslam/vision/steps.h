@@ -12,6 +12,12 @@ typedef struct bslam_step_sums {
     uint32_t clear;
 } bslam_step_sums_t;
 
+static inline void bslam_step_add(int32_t step, bslam_step_sums_t *sums)
+{
+    sums->sum += bslam_least(step, BSLAM_EDGE_STEP_MAX);
+    sums->clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - step) >> 31;  // 1 where it is below 0
+}
+
 /// Of `count` cells that are so far apart; tables have room for sixteen beyond the last.
 static inline bslam_step_sums_t bslam_sum_steps(const uint8_t *step, int32_t count, int32_t apart)
 {
@@ -30,10 +36,15 @@ static inline bslam_step_sums_t bslam_sum_steps(const uint8_t *step, int32_t cou
         return (bslam_step_sums_t){bslam_lanes_sum(sum), (uint32_t)bslam_lanes_sum(clear)};
     }
 #endif
-    for (int32_t left = count; left > 0; left--, step += apart) {
-        const int32_t here = *step;
-        sums.sum += bslam_least(here, BSLAM_EDGE_STEP_MAX);
-        sums.clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - here) >> 31;  // 1 where it is below 0
+    if (count % 2 != 0) {
+        bslam_step_add(*step, &sums);
+        step += apart;
+    }
+    for (int32_t left = count / 2; left > 0; left--) {
+        bslam_step_add(*step, &sums);
+        step += apart;
+        bslam_step_add(*step, &sums);
+        step += apart;
     }
     return sums;
 }
