@@ -168,12 +168,19 @@ static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int3
 
 #endif
 
-/// Mean of the sideways steps along a line, in quarters.
+/// Mean of the sideways steps along a line that stays in its column, in quarters.
+static inline uint8_t straight_step(const column_sums_t *sums, const side_t *side)
+{
+    const int32_t top = side->top, bottom = side->bottom;
+    return (uint8_t)(4 * steps_between(sums, side->column, top, bottom) / (bottom - top));
+}
+
+/// The same along any line.
 static uint8_t mean_step(const bslam_view_t *view, const column_sums_t *sums, const side_t *side)
 {
     const int32_t top = side->top, bottom = side->bottom;
     if (side->u_px[0] == side->u_px[2]) {
-        return (uint8_t)(4 * steps_between(sums, side->column, top, bottom) / (bottom - top));
+        return straight_step(sums, side);
     }
     int32_t middle = top;
     while (middle < bottom && !(middle_px(middle) > side->v_px[1])) {
@@ -263,12 +270,10 @@ static inline bool find_rows(const bslam_frame_t *frame, side_t *side)
     return side->bottom - side->top >= 2;
 }
 
-/// Where the kind would stand in the side's column. False: it would leave the frame.
-static inline bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+/// Where the kind would stand in the side's column, upright in the frame. False: it would leave the frame.
+static inline bool place_straight(const bslam_view_t *view, const wall_t *wall, const upright_t *kind,
+                                  side_t *side)
 {
-    if (does_bend(view)) {
-        return bend(view, wall, kind, side) && find_rows(view->frame, side);
-    }
     const float camera_m = (float)view->camera->z_m;
     // A straight side's middle is of no use.
     side->v_px[0] = wall->horizon_px - side->metre_px * (kind->heights_m[0] - camera_m);
@@ -276,9 +281,37 @@ static inline bool place(const bslam_view_t *view, const wall_t *wall, const upr
     return find_rows(view->frame, side);
 }
 
+/// The same through a lens that bends uprights.
+static bool place_bent(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+{
+    return bend(view, wall, kind, side) && find_rows(view->frame, side);
+}
+
+/// The same through any lens.
+static bool place(const bslam_view_t *view, const wall_t *wall, const upright_t *kind, side_t *side)
+{
+    return does_bend(view) ? place_bent(view, wall, kind, side) : place_straight(view, wall, kind, side);
+}
+
 static bool shows_much(const bslam_view_t *view)
 {
     return view->frame->columns > COLUMNS_FEW;
+}
+
+/// How the colour steps where a kind would stand in a side's column; 0: it does not. A copy of the side that
+/// none but this function sees stays in registers.
+static inline uint8_t step_where(const bslam_view_t *view, const wall_t *wall, const column_sums_t *sums,
+                                 const upright_t *kind, const side_t *side)
+{
+    side_t here = *side;
+    return place_straight(view, wall, kind, &here) ? straight_step(sums, &here) : 0;
+}
+
+/// The same through a lens that bends uprights.
+static uint8_t step_where_bent(const bslam_view_t *view, const wall_t *wall, const column_sums_t *sums,
+                               const upright_t *kind, side_t *side)
+{
+    return place_bent(view, wall, kind, side) ? mean_step(view, sums, side) : 0;
 }
 
 /// How the colour steps where each kind would stand in each column; 0: it does not. Not to be
@@ -288,14 +321,17 @@ __attribute__((noinline)) static void find_steps(const bslam_view_t *view, const
 {
     column_sums_t sums;
     side_t side = {0};
+    const bool bends = does_bend(view);
     for (int32_t column = 0; column < view->frame->columns; column++) {
         if (column % BSLAM_WORD_BYTES == 0) {
             sum_columns(view, column, &sums);
         }
         const bool is_known = begin_side(view, wall, column, &side);
         for (int32_t kind = 0; kind < UPRIGHTS; kind++) {
-            const bool stands = is_known && place(view, wall, &uprights[kind], &side);
-            steps->of_kind[kind][column] = stands ? mean_step(view, &sums, &side) : 0;
+            const upright_t *upright = &uprights[kind];
+            steps->of_kind[kind][column] = !is_known ? 0
+                                           : bends   ? step_where_bent(view, wall, &sums, upright, &side)
+                                                     : step_where(view, wall, &sums, upright, &side);
         }
     }
 }
