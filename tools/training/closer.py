@@ -36,7 +36,7 @@ CLOSE_COST = 0.001
 CLOSE_ITERATIONS = 80
 VERDICT_COST = 0.001
 VERDICT_ITERATIONS = 150
-FUSION_LOSS = 0.005
+FUSION_LOSS = 0.002
 """The share of objects with a sure box that get no closer look."""
 
 CELLS, WAYS, BANDS, SIDE = 6, 4, 3, 24  # as in patch.c

@@ -30,8 +30,8 @@ GLANCE_COST = 0.01
 SURE = -0.5
 """Objects whose best box scores this or more are those that the stages before it are to keep."""
 STAGES = ("glance", "screen", "any")
-STAGE_LOSS = 0.0025
-"""The share of these objects whose best box a stage after the glance may drop."""
+STAGE_LOSSES = (0.002, 0.001)
+"""The share of these objects whose best box each stage after the glance may drop."""
 OVERLAP_FOUND = 0.5  # as OVERLAP_MIN of truth.py
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
@@ -230,7 +230,7 @@ def choose_thresholds(samples: BoxSamples, detector: DetectorModel, glance_loss:
     kept = values[list(best.values())]
     glance, screen, first = (
         float(np.quantile(kept[:, stage], loss))
-        for stage, loss in enumerate((glance_loss, STAGE_LOSS, STAGE_LOSS))
+        for stage, loss in enumerate((glance_loss, *STAGE_LOSSES))
     )
     return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
 

@@ -55,8 +55,20 @@ static inline void add_word(const int8_t *bytes, uint32_t both, int32_t sums[ROW
     sums[1] = bslam_halves_dot(bslam_bytes_signed_odd(word), both, sums[1]);
 }
 
-/// Sums of two pairs of rows, whose weights begin `next` bytes apart: 512 * 2 * 255 * 128 fits. Two at once,
-/// since what a feature counts is then worked out half as often.
+/// Sums of a pair of rows: 512 * 2 * 255 * 128 fits.
+static void sum_pair(const bslam_hinged_t *machine, const uint8_t *x, const int8_t *bytes, int32_t sums[ROWS])
+{
+    const uint8_t *knots = machine->knots;
+    int32_t pair[ROWS] = {0, 0};
+    for (const uint8_t *end = x + machine->features; x != end; x++, knots++, bytes += 2 * ROWS) {
+        add_word(bytes, both_of(*x, *knots), pair);
+    }
+    sums[0] = pair[0];
+    sums[1] = pair[1];
+}
+
+/// Sums of two pairs of rows, whose weights begin `next` bytes apart: what a feature counts is then worked
+/// out half as often.
 static void sum_pairs(const bslam_hinged_t *machine, const uint8_t *x, const int8_t *bytes, int32_t next,
                       int32_t sums[2 * ROWS])
 {
@@ -78,9 +90,12 @@ void bslam_hinged_decide(const bslam_hinged_t *machine, const uint8_t *x, float 
     const int32_t pair_bytes = 2 * ROWS * machine->features, rows = machine->rows;
     const int8_t *bytes = machine->bytes;
     for (int32_t first = 0; first < rows; first += 2 * ROWS, bytes += 2 * pair_bytes) {
-        const bool is_last_pair = rows - first <= ROWS;
-        int32_t sums[2 * ROWS];
-        sum_pairs(machine, x, bytes, is_last_pair ? 0 : pair_bytes, sums);
+        int32_t sums[2 * ROWS] = {0};
+        if (rows - first <= ROWS) {
+            sum_pair(machine, x, bytes, sums);
+        } else {
+            sum_pairs(machine, x, bytes, pair_bytes, sums);
+        }
         for (int32_t row = first; row < first + 2 * ROWS && row < rows; row++) {
             values[row] = machine->bias[row] + machine->byte_scale[row] * (float)sums[row - first];
         }

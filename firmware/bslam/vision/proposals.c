@@ -12,6 +12,7 @@
 typedef enum source {
     LIKELY,   ///< those whose value is above the level
     SMOOTH,   ///< those near which the colour steps by at most the level: faces of one colour
+    BRIGHT,   ///< those whose light is above the level, a tone's: what light from outside has washed out
     STANDING  ///< all but smooth faces that are large or leave the frame: what stands before walls and floor
 } source_t;
 
@@ -26,10 +27,8 @@ typedef struct pass {
 } pass_t;
 
 static const pass_t passes[] = {
-    {LIKELY, 0, false, 0, false},
-    {LIKELY, 24, false, 0, false},
-    {LIKELY, 0, true, 1, true},
-    {STANDING, 40, true, 1, false},
+    {LIKELY, 0, false, 0, false},   {LIKELY, 24, false, 0, false},  {LIKELY, 0, true, 1, true},
+    {STANDING, 40, true, 1, false}, {BRIGHT, 185, false, 0, false},
 };
 #define PASSES ((int32_t)(sizeof passes / sizeof passes[0]))
 _Static_assert(sizeof passes / sizeof passes[0] == BSLAM_SEGMENTATIONS, "one number a segmentation");
@@ -298,12 +297,21 @@ static void propose_components(bslam_proposals_t *proposals, const bslam_view_t 
 
 #define ALL_FOUR 0x01010101U
 
-/// Bits of 16 cells: those whose value is above the level, which `limit` has 128 more in each byte, or near
-/// which the colour steps by no more than it has.
+/// The level as bits_of takes it, in each byte.
+static uint32_t limit_of(source_t source, int32_t level)
+{
+    return (uint32_t)(source == LIKELY ? level + 128 : level) * ALL_FOUR;
+}
+
+/// Bits of 16 cells: those whose value or light is above the level, or near which the colour steps by no more
+/// than that.
 static inline uint32_t bits_of(const bslam_view_t *view, source_t source, int32_t i, uint32_t limit)
 {
     if (source == LIKELY) {
         return bslam_bits_above(view->values + i, view->values + i, BSLAM_TOP_BITS, limit);
+    }
+    if (source == BRIGHT) {
+        return bslam_bits_above(view->tones->light + i, view->tones->light + i, 0, limit);
     }
     return bslam_bits_above(view->step_x + i, view->step_y + i, 0, limit) ^ 0xFFFFU;
 }
@@ -313,7 +321,7 @@ static inline uint32_t bits_of(const bslam_view_t *view, source_t source, int32_
 static void fill_mask(uint32_t *mask, const bslam_view_t *view, source_t source, int32_t level)
 {
     const int32_t columns = view->frame->columns, cells = columns * view->frame->rows;
-    const uint32_t limit = (uint32_t)(source == LIKELY ? level + 128 : level) * ALL_FOUR;
+    const uint32_t limit = limit_of(source, level);
     for (int32_t first = 0; first < cells; first += columns) {
         for (int32_t k = 0; k < columns; k += BSLAM_MASK_BITS) {
             const uint32_t bits = bits_of(view, source, first + k, limit);

@@ -9,7 +9,7 @@
 #include "bslam/vision/cells.h"
 
 /// Segmentations of a frame; boxes found otherwise have numbers from here on.
-#define BSLAM_SEGMENTATIONS 4
+#define BSLAM_SEGMENTATIONS 5
 
 /// A box in which there may be a beacon.
 typedef struct bslam_proposal {

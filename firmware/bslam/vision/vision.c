@@ -4,8 +4,10 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bslam/math/bounds.h"
 #include "bslam/math/lanes.h"
 #include "bslam/math/trig.h"
+#include "bslam/vision/features.h"
 #include "bslam/vision/glance.h"
 #include "bslam/vision/uprights.h"
 #include "bslam/vision/recogniser.h"
@@ -26,6 +28,13 @@ _Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
 #define FLAT_RANGE 12
 /// An outline that overlaps the detector's box less than this is of something else.
 #define AGREE_MIN BSLAM_R(0.75)
+/// What a candidate of a kind no higher than SMALL_KIND_M loses where it is lower than its kind: so much for
+/// each unit of the natural logarithm beyond SMALL_FREE, SMALL_LOSS_MAX at most, since the floor line errs
+/// too.
+#define SMALL_KIND_M 0.5f
+#define SMALL_FREE 0.5f
+#define SMALL_LOSS 4.0f
+#define SMALL_LOSS_MAX 2.0f
 
 static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
     [BSLAM_VISION_SEEN] = "seen",
@@ -364,12 +373,44 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
     return bslam_measure(frame, camera, &rough, &own_size, candidate);
 }
 
+/// What a candidate's score loses because it is smaller than its kind, to the pixel. For small kinds only: on
+/// walls hang many things that look like those and are smaller still, call points for signs say, and the
+/// detector's own boxes end at cells.
+static float smallness(const bslam_view_t *view, const bslam_beacon_class_t *kind, const bslam_box_t *box,
+                       const bslam_candidate_t *candidate)
+{
+    const unsigned cut =
+        BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
+    if (!(kind->height_m > 0) || kind->height_m > SMALL_KIND_M || (candidate->marks & cut) != 0U) {
+        return 0.0f;
+    }
+    const float height_m = bslam_height_on_wall_m(view, box);
+    if (!(height_m > 0)) {
+        return 0.0f;
+    }
+    const float loss = SMALL_LOSS * (bslam_log(kind->height_m / height_m) - SMALL_FREE);
+    return bslam_clampf(loss, 0.0f, SMALL_LOSS_MAX);
+}
+
+/// Puts a candidate behind those that are at least as sure; returns how many there are then.
+static int32_t insert(bslam_candidate_t *candidates, int32_t count, const bslam_candidate_t *candidate)
+{
+    int32_t at = count;
+    for (; at > 0 && candidates[at - 1].score < candidate->score; at--) {
+        candidates[at] = candidates[at - 1];
+    }
+    candidates[at] = *candidate;
+    return count + 1;
+}
+
 /// Measures the candidates; one that has no outline is of no use. Through a wide lens a thing's sides are
 /// bent, and the box around the straight ones that measuring finds is too narrow: there the detector's stays.
 /// So it does where the outline is of something else. Not to be inlined: its candidates would be on the stack
 /// while proposals are judged.
-__attribute__((noinline)) static void measure(bslam_vision_t *vision, const bslam_frame_t *frame)
+__attribute__((noinline)) static void measure(bslam_vision_t *vision, const bslam_view_t *view,
+                                              float threshold)
 {
+    const bslam_frame_t *frame = view->frame;
     const bool is_wide = vision->cameras[vision->camera].lens == BSLAM_LENS_EQUIDISTANT;
     int32_t kept = 0;
     for (int32_t i = 0; i < vision->candidate_count; i++) {
@@ -380,8 +421,12 @@ __attribute__((noinline)) static void measure(bslam_vision_t *vision, const bsla
             if (is_wide || !agrees) {
                 candidate.outline = found;
             }
-            candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
-            vision->candidates[kept++] = candidate;
+            const bslam_beacon_class_t *kind = &vision->model->classes[candidate.beacon_class - 1];
+            candidate.score -= smallness(view, kind, &candidate.outline, &candidate);
+            if (candidate.score >= threshold) {
+                candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
+                kept = insert(vision->candidates, kept, &candidate);
+            }
         }
     }
     vision->candidate_count = kept;
@@ -408,7 +453,7 @@ static void look(bslam_vision_t *vision, const bslam_frame_t *frame, bool robot_
     vision->candidate_count = bslam_detector_judge(
         detector, vision->model->classes, vision->model->class_count, &view, &vision->proposals,
         vision->opinions, vision->candidates, &vision->candidates_dropped);
-    measure(vision, frame);
+    measure(vision, &view, detector->threshold);
 }
 
 bslam_status_t bslam_vision_end(bslam_vision_t *vision, bool robot_moved)

@@ -1,5 +1,7 @@
 #include "support.h"
 
+#include <math.h>
+
 #include "blank_model.h"
 
 #include "bslam/math/trig.h"
@@ -329,6 +331,17 @@ static void test_end_brighter_light_gives_the_same_boxes(void **state)
     assert_near(best_overlap(99.5, 59.5, 139.5, 99.5), dim, 0.02);
 }
 
+/// Light from outside washes a window out: it is no beacon's colour, and its sides hardly step.
+static void test_end_what_is_washed_out_is_proposed(void **state)
+{
+    detector.cell_weights[6] = 0;  // no cell is a beacon's
+    paint(0, 0, WIDTH, 180, 205, 205, 205);
+    paint(0, 180, WIDTH, HEIGHT, 90, 70, 60);
+    paint(100, 60, 140, 100, 250, 250, 250);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    assert_true(best_overlap(99.5, 59.5, 139.5, 99.5) > BSLAM_R(0.9));
+}
+
 static void test_end_candidates_come_surest_first(void **state)
 {
     detector.fusion_weights[UNIT_MODEL_CLASSES + 2] = 1;  // the screen's value
@@ -420,6 +433,41 @@ static void test_end_candidate_becomes_its_second_kind_where_that_can_be_measure
         assert_int_equal(found->second_class, i < 2 ? 1 : 2);
         assert_int_equal(found->has_range, i < 2);
     }
+}
+
+/// The score of a square so many pixels high, 2.29 m away, taken for a thing so high; -1 if it is none.
+static float score_of(int side_px, float height_m)
+{
+    const bslam_beacon_class_t kind = {.name = "kind", .height_m = height_m};
+    const bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {kind, kind};
+    const bslam_camera_t camera = camera_at(0);
+    model.classes = kinds;
+    start_with(&camera);
+    paint_room();
+    paint(140, 60, 140 + side_px, 60 + side_px, 200, 30, 30);
+    assert_int_equal(show(0, true), BSLAM_OK);
+    int32_t count;
+    const bslam_candidate_t *found = bslam_vision_candidates(&vision, &count);
+    for (int i = 0; i < count; i++) {
+        if (found[i].outline.top_px > 59 && found[i].outline.top_px < 60) {
+            return found[i].score;
+        }
+    }
+    return -1;
+}
+
+/// Call points look like signs, and are a third as high.
+static void test_end_what_is_smaller_than_its_small_kind_is_less_sure(void **state)
+{
+    take_all(UNIT_MODEL_CLASSES);
+    const float unjudged = score_of(16, 0.51f);  // as wide and as high, of a kind that is not small
+    assert_true(unjudged >= 3);
+    assert_near(unjudged - score_of(16, 0.3f), 4 * (log(0.3 / (16 * 2.29 / 277.1)) - 0.5), 0.1);
+    assert_near(unjudged - score_of(16, 0.49f), 2, 1e-5);
+    assert_true(score_of(36, 0.51f) == score_of(36, 0.3f));
+    model.pinhole.threshold = unjudged - 1.0f;
+    assert_true(score_of(16, 0.51f) == unjudged);
+    assert_true(score_of(16, 0.49f) == -1);
 }
 
 /// Whether a candidate's outline is the box of a proposal, as the detector had it.
@@ -723,9 +771,11 @@ int main(void)
         TEST(test_end_rectangle_off_the_grid_of_cells_is_proposed_to_the_pixel),
         TEST(test_end_rectangle_moved_by_cells_moves_its_box),
         TEST(test_end_brighter_light_gives_the_same_boxes),
+        TEST(test_end_what_is_washed_out_is_proposed),
         TEST(test_end_candidates_come_surest_first),
         TEST(test_end_of_a_model_of_one_kind_there_is_no_second),
         TEST(test_end_candidate_becomes_its_second_kind_where_that_can_be_measured),
+        TEST(test_end_what_is_smaller_than_its_small_kind_is_less_sure),
         TEST(test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s),
         TEST(test_end_outline_of_something_else_is_not_taken),
         TEST(test_end_zoomed_camera_sees_what_a_doubled_picture_shows),
