@@ -4,25 +4,15 @@
 #include <stddef.h>
 
 #include "bslam/math/lanes.h"
+#include "bslam/svm/svm.h"
 
 #define ROWS_MAX 255
 /// Of a pair.
 #define ROWS 2
 /// Weights that a pair has of a grid.
 #define GRID_BYTES (ROWS * BSLAM_GRID_KNOTS * BSLAM_GRID_KNOTS)
-#define LARGEST 1e12f
 
 static const uint8_t grid_knots[BSLAM_GRID_KNOTS] = {0, 3, 5, BSLAM_KNOTS - 1};
-
-static bool are_numbers(const float *values, int32_t count)
-{
-    for (int32_t i = 0; i < count; i++) {
-        if (!(values[i] >= -LARGEST && values[i] <= LARGEST)) {
-            return false;
-        }
-    }
-    return true;
-}
 
 static bool do_rise(const float *knots)
 {
@@ -65,8 +55,9 @@ bslam_status_t bslam_additive_check(const bslam_additive_t *machine, int32_t fea
     if (status != BSLAM_OK) {
         return status;
     }
-    if (!are_numbers(machine->knots, features * BSLAM_KNOTS) ||
-        !are_numbers(machine->byte_scale, machine->rows) || !are_numbers(machine->bias, machine->rows)) {
+    if (!bslam_are_numbers(machine->knots, features * BSLAM_KNOTS) ||
+        !bslam_are_numbers(machine->byte_scale, machine->rows) ||
+        !bslam_are_numbers(machine->bias, machine->rows)) {
         return BSLAM_E_NOT_FINITE;
     }
     for (int32_t i = 0; i < features; i++) {

@@ -4,21 +4,11 @@
 #include <stddef.h>
 
 #include "bslam/math/bytes.h"
+#include "bslam/svm/svm.h"
 
 #define ROWS_MAX 255
 /// Of a pair.
 #define ROWS 2
-#define LARGEST 1e12f
-
-static bool are_numbers(const float *values, int32_t count)
-{
-    for (int32_t i = 0; i < count; i++) {
-        if (!(values[i] >= -LARGEST && values[i] <= LARGEST)) {
-            return false;
-        }
-    }
-    return true;
-}
 
 bslam_status_t bslam_hinged_check(const bslam_hinged_t *machine, int32_t features)
 {
@@ -30,7 +20,8 @@ bslam_status_t bslam_hinged_check(const bslam_hinged_t *machine, int32_t feature
         machine->bias == NULL) {
         return BSLAM_E_PARAMETER;
     }
-    if (!are_numbers(machine->byte_scale, machine->rows) || !are_numbers(machine->bias, machine->rows)) {
+    if (!bslam_are_numbers(machine->byte_scale, machine->rows) ||
+        !bslam_are_numbers(machine->bias, machine->rows)) {
         return BSLAM_E_NOT_FINITE;
     }
     for (int32_t row = 0; row < machine->rows; row++) {

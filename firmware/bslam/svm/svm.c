@@ -10,7 +10,7 @@ static int32_t weights_in_row(const bslam_svm_t *svm)
     return BSLAM_SVM_WEIGHTS(svm->features, svm->quadratic);
 }
 
-static bool all_numbers(const float *values, int32_t count)
+bool bslam_are_numbers(const float *values, int32_t count)
 {
     for (int32_t i = 0; i < count; i++) {
         if (!bslam_is_number(values[i])) {
@@ -38,7 +38,7 @@ bslam_status_t bslam_svm_check(const bslam_svm_t *svm, int32_t features)
     // A scale a row in place of the weights, where the weights are bytes.
     const float *table = svm->bytes != NULL ? svm->byte_scale : svm->weights;
     const int32_t count = svm->rows * (svm->bytes != NULL ? 1 : weights_in_row(svm));
-    if (!all_numbers(table, count) || !all_numbers(svm->bias, svm->rows)) {
+    if (!bslam_are_numbers(table, count) || !bslam_are_numbers(svm->bias, svm->rows)) {
         return BSLAM_E_NOT_FINITE;
     }
     for (int32_t r = 0; svm->bytes != NULL && r < svm->rows; r++) {

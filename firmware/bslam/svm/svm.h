@@ -33,6 +33,9 @@ typedef struct bslam_svm {
     const float *bias;        ///< rows values
 } bslam_svm_t;
 
+/// Whether all are numbers that a machine may have: not NaN, infinite or beyond 1e12.
+bool bslam_are_numbers(const float *values, int32_t count);
+
 /// Looks a machine over, once, before its first use. BSLAM_E_COUNT: rows or features out of 1 to
 /// BSLAM_SVM_..._MAX, or not as many features as the caller computes. BSLAM_E_PARAMETER: weights and bytes
 /// are both given or both missing, bytes without a scale, no bias, a scale below 0. BSLAM_E_NOT_FINITE: a

@@ -5,16 +5,6 @@
 #include "bslam/base/real.h"
 #include "bslam/vision/frame.h"
 
-static bool are_numbers(const float *values, int32_t count)
-{
-    for (int32_t i = 0; i < count; i++) {
-        if (!bslam_is_number((bslam_real_t)values[i])) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /// A machine of one row. A quadratic one has more weights than who asks for a linear one would give it.
 static bslam_status_t check_svm(const bslam_svm_t *svm, int32_t features, bool may_be_quadratic)
 {
@@ -53,9 +43,9 @@ static bslam_status_t check_detector(const bslam_detector_model_t *detector, int
     }
     const float limits[] = {detector->glance_threshold, detector->screen_threshold, detector->any_threshold,
                             detector->fusion_threshold, detector->threshold};
-    if (!are_numbers(limits, sizeof limits / sizeof limits[0]) ||
-        !are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
-        !are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
+    if (!bslam_are_numbers(limits, sizeof limits / sizeof limits[0]) ||
+        !bslam_are_numbers(detector->blob_offset, BSLAM_BLOB_FEATURES) ||
+        !bslam_are_numbers(detector->blob_scale, BSLAM_BLOB_FEATURES)) {
         return BSLAM_E_NOT_FINITE;
     }
     return BSLAM_OK;
