@@ -229,8 +229,7 @@ def choose_thresholds(samples: BoxSamples, detector: DetectorModel, glance_loss:
             best[key] = i
     kept = values[list(best.values())]
     glance, screen, first = (
-        float(np.quantile(kept[:, stage], loss))
-        for stage, loss in enumerate((glance_loss, *STAGE_LOSSES))
+        float(np.quantile(kept[:, stage], loss)) for stage, loss in enumerate((glance_loss, *STAGE_LOSSES))
     )
     return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
 
