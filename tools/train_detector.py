@@ -48,10 +48,14 @@ class Plan:
     cells_step: int  # every so many worlds give cells,
     cells: int  # and so many are taken
     halves: bool  # each frame is looked at once, not twice: a wide one shows thrice as many beacons
-    glance_loss: float  # the share of objects with a sure box that may lose it at the first glance
+    glance_loss: float  # the share of objects with a sure box that may lose it at the first glance,
+    screen_loss: float  # and at the screen
 
 
-PLANS = {"pinhole": Plan(1056, 4, 200_000, False, 0.004), "wide": Plan(900, 6, 80_000, True, 0.001)}
+PLANS = {
+    "pinhole": Plan(1056, 4, 200_000, False, 0.004, 0.002),
+    "wide": Plan(900, 6, 80_000, True, 0.001, 0.001),
+}
 
 
 def train(
@@ -85,7 +89,7 @@ def finish(
     boxes = gather_boxes(folder, lens, "train", some, detector, processes, plan.halves)
     detector = fit_glance(boxes, detector)
     boxes = gather_boxes(folder, lens, "train", left_out, detector, processes, plan.halves)
-    detector = choose_thresholds(boxes, detector, plan.glance_loss)
+    detector = choose_thresholds(boxes, detector, plan.glance_loss, plan.screen_loss)
     print(f"{lens}: {shares(boxes, detector)}", flush=True)
     return look_closer(folder, lens, detector, worlds, validation, processes)
 

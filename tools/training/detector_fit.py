@@ -30,8 +30,8 @@ GLANCE_COST = 0.01
 SURE = -0.5
 """Objects whose best box scores this or more are those that the stages before it are to keep."""
 STAGES = ("glance", "screen", "any")
-STAGE_LOSSES = (0.002, 0.001)
-"""The share of these objects whose best box each stage after the glance may drop."""
+FIRST_LOSS = 0.001
+"""The share of these objects whose best box the first additive machine may drop."""
 OVERLAP_FOUND = 0.5  # as OVERLAP_MIN of truth.py
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
@@ -218,9 +218,12 @@ def fit_glance(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
     return replace(detector, glance=svm)
 
 
-def choose_thresholds(samples: BoxSamples, detector: DetectorModel, glance_loss: float) -> DetectorModel:
+def choose_thresholds(
+    samples: BoxSamples, detector: DetectorModel, glance_loss: float, screen_loss: float
+) -> DetectorModel:
     """The thresholds of the stages before the score, from boxes that nothing was fitted to: each drops the
-    best box of so few of the objects that have a sure one, the glance `glance_loss` of them."""
+    best box of so few of the objects that have a sure one, of which `glance_loss` and `screen_loss` are the
+    first two's shares."""
     on_object = samples.of(samples.overlap >= OVERLAP_FOUND)
     values = machine_values(on_object, detector)
     best: dict[tuple[int, int], int] = {}
@@ -229,7 +232,8 @@ def choose_thresholds(samples: BoxSamples, detector: DetectorModel, glance_loss:
             best[key] = i
     kept = values[list(best.values())]
     glance, screen, first = (
-        float(np.quantile(kept[:, stage], loss)) for stage, loss in enumerate((glance_loss, *STAGE_LOSSES))
+        float(np.quantile(kept[:, stage], loss))
+        for stage, loss in enumerate((glance_loss, screen_loss, FIRST_LOSS))
     )
     return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
 

@@ -376,7 +376,7 @@ static bslam_status_t measure_one(const bslam_vision_t *vision, const bslam_fram
 /// What a candidate's score loses because it is smaller than its kind, to the pixel. For small kinds only: on
 /// walls hang many things that look like those and are smaller still, call points for signs say, and the
 /// detector's own boxes end at cells.
-static float smallness(const bslam_view_t *view, const bslam_beacon_class_t *kind, const bslam_box_t *box,
+static float smallness(const bslam_view_t *view, const bslam_beacon_class_t *kind,
                        const bslam_candidate_t *candidate)
 {
     const unsigned cut =
@@ -384,7 +384,7 @@ static float smallness(const bslam_view_t *view, const bslam_beacon_class_t *kin
     if (!(kind->height_m > 0) || kind->height_m > SMALL_KIND_M || (candidate->marks & cut) != 0U) {
         return 0.0f;
     }
-    const float height_m = bslam_height_on_wall_m(view, box);
+    const float height_m = bslam_height_on_wall_m(view, &candidate->outline);
     if (!(height_m > 0)) {
         return 0.0f;
     }
@@ -422,7 +422,7 @@ __attribute__((noinline)) static void measure(bslam_vision_t *vision, const bsla
                 candidate.outline = found;
             }
             const bslam_beacon_class_t *kind = &vision->model->classes[candidate.beacon_class - 1];
-            candidate.score -= smallness(view, kind, &candidate.outline, &candidate);
+            candidate.score -= smallness(view, kind, &candidate);
             if (candidate.score >= threshold) {
                 candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
                 kept = insert(vision->candidates, kept, &candidate);

@@ -448,6 +448,9 @@ static float score_of(int side_px, float height_m)
     assert_int_equal(show(0, true), BSLAM_OK);
     int32_t count;
     const bslam_candidate_t *found = bslam_vision_candidates(&vision, &count);
+    for (int i = 1; i < count; i++) {
+        assert_true(found[i].score <= found[i - 1].score);
+    }
     for (int i = 0; i < count; i++) {
         if (found[i].outline.top_px > 59 && found[i].outline.top_px < 60) {
             return found[i].score;
