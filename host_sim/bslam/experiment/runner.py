@@ -328,8 +328,17 @@ def make_trace(
         refusals=dict(refusals),
         target=dict(target or {}),
         step_us_median=step_us_median,
-        kept_map=slam.save_map() if hasattr(slam, "save_map") else None,
+        kept_map=_saved_map(slam),
     )
+
+
+def _saved_map(slam: Any) -> bytes | None:
+    """The map to keep; None where none can be saved: by a target, or of a drive so lost that its covariance
+    is none. What was measured of the drive stands all the same."""
+    try:
+        return slam.save_map() if hasattr(slam, "save_map") else None
+    except CoreError:
+        return None
 
 
 def _changed_parameters(slam: Any) -> dict[str, Number]:

@@ -57,7 +57,7 @@ class Trace:
     refusals: dict[str, int] = field(default_factory=dict)  # inputs that the core refused, by status
     target: dict[str, Any] = field(default_factory=dict)  # image, hash, instructions, if it ran on a target
     step_us_median: float = 0.0
-    kept_map: bytes | None = None  # the final map as docs/MAP.md has it; None: it ran where none can be saved
+    kept_map: bytes | None = None  # the final map as docs/MAP.md has it; None: none could be saved
 
     @property
     def steps(self) -> int:

@@ -212,6 +212,18 @@ def test_a_refusal_is_counted_and_the_run_goes_on(log):
     assert trace.counts.deferred == 4  # the refused frame has no account
 
 
+def test_a_drive_whose_map_cannot_be_saved_is_measured_all_the_same(log):
+    class Lost(Recorder):
+        def save_map(self):
+            raise CoreError("BSLAM_E_MAP", "map of 80 bytes")
+
+    trace, recorder = run(log, recorder=Lost())
+    assert trace.kept_map is None
+    assert len(trace.pose) == 3 and trace.counters == {"odometry": 2}
+    recorder.save_map = lambda: b"map"
+    assert run(log, recorder=recorder)[0].kept_map == b"map"
+
+
 def test_with_a_lead_the_pose_is_that_of_the_past(log):
     trace, recorder = run(log, RunOptions(odometry_lead_us=50_000))
     assert recorder.asked_us == [-50_000, -10_000, 30_000]
