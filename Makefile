@@ -77,7 +77,7 @@ tables: setup-run ## the tables of the paper, in our figures
 	$(BSLAM) tables --association known --out out/tables
 
 .PHONY: train
-train: setup ## train the beacon detectors on rendered worlds, write firmware/models/beacons.h (25 min)
+train: setup ## train the beacon detectors on rendered worlds, write firmware/models/beacons.h (50 min)
 	$(PYTHON) tools/train_detector.py
 	@$(MAKE) --silent extension
 

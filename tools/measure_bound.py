@@ -212,9 +212,7 @@ def main() -> int:
     owned = proposed.owner >= 0
     with_box = len(np.unique(np.column_stack([proposed.samples.world, proposed.owner])[owned], axis=0))
     print(f"{lens}: a box of {with_box / len(objects):.3f} of {len(objects)} objects", flush=True)
-    samples = gather_boxes(
-        options.folder, lens, options.style, range(worlds), None, options.processes, PLANS[lens].halves
-    )
+    samples = gather_boxes(options.folder, lens, options.style, range(worlds), None, options.processes)
     for name in options.judges:
         started = time.monotonic()
         with threadpool_limits(1):  # the same sums on any number of cores

@@ -36,7 +36,6 @@ from training.render_set import FRAMES_A_WORLD, RIGS, render_set
 ROOT = Path(__file__).resolve().parent.parent
 HEADER = ROOT / "firmware" / "models" / "beacons.h"
 VALIDATION_FROM = 5000
-GLANCE_WORLDS = 120  # few weights, as the cells' machine
 PRECISION = 0.95
 
 
@@ -47,14 +46,15 @@ class Plan:
     worlds: int
     cells_step: int  # every so many worlds give cells,
     cells: int  # and so many are taken
-    halves: bool  # each frame is looked at once, not twice: a wide one shows thrice as many beacons
+    nothing_step: int  # of boxes of nothing one in so many is kept: a wide frame has thrice as many
+    glance_worlds: int  # for the first glance, which has few weights as well
     glance_loss: float  # the share of objects with a sure box that may lose it at the first glance,
     screen_loss: float  # and at the screen
 
 
 PLANS = {
-    "pinhole": Plan(1056, 4, 200_000, False, 0.004, 0.002),
-    "wide": Plan(900, 6, 80_000, True, 0.001, 0.001),
+    "pinhole": Plan(3000, 12, 200_000, 1, 600, 0.006, 0.002),
+    "wide": Plan(1800, 12, 80_000, 3, 120, 0.001, 0.001),
 }
 
 
@@ -62,20 +62,26 @@ def train(
     folder: Path, lens: str, detector: DetectorModel, worlds: int, validation: int, processes: int
 ) -> tuple[DetectorModel, str]:
     """The detector for a kind of lens, and what it reaches on worlds left out."""
-    plan, seeds, left_out = PLANS[lens], range(worlds), range(VALIDATION_FROM, VALIDATION_FROM + validation)
-    started = time.monotonic()
-    for some in (seeds, left_out):
-        render_set(folder, lens, "train", some, processes)
+    detector = fit_boxes(folder, lens, detector, range(worlds), processes)
+    return finish(folder, lens, detector, worlds, validation, processes)
+
+
+def fit_boxes(
+    folder: Path, lens: str, detector: DetectorModel, seeds: range, processes: int
+) -> DetectorModel:
+    """The machines that tell cells and boxes. Their samples, gigabytes, are gone when it returns."""
+    plan, started = PLANS[lens], time.monotonic()
+    render_set(folder, lens, "train", seeds, processes)
     cells = gather_cells(folder, lens, "train", seeds[:: plan.cells_step], processes)
     detector = replace(detector, cell=fit_cells(cells, plan.cells))
-    boxes = gather_boxes(folder, lens, "train", seeds, detector, processes, plan.halves)
+    boxes = gather_boxes(folder, lens, "train", seeds, detector, processes, plan.nothing_step)
     print(f"{lens}: {summary(boxes)}", flush=True)
     offset, scale = normaliser(boxes.features)
     detector = replace(detector, blob_offset=offset, blob_scale=scale)
     for fit in (fit_screen, fit_kinds, fit_fusion):
         detector = fit(boxes, detector)
         print(f"{lens}: {fit.__name__} done, {time.monotonic() - started:.0f} s", flush=True)
-    return finish(folder, lens, detector, worlds, validation, processes)
+    return detector
 
 
 def finish(
@@ -83,12 +89,12 @@ def finish(
 ) -> tuple[DetectorModel, str]:
     """What depends on the other machines: the first glance, and thresholds; then the closer look."""
     plan, left_out = PLANS[lens], range(VALIDATION_FROM, VALIDATION_FROM + validation)
-    some = range(min(worlds, GLANCE_WORLDS))
+    some = range(min(worlds, plan.glance_worlds))
     for seeds in (some, left_out):
         render_set(folder, lens, "train", seeds, processes)
-    boxes = gather_boxes(folder, lens, "train", some, detector, processes, plan.halves)
+    boxes = gather_boxes(folder, lens, "train", some, detector, processes)
     detector = fit_glance(boxes, detector)
-    boxes = gather_boxes(folder, lens, "train", left_out, detector, processes, plan.halves)
+    boxes = gather_boxes(folder, lens, "train", left_out, detector, processes)
     detector = choose_thresholds(boxes, detector, plan.glance_loss, plan.screen_loss)
     print(f"{lens}: {shares(boxes, detector)}", flush=True)
     return look_closer(folder, lens, detector, worlds, validation, processes)

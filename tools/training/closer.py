@@ -80,7 +80,7 @@ def _close_of_world(
     parts = []
     for recolour in (False, True):
         front_end = FrontEnd([camera_of(lens, seed)], model)
-        for boxes in boxes_of_world(folder, lens, style, front_end, seed, recolour, halves=True):
+        for boxes in boxes_of_world(folder, lens, style, front_end, seed, recolour):
             values = machine_values(boxes, detector)
             limits = detector.glance_threshold, detector.screen_threshold, detector.any_threshold
             chosen = np.flatnonzero((values[:, :3] >= limits).all(axis=1))

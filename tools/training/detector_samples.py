@@ -147,18 +147,18 @@ def gather_boxes(
     seeds: Iterable[int],
     detector: DetectorModel | None,
     processes: int,
-    halves: bool = False,
+    nothing_step: int = 1,
 ) -> BoxSamples:
-    """Proposals of the worlds' frames by a detector's cells (None: the built-in one's), each world looked at
-    twice: as it is, and in other colours. `halves`: every second frame the one way, the others the other.
+    """Proposals of the worlds' frames by a detector's cells (None: the built-in one's): of every second frame
+    as it is, of the others in other colours. Of those that show nothing one in `nothing_step` is kept.
 
-    The second look has RECOLOURED added to its world's number. What is a beacon hangs on shape, size, place
+    These have RECOLOURED added to their world's number. What is a beacon hangs on shape, size, place
     more than on its colour: a detector that has seen red signs and no other red things takes those for signs.
     """
     seeds = list(seeds)
     seeds += [seed + RECOLOURED for seed in seeds]
     model = None if detector is None else model_of(detector)
-    work = partial(_boxes_of_world, folder, lens, style, model, halves)
+    work = partial(_boxes_of_world, folder, lens, style, model, nothing_step)
     return _gathered(BoxSamples, work, seeds, processes, f"proposals {lens}")
 
 
@@ -195,24 +195,25 @@ def _cells_of_world(folder: Path, lens: str, style: str, model: BeaconModel, see
 
 
 def _boxes_of_world(
-    folder: Path, lens: str, style: str, model: BeaconModel | None, halves: bool, seed: int
+    folder: Path, lens: str, style: str, model: BeaconModel | None, nothing_step: int, seed: int
 ) -> BoxSamples:
     number = seed % RECOLOURED
     front_end = FrontEnd([camera_of(lens, number)], model)
-    parts = list(boxes_of_world(folder, lens, style, front_end, number, seed >= RECOLOURED, halves))
-    return joined(BoxSamples, parts)
+    parts = list(boxes_of_world(folder, lens, style, front_end, number, seed >= RECOLOURED))
+    boxes = joined(BoxSamples, parts)
+    return boxes.of((boxes.label != NOTHING) | (np.arange(len(boxes.label)) % nothing_step == 0))
 
 
 def boxes_of_world(
-    folder: Path, lens: str, style: str, front_end: FrontEnd, seed: int, recolour: bool, halves: bool
+    folder: Path, lens: str, style: str, front_end: FrontEnd, seed: int, recolour: bool
 ) -> Iterator[BoxSamples]:
-    """Proposals of a world's frames, one after the other, as gather_boxes has them; the front end has then
-    seen the frame."""
+    """Proposals of a world's even frames, or of the odd ones in other colours, one after the other; the front
+    end has then seen the frame."""
     world = read_world(folder, lens, style, seed)
     world = replace(world, seed=seed + RECOLOURED) if recolour else world
     cell_px = CELL_PX / camera_of(lens, seed).zoom
     for index, picture in enumerate(world.pictures):
-        if halves and (index % 2 == 0) != recolour:
+        if (index % 2 == 0) != recolour:
             continue
         front_end.see(recoloured(picture, world.seed) if recolour else picture)
         yield _label_boxes(world, index, front_end.proposals(), cell_px)

@@ -345,12 +345,39 @@ def _slots(canvas: Canvas, artist: Artist, body: Colour) -> None:
         canvas.frame(0.0, 0.0, 1.0, 1.0, artist.between(0.005, 0.02), tint(body, artist.between(0.6, 1.1)))
 
 
+def _sections(canvas: Canvas, artist: Artist, body: Colour) -> None:
+    """Rows and columns of anything: slots, gaps, flutes, rails before them, a cover over them."""
+    for upright in (True, False):
+        if artist.chance(0.6):
+            _repeat(canvas, artist, body, artist.count(3, 40) if upright else artist.count(2, 16), upright)
+    for _ in range(artist.count(0, 3)):
+        at, thick = artist.between(0.0, 0.95), artist.between(0.01, 0.12)
+        box = (at, 0.0, at + thick, 1.0) if artist.chance(0.4) else (0.0, at, 1.0, at + thick)
+        canvas.rect(*box, tint(body, artist.between(0.3, 1.1)), artist.between(0.4, 1.0))
+    if artist.chance(0.5):
+        canvas.frame(0.0, 0.0, 1.0, 1.0, artist.between(0.005, 0.05), tint(body, artist.between(0.5, 1.15)))
+
+
+def _repeat(canvas: Canvas, artist: Artist, body: Colour, count: int, upright: bool) -> None:
+    """So many equal sections, side by side or stacked: a stretch of each is darker, another paler."""
+    low, high = artist.between(0.0, 0.15), artist.between(0.85, 1.0)
+    starts = artist.between(0.0, 0.5), artist.between(0.0, 0.5)
+    widths = artist.between(0.1, 0.5), artist.between(0.1, 0.5)
+    factors = artist.between(0.3, 0.95), artist.between(1.0, 1.15)
+    for i in range(count):
+        for start, width, factor in zip(starts, widths, factors, strict=True):
+            first, last = (i + start) / count, (i + start + width) / count
+            box = (first, low, last, high) if upright else (low, first, high, last)
+            canvas.scale(*box, factor)
+
+
 _RADIATORS: dict[str, Callable[[Canvas, Artist, Colour], None]] = {
     "ribs": _ribs,
     "plates": _plates,
     "columns": _columns,
     "bars": _bars_across,
     "slots": _slots,
+    "sections": _sections,
 }
 
 

@@ -199,6 +199,26 @@ def _medley(canvas: Canvas, artist: Artist) -> None:
         canvas.grain(artist.random, artist.between(0.05, 0.3), artist.count(3, 20), artist.count(3, 20), 0.5)
 
 
+def _faded(canvas: Canvas, artist: Artist) -> None:
+    """Few pale inks on a pale ground: a drawing, a plan, or what the sun has left of anything else."""
+    ground = mix(
+        hsv(artist.hue(), artist.between(0.0, 0.4), 1.0), artist.grey(0.6, 1.0), artist.between(0, 1)
+    )
+    if artist.chance(0.5):
+        canvas.rect(0.0, 0.0, 1.0, 1.0, ground)
+    if artist.chance(0.5):
+        canvas.grain(artist.random, artist.between(0.03, 0.2), artist.count(2, 16), artist.count(2, 16), 0.6)
+    scribble(canvas, artist, artist.count(0, 6))
+    for _ in range(artist.count(0, 6)):
+        ends = [(artist.between(0.0, 1.0), artist.between(0.0, 1.0)) for _ in range(2)]
+        canvas.line(ends[0], ends[1], artist.between(0.005, 0.05), artist.accent())
+    canvas.rect(0.0, 0.0, 1.0, 1.0, ground, artist.between(0.1, 0.7))
+    if artist.chance(0.3):
+        left, top = artist.between(0.0, 0.6), artist.between(0.0, 0.8)
+        box = (left, top, artist.between(left + 0.1, 1.0), artist.between(top + 0.05, 1.0))
+        text(canvas, artist, box, artist.between(0.03, 0.1), artist.accent())
+
+
 _POSTERS: dict[str, Callable[[Canvas, Artist], None]] = {
     "fields": _fields,
     "article": _article,
@@ -213,6 +233,7 @@ _POSTERS: dict[str, Callable[[Canvas, Artist], None]] = {
     "map": _map,
     "mosaic": _mosaic,
     "medley": _medley,
+    "faded": _faded,
 }
 
 _GREEN, _BLUE, _YELLOW, _RED = (0.0, 0.33, 0.16), (0.0, 0.38, 0.72), (0.98, 0.8, 0.0), (0.8, 0.05, 0.08)

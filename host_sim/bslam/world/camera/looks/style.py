@@ -70,11 +70,15 @@ TRAIN = Style(
         (0.33, 0.21, 0.14),
         (0.70, 0.50, 0.36),
     ),
-    posters=("fields", "article", "photo", "shapes", "grid", "headline", "stripes", *("medley",) * 5),
+    posters=(
+        *("fields", "article", "photo", "shapes", "grid", "headline", "stripes"),
+        *("medley",) * 5,
+        *("faded",) * 4,
+    ),
     doors=("plain", "panels4", "panels2", "slit", "pane", "kick", "glazed", *("medley",) * 5),
     cabinets=("two_doors", "drawers", "books", "lockers", "half_books", *("medley",) * 4),
     signs=("arrow", "runner", "ring", "triangle", "flame", "text", *("glyph",) * 5),
-    radiators=("ribs", "plates", "columns", "slots"),
+    radiators=("ribs", "plates", "columns", "slots", *("sections",) * 4),
     views=("sky", "trees", "houses", "dusk"),
     drapes=("none", "none", "blind", "curtains", "roller", "slats"),
     clutter=(
