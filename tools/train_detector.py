@@ -48,13 +48,14 @@ class Plan:
     cells: int  # and so many are taken
     nothing_step: int  # of boxes of nothing one in so many is kept: a wide frame has thrice as many
     glance_worlds: int  # for the first glance, which has few weights as well
-    glance_loss: float  # the share of objects with a sure box that may lose it at the first glance,
-    screen_loss: float  # and at the screen
+    # The shares of objects with a sure box that may lose it: at the first glance, at the screen, at the first
+    # additive machine.
+    losses: tuple[float, float, float]
 
 
 PLANS = {
-    "pinhole": Plan(3000, 12, 200_000, 1, 600, 0.006, 0.002),
-    "wide": Plan(1800, 12, 80_000, 3, 120, 0.001, 0.001),
+    "pinhole": Plan(3000, 12, 200_000, 1, 600, (0.006, 0.002, 0.002)),
+    "wide": Plan(1800, 12, 80_000, 3, 120, (0.001, 0.001, 0.001)),
 }
 
 
@@ -95,7 +96,7 @@ def finish(
     boxes = gather_boxes(folder, lens, "train", some, detector, processes)
     detector = fit_glance(boxes, detector)
     boxes = gather_boxes(folder, lens, "train", left_out, detector, processes)
-    detector = choose_thresholds(boxes, detector, plan.glance_loss, plan.screen_loss)
+    detector = choose_thresholds(boxes, detector, plan.losses)
     print(f"{lens}: {shares(boxes, detector)}", flush=True)
     return look_closer(folder, lens, detector, worlds, validation, processes)
 

@@ -30,8 +30,6 @@ GLANCE_COST = 0.01
 SURE = -0.5
 """Objects whose best box scores this or more are those that the stages before it are to keep."""
 STAGES = ("glance", "screen", "any")
-FIRST_LOSS = 0.001
-"""The share of these objects whose best box the first additive machine may drop."""
 OVERLAP_FOUND = 0.5  # as OVERLAP_MIN of truth.py
 FEATURE_LIMIT = 3.0  # as BSLAM_FEATURE_LIMIT
 OVERLAP_SURE = 0.6
@@ -219,11 +217,10 @@ def fit_glance(samples: BoxSamples, detector: DetectorModel) -> DetectorModel:
 
 
 def choose_thresholds(
-    samples: BoxSamples, detector: DetectorModel, glance_loss: float, screen_loss: float
+    samples: BoxSamples, detector: DetectorModel, losses: tuple[float, float, float]
 ) -> DetectorModel:
     """The thresholds of the stages before the score, from boxes that nothing was fitted to: each drops the
-    best box of so few of the objects that have a sure one, of which `glance_loss` and `screen_loss` are the
-    first two's shares."""
+    best box of this share of the objects that have a sure one."""
     on_object = samples.of(samples.overlap >= OVERLAP_FOUND)
     values = machine_values(on_object, detector)
     best: dict[tuple[int, int], int] = {}
@@ -231,10 +228,7 @@ def choose_thresholds(
         if values[i, -1] >= SURE and (key not in best or values[i, -1] > values[best[key], -1]):
             best[key] = i
     kept = values[list(best.values())]
-    glance, screen, first = (
-        float(np.quantile(kept[:, stage], loss))
-        for stage, loss in enumerate((glance_loss, screen_loss, FIRST_LOSS))
-    )
+    glance, screen, first = (float(np.quantile(kept[:, stage], loss)) for stage, loss in enumerate(losses))
     return replace(detector, glance_threshold=glance, screen_threshold=screen, any_threshold=first)
 
 
