@@ -212,7 +212,9 @@ def main() -> int:
     owned = proposed.owner >= 0
     with_box = len(np.unique(np.column_stack([proposed.samples.world, proposed.owner])[owned], axis=0))
     print(f"{lens}: a box of {with_box / len(objects):.3f} of {len(objects)} objects", flush=True)
-    samples = gather_boxes(options.folder, lens, options.style, range(worlds), None, options.processes)
+    samples = gather_boxes(
+        options.folder, lens, options.style, range(worlds), None, options.processes, PLANS[lens].nothing_step
+    )
     for name in options.judges:
         started = time.monotonic()
         with threadpool_limits(1):  # the same sums on any number of cores

@@ -316,6 +316,8 @@ def make_trace(
     step_us_median: float = 0.0,
 ) -> Trace:
     """The trace of a run that has ended; `target` is what it ran on, if not here."""
+    refused = Counter(refusals)
+    kept_map = _saved_map(slam, refused)
     return Trace(
         time_us=np.array(times_us, dtype=np.int64),
         pose=np.array(rows.poses, dtype=np.float64),
@@ -325,19 +327,20 @@ def make_trace(
         beacons=tuple(_map_beacon(beacon, ledger) for beacon in slam.beacons()),
         parameters=_changed_parameters(slam),
         counters=dict(slam.counters()),
-        refusals=dict(refusals),
+        refusals=dict(refused),
         target=dict(target or {}),
         step_us_median=step_us_median,
-        kept_map=_saved_map(slam),
+        kept_map=kept_map,
     )
 
 
-def _saved_map(slam: Any) -> bytes | None:
-    """The map to keep; None where none can be saved: by a target, or of a drive so lost that its covariance
-    is none. What was measured of the drive stands all the same."""
+def _saved_map(slam: Any, refusals: Counter[str]) -> bytes | None:
+    """The map to keep; None where none can be saved: by a target, or, which is counted, of a drive so lost
+    that its covariance is none. What was measured of the drive stands all the same."""
     try:
         return slam.save_map() if hasattr(slam, "save_map") else None
-    except CoreError:
+    except CoreError as refusal:
+        refusals[refusal.status] += 1
         return None
 
 

@@ -218,7 +218,7 @@ def test_a_drive_whose_map_cannot_be_saved_is_measured_all_the_same(log):
             raise CoreError("BSLAM_E_MAP", "map of 80 bytes")
 
     trace, recorder = run(log, recorder=Lost())
-    assert trace.kept_map is None
+    assert trace.kept_map is None and trace.refusals == {"BSLAM_E_MAP": 1}
     assert len(trace.pose) == 3 and trace.counters == {"odometry": 2}
     recorder.save_map = lambda: b"map"
     assert run(log, recorder=recorder)[0].kept_map == b"map"
