@@ -207,7 +207,7 @@ def _boxes_of_world(
 def boxes_of_world(
     folder: Path, lens: str, style: str, front_end: FrontEnd, seed: int, recolour: bool
 ) -> Iterator[BoxSamples]:
-    """Proposals of a world's even frames, or of the odd ones in other colours, one after the other; the front
+    """Proposals of a world's odd frames, or of the even ones in other colours, one after the other; the front
     end has then seen the frame."""
     world = read_world(folder, lens, style, seed)
     world = replace(world, seed=seed + RECOLOURED) if recolour else world

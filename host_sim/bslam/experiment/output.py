@@ -68,7 +68,8 @@ def finite(content: Any) -> Any:
 
 
 def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None) -> None:
-    """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth), NAME.map.csv and the map itself.
+    """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth), NAME.map.csv and the map itself: where
+    none could be saved, none of an earlier run stays.
 
     The estimate stays in the map frame and the truth in its own: real logs are aligned by whoever compares
     them.
@@ -80,6 +81,8 @@ def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None)
     write_atomically(out / f"{name}.map.csv", map_csv(trace))
     if trace.kept_map is not None:
         write_atomically(out / f"{name}{SUFFIX}", trace.kept_map)
+    else:
+        (out / f"{name}{SUFFIX}").unlink(missing_ok=True)
 
 
 def tum(time_us: NDArray[np.int64], poses: NDArray[np.float64]) -> str:

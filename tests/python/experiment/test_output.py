@@ -74,7 +74,8 @@ def test_write_run_replaces_what_was_there(made, tmp_path):
     log = made.circle_log(steps=5)
     poses = np.column_stack([log.truth.x_m, log.truth.y_m, log.truth.theta_rad])
     trace = made.trace(poses, step_times_us(log), [made.map_beacon(1, 3, 1.0, 1.0)])
-    (tmp_path / "x.map.csv").write_text("old")
+    for suffix in (".map.csv", ".bslam"):  # this run has no map of its own to keep
+        (tmp_path / f"x{suffix}").write_text("old")
     write_run(tmp_path, "x", trace, evaluate(log, trace, RunOptions(), False))
     estimate, truth = (np.loadtxt(tmp_path / f"x.{one}.tum") for one in ("estimate", "truth"))
     assert estimate.shape == truth.shape == (6, 8)

@@ -44,6 +44,25 @@ def test_make_world_has_the_beacons_it_promises(worlds: list[Scene]) -> None:
     assert kinds == set(KINDS)
 
 
+@pytest.mark.parametrize("name", ["train", "test"])
+def test_every_layout_of_a_style_can_be_painted(name: str) -> None:
+    style, random = style_of(name), np.random.default_rng(5)
+    for kind, lists in {"poster": "posters", "door": "doors", "cabinet": "cabinets", "sign": "signs"}.items():
+        _paint_each(style, lists, kind, random)
+    for lists in ("views", "drapes"):
+        _paint_each(style, lists, "window", random)
+    _paint_each(style, "radiators", "radiator", random)
+
+
+def _paint_each(style: looks.style.Style, lists: str, kind: str, random: np.random.Generator) -> None:
+    for layout in dict.fromkeys(getattr(style, lists)):
+        artist = looks.Artist(replace(style, **{lists: (layout,)}), random)
+        fronts = [looks.BEACONS[kind](artist).front for _ in range(4)]
+        for front in fronts:
+            assert front.dtype == np.uint8 and front.ndim == 3 and front.shape[2] == 4
+        assert any((front != fronts[0]).any() for front in fronts[1:]), (lists, layout)  # drawn anew
+
+
 def test_make_world_beacons_never_overlap(worlds: list[Scene]) -> None:
     for scene in worlds:
         boxes = []
