@@ -180,7 +180,8 @@ def write_files(
     """Judge a run that is over, and write its files; `more` goes into its entry. Raises BslamError."""
     evaluation = evaluate(log, trace, job.options, job.source.align)
     if job.files:
-        write_run(out, job.name, trace, evaluation)
+        start_map = job.options.kept_map
+        write_run(out, job.name, trace, evaluation, None if start_map is None else Path(start_map))
     if job.draw is not None:
         job.draw(out, job.name, job.source, log, trace, evaluation)
     entry = summarise(log, trace, job.options, evaluation) | {

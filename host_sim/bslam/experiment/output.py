@@ -67,9 +67,11 @@ def finite(content: Any) -> Any:
     return content
 
 
-def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None) -> None:
+def write_run(
+    out: Path, name: str, trace: Trace, evaluation: Evaluation | None, start_map: Path | None = None
+) -> None:
     """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth), NAME.map.csv and the map itself: where
-    none could be saved, none of an earlier run stays.
+    none could be saved, none of an earlier run stays but `start_map`, which this one started in.
 
     The estimate stays in the map frame and the truth in its own: real logs are aligned by whoever compares
     them.
@@ -79,10 +81,11 @@ def write_run(out: Path, name: str, trace: Trace, evaluation: Evaluation | None)
         known = np.isfinite(evaluation.truth[:, 0])
         write_atomically(out / f"{name}.truth.tum", tum(trace.time_us[known], evaluation.truth[known]))
     write_atomically(out / f"{name}.map.csv", map_csv(trace))
+    kept = out / f"{name}{SUFFIX}"
     if trace.kept_map is not None:
-        write_atomically(out / f"{name}{SUFFIX}", trace.kept_map)
-    else:
-        (out / f"{name}{SUFFIX}").unlink(missing_ok=True)
+        write_atomically(kept, trace.kept_map)
+    elif start_map is None or start_map.resolve() != kept.resolve():
+        kept.unlink(missing_ok=True)
 
 
 def tum(time_us: NDArray[np.int64], poses: NDArray[np.float64]) -> str:

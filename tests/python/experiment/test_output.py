@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -82,6 +83,19 @@ def test_write_run_replaces_what_was_there(made, tmp_path):
     assert np.allclose(estimate[:, 1:3], poses[:, :2], atol=1e-6)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.estimate.tum", "x.map.csv", "x.truth.tum"]
     assert "old" not in (tmp_path / "x.map.csv").read_text()
+
+
+def test_a_run_that_saves_no_map_leaves_the_one_that_it_started_in(made, tmp_path, monkeypatch):
+    log = made.circle_log(steps=5)
+    poses = np.column_stack([log.truth.x_m, log.truth.y_m, log.truth.theta_rad])
+    trace = made.trace(poses, step_times_us(log), [made.map_beacon(1, 3, 1.0, 1.0)])
+    (tmp_path / "x.bslam").write_text("old")
+    monkeypatch.chdir(tmp_path)
+    evaluation = evaluate(log, trace, RunOptions(), False)
+    write_run(tmp_path, "x", trace, evaluation, Path("x.bslam"))
+    assert (tmp_path / "x.bslam").read_text() == "old"
+    write_run(tmp_path, "x", trace, evaluation, Path("another.bslam"))
+    assert not (tmp_path / "x.bslam").exists()
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
