@@ -102,8 +102,9 @@ class BeaconClass:
     height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known. top_low_m to
     top_high_m: how high its upper side is above the floor; 0: not known. looks_sd: by what part a distance
     from its height errs because of its looks, a pale rim say. width_m: of what is as wide from every side.
-    narrow_m to wide_m: how wide its front is; 0: not known. scale_sd: by what part all distances of one thing
-    err alike, what it may be mistaken for included; 0: not known.
+    body_m: its height where only the body below its neck is found; 0: it has none. narrow_m to wide_m: how
+    wide its front is; 0: not known. scale_sd: by what part all distances of one thing err alike, what it may
+    be mistaken for included; 0: not known.
     """
 
     name: str
@@ -113,6 +114,7 @@ class BeaconClass:
     top_high_m: float = 0.0
     looks_sd: float = 0.0
     width_m: float = 0.0
+    body_m: float = 0.0
     narrow_m: float = 0.0
     wide_m: float = 0.0
     scale_sd: float = 0.0

@@ -29,6 +29,7 @@ typedef struct bslam_beacon_class {
     float top_high_m;  ///< and at most; 0: not known
     float looks_sd;    ///< what its looks (a pale rim, a lid) make of a distance by its height, as a fraction
     float width_m;     ///< of what is as wide from every side; 0: it is not, or not known
+    float body_m;      ///< its height where only the body below its neck is found; 0: it has none
     float narrow_m;    ///< its front is so wide at least,
     float wide_m;      ///< and at most; 0: not known
     float scale_sd;    ///< by what part all distances of one thing err alike, mistaken kinds included; 0: not

@@ -60,10 +60,11 @@ static bool box_is_number(const bslam_box_t *box)
 
 static bslam_status_t check_size(const bslam_size_t *size)
 {
-    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m,  size->top_low_m, size->top_high_m,
-                                      size->width_m,  size->narrow_m, size->wide_m};
+    const bslam_real_t lengths_m[] = {size->height_m, size->depth_m, size->top_low_m, size->top_high_m,
+                                      size->width_m,  size->body_m,  size->narrow_m,  size->wide_m};
     bool in_range = size->top_low_m <= size->top_high_m && size->narrow_m <= size->wide_m &&
-                    bslam_in_range(size->looks_sd, 0, 1) && bslam_in_range(size->scale_sd, 0, 1);
+                    size->body_m <= size->height_m && bslam_in_range(size->looks_sd, 0, 1) &&
+                    bslam_in_range(size->scale_sd, 0, 1);
     bool are_numbers = bslam_is_number(size->looks_sd) && bslam_is_number(size->scale_sd);
     for (int32_t i = 0; i < (int32_t)(sizeof lengths_m / sizeof lengths_m[0]); i++) {
         in_range = in_range && bslam_in_range(lengths_m[i], 0, SIZE_MAX_M);
@@ -159,8 +160,8 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
     const bslam_real_t looks = size->looks_sd * height_m * by_height;
     const bslam_real_t top_noise = point_var + RANGE_DOUBT * o->top_var;
     const bslam_real_t bottom_noise = point_var + RANGE_DOUBT * o->bottom_var;
-    const bslam_real_t top_var = top_noise + looks * looks / 2;
-    const bslam_real_t bottom_var = bottom_noise + looks * looks / 2;
+    const bslam_real_t top_var = top_noise;
+    const bslam_real_t bottom_var = bottom_noise + looks * looks;
     if (!(size->top_high_m > 0)) {
         const bslam_real_t square = (top - bottom) * (top - bottom);
         return (ahead_t){by_height, (top_var + bottom_var) / square, (top_noise + bottom_noise) / square, 0};
@@ -189,7 +190,33 @@ static ahead_t ahead_of(const bslam_outline_t *o, const bslam_camera_t *camera, 
                      bslam_sqrt(distance2)};
 }
 
-/// False if the width of something round contradicts that: of an extinguisher without its neck, say.
+/// How wide something round is seen, of what it would be so far ahead.
+static bslam_real_t width_ratio(const bslam_outline_t *o, const bslam_size_t *size, const ahead_t *ahead)
+{
+    return (o->left - o->right) / (size->width_m * ahead->inverse);
+}
+
+/// As ahead_of; by the body alone where the width is nearer to that of an object seen without its neck.
+static ahead_t ahead_of_body(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
+                             bslam_real_t point_var)
+{
+    const ahead_t whole = ahead_of(o, camera, size, point_var);
+    if (!(size->width_m > 0 && size->body_m > 0 && whole.inverse > 0)) {
+        return whole;
+    }
+    const bslam_real_t ratio = width_ratio(o, size, &whole);
+    if (ratio * ratio * size->body_m < size->height_m) {
+        return whole;
+    }
+    const bslam_real_t neck_m = size->height_m - size->body_m;
+    bslam_size_t body = *size;
+    body.height_m = size->body_m;
+    body.top_low_m -= neck_m;
+    body.top_high_m -= neck_m;
+    return ahead_of(o, camera, &body, point_var);
+}
+
+/// False if the width of something round contradicts that.
 static bool agrees_with_width(const bslam_outline_t *o, const bslam_size_t *size, bslam_real_t point_var,
                               const ahead_t *ahead)
 {
@@ -197,7 +224,7 @@ static bool agrees_with_width(const bslam_outline_t *o, const bslam_size_t *size
         return true;
     }
     const bslam_real_t width = o->left - o->right;
-    const bslam_real_t ratio = width / (size->width_m * ahead->inverse);
+    const bslam_real_t ratio = width_ratio(o, size, ahead);
     const bslam_real_t variance = WIDTH_SD * WIDTH_SD + ahead->relative_var +
                                   (2 * point_var + o->left_var + o->right_var) / (width * width);
     return (ratio - 1) * (ratio - 1) <= WIDTH_SDS * WIDTH_SDS * variance;
@@ -230,7 +257,7 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     if (!is_whole || !(size->height_m > 0)) {
         return;
     }
-    const ahead_t ahead = ahead_of(o, camera, size, point_var);
+    const ahead_t ahead = ahead_of_body(o, camera, size, point_var);
     const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var;
     candidate->misplaced_sds = (float)ahead.residual_sds;
     const bool hangs_right = ahead.residual_sds <= MISPLACED_SDS && ahead.inverse > 0;

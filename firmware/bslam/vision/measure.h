@@ -12,6 +12,7 @@ typedef struct bslam_size {
     bslam_real_t top_low_m;   ///< its upper side is so high above the floor at least,
     bslam_real_t top_high_m;  ///< and at most; 0: not known
     bslam_real_t width_m;     ///< of what is as wide from every side; 0: it is not, or not known
+    bslam_real_t body_m;      ///< its height where only the body below its neck is found; 0: it has none
     bslam_real_t narrow_m;    ///< its front is so wide at least,
     bslam_real_t wide_m;      ///< and at most; 0: not known
     bslam_real_t looks_sd;    ///< what its looks make of a distance by its height, as a fraction

@@ -313,6 +313,7 @@ static bslam_size_t size_of(const bslam_beacon_class_t *kind)
         .top_high_m = (bslam_real_t)kind->top_high_m,
         .looks_sd = (bslam_real_t)kind->looks_sd,
         .width_m = (bslam_real_t)kind->width_m,
+        .body_m = (bslam_real_t)kind->body_m,
         .narrow_m = (bslam_real_t)kind->narrow_m,
         .wide_m = (bslam_real_t)kind->wide_m,
         .scale_sd = (bslam_real_t)kind->scale_sd,

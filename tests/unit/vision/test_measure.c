@@ -254,6 +254,42 @@ static void test_measure_takes_no_distance_where_height_and_width_contradict_eac
     assert_true(headless.has_bearing && !headless.has_range && headless.marks == BSLAM_MARK_MISPLACED);
 }
 
+/// Told how high it is below its neck, the same gives the distance of the body; a whole one is as before.
+static void test_measure_takes_the_distance_of_the_body_where_the_neck_is_not_found(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0, 0);
+    bslam_size_t size = POSTER_SIZE;
+    size.width_m = BSLAM_R(0.7);
+    const bslam_candidate_t plain = measured(&camera, &panel, &size);
+    size.body_m = BSLAM_R(0.64);
+    const bslam_candidate_t whole = measured(&camera, &panel, &size);
+    assert_true(memcmp(&whole, &plain, sizeof whole) == 0);
+    size.height_m = BSLAM_R(1.0);
+    size.body_m = BSLAM_R(0.8);
+    const bslam_candidate_t headless = measured(&camera, &panel, &size);
+    assert_true(headless.has_range && headless.marks == 0);
+    assert_near(headless.range_m, 3, 0.03);
+    size.top_low_m = size.top_high_m = BSLAM_R(1.7);  // of the neck: the body ends at 1.5 m
+    const bslam_candidate_t hung = measured(&camera, &panel, &size);
+    assert_true(hung.has_range && hung.misplaced_sds < 1);
+    assert_near(hung.range_m, 3, 0.03);
+}
+
+/// Where its looks leave open where it ends it is the lower side that is in doubt: a skirting, a shadow.
+static void test_measure_trusts_the_upper_side_where_the_lower_one_is_not_the_objects(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    unit_panel_t panel = poster(3, 0, 0);
+    panel.low_m -= 0.1;
+    bslam_size_t size = POSTER_SIZE;
+    size.top_low_m = size.top_high_m = BSLAM_R(1.5);
+    size.looks_sd = BSLAM_R(0.12);
+    const bslam_candidate_t longer = measured(&camera, &panel, &size);
+    assert_near(longer.range_m, 3, 0.12);  // by its height alone it would be 2.67
+    assert_true(fabs((double)longer.range_m - 3) < (double)longer.range_sd_m);
+}
+
 static void test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow(void **state)
 {
     const bslam_camera_t camera = unit_pinhole();
@@ -380,6 +416,10 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
     const bslam_size_t inside_out = {
         .height_m = 1, .top_high_m = 1, .narrow_m = BSLAM_R(0.6), .wide_m = BSLAM_R(0.5)};
     assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &inside_out, &candidate), BSLAM_E_RANGE);
+    const bslam_size_t all_body = {.height_m = 1, .body_m = BSLAM_R(1.1)};
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &all_body, &candidate), BSLAM_E_RANGE);
+    const bslam_size_t no_body = {.height_m = 1, .body_m = real(NAN)};
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &no_body, &candidate), BSLAM_E_NOT_FINITE);
     camera.width_px = 160;
     assert_int_equal(bslam_measure(&picture.frame, &camera, &good, &POSTER_SIZE, &candidate),
                      BSLAM_E_PARAMETER);
@@ -403,6 +443,8 @@ int main(void)
         cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
         cmocka_unit_test(test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim),
         cmocka_unit_test(test_measure_takes_no_distance_where_height_and_width_contradict_each_other),
+        cmocka_unit_test(test_measure_takes_the_distance_of_the_body_where_the_neck_is_not_found),
+        cmocka_unit_test(test_measure_trusts_the_upper_side_where_the_lower_one_is_not_the_objects),
         cmocka_unit_test(test_measure_is_as_sure_of_a_distance_as_its_kinds_looks_allow),
         cmocka_unit_test(test_measure_says_what_all_distances_share_by_the_kind_or_by_what_is_no_noise),
         cmocka_unit_test(test_measure_marks_what_is_half_hidden_and_gives_it_a_rough_direction),
