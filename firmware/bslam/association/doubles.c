@@ -39,6 +39,13 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->double_d2 * det;
 }
 
+/// A door and the sign beside it are two, however little the map knows of where they stand.
+static bool are_of_two_classes(const bslam_looks_t *looks, int a, int b)
+{
+    const uint8_t one = bslam_looks_class(looks, a), other = bslam_looks_class(looks, b);
+    return one != BSLAM_CLASS_NONE && other != BSLAM_CLASS_NONE && one != other;
+}
+
 /// Of a pair in one place, what the frame adds. True if one of them must leave.
 static bool count_pair(bslam_look_t *younger, uint32_t older_uid, bool together, int32_t limit)
 {
@@ -60,11 +67,12 @@ static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, int a, int b
     return looks->of[more].ousted >= OUSTED_MAX ? more : less;
 }
 
-/// The oldest other beacon in the place of beacon `index`; BSLAM_NO_DOUBLE if there is none.
-static int find_other(const bslam_ekf_t *ekf, const bslam_params_t *params, int index)
+/// The oldest other beacon that beacon `index` may be; BSLAM_NO_DOUBLE if there is none.
+static int find_other(const bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                      int index)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
-        if (b != index && is_one_place(ekf, params, index, b)) {
+        if (b != index && !are_of_two_classes(looks, index, b) && is_one_place(ekf, params, index, b)) {
             return b;
         }
     }
@@ -75,7 +83,7 @@ int bslam_doubles_settle(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bsl
                          int64_t time_us)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
-        const int other = is_seen(ekf, b, time_us) ? find_other(ekf, params, b) : BSLAM_NO_DOUBLE;
+        const int other = is_seen(ekf, b, time_us) ? find_other(looks, ekf, params, b) : BSLAM_NO_DOUBLE;
         if (other == BSLAM_NO_DOUBLE) {
             continue;
         }

@@ -116,6 +116,16 @@ bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_para
     return bslam_ln(BSLAM_LOOKS_CLASSES * as_this / ((bslam_real_t)all + BSLAM_LOOKS_CLASSES * doubt));
 }
 
+uint8_t bslam_looks_class(const bslam_looks_t *looks, int index)
+{
+    const uint8_t *seen_as = looks->of[index].seen_as;
+    int most = 0;
+    for (int k = 1; k < BSLAM_LOOKS_CLASSES; k++) {
+        most = seen_as[k] > seen_as[most] ? k : most;
+    }
+    return seen_as[most] > 0 ? (uint8_t)(most + 1) : BSLAM_CLASS_NONE;
+}
+
 /// Counts; what was long ago counts less.
 static void note_class(bslam_look_t *look, uint8_t beacon_class)
 {

@@ -90,6 +90,9 @@ bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t
 bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                     uint8_t beacon_class);
 
+/// The class that beacon `index` was surely seen as most often; BSLAM_CLASS_NONE: it never was.
+uint8_t bslam_looks_class(const bslam_looks_t *looks, int index);
+
 /// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone way_um. Its
 /// class is noted and its machine is shown it, unless the last one was a few centimetres ago; a machine is
 /// found for a beacon that has none. O(machines).

@@ -75,12 +75,18 @@ static void see_two(int frames)
     }
 }
 
-static void see_object(int object, int view, double bearing_rad)
+static void see_as(int object, int view, double bearing_rad, uint8_t beacon_class)
 {
     float signature[BSLAM_SAMPLE_FEATURES];
     bslam_sighting_t seen = unit_polar(bearing_rad, 4, -1);
     seen.signature = signature_of(object, view, signature);
+    seen.beacon_class = beacon_class;
     see(&seen, 1);
+}
+
+static void see_object(int object, int view, double bearing_rad)
+{
+    see_as(object, view, bearing_rad, BSLAM_CLASS_NONE);
 }
 
 static void test_a_signature_that_is_not_finite_is_refused_and_changes_nothing(void **state)
@@ -213,6 +219,19 @@ static void test_a_neighbour_seen_with_the_other_stays(void **state)
     assert_int_equal(looks.counters.retired, 0);
 }
 
+/// As in test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, but the detector tells them apart.
+static void test_a_neighbour_of_another_class_stays_if_never_seen_with_it(void **state)
+{
+    for (int view = 0; view < 20; view++) {
+        see_as(0, view, 0, 1);
+    }
+    for (int view = 0; view < 60; view++) {
+        see_as(2, view, 0.1, 6);
+    }
+    assert_int_equal(looks.counters.retired, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+}
+
 /// Object 1, where beacon 0 of object 0 has not been seen for long, in this many frames; how many were kept
 /// from that beacon.
 static uint32_t waits_of_another(int frames)
@@ -265,6 +284,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
+        cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
         cmocka_unit_test_setup(test_a_match_that_a_young_machine_is_against_waits_for_a_second, setup),
         cmocka_unit_test_setup(test_in_a_frozen_map_it_waits_no_longer, setup),
     };
