@@ -76,7 +76,7 @@ class Books(BookedRun):
         """Notes a frame."""
         del time_us
         for row, (identity, account) in enumerate(zip(true_id, accounts, strict=False), self.sightings):
-            if account.result in ("matched", "new"):
+            if account.result in ("matched", "new") or account.reason == "trial":
                 self._rows[account.beacon_uid].append(row)
             if account.result == "matched":
                 self._test_ratio[account.beacon_uid].append(account.test_ratio)

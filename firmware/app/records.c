@@ -81,6 +81,7 @@ void record_put_sighting(bslam_link_writer_t *out, const bslam_sighting_t *sight
     bslam_link_put_real(out, sighting->bearing_sd_rad);
     bslam_link_put_real(out, sighting->range_sd_m);
     bslam_link_put_real(out, sighting->range_scale_sd);
+    bslam_link_put_real(out, sighting->score);
     bslam_link_put_i32(out, sighting->label);
     bslam_link_put_u8(out, sighting->beacon_class);
     bslam_link_put_u8(out, (sighting->has_range ? FLAG_RANGE : 0) | (with_signature ? FLAG_SIGNATURE : 0));
@@ -96,6 +97,7 @@ void record_get_sighting(bslam_link_reader_t *reader, const float *signature, bs
     sighting->bearing_sd_rad = bslam_link_get_real(reader);
     sighting->range_sd_m = bslam_link_get_real(reader);
     sighting->range_scale_sd = bslam_link_get_real(reader);
+    sighting->score = bslam_link_get_real(reader);
     sighting->label = bslam_link_get_i32(reader);
     sighting->beacon_class = bslam_link_get_u8(reader);
     const uint8_t flags = bslam_link_get_u8(reader);

@@ -36,7 +36,7 @@ ODOMETRY_COLUMNS = {
 }
 GYRO = "gyro_radps"
 """Column of odometry that a robot without a gyro leaves out."""
-SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_m", "range_scale_sd")
+SIGHTING_NUMBERS = ("bearing_sd_rad", "range_sd_m", "range_scale_sd", "score")
 """Columns of sightings that a detector may leave out."""
 CLASS = "beacon_class"
 """Column of sightings that a detector may leave out: the kind of beacon."""
@@ -91,6 +91,9 @@ class Sightings:
     signature: NDArray[np.float32] | None = None  # (m, SIGNATURE_SIZE) how each looks; None: nobody knows
     beacon_class: NDArray[np.int64] | None = (
         None  # (m,) the detector's kind of beacon, 1 to 254; 0, None: it has none
+    )
+    score: NDArray[np.float64] | None = (
+        None  # (m,) how sure the detector is that each is a beacon; 0, None: it does not say
     )
 
 
@@ -294,7 +297,7 @@ def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
         columns["range_m"] = _texts_or_empty(sightings.range_m)
     if not sightings.mappable.all():
         columns["mappable"] = _texts(sightings.mappable, int)
-    for name in SIGHTING_NOISE:
+    for name in SIGHTING_NUMBERS:
         if getattr(sightings, name) is not None:
             columns[name] = _texts(getattr(sightings, name), float)
     if sightings.beacon_class is not None:
@@ -343,6 +346,7 @@ _COLUMNS = {
     ),
     "range_sd_m": Column("0 or a number from 0.001 to 1e4", lambda v: (v == 0) | ((v >= 1e-3) & (v <= 1e4))),
     "range_scale_sd": Column("a number from 0 to 1", lambda v: (v >= 0) & (v <= 1)),
+    "score": _NUMBER,
     CLASS: Column("an integer from 0 to 254", lambda values: is_count(values) & (values <= 254)),
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,
@@ -396,7 +400,7 @@ def _require_tick_range(table: Table, robot: Robot) -> None:
 
 def _read_sightings(folder: Path) -> Sightings:
     layout = _columns("time_us", "beacon_id", "bearing_rad")
-    optional = _columns("range_m", "mappable", *SIGHTING_NOISE, CLASS)
+    optional = _columns("range_m", "mappable", *SIGHTING_NUMBERS, CLASS)
     table = read_table(_require_csv(folder, "sightings"), [layout], optional)
     table.require_order("time_us", strict=False)
     return Sightings(
@@ -405,7 +409,7 @@ def _read_sightings(folder: Path) -> Sightings:
         bearing_rad=wrap_rad(table.values["bearing_rad"]),
         range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
-        **{name: table.values.get(name) for name in SIGHTING_NOISE},
+        **{name: table.values.get(name) for name in SIGHTING_NUMBERS},
         signature=_read_signatures(folder / SIGNATURES, table.rows),
         beacon_class=table.integers(CLASS) if CLASS in table.values else None,
     )

@@ -42,7 +42,8 @@ static void require_turn(void)
         fuzz_require(bslam_in_range(turn.turn_rad, -3 * BSLAM_PI, 3 * BSLAM_PI));
         fuzz_require(turn.variance_rad2 > 0 && isfinite((double)turn.variance_rad2));
         fuzz_require(bslam_in_range(turn.mismatch, 0, 2));
-        fuzz_require(isfinite((double)turn.parallax_rad_per_m) && isfinite((double)turn.sideways));
+        fuzz_require(isfinite((double)turn.parallax_rad_per_m) &&
+                     isfinite((double)turn.parallax_sd_rad_per_m));
     }
 }
 

@@ -80,6 +80,7 @@ bslam_sighting_t fuzz_sighting(fuzz_input_t *input, float signature[BSLAM_SAMPLE
     }
     if ((flags & 32u) != 0) {
         sighting.beacon_class = fuzz_u8(input);
+        sighting.score = fuzz_real(input, -2, 4);
     }
     if ((flags & 64u) != 0) {
         fuzz_signature(input, signature);

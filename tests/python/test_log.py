@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bslam.errors import BslamError
 from bslam.log import (
-    SIGHTING_NOISE,
+    SIGHTING_NUMBERS,
     SIGNATURE_SIZE,
     Beacons,
     Log,
@@ -123,10 +123,10 @@ def test_write_then_read_without_truth_map_and_ranges_gives_the_same_log(tmp_pat
     assert_same_log(log, read_folder(tmp_path))
 
 
-def test_write_then_read_keeps_the_noise_that_the_detector_gives(tmp_path: Path) -> None:
+def test_write_then_read_keeps_the_noise_and_the_score_that_the_detector_gives(tmp_path: Path) -> None:
     log = a_log()
-    values = ([0.01, 0.0, 0.02], [0.1, 0.0, 1.0 / 3.0], [0.07, 0.0, 1.0])
-    noise = {name: np.array(column) for name, column in zip(SIGHTING_NOISE, values, strict=True)}
+    values = ([0.01, 0.0, 0.02], [0.1, 0.0, 1.0 / 3.0], [0.07, 0.0, 1.0], [1.3, 0.0, -0.1])
+    noise = {name: np.array(column) for name, column in zip(SIGHTING_NUMBERS, values, strict=True)}
     log = replace(log, sightings=replace(log.sightings, **noise))
     write_folder(log, tmp_path)
     assert_same_log(log, read_folder(tmp_path))

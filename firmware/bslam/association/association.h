@@ -29,6 +29,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
     BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
     BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
+    BSLAM_REASON_TRIAL,        ///< it shows a beacon that may be none, as far as the detector's scores tell
     BSLAM_REASON_COUNT
 } bslam_reason_t;
 

@@ -148,7 +148,12 @@
     REAL(confirm_d2, 1e6, 1e-3, 1e6, \
          "and against it beyond this squared Mahalanobis distance; it leaves with as many against as for") \
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
-            "one not confirmed by then is removed (of told identity: if contradicted); 0: none")
+            "one not confirmed by then is removed (of told identity: if contradicted); 0: none") \
+    REAL(trust_score, 0.5, -100.0, 100.0, \
+         "svm: of a detector that gives scores, one above this speaks for a beacon, by how much it is above") \
+    REAL(trust_sum, 7.0, 0.0, 1e6, "svm: until that comes to this, the beacon's sightings are not used") \
+    INTEGER(trust_beacons, 4, 0, 250, "svm: unless fewer than so many are confirmed") \
+    REAL(confirm_sum, 15.0, 0.0, 1e6, "svm: and once it comes to this the beacon is confirmed")
 // clang-format on
 
 /// Values of `filter`.

@@ -21,9 +21,9 @@
 #define BSLAM_LINK_CRC_BYTES 2
 /// A frame of sightings of the largest size, but no less than the counters take.
 #if BSLAM_SIGHTINGS_MAX < 16
-#define BSLAM_LINK_PAYLOAD_MAX 432
+#define BSLAM_LINK_PAYLOAD_MAX 496
 #else
-#define BSLAM_LINK_PAYLOAD_MAX (16 + 26 * BSLAM_SIGHTINGS_MAX)
+#define BSLAM_LINK_PAYLOAD_MAX (16 + 30 * BSLAM_SIGHTINGS_MAX)
 #endif
 /// Header, payload and CRC.
 #define BSLAM_LINK_CONTENT_MAX (BSLAM_LINK_HEADER_BYTES + BSLAM_LINK_PAYLOAD_MAX + BSLAM_LINK_CRC_BYTES)

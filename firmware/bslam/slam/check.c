@@ -6,6 +6,7 @@
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);
 static const bslam_real_t BEARING_SD_MIN_RAD = BSLAM_R(1e-5);
+static const bslam_real_t SCORE_MAX = BSLAM_R(1e6);
 
 /// A standard deviation, or 0 where the detector gives none.
 static bool is_noise(bslam_real_t sd, bslam_real_t low, bslam_real_t high)
@@ -37,8 +38,8 @@ static bool signature_is_finite(const float *signature)
 
 static bool is_finite(const bslam_sighting_t *sighting)
 {
-    const bool direction =
-        bslam_is_number(sighting->bearing_rad) && bslam_is_number(sighting->bearing_sd_rad);
+    const bool direction = bslam_is_number(sighting->bearing_rad) &&
+                           bslam_is_number(sighting->bearing_sd_rad) && bslam_is_number(sighting->score);
     const bool distance = bslam_is_number(sighting->range_m) && bslam_is_number(sighting->range_sd_m) &&
                           bslam_is_number(sighting->range_scale_sd);
     return direction && (distance || !sighting->has_range) && signature_is_finite(sighting->signature);
@@ -56,8 +57,9 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
     const bool bearing_ok = bslam_in_range(sighting->bearing_rad, -2 * BSLAM_PI, 2 * BSLAM_PI) &&
                             is_noise(sighting->bearing_sd_rad, BEARING_SD_MIN_RAD, BSLAM_PI);
     const bool range_ok = !sighting->has_range || distance_is_possible(sighting);
+    const bool score_ok = bslam_in_range(sighting->score, -SCORE_MAX, SCORE_MAX);
     // What is no number is in no range: what is wrong is asked only where something is.
-    if (bearing_ok && range_ok && sighting->label >= BSLAM_LABEL_NONE &&
+    if (bearing_ok && range_ok && score_ok && sighting->label >= BSLAM_LABEL_NONE &&
         signature_is_finite(sighting->signature)) {
         return BSLAM_OK;
     }

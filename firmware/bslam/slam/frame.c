@@ -48,23 +48,6 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
     slam->counters.frozen += reason == BSLAM_REASON_FROZEN ? 1u : 0u;
 }
 
-/// A sighting counts towards a beacon's confirmation if the robot has gone far enough since the last that
-/// did, and against it if it is too far off: what is not of the size that it is taken for is not, seen from
-/// the next place, where it was.
-static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
-{
-    const bslam_params_t *params = &slam->params;
-    const uint32_t least_um = (uint32_t)(params->confirm_way_m * MICROMETRES_PER_M);
-    if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
-        beacon->view_um = slam->way_um;
-        beacon->views = (uint16_t)(distance2 <= params->confirm_d2 ? beacon->views + 1 : beacon->views - 1);
-        if (beacon->views >= params->confirm_sightings) {
-            beacon->confirmed = true;
-            slam->confirmed_now = true;
-        }
-    }
-}
-
 /// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
 /// taken for something else, it has a direction only.
 static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
@@ -75,6 +58,23 @@ static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bsla
                          sighting->beacon_class != BSLAM_CLASS_NONE;
     taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
     return taken;
+}
+
+static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
+                       bslam_beacon_t *beacon, bslam_real_t distance2)
+{
+    beacon->sightings++;
+    beacon->way_um = slam->way_um;
+    beacon->last_seen_us = time_us;
+    bslam_slam_trust_match(slam, beacon, sighting, distance2);
+}
+
+/// A sighting of what may be no beacon moves nothing, but says whether it is one.
+static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
+                      bslam_beacon_t *beacon, bslam_account_t *account)
+{
+    fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TRIAL, beacon);
+    note_match(slam, time_us, sighting, beacon, 0);
 }
 
 /// Fuses a sighting with the beacon that association chose.
@@ -101,10 +101,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
         const bslam_sighting_t taken = sighting_of(sighting, beacon);
         slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
-    beacon->sightings++;
-    beacon->way_um = slam->way_um;
-    beacon->last_seen_us = time_us;
-    count_view(slam, beacon, fusion.distance2);
+    note_match(slam, time_us, sighting, beacon, fusion.distance2);
 }
 
 /// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
@@ -137,9 +134,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->last_seen_us = time_us;
     beacon->sightings = 1;
     beacon->way_um = slam->way_um;
-    beacon->view_um = slam->way_um;
-    beacon->views = 1;
-    beacon->confirmed = slam->params.confirm_sightings <= 1;
+    bslam_slam_trust_new(slam, beacon, sighting);
     note_rivals(slam, index);
     if (slam->smoother != NULL) {
         slam->smoothing->see(slam->smoother, sighting, index);
@@ -179,9 +174,14 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 {
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
-        if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH) {
-            fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[slam->matches[i].beacon],
-                       &slam->innovations[i], &slam->accounts[i]);
+        if (slam->matches[i].verdict != BSLAM_VERDICT_MATCH) {
+            continue;
+        }
+        bslam_beacon_t *beacon = &slam->ekf.beacons[slam->matches[i].beacon];
+        if (bslam_slam_is_on_trial(slam, beacon, &sightings[i])) {
+            try_match(slam, time_us, &sightings[i], beacon, &slam->accounts[i]);
+        } else {
+            fuse_match(slam, time_us, &sightings[i], beacon, &slam->innovations[i], &slam->accounts[i]);
         }
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
@@ -218,8 +218,9 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
+        const bool is_tried = account->reason == BSLAM_REASON_TRIAL;
         all_matched = all_matched && account->outcome == BSLAM_OUTCOME_MATCHED;
-        if (!is_new && account->outcome != BSLAM_OUTCOME_MATCHED) {
+        if (!is_new && !is_tried && account->outcome != BSLAM_OUTCOME_MATCHED) {
             continue;
         }
         const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
@@ -252,7 +253,7 @@ static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *b
     if (beacon->confirmed) {
         return false;
     }
-    if (beacon->views == 0) {
+    if (bslam_slam_is_refuted(beacon)) {
         return true;
     }
     if (window_us == 0 || time_us - beacon->first_seen_us <= window_us) {

@@ -1,4 +1,5 @@
-/// What the files of this directory call of each other: motion.c, check.c, frame.c, slam.c. Not for users.
+/// What the files of this directory call of each other: motion.c, check.c, trust.c, frame.c, slam.c. Not for
+/// users.
 #ifndef BSLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_INTERNAL_H
 
@@ -22,6 +23,22 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us,
                                                        const bslam_sighting_t *sightings, int count,
                                                        int64_t *behind_us);
+
+// ---- trust.c: whether what is seen is a beacon. MATH "Confirmed" ------------------------------------------
+
+/// A beacon that a sighting has just started: what that says for it.
+void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
+
+/// A sighting was matched with it, at this squared Mahalanobis distance: it may be confirmed by that.
+void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
+                            bslam_real_t distance2);
+
+/// Whether nobody knows yet that it is a beacon, and sightings like this one are to be used for nothing else.
+bool bslam_slam_is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon,
+                            const bslam_sighting_t *sighting);
+
+/// Whether as much speaks against it as for it.
+bool bslam_slam_is_refuted(const bslam_beacon_t *beacon);
 
 // ---- frame.c: the two halves of bslam_slam_sightings, for what looks at a frame before it is used ---------
 

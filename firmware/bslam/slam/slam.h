@@ -57,7 +57,8 @@ typedef enum bslam_outcome {
 typedef struct bslam_account {
     bslam_outcome_t outcome;
     bslam_reason_t reason;  ///< BSLAM_REASON_NONE if it was used
-    bool has_beacon;        ///< beacon_uid is set: it was matched, started a beacon, or was gated against one
+    bool has_beacon;  ///< beacon_uid is set: of the one it was matched with (on trial or not), or started, or
+                      ///< was gated against
     uint32_t beacon_uid;
     bslam_real_t test_ratio;  ///< squared Mahalanobis distance over the gate's; negative: not computed
     bslam_real_t weight;      ///< 1 for full weight, 0 for not used

@@ -19,6 +19,7 @@ bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate)
         .bearing_sd_rad = hypotenuse(candidate->bearing_sd_rad, BEARING_BIAS_RAD),
         .has_range = candidate->has_range,
         .beacon_class = candidate->beacon_class,
+        .score = candidate->score,
         .label = BSLAM_LABEL_NONE,
         .signature = candidate->signature,
     };

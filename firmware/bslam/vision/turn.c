@@ -24,9 +24,17 @@ static const bslam_real_t LEAST_RESIDUAL = BSLAM_R(0.3);
 // Residuals are no noise but things that changed, alike over columns and bands: so many count as one.
 static const bslam_real_t ALIKE = 225;
 static const bslam_real_t ROUNDING_VAR = BSLAM_R(0.17);  // of a residual, from two rounded values
-// What the floor line does not tell: how far things are, and how near they may be.
-static const bslam_real_t USUAL_DISTANCE_M = 4;
-static const bslam_real_t LEAST_DISTANCE_M = BSLAM_R(0.5);
+// One over the distance of things, 1/m: how much it errs where the floor line tells it (most things stand
+// where the floor ends, some before); what it is taken for where nothing does, and how much that errs; the
+// largest.
+static const bslam_real_t TOLD_SD_PER_M = BSLAM_R(0.1);
+static const bslam_real_t USUAL_PER_M = BSLAM_R(0.25);
+static const bslam_real_t USUAL_SD_PER_M = BSLAM_R(0.25);
+static const bslam_real_t MOST_PER_M = 2;
+// Where there is no floor to the frame's lower edge, something stands nearer than the floor that would be
+// seen there: one over its distance is larger by this in the mean, and errs by a third of itself.
+static const bslam_real_t IN_FRONT = BSLAM_R(1.27);
+static const bslam_real_t IN_FRONT_SD = BSLAM_R(0.33);
 
 /// The row of the half-resolution copy where an elevation is, in the middle of the frame.
 static int16_t row_at(const bslam_camera_t *camera, bslam_real_t elevation_tangent)
@@ -44,6 +52,18 @@ static bslam_real_t bearing_at(const bslam_camera_t *level, bslam_real_t u_px)
     return bslam_camera_unproject(level, u_px, bslam_horizon_px(level), &direction) == BSLAM_OK
                ? bslam_atan2(direction.y, direction.x)
                : 0;
+}
+
+/// One over the distance of what hides all the floor that the frame's lower edge would show.
+static bslam_real_t inverse_in_front_per_m(const bslam_camera_t *camera)
+{
+    const bslam_real_t v_px = (bslam_real_t)camera->height_px - BSLAM_R(0.5);
+    bslam_direction_t ray = {0};
+    if (bslam_camera_unproject(camera, camera->cx_px, v_px, &ray) != BSLAM_OK || !(ray.z < 0)) {
+        return USUAL_PER_M;
+    }
+    const bslam_real_t inverse = -ray.z / (camera->z_m * bslam_sqrt(ray.x * ray.x + ray.y * ray.y));
+    return inverse * IN_FRONT < MOST_PER_M ? inverse * IN_FRONT : MOST_PER_M;
 }
 
 static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
@@ -66,6 +86,7 @@ static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
     for (int32_t i = 0; i <= BANDS; i++) {
         grid->row_px[i] = row_at(camera, EDGE[i]);
     }
+    grid->inverse_in_front_per_m = inverse_in_front_per_m(camera);
 }
 
 void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision)
@@ -203,8 +224,8 @@ typedef struct bslam_turn_sums {
     bslam_real_t residual;   // absolute, not weighted
     bslam_real_t slope2;     // weighted
     bslam_real_t slope_residual;
-    bslam_real_t parallax;  // slope2 of each column times its parallax
-    bslam_real_t sideways;
+    bslam_real_t parallax;     // slope2 of each column times its parallax
+    bslam_real_t parallax_sd;  // and times that one's
     int32_t count;
 } turn_sums_t;
 
@@ -228,7 +249,7 @@ static void add_column(turn_sums_t *sums, const pattern_pair_t *pair, int32_t no
     }
     sums->slope2 += slope2;
     sums->parallax += slope2 * column.parallax_per_m;
-    sums->sideways += slope2 * column.sine;
+    sums->parallax_sd += slope2 * column.parallax_sd_per_m;
     sums->count += BANDS;
 }
 
@@ -246,7 +267,27 @@ static turn_sums_t add_columns(const pattern_pair_t *pair, bslam_real_t shift, b
     return sums;
 }
 
-/// Where each column looks, and how near things are there, by the floor line.
+/// How near things are above a cell of the floor line: one over their distance, 1/m, and its noise.
+typedef struct bslam_nearness {
+    bslam_real_t per_m;
+    bslam_real_t sd_per_m;
+} nearness_t;
+
+static nearness_t nearness_at(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t cell)
+{
+    const bslam_floor_line_t *line = &vision->floor_line;
+    const bslam_real_t told_m = line->distance_m[cell];
+    if (told_m > 0) {
+        const bslam_real_t told_per_m = 1 / told_m;
+        return (nearness_t){told_per_m < MOST_PER_M ? told_per_m : MOST_PER_M, TOLD_SD_PER_M};
+    }
+    if (line->edge_px[cell] >= vision->cameras[vision->camera].height_px - BSLAM_CELL_PX) {
+        return (nearness_t){grid->inverse_in_front_per_m, grid->inverse_in_front_per_m * IN_FRONT_SD};
+    }
+    return (nearness_t){USUAL_PER_M, USUAL_SD_PER_M};
+}
+
+/// Where each column looks, and how near things are there.
 static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t count,
                        bslam_turn_column_t *columns)
 {
@@ -254,11 +295,9 @@ static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *visi
     bslam_sin_cos(vision->cameras[vision->camera].yaw_rad + grid->first_rad, &sine, &cosine);
     bslam_sin_cos(grid->step_rad, &step_sine, &step_cosine);
     for (int32_t i = 0; i < count; i++) {
-        const int32_t cell = (grid->at_px[i] >> 8) * 2 / BSLAM_CELL_PX;
-        const bslam_real_t told_m = vision->floor_line.distance_m[cell];
-        const bslam_real_t least_m = told_m > LEAST_DISTANCE_M ? told_m : LEAST_DISTANCE_M;
-        columns[i].sine = sine;
-        columns[i].parallax_per_m = sine / (told_m > 0 ? least_m : USUAL_DISTANCE_M);
+        const nearness_t near = nearness_at(grid, vision, (grid->at_px[i] >> 8) * 2 / BSLAM_CELL_PX);
+        columns[i].parallax_per_m = sine * near.per_m;
+        columns[i].parallax_sd_per_m = sine * near.sd_per_m;
         const bslam_real_t next = sine * step_cosine - cosine * step_sine;  // one step to the right
         cosine = cosine * step_cosine + sine * step_sine;
         sine = next;
@@ -292,7 +331,7 @@ static bool compare(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_tu
     turn->variance_rad2 = shift_var * grid->step_rad * grid->step_rad;
     turn->mismatch = match.mismatch;
     turn->parallax_rad_per_m = sums.parallax / sums.slope2;
-    turn->sideways = sums.sideways / sums.slope2;
+    turn->parallax_sd_rad_per_m = sums.parallax_sd / sums.slope2;
     return true;
 }
 

@@ -30,9 +30,9 @@ typedef struct bslam_turn {
     bslam_real_t variance_rad2;  ///< of its noise
     bslam_real_t mismatch;       ///< of the two patterns: 0 they are alike, 1 they have nothing in common
     /// A metre driven forward looks like a turn of minus so much, if things are where the floor ends; and so
-    /// much more for each 1/m by which one over their distance is larger.
+    /// much more if each is nearer than that by a standard deviation.
     bslam_real_t parallax_rad_per_m;
-    bslam_real_t sideways;
+    bslam_real_t parallax_sd_rad_per_m;  ///< negative where what is seen lies to the right
 } bslam_turn_t;
 
 /// What a camera saw last: the brightness of each column less that of its neighbourhood.
@@ -48,12 +48,13 @@ typedef struct bslam_turn_grid {
     bslam_real_t step_rad;   ///< to the next, to the right
     bslam_turn_place_t at_px[BSLAM_TURN_COLUMNS];  ///< in the half-resolution copy, 256ths of a pixel
     int16_t row_px[BSLAM_TURN_BANDS + 1];          ///< its rows between the bands, the lowest first
+    bslam_real_t inverse_in_front_per_m;  ///< one over the distance of what hides all the floor in view
 } bslam_turn_grid_t;
 
-/// Sine of a column's bearing, and the same over the distance of what is there.
+/// The sine of a column's bearing over the distance of what is there, and that one's standard deviation.
 typedef struct bslam_turn_column {
-    bslam_real_t sine;
     bslam_real_t parallax_per_m;
+    bslam_real_t parallax_sd_per_m;
 } bslam_turn_column_t;
 
 typedef struct bslam_turns {

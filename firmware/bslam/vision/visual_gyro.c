@@ -15,12 +15,13 @@ static const int64_t NO_FRAME = INT64_MIN;
 static const int64_t STEP_MAX_US = 4000000;
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 
-// Tried on the paper's room, drives 0:8.
+// Tried on the paper's room, drives 0:8, and on beacons in pairs, 100:106.
 static const bslam_real_t RATE_SD = BSLAM_R(0.5);              // rad/s, before anything is known
 static const bslam_real_t RATE_SD_PER_SQRT_S = BSLAM_R(0.75);  // rad/s
 static const bslam_real_t SPEED_SD = BSLAM_R(0.2);             // m/s
 static const bslam_real_t SPEED_SD_PER_SQRT_S = BSLAM_R(0.12);
-static const bslam_real_t NEARNESS_SD = BSLAM_R(0.12);  // 1/m
+// How much nearer things are than the turn's parallax has it, in that one's standard deviations.
+static const bslam_real_t NEARNESS_SD = 1;
 static const bslam_real_t NEARNESS_LASTS_S = BSLAM_R(0.6);
 // A frame's turn: least noise, and how much more for patterns that match badly.
 static const bslam_real_t TURN_SD = BSLAM_R(0.001);
@@ -28,7 +29,7 @@ static const bslam_real_t TURN_SD_PER_MISMATCH = BSLAM_R(0.02);
 // Turns farther off than this many standard deviations are seen past something near that the floor line does
 // not show, if that can be; else they are refused, and so many in a row believed.
 static const bslam_real_t GATE = 5;
-static const bslam_real_t NEAR_SD = 1;  // 1/m
+static const bslam_real_t NEAR_SD = 5;
 enum { REFUSED_MAX = 4 };
 static const bslam_real_t TOLD_SD = BSLAM_R(0.4);  // rad/s
 
@@ -138,11 +139,12 @@ static void take_turn(bslam_visual_gyro_t *gyro, int32_t camera, const bslam_tur
     const int32_t nearness = NEARNESS + camera;
     const bslam_real_t span_s = seconds(gyro->time_us - gyro->frame_us[camera]);
     const bslam_real_t speed_mps = gyro->state[SPEED];
-    const bslam_real_t parallax = turn->parallax_rad_per_m + turn->sideways * gyro->state[nearness];
+    const bslam_real_t parallax =
+        turn->parallax_rad_per_m + turn->parallax_sd_rad_per_m * gyro->state[nearness];
     bslam_real_t coefficients[STATES] = {0};
     coefficients[TURNS + camera] = 1;
     coefficients[SPEED] = -span_s * parallax;
-    coefficients[nearness] = -span_s * speed_mps * turn->sideways;
+    coefficients[nearness] = -span_s * speed_mps * turn->parallax_sd_rad_per_m;
     const bslam_real_t innovation =
         turn->turn_rad - (gyro->state[TURNS + camera] - span_s * speed_mps * parallax);
     const bslam_real_t variance =
@@ -171,7 +173,7 @@ bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro, int32_t camera,
     if (turn != NULL) {
         const bool finite = bslam_is_number(turn->turn_rad) && bslam_is_number(turn->variance_rad2) &&
                             bslam_is_number(turn->mismatch) && bslam_is_number(turn->parallax_rad_per_m) &&
-                            bslam_is_number(turn->sideways);
+                            bslam_is_number(turn->parallax_sd_rad_per_m);
         if (!finite) {
             return BSLAM_E_NOT_FINITE;
         }

@@ -7,8 +7,8 @@
 ///     time, reading.has_gyro = bslam_visual_gyro_rate(&gyro, &reading.gyro_radps)
 ///
 /// A small Kalman filter of its own, so that a frame's turn, which spans several steps, need not wait in the
-/// map's filter: turn rate, speed, the turn since each camera's frame before, and by how much one over the
-/// distance of what each camera sees is more than the floor line said.
+/// map's filter: turn rate, speed, the turn since each camera's frame before, and how much nearer than the
+/// floor line said is what each camera sees.
 #ifndef BSLAM_VISION_VISUAL_GYRO_H
 #define BSLAM_VISION_VISUAL_GYRO_H
 

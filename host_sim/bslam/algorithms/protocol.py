@@ -59,6 +59,8 @@ class Sighting:
     """(71,) how it looks; None: nobody knows, or identities are given."""
     beacon_class: int | None = None
     """The detector's kind of beacon, 1 to 254; None: it does not say, or identities are given."""
+    score: float | None = None
+    """How sure the detector is that this is a beacon; None: it does not say."""
 
 
 @dataclass(frozen=True, slots=True)

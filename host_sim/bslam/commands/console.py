@@ -279,6 +279,7 @@ def _input_of(told: Told) -> Reading | Frame:
         [one.range_scale_sd for one in seen],
         np.stack(signatures) if signatures else None,
         [one.beacon_class for one in seen],
+        [one.score for one in seen],
         accounts=told.accounts if told.refused is None else None,
         refused=told.refused,
     )

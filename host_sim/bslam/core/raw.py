@@ -47,26 +47,26 @@ class Library:
 
     def sightings(
         self,
-        rows: Sequence[tuple[float, float, int, int, float, float, float]],
+        rows: Sequence[tuple[float, float, int, int, float, float, float, float]],
         signature: NDArray[np.float32] | None = None,
     ) -> Any:
         """Rows as a C array.
 
-        A row: bearing_rad, range_m or NaN, label, beacon_class, bearing_sd_rad, range_sd_m, range_scale_sd.
+        A row: bearing_rad, range_m or NaN, label, beacon_class, bearing_sd_rad, range_sd_m, range_scale_sd,
+        score.
 
         signature: (rows, n) float32, C-contiguous; the array is good as long as it is.
         """
         array = self.ffi.new("bslam_sighting_t[]", len(rows))
         for sighting, row in zip(array, rows, strict=True):
-            bearing_rad, range_m, label, beacon_class, bearing_sd_rad, range_sd_m, range_scale_sd = row
+            bearing_rad, range_m, label, beacon_class, *noise, score = row
             sighting.bearing_rad = bearing_rad
             sighting.has_range = range_m == range_m
             sighting.range_m = range_m if range_m == range_m else 0.0
             sighting.beacon_class = beacon_class
             sighting.label = label
-            sighting.bearing_sd_rad = bearing_sd_rad
-            sighting.range_sd_m = range_sd_m
-            sighting.range_scale_sd = range_scale_sd
+            sighting.bearing_sd_rad, sighting.range_sd_m, sighting.range_scale_sd = noise
+            sighting.score = score
         if signature is not None and len(rows) > 0:
             first = self.ffi.from_buffer("float[]", signature)
             for index, sighting in enumerate(array):

@@ -212,19 +212,21 @@ class Slam:
         range_scale_sd: Sequence[float] | None = None,
         signature: NDArray[np.float32] | None = None,
         beacon_class: Sequence[int] | None = None,
+        score: Sequence[float] | None = None,
     ) -> list[Account]:
         """One image: equal lengths; range NaN: direction only; label -1: no identity.
 
         The noise as the detector gives it, and by what part all distances of a thing err alike; 0, or none at
         all: as the parameters have it. signature (m, 71): how each looks; None: nobody knows.
-        beacon_class: the detector's kind of each, 1 to 254; 0, or none at all: it does not say.
+        beacon_class: the detector's kind of each, 1 to 254; 0, or none at all: it does not say. score: how
+        sure it is that each is a beacon; 0, or none at all: it does not say.
 
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
         silent = [0.0] * len(bearing_rad)
         noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
         classes = told_classes(mappable, beacon_class)
-        rows = list(zip(bearing_rad, range_m, label, classes, *noise, strict=True))
+        rows = list(zip(bearing_rad, range_m, label, classes, *noise, score or silent, strict=True))
         if signature is not None:
             signature = _checked_signatures(signature, len(rows))
         try:

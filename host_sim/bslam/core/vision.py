@@ -103,7 +103,7 @@ class Turn:
     variance_rad2: float
     mismatch: float
     parallax_rad_per_m: float
-    sideways: float
+    parallax_sd_rad_per_m: float
 
 
 @dataclass(frozen=True)

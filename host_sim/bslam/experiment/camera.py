@@ -111,6 +111,7 @@ class CameraDrive:
             range_scale_sd=self.seen["range_scale_sd"].copy(),
             signature=np.ascontiguousarray(self.seen["signature"]),
             beacon_class=self.seen["beacon_class"].copy(),
+            score=self.seen["score"].copy(),
         )
 
 

@@ -143,7 +143,7 @@ class _Rerun:
         columns = (frame.bearing_rad, frame.range_m, frame.label, frame.mappable)
         noise = (frame.bearing_sd_rad, frame.range_sd_m, frame.range_scale_sd)
         accounts, refused = self._try(
-            "sightings", frame.time_us, *columns, *noise, frame.signature, frame.beacon_class
+            "sightings", frame.time_us, *columns, *noise, frame.signature, frame.beacon_class, frame.score
         )
         true_id = frame.label if frame.true_id is None else frame.true_id
         if accounts is None:

@@ -202,8 +202,8 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
     """The columns of a frame (`runner.columns_for_filter`) as objects; what is not known as None."""
     bearing_rad, range_m, label, mappable = columns[:4]
     nothing = [None] * len(bearing_rad)
-    bearing_sd, range_sd, scale_sd, signature, kind = (
-        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in range(4, 9)
+    bearing_sd, range_sd, scale_sd, signature, kind, score = (
+        nothing if len(columns) <= at or columns[at] is None else columns[at] for at in range(4, 10)
     )
     return [
         Sighting(
@@ -216,8 +216,9 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
             range_scale_sd=alike or None,
             signature=look,
             beacon_class=told or None,
+            score=sure or None,
         )
-        for bearing, distance, identity, use, sd_rad, sd_m, alike, look, told in zip(
+        for bearing, distance, identity, use, sd_rad, sd_m, alike, look, told, sure in zip(
             bearing_rad,
             range_m,
             label,
@@ -227,6 +228,7 @@ def _as_sightings(columns: list[Any]) -> list[Sighting]:
             scale_sd,
             signature,
             kind,
+            score,
             strict=True,
         )
     ]

@@ -388,6 +388,7 @@ class Frames:
         self._columns = columns_for_filter(sightings, options)
         self._signature = sightings.signature if uses_looks(options) else None
         self._class = None if sightings.beacon_class is None else sightings.beacon_class.tolist()
+        self._score = None if sightings.score is None else sightings.score.tolist()
         self._next = 0
 
     def gyro_radps(self, row: int, time_us: int) -> float | None:
@@ -408,10 +409,10 @@ class Frames:
         rows = slice(self._bounds[frame], self._bounds[frame + 1])
         self._next = frame + 1
         columns: list[Any] = [column[rows] for column in self._columns]
-        if self._signature is not None or self._class is not None:
+        more = (self._signature, self._class, self._score)
+        if any(one is not None for one in more):
             columns += [None] * (SIGNATURE - len(columns))
-            columns += [None if self._signature is None else self._signature[rows]]
-            columns += [] if self._class is None else [self._class[rows]]
+            columns += [None if one is None else one[rows] for one in more]
         return self._time_us[frame], self._true_id[rows], columns
 
 

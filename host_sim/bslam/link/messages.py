@@ -77,7 +77,7 @@ _PARAM_ID = struct.Struct("<H")
 _PARAM = struct.Struct("<Hf")
 _REPORT = struct.Struct("<BIIBf")
 _CAMERA = struct.Struct("<BBHH9fB")
-_SEEN = struct.Struct("<5fiBB")
+_SEEN = struct.Struct("<6fiBB")
 _LOOKED = struct.Struct("<4B")
 _VALUE = struct.Struct("<f")
 _PLACE = struct.Struct("<I")
@@ -92,12 +92,13 @@ _SIGHTING = np.dtype(
         ("bearing_sd_rad", "<f4"),
         ("range_sd_m", "<f4"),
         ("range_scale_sd", "<f4"),
+        ("score", "<f4"),
         ("label", "<i4"),
         ("beacon_class", "u1"),
         ("flags", "u1"),
     ]
 )
-_NOISE = ("bearing_sd_rad", "range_sd_m", "range_scale_sd")
+_REALS = ("bearing_sd_rad", "range_sd_m", "range_scale_sd", "score")
 _SOURCES = {"wheels": 0, "ticks": 1, "velocity": 2}
 _NOT_MAPPABLE = 255
 _SIGNATURE_BYTES = 4 * 71
@@ -134,7 +135,7 @@ def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
 
 def payload_max(sightings_max: int) -> int:
     """Bytes of the longest payload of an image that takes so many sightings (BSLAM_LINK_PAYLOAD_MAX)."""
-    return 16 + 26 * max(sightings_max, 16)
+    return 16 + 30 * max(sightings_max, 16)
 
 
 def signatures_a_frame(sightings_max: int) -> int:
@@ -148,7 +149,7 @@ def signatures(first: int, part: NDArray[np.float32]) -> bytes:
 
 
 def sightings(
-    rows: Sequence[tuple[float, float, int, int, float, float, float]], signed: bool, most: int
+    rows: Sequence[tuple[float, float, int, int, float, float, float, float]], signed: bool, most: int
 ) -> bytes:
     """Rows as `bslam.core.raw.Library.sightings` takes them; of more than `most` only the number counts.
 
@@ -157,12 +158,12 @@ def sightings(
     count, rows = len(rows), rows[:most]
     table = np.zeros(len(rows), dtype=_SIGHTING)
     if rows:
-        bearing_rad, range_m, label, beacon_class, *noise = zip(*rows, strict=True)
+        bearing_rad, range_m, label, beacon_class, *reals = zip(*rows, strict=True)
         with np.errstate(over="ignore"):
             has_range = ~np.isnan(np.array(range_m, dtype=np.float64))
             table["bearing_rad"] = bearing_rad
             table["range_m"] = np.where(has_range, range_m, 0.0)
-            for name, values in zip(_NOISE, noise, strict=True):
+            for name, values in zip(_REALS, reals, strict=True):
                 table[name] = values
         table["label"] = label
         table["beacon_class"] = beacon_class
@@ -318,19 +319,20 @@ class Seen:
     bearing_sd_rad: float
     range_sd_m: float
     range_scale_sd: float
+    score: float
     beacon_class: int
     signature: NDArray[np.float32] | None  # (71,)
 
 
 def read_seen(body: bytes) -> Seen:
     """The sighting that follows the first byte of an answer to SEEN, or of SIGHTED."""
-    bearing_rad, range_m, sd_rad, sd_m, scale_sd, _, kind, flags = _SEEN.unpack_from(body, 1)
+    bearing_rad, range_m, sd_rad, sd_m, scale_sd, score, _, kind, flags = _SEEN.unpack_from(body, 1)
     has_range, signed = bool(flags & 1), bool(flags & 2)
     looks = np.frombuffer(body[1 + _SEEN.size :], "<f4").astype(np.float32)
     if looks.shape != ((_SIGNATURE_BYTES // 4) * signed,):
         raise struct.error(f"a sighting of {len(body)} bytes")
     range_m = range_m if has_range else math.nan
-    return Seen(bearing_rad, range_m, sd_rad, sd_m, scale_sd, kind, looks if signed else None)
+    return Seen(bearing_rad, range_m, sd_rad, sd_m, scale_sd, score, kind, looks if signed else None)
 
 
 @dataclass(frozen=True)

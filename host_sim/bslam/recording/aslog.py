@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.log import SIGHTING_NOISE, TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
+from bslam.log import SIGHTING_NUMBERS, TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
 from bslam.parsing.settings import parse_table
 from bslam.recording.entries import Frame, Reading, Start, TruePose
 from bslam.recording.reader import Recording
@@ -88,7 +88,7 @@ def _sightings(frames: list[Frame]) -> Sightings:
     def told(name: str) -> bool:
         return bool(frames) and all(getattr(frame, name) is not None for frame in frames)
 
-    noise = {name: column(name, np.float64) for name in SIGHTING_NOISE if told(name)}
+    numbers = {name: column(name, np.float64) for name in SIGHTING_NUMBERS if told(name)}
     return Sightings(
         time_us=np.repeat(
             np.array([frame.time_us for frame in frames], dtype=np.int64),
@@ -100,7 +100,7 @@ def _sightings(frames: list[Frame]) -> Sightings:
         mappable=column("mappable", np.bool_),
         signature=np.concatenate([frame.signature for frame in frames]) if told("signature") else None,
         beacon_class=column("beacon_class", np.int64) if told("beacon_class") else None,
-        **noise,
+        **numbers,
     )
 
 

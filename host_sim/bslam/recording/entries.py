@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bslam.core.learner import SIGNATURE_SIZE
 from bslam.core.slam import Account, Beacon
-from bslam.log import ODOMETRY_COLUMNS, SIGHTING_NOISE
+from bslam.log import ODOMETRY_COLUMNS, SIGHTING_NUMBERS
 
 Json = dict[str, Any]
 Pose = tuple[float, float, float]
@@ -70,6 +70,7 @@ class Frame:
     range_scale_sd: list[float] | None = None
     signature: NDArray[np.float32] | None = None  # (m, 71)
     beacon_class: list[int] | None = None
+    score: list[float] | None = None
     true_id: list[int] | None = None  # beacon_id of each, -1: of none; None: nobody knows
     accounts: list[Account] | None = None  # None: the frame was refused
     refused: str | None = None
@@ -154,7 +155,7 @@ def _frame_to(one: Frame) -> Json:
     for i, bearing_rad in enumerate(one.bearing_rad):
         row: Json = {"bearing_rad": bearing_rad, "range_m": _number_or_none(one.range_m[i])}
         row |= {"label": one.label[i], "mappable": bool(one.mappable[i])}
-        for name in SIGHTING_NOISE:
+        for name in SIGHTING_NUMBERS:
             told = getattr(one, name)
             row |= {} if told is None else {name: told[i]}
         if one.true_id is not None:
@@ -166,8 +167,8 @@ def _frame_to(one: Frame) -> Json:
         if one.accounts is not None:
             row["account"] = asdict(one.accounts[i])
         rows.append(row)
-    noise = [name for name in SIGHTING_NOISE if getattr(one, name) is not None]
-    words = {"signed": one.signature is not None, "noise": noise}
+    numbers = [name for name in SIGHTING_NUMBERS if getattr(one, name) is not None]
+    words = {"signed": one.signature is not None, "numbers": numbers}
     return {"time_us": one.time_us, "refused": one.refused, **words, "sightings": rows}
 
 
@@ -186,7 +187,7 @@ def _frame_from(content: Json) -> Frame:
         true_id=_column(rows, "true_id") if identified else None,
         accounts=None if content["refused"] else [Account(**one) for one in _column(rows, "account")],
         refused=content["refused"],
-        **{name: _column(rows, name) for name in content["noise"]},
+        **{name: _column(rows, name) for name in content["numbers"]},
     )
 
 

@@ -55,10 +55,11 @@ class Recorder:
         range_scale_sd: list[float] | None = None,
         signature: NDArray[np.float32] | None = None,
         beacon_class: list[int] | None = None,
+        score: list[float] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
         noise = (bearing_sd_rad, range_sd_m, range_scale_sd)
-        inputs = (time_us, bearing_rad, range_m, label, mappable, *noise, signature, beacon_class)
+        inputs = (time_us, bearing_rad, range_m, label, mappable, *noise, signature, beacon_class, score)
         accounts, refusal = self._attempt("sightings", *inputs)
         self._end_step(Frame(*inputs, self.true_id, accounts, _status(refusal)), refusal)
         return list(accounts)

@@ -63,6 +63,7 @@ _SIGHTING = _object(
     bearing_sd_rad=_NUMBER,
     range_sd_m=_NUMBER,
     range_scale_sd=_NUMBER,
+    score=_NUMBER,
     signature=_TEXT,
     beacon_class=_WHOLE,
     true_id=_WHOLE,
@@ -103,7 +104,7 @@ SCHEMAS: dict[str, Json] = {
         **{name: _NUMBER for names in ODOMETRY_COLUMNS.values() for name in names},
     ),
     "bslam.Sightings": _object(
-        time_us=_WHOLE, refused=_TEXT, signed=_BOOL, noise=_list(_TEXT), sightings=_list(_SIGHTING)
+        time_us=_WHOLE, refused=_TEXT, signed=_BOOL, numbers=_list(_TEXT), sightings=_list(_SIGHTING)
     ),
     "bslam.Call": _object(
         name=_TEXT, arguments=_list({"type": ["number", "string"]}), refused=_TEXT, words=_object()

@@ -151,12 +151,13 @@ class RemoteSlam:
         range_scale_sd: Sequence[float] | None = None,
         signature: NDArray[np.float32] | None = None,
         beacon_class: Sequence[int] | None = None,
+        score: Sequence[float] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
         silent = [0.0] * len(bearing_rad)
         noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
         classes = told_classes(mappable, beacon_class)
-        rows = list(zip(bearing_rad, range_m, label, classes, *noise, strict=True))
+        rows = list(zip(bearing_rad, range_m, label, classes, *noise, score or silent, strict=True))
         signed, most = signature is not None, self._client.info.sightings_max
         payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
         if signature is not None:

@@ -63,6 +63,7 @@ def frames(draw):
         range_scale_sd=draw(st.lists(floats, **rows)) if noisy and classed else None,
         signature=table if signed else None,
         beacon_class=draw(st.lists(st.integers(0, 254), **rows)) if classed and count else None,
+        score=draw(st.lists(floats, **rows)) if classed else None,
         true_id=draw(st.lists(st.integers(-1, 99), **rows)) if known and count else None,
         accounts=None if refused else draw(st.lists(accounts, **rows)),
         refused="BSLAM_E_TIME" if refused else None,

@@ -154,8 +154,8 @@ def columns_of(candidates):
     told = [(c.told.bearing_sd_rad, c.told.range_sd_m, c.told.range_scale_sd) for c in candidates]
     noise = [list(column) for column in zip(*told, strict=True)] if told else [[], [], []]
     signatures = np.stack([c.signature for c in candidates]) if candidates else None
-    kinds = [c.beacon_class for c in candidates]
-    return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *noise, signatures, kinds
+    kinds, scores = [c.beacon_class for c in candidates], [c.score for c in candidates]
+    return bearings, ranges, [-1] * len(bearings), [True] * len(bearings), *noise, signatures, kinds, scores
 
 
 def feed(slam, told):

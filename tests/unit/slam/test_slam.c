@@ -287,6 +287,12 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
         seen[1].range_scale_sd = (bslam_real_t)noises[i].range_scale_sd;
         assert_frame_refused(&slam, 11 * STEP_US, seen, 2, noises[i].expected, 1);
     }
+    static const double scores[] = {NAN, INFINITY, 1.1e6, -1.1e6};
+    for (int i = 0; i < COUNT_OF(scores); i++) {
+        bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(-0.8, 3, 2)};
+        seen[1].score = (bslam_real_t)scores[i];
+        assert_frame_refused(&slam, 11 * STEP_US, seen, 2, i < 2 ? BSLAM_E_NOT_FINITE : BSLAM_E_RANGE, 1);
+    }
     // A good frame forgets which sighting was bad.
     see_one(&slam, 11 * STEP_US, unit_polar(0.3, 4, 1));
     assert_int_equal(bslam_slam_bad_sighting(&slam), -1);

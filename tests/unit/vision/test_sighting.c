@@ -14,7 +14,8 @@ static bslam_candidate_t seen(bool has_range)
                                .range_scale_sd = BSLAM_R(0.08),
                                .has_bearing = true,
                                .has_range = has_range,
-                               .beacon_class = 3};
+                               .beacon_class = 3,
+                               .score = 1.25f};
 }
 
 static void test_sighting_of_a_whole_thing_has_its_noise_and_what_all_its_distances_share(void **state)
@@ -28,6 +29,7 @@ static void test_sighting_of_a_whole_thing_has_its_noise_and_what_all_its_distan
     assert_near(told.range_sd_m, sqrt(0.3 * 0.3 + 0.1 * 0.1), 1e-6);  // 2 % of 5 m besides
     assert_near(told.range_scale_sd, candidate.range_scale_sd, 0);
     assert_int_equal(told.beacon_class, 3);
+    assert_near(told.score, 1.25, 0);
     assert_int_equal(told.label, BSLAM_LABEL_NONE);
     assert_ptr_equal(told.signature, candidate.signature);
 }

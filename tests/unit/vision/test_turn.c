@@ -101,7 +101,27 @@ static void test_see_driving_by_is_told_as_parallax(void **state)
     const bslam_turn_t turn = turn_seen();
     assert_near((double)(turn.turn_rad + turn.parallax_rad_per_m * BSLAM_R(0.08)), 0.01, 0.0015);
     assert_near((double)turn.parallax_rad_per_m, sin(1.1) / RING_M, 0.03);
-    assert_near((double)turn.sideways, sin(1.1), 0.1);
+    assert_near((double)turn.parallax_sd_rad_per_m, sin(1.1) * 0.1, 0.01);
+}
+
+/// No floor to the frame's lower edge: what hides it is nearer than the floor seen there otherwise.
+static void test_see_what_hides_the_floor_is_near(void **state)
+{
+    vision.cameras[0].yaw_rad = BSLAM_R(1.1);
+    const bslam_camera_t *camera = &vision.cameras[0];
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0.08, 0.01);
+    for (int i = 0; i < BSLAM_COLUMNS_MAX; i++) {
+        vision.floor_line.distance_m[i] = 0;
+        vision.floor_line.edge_px[i] = (int16_t)camera->height_px;
+    }
+    const bslam_turn_t hidden = turn_seen();
+    const double nearest_m =
+        (double)(camera->z_m * camera->fy_px / ((bslam_real_t)camera->height_px - camera->cy_px));
+    const double before_it = (double)hidden.parallax_rad_per_m / sin(1.1) * nearest_m;
+    assert_true(before_it > 1.1 && before_it < 1.5);
+    assert_true((double)hidden.parallax_sd_rad_per_m > 0.2 * (double)hidden.parallax_rad_per_m);
 }
 
 static void test_see_a_camera_that_turned_on_its_own_is_no_turn_of_the_robot(void **state)
@@ -160,6 +180,7 @@ int main(void)
         cmocka_unit_test_setup(test_see_a_turn_is_measured_to_a_part_of_a_column, start),
         cmocka_unit_test_setup(test_see_through_a_fisheye, start),
         cmocka_unit_test_setup(test_see_driving_by_is_told_as_parallax, start),
+        cmocka_unit_test_setup(test_see_what_hides_the_floor_is_near, start),
         cmocka_unit_test_setup(test_see_a_camera_that_turned_on_its_own_is_no_turn_of_the_robot, start),
         cmocka_unit_test_setup(test_see_each_camera_has_its_own_frame_before, start),
         cmocka_unit_test_setup(test_see_a_plain_wall_tells_nothing, start),

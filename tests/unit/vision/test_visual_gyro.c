@@ -47,7 +47,7 @@ static double error_after(int steps, double speed_mps, const double nearness_per
                              way_m * sideways * (0.25 + (passing ? nearness_per_m[camera] : 0))),
             .variance_rad2 = BSLAM_R(1e-6),
             .parallax_rad_per_m = real(sideways * 0.25),
-            .sideways = real(sideways),
+            .parallax_sd_rad_per_m = real(sideways * 0.1),
         };
         assert_int_equal(bslam_visual_gyro_take(&gyro, camera, step < CAMERAS ? NULL : &turn), BSLAM_OK);
         at_frame_rad[camera] = heading_rad;
@@ -75,6 +75,26 @@ static void test_rate_is_not_led_astray_by_something_near_on_one_side(void **sta
     static const double passing_a_chair[CAMERAS] = {1.5, 0, 0};
     double worst_radps;
     assert_near(error_after(200, 0.4, passing_a_chair, &worst_radps), 0, 0.06);
+}
+
+/// Two cameras contradict each other, and one of them sees the floor.
+static void test_rate_is_that_of_the_camera_that_knows_how_far_things_are(void **state)
+{
+    for (int step = 0; step < 60; step++) {
+        advance(step, 0.4);
+        const double sideways = step % 2 == 0 ? 0.9 : -0.9, way_m = 2 * STEP_S * 0.4;
+        const double true_per_m = step % 2 == 0 ? 0.2 : 1.0;
+        const bslam_turn_t turn = {
+            .turn_rad = real(-way_m * sideways * true_per_m),
+            .variance_rad2 = BSLAM_R(1e-6),
+            .parallax_rad_per_m = real(sideways * (step % 2 == 0 ? 0.2 : 0.75)),
+            .parallax_sd_rad_per_m = real(sideways * (step % 2 == 0 ? 0.1 : 0.25)),
+        };
+        assert_int_equal(bslam_visual_gyro_take(&gyro, step % 2, step < 2 ? NULL : &turn), BSLAM_OK);
+    }
+    bslam_real_t rate_radps = 7;
+    assert_true(bslam_visual_gyro_rate(&gyro, &rate_radps));
+    assert_near((double)rate_radps, 0, 0.03);  // halfway between the two would be 0.045
 }
 
 static void test_rate_is_not_told_before_and_long_after_anything_was_seen(void **state)
@@ -131,7 +151,7 @@ static void test_bad_input_is_refused_and_nothing_changes(void **state)
     for (int i = 0; i < 5; i++) {
         turn = good;
         *(bslam_real_t *[]){&turn.turn_rad, &turn.variance_rad2, &turn.mismatch, &turn.parallax_rad_per_m,
-                            &turn.sideways}[i] = real(INFINITY);
+                            &turn.parallax_sd_rad_per_m}[i] = real(INFINITY);
         assert_int_equal(bslam_visual_gyro_take(&gyro, 0, &turn), BSLAM_E_NOT_FINITE);
     }
     assert_memory_equal(&gyro, &before, sizeof before);
@@ -142,6 +162,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_rate_follows_turns_that_span_three_steps, start),
         cmocka_unit_test_setup(test_rate_is_not_led_astray_by_something_near_on_one_side, start),
+        cmocka_unit_test_setup(test_rate_is_that_of_the_camera_that_knows_how_far_things_are, start),
         cmocka_unit_test_setup(test_rate_is_not_told_before_and_long_after_anything_was_seen, start),
         cmocka_unit_test_setup(test_a_lasting_contradiction_is_believed_in_the_end, start),
         cmocka_unit_test_setup(test_bad_input_is_refused_and_nothing_changes, start),

@@ -1,0 +1,85 @@
+// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Confirmed".
+#include "bslam/slam/internal.h"
+
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+// What one sighting says at most: the next frame shows the same, and may be wrong the same way.
+static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5);
+
+/// Whether scores decide: where beacons are told apart by looks, of a detector that gives them.
+static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
+{
+    return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
+}
+
+static void confirm(bslam_slam_t *slam, bslam_beacon_t *beacon)
+{
+    beacon->confirmed = true;
+    slam->confirmed_now = true;
+}
+
+static void add_score(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    const bslam_real_t above = sighting->score - slam->params.trust_score;
+    beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > SCORE_HIGH ? SCORE_HIGH : above;
+    if (!beacon->confirmed && beacon->score_sum >= slam->params.confirm_sum) {
+        confirm(slam, beacon);
+    }
+}
+
+/// A sighting counts if the robot has gone far enough since the last that did, and against the beacon if it
+/// is too far off: what is not of the size that it is taken for is not, seen from the next place, where it
+/// was.
+static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
+{
+    const bslam_params_t *params = &slam->params;
+    const uint32_t least_um = (uint32_t)(params->confirm_way_m * MICROMETRES_PER_M);
+    if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
+        beacon->view_um = slam->way_um;
+        beacon->views = (uint16_t)(distance2 <= params->confirm_d2 ? beacon->views + 1 : beacon->views - 1);
+        if (beacon->views >= params->confirm_sightings) {
+            confirm(slam, beacon);
+        }
+    }
+}
+
+void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    beacon->view_um = slam->way_um;
+    beacon->views = 1;
+    if (has_score(slam, sighting)) {
+        add_score(slam, beacon, sighting);
+    } else {
+        beacon->confirmed = slam->params.confirm_sightings <= 1;
+    }
+}
+
+void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
+                            bslam_real_t distance2)
+{
+    if (has_score(slam, sighting)) {
+        add_score(slam, beacon, sighting);
+    } else {
+        count_view(slam, beacon, distance2);
+    }
+}
+
+static int confirmed_count(const bslam_ekf_t *ekf)
+{
+    int count = 0;
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        count += ekf->beacons[b].confirmed ? 1 : 0;
+    }
+    return count;
+}
+
+bool bslam_slam_is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon,
+                            const bslam_sighting_t *sighting)
+{
+    return !beacon->confirmed && has_score(slam, sighting) && beacon->score_sum < slam->params.trust_sum &&
+           confirmed_count(&slam->ekf) >= slam->params.trust_beacons;
+}
+
+bool bslam_slam_is_refuted(const bslam_beacon_t *beacon)
+{
+    return !beacon->confirmed && (beacon->views == 0 || beacon->score_sum < 0);
+}

@@ -1,0 +1,175 @@
+// Whether what is seen is a beacon, by the scores of a detector.
+#include "support.h"
+
+#include <math.h>
+
+#include "bslam/slam/slam.h"
+
+enum { STEP_US = 40000 };
+
+static bslam_slam_t slam;
+static int64_t now_us;
+
+static void start(int32_t association)
+{
+    bslam_params_t params = unit_params();
+    params.association = association;
+    params.trust_score = BSLAM_R(0.5);
+    params.trust_sum = 4;
+    params.trust_beacons = 0;
+    params.confirm_sum = 6;
+    params.confirm_sightings = 3;
+    params.confirm_window_us = 0;
+    int bad_id;
+    memset(&slam, 0, sizeof slam);
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    now_us = 0;
+}
+
+static int setup(void **state)
+{
+    start(BSLAM_ASSOCIATION_SVM);
+    return 0;
+}
+
+/// The robot stands, and sees one thing with this score; what became of it.
+static bslam_account_t see_at(double bearing_rad, double score)
+{
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    bslam_sighting_t seen =
+        unit_polar(bearing_rad, 4, slam.params.association == BSLAM_ASSOCIATION_KNOWN ? 1 : -1);
+    seen.score = real(score);
+    now_us += STEP_US;
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us, &seen, 1), BSLAM_OK);
+    return slam.accounts[0];
+}
+
+/// Where the next frame would leave the filter if it showed nothing.
+static void look_at_nothing(bslam_ekf_t *left)
+{
+    static bslam_slam_t now;
+    now = slam;
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us + STEP_US, NULL, 0), BSLAM_OK);
+    *left = slam.ekf;
+    slam = now;
+}
+
+static bslam_account_t see(double score)
+{
+    return see_at(0.2, score);
+}
+
+static bool is_confirmed(int index)
+{
+    bslam_beacon_view_t view;
+    assert_int_equal(bslam_slam_beacon(&slam, index, &view), BSLAM_OK);
+    return view.confirmed;
+}
+
+/// Each speaks for it by 1: with four it is believed, with six confirmed.
+static void test_until_a_beacon_is_believed_its_sightings_move_nothing(void **state)
+{
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_NEW);
+    const uint32_t uid = slam.accounts[0].beacon_uid;
+    static bslam_ekf_t unmoved;
+    for (int i = 0; i < 3; i++) {
+        look_at_nothing(&unmoved);
+        // Off to the side: it would move if it was used.
+        const bslam_account_t account = see_at(0.21, 1.5);
+        assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
+        assert_int_equal(account.reason, BSLAM_REASON_TRIAL);
+        assert_true(account.has_beacon);
+        assert_int_equal(account.beacon_uid, uid);
+        assert_memory_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
+        assert_memory_equal(slam.ekf.covariance, unmoved.covariance, sizeof unmoved.covariance);
+        assert_false(is_confirmed(0));
+    }
+    assert_int_equal(slam.counters.deferred, 3);
+    assert_int_equal(see_at(0.21, 1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_memory_not_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
+    assert_false(is_confirmed(0));
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(is_confirmed(0));
+}
+
+static void test_one_sighting_says_so_much_at_most(void **state)
+{
+    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_NEW);  // 1.5
+    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);  // 4.5
+    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(is_confirmed(0));
+}
+
+static void test_what_more_speaks_against_than_for_leaves(void **state)
+{
+    (void)see(1.0);  // 0.5
+    (void)see(0.1);  // 0.1
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    (void)see(0.1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_int_equal(slam.counters.removed, 1);
+}
+
+static void test_a_confirmed_beacon_stays_whatever_it_scores(void **state)
+{
+    for (int i = 0; i < 8; i++) {
+        (void)see(2);
+    }
+    for (int i = 0; i < 40; i++) {
+        assert_int_equal(see(-100).outcome, BSLAM_OUTCOME_MATCHED);
+    }
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+}
+
+static void test_without_scores_a_beacon_is_believed_at_once(void **state)
+{
+    assert_int_equal(see(0).outcome, BSLAM_OUTCOME_NEW);
+    assert_int_equal(see(0).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_false(is_confirmed(0));
+    assert_int_equal(see(0).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(is_confirmed(0));
+}
+
+/// A robot that knows no place yet takes what it gets.
+static void test_while_few_are_confirmed_all_are_believed(void **state)
+{
+    slam.params.trust_beacons = 1;
+    (void)see(1.5);
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    }
+    assert_true(is_confirmed(0));
+    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_NEW);
+    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_DEFERRED);
+}
+
+static void test_other_methods_do_not_ask_for_scores(void **state)
+{
+    static const int32_t methods[] = {BSLAM_ASSOCIATION_KNOWN, BSLAM_ASSOCIATION_NEAREST,
+                                      BSLAM_ASSOCIATION_MAHALANOBIS};
+    for (int i = 0; i < COUNT_OF(methods); i++) {
+        start(methods[i]);
+        assert_int_equal(see(0.1).outcome, BSLAM_OUTCOME_NEW);
+        assert_int_equal(see(0.1).outcome, BSLAM_OUTCOME_MATCHED);
+        assert_int_equal(see(0.1).outcome, BSLAM_OUTCOME_MATCHED);
+        assert_true(is_confirmed(0));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_until_a_beacon_is_believed_its_sightings_move_nothing, setup),
+        cmocka_unit_test_setup(test_one_sighting_says_so_much_at_most, setup),
+        cmocka_unit_test_setup(test_what_more_speaks_against_than_for_leaves, setup),
+        cmocka_unit_test_setup(test_a_confirmed_beacon_stays_whatever_it_scores, setup),
+        cmocka_unit_test_setup(test_without_scores_a_beacon_is_believed_at_once, setup),
+        cmocka_unit_test_setup(test_while_few_are_confirmed_all_are_believed, setup),
+        cmocka_unit_test_setup(test_other_methods_do_not_ask_for_scores, setup),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
