@@ -153,7 +153,7 @@
          "svm: of a detector that gives scores, one above this speaks for a beacon, by how much it is above") \
     REAL(trust_sum, 7.0, 0.0, 1e6, "svm: until that comes to this, the beacon's sightings are not used") \
     INTEGER(trust_beacons, 4, 0, 250, "svm: unless fewer than so many are confirmed") \
-    REAL(confirm_sum, 15.0, 0.0, 1e6, "svm: and once it comes to this the beacon is confirmed")
+    REAL(confirm_sum, 10.0, 0.0, 1e6, "svm: and until it comes to this the beacon is not confirmed")
 // clang-format on
 
 /// Values of `filter`.

@@ -11,34 +11,31 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
     return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
-static void confirm(bslam_slam_t *slam, bslam_beacon_t *beacon)
+static void add_score(const bslam_params_t *params, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
-    beacon->confirmed = true;
-    slam->confirmed_now = true;
-}
-
-static void add_score(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
-{
-    const bslam_real_t above = sighting->score - slam->params.trust_score;
+    const bslam_real_t above = sighting->score - params->trust_score;
     beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > SCORE_HIGH ? SCORE_HIGH : above;
-    if (!beacon->confirmed && beacon->score_sum >= slam->params.confirm_sum) {
-        confirm(slam, beacon);
-    }
 }
 
 /// A sighting counts if the robot has gone far enough since the last that did, and against the beacon if it
 /// is too far off: what is not of the size that it is taken for is not, seen from the next place, where it
 /// was.
-static void count_view(bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
+static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
 {
     const bslam_params_t *params = &slam->params;
     const uint32_t least_um = (uint32_t)(params->confirm_way_m * MICROMETRES_PER_M);
     if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
         beacon->view_um = slam->way_um;
         beacon->views = (uint16_t)(distance2 <= params->confirm_d2 ? beacon->views + 1 : beacon->views - 1);
-        if (beacon->views >= params->confirm_sightings) {
-            confirm(slam, beacon);
-        }
+    }
+}
+
+static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    const bool is_sure = !has_score(slam, sighting) || beacon->score_sum >= slam->params.confirm_sum;
+    if (!beacon->confirmed && is_sure && beacon->views >= slam->params.confirm_sightings) {
+        beacon->confirmed = true;
+        slam->confirmed_now = true;
     }
 }
 
@@ -47,20 +44,19 @@ void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bsla
     beacon->view_um = slam->way_um;
     beacon->views = 1;
     if (has_score(slam, sighting)) {
-        add_score(slam, beacon, sighting);
-    } else {
-        beacon->confirmed = slam->params.confirm_sightings <= 1;
+        add_score(&slam->params, beacon, sighting);
     }
+    decide(slam, beacon, sighting);
 }
 
 void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
                             bslam_real_t distance2)
 {
     if (has_score(slam, sighting)) {
-        add_score(slam, beacon, sighting);
-    } else {
-        count_view(slam, beacon, distance2);
+        add_score(&slam->params, beacon, sighting);
     }
+    count_view(slam, beacon, distance2);
+    decide(slam, beacon, sighting);
 }
 
 static int confirmed_count(const bslam_ekf_t *ekf)

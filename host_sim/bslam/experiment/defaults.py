@@ -28,7 +28,7 @@ CAMERA: Final[dict[str, int | float]] = {
 # thrown away. Its errors are its own for a metre of way, so one beacon mapped twice stands in two places.
 # Tried on paper_room, seeds 100:108.
 CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
-    "confirm_sightings": 20,
+    "confirm_sightings": 10,
     "confirm_way_m": 0.1,
     "confirm_window_us": 0,
     "double_sd_m": 0.3,

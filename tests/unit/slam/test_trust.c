@@ -134,6 +134,17 @@ static void test_without_scores_a_beacon_is_believed_at_once(void **state)
     assert_true(is_confirmed(0));
 }
 
+static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **state)
+{
+    slam.params.confirm_sightings = 9;
+    for (int i = 0; i < 8; i++) {
+        (void)see(3);
+        assert_false(is_confirmed(0));
+    }
+    assert_int_equal(see(3).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(is_confirmed(0));
+}
+
 /// A robot that knows no place yet takes what it gets.
 static void test_while_few_are_confirmed_all_are_believed(void **state)
 {
@@ -168,6 +179,7 @@ int main(void)
         cmocka_unit_test_setup(test_what_more_speaks_against_than_for_leaves, setup),
         cmocka_unit_test_setup(test_a_confirmed_beacon_stays_whatever_it_scores, setup),
         cmocka_unit_test_setup(test_without_scores_a_beacon_is_believed_at_once, setup),
+        cmocka_unit_test_setup(test_what_is_seen_surely_from_few_places_is_not_confirmed, setup),
         cmocka_unit_test_setup(test_while_few_are_confirmed_all_are_believed, setup),
         cmocka_unit_test_setup(test_other_methods_do_not_ask_for_scores, setup),
     };
