@@ -150,10 +150,10 @@
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none") \
     REAL(trust_score, 0.5, -100.0, 100.0, \
-         "svm: of a detector that gives scores, one above this speaks for a beacon, by how much it is above") \
-    REAL(trust_sum, 7.0, 0.0, 1e6, "svm: until that comes to this, the beacon's sightings are not used") \
+         "svm: a detector's score speaks for a beacon by how much it is above this") \
+    REAL(trust_sum, 7.0, 0.0, 1e6, "svm: until those of a beacon come to this, its sightings are not used") \
     INTEGER(trust_beacons, 4, 0, 250, "svm: unless fewer than so many are confirmed") \
-    REAL(confirm_sum, 10.0, 0.0, 1e6, "svm: and until it comes to this the beacon is not confirmed")
+    REAL(confirm_sum, 10.0, 0.0, 1e6, "svm: and until they come to this it is not confirmed")
 // clang-format on
 
 /// Values of `filter`.

@@ -56,9 +56,7 @@ class Bslam:
         kinds = [one.beacon_class or 0 for one in sightings]
         scores = [one.score or 0.0 for one in sightings]
         try:
-            told = self._slam.sightings(
-                time_us, *columns, signature=looks, beacon_class=kinds, score=scores
-            )
+            told = self._slam.sightings(time_us, *columns, signature=looks, beacon_class=kinds, score=scores)
         except CoreError:
             self._accounts = None  # the core has counted it
             return
