@@ -134,6 +134,10 @@ bslam_params_t unit_params(void)
     p.new_d2 = 40;
     p.confirm_sightings = 4;
     p.confirm_window_us = 0;
+    p.trust_score = BSLAM_R(0.5);
+    p.trust_sum = 7;
+    p.trust_beacons = 4;
+    p.confirm_sum = 10;
     return p;
 }
 

@@ -38,7 +38,8 @@ typedef enum bslam_verdict {
     BSLAM_VERDICT_REJECT = 0,
     BSLAM_VERDICT_MATCH,
     BSLAM_VERDICT_NEW,
-    BSLAM_VERDICT_DEFER  ///< undecided: used for nothing
+    BSLAM_VERDICT_DEFER,  ///< undecided: used for nothing
+    BSLAM_VERDICT_TRIAL   ///< no method's: a match or a new one that says whether there is a beacon, no more
 } bslam_verdict_t;
 
 typedef struct bslam_match {

@@ -63,12 +63,13 @@ typedef struct bslam_beacon {
     int64_t last_seen_us;
     uint32_t sightings;  ///< that were matched with it, the one that started it included
     uint32_t gated;      ///< sightings taken for it that its gate rejected
-    uint32_t way_um;     ///< that the robot had gone when it was matched last, modulo 4.3 km
+    uint32_t way_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
     uint32_t view_um;    ///< the same when it was last counted in views
     uint16_t views;      ///< sightings far apart that count towards its confirmation, less those against
     bool confirmed;
     uint8_t beacon_class;
-    bslam_real_t score_sum;    ///< what its sightings' scores say for it: more than it is a beacon at all
+    bool has_scores;           ///< of its sightings
+    bslam_real_t score_sum;    ///< what these say for its being a beacon at all
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
 } bslam_beacon_t;
 

@@ -64,17 +64,25 @@ static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
                        bslam_beacon_t *beacon, bslam_real_t distance2)
 {
     beacon->sightings++;
-    beacon->way_um = slam->way_um;
     beacon->last_seen_us = time_us;
     bslam_slam_trust_match(slam, beacon, sighting, distance2);
 }
 
 /// A sighting of what may be no beacon moves nothing, but says whether it is one.
 static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
-                      bslam_beacon_t *beacon, bslam_account_t *account)
+                      const bslam_match_t *match, bslam_account_t *account)
 {
+    bslam_beacon_t *beacon = match->beacon >= 0 ? &slam->ekf.beacons[match->beacon] : NULL;
+    if (beacon != NULL && slam->params.gate_d2 > 0 && match->distance2 > slam->params.gate_d2) {
+        reject(slam, BSLAM_REASON_GATE, beacon, account);
+        beacon->gated++;
+        account->test_ratio = test_ratio(&slam->params, match->distance2);
+        return;
+    }
     fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TRIAL, beacon);
-    note_match(slam, time_us, sighting, beacon, 0);
+    if (beacon != NULL) {
+        note_match(slam, time_us, sighting, beacon, match->distance2);
+    }
 }
 
 /// Fuses a sighting with the beacon that association chose.
@@ -101,6 +109,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
         const bslam_sighting_t taken = sighting_of(sighting, beacon);
         slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
+    beacon->way_um = slam->way_um;
     note_match(slam, time_us, sighting, beacon, fusion.distance2);
 }
 
@@ -172,16 +181,15 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                                                   const bslam_pose_t *mount,
                                                   const bslam_sighting_t *sightings, int count)
 {
+    bslam_slam_try(slam, sightings, count);
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
-        if (slam->matches[i].verdict != BSLAM_VERDICT_MATCH) {
-            continue;
-        }
-        bslam_beacon_t *beacon = &slam->ekf.beacons[slam->matches[i].beacon];
-        if (bslam_slam_is_on_trial(slam, beacon, &sightings[i])) {
-            try_match(slam, time_us, &sightings[i], beacon, &slam->accounts[i]);
-        } else {
-            fuse_match(slam, time_us, &sightings[i], beacon, &slam->innovations[i], &slam->accounts[i]);
+        const bslam_match_t *match = &slam->matches[i];
+        if (match->verdict == BSLAM_VERDICT_TRIAL) {
+            try_match(slam, time_us, &sightings[i], match, &slam->accounts[i]);
+        } else if (match->verdict == BSLAM_VERDICT_MATCH) {
+            fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[match->beacon], &slam->innovations[i],
+                       &slam->accounts[i]);
         }
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
@@ -218,9 +226,10 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
-        const bool is_tried = account->reason == BSLAM_REASON_TRIAL;
-        all_matched = all_matched && account->outcome == BSLAM_OUTCOME_MATCHED;
-        if (!is_new && !is_tried && account->outcome != BSLAM_OUTCOME_MATCHED) {
+        const bool is_tried = account->reason == BSLAM_REASON_TRIAL && account->has_beacon;
+        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || is_tried;
+        all_matched = all_matched && is_matched;
+        if (!is_new && !is_matched) {
             continue;
         }
         const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
@@ -256,7 +265,8 @@ static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *b
     if (bslam_slam_is_refuted(beacon)) {
         return true;
     }
-    if (window_us == 0 || time_us - beacon->first_seen_us <= window_us) {
+    // Of a detector with scores it is these that refute it.
+    if (window_us == 0 || beacon->has_scores || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
     return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;

@@ -33,9 +33,10 @@ void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bsla
 void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
                             bslam_real_t distance2);
 
-/// Whether nobody knows yet that it is a beacon, and sightings like this one are to be used for nothing else.
-bool bslam_slam_is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon,
-                            const bslam_sighting_t *sighting);
+/// Turns matches with beacons of which nobody knows yet whether they are any, and new ones that would be
+/// refuted at once, into BSLAM_VERDICT_TRIAL. Before anything of the frame is used: its order does not
+/// matter.
+void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
 
 /// Whether as much speaks against it as for it.
 bool bslam_slam_is_refuted(const bslam_beacon_t *beacon);

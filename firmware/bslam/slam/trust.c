@@ -1,20 +1,24 @@
-// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Confirmed".
+// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "On trial" and
+// "Confirmed".
 #include "bslam/slam/internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 // What one sighting says at most: the next frame shows the same, and may be wrong the same way.
 static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5);
 
-/// Whether scores decide: where beacons are told apart by looks, of a detector that gives them.
+/// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
     return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
-static void add_score(const bslam_params_t *params, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
-    const bslam_real_t above = sighting->score - params->trust_score;
-    beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > SCORE_HIGH ? SCORE_HIGH : above;
+    if (has_score(slam, sighting)) {
+        const bslam_real_t above = sighting->score - slam->params.trust_score;
+        beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > SCORE_HIGH ? SCORE_HIGH : above;
+        beacon->has_scores = true;
+    }
 }
 
 /// A sighting counts if the robot has gone far enough since the last that did, and against the beacon if it
@@ -25,14 +29,17 @@ static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_r
     const bslam_params_t *params = &slam->params;
     const uint32_t least_um = (uint32_t)(params->confirm_way_m * MICROMETRES_PER_M);
     if (!beacon->confirmed && slam->way_um - beacon->view_um >= least_um) {
+        const bool is_enough = beacon->views >= params->confirm_sightings;  // scores may be missing
         beacon->view_um = slam->way_um;
-        beacon->views = (uint16_t)(distance2 <= params->confirm_d2 ? beacon->views + 1 : beacon->views - 1);
+        beacon->views = (uint16_t)(distance2 > params->confirm_d2 ? beacon->views - 1
+                                   : is_enough                    ? beacon->views
+                                                                  : beacon->views + 1);
     }
 }
 
-static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon)
 {
-    const bool is_sure = !has_score(slam, sighting) || beacon->score_sum >= slam->params.confirm_sum;
+    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->params.confirm_sum;
     if (!beacon->confirmed && is_sure && beacon->views >= slam->params.confirm_sightings) {
         beacon->confirmed = true;
         slam->confirmed_now = true;
@@ -43,20 +50,16 @@ void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bsla
 {
     beacon->view_um = slam->way_um;
     beacon->views = 1;
-    if (has_score(slam, sighting)) {
-        add_score(&slam->params, beacon, sighting);
-    }
-    decide(slam, beacon, sighting);
+    add_score(slam, beacon, sighting);
+    decide(slam, beacon);
 }
 
 void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
                             bslam_real_t distance2)
 {
-    if (has_score(slam, sighting)) {
-        add_score(&slam->params, beacon, sighting);
-    }
+    add_score(slam, beacon, sighting);
     count_view(slam, beacon, distance2);
-    decide(slam, beacon, sighting);
+    decide(slam, beacon);
 }
 
 static int confirmed_count(const bslam_ekf_t *ekf)
@@ -68,11 +71,22 @@ static int confirmed_count(const bslam_ekf_t *ekf)
     return count;
 }
 
-bool bslam_slam_is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon,
-                            const bslam_sighting_t *sighting)
+static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
-    return !beacon->confirmed && has_score(slam, sighting) && beacon->score_sum < slam->params.trust_sum &&
-           confirmed_count(&slam->ekf) >= slam->params.trust_beacons;
+    return !beacon->confirmed && beacon->has_scores && beacon->score_sum < slam->params.trust_sum;
+}
+
+void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
+{
+    const bool takes_all = confirmed_count(&slam->ekf) < slam->params.trust_beacons;
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->matches[i];
+        const bool is_tried = match->verdict == BSLAM_VERDICT_MATCH && !takes_all &&
+                              is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
+        const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
+                                sightings[i].score < slam->params.trust_score;
+        match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TRIAL : match->verdict;
+    }
 }
 
 bool bslam_slam_is_refuted(const bslam_beacon_t *beacon)

@@ -54,16 +54,20 @@ static bslam_real_t bearing_at(const bslam_camera_t *level, bslam_real_t u_px)
                : 0;
 }
 
-/// One over the distance of what hides all the floor that the frame's lower edge would show.
-static bslam_real_t inverse_in_front_per_m(const bslam_camera_t *camera)
+/// One over the distance of what hides all the floor that the frame's lower edge would show, in its middle.
+static void fill_in_front(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
 {
     const bslam_real_t v_px = (bslam_real_t)camera->height_px - BSLAM_R(0.5);
     bslam_direction_t ray = {0};
-    if (bslam_camera_unproject(camera, camera->cx_px, v_px, &ray) != BSLAM_OK || !(ray.z < 0)) {
-        return USUAL_PER_M;
+    grid->in_front_per_m = USUAL_PER_M;
+    grid->in_front_sd_per_m = USUAL_SD_PER_M;
+    if (camera->z_m > 0 && bslam_camera_unproject(camera, camera->cx_px, v_px, &ray) == BSLAM_OK &&
+        ray.z < 0) {
+        const bslam_real_t along = bslam_sqrt(ray.x * ray.x + ray.y * ray.y);
+        const bslam_real_t per_m = along > 0 ? -ray.z / (camera->z_m * along) * IN_FRONT : MOST_PER_M;
+        grid->in_front_per_m = per_m < MOST_PER_M ? per_m : MOST_PER_M;
+        grid->in_front_sd_per_m = grid->in_front_per_m * IN_FRONT_SD;
     }
-    const bslam_real_t inverse = -ray.z / (camera->z_m * bslam_sqrt(ray.x * ray.x + ray.y * ray.y));
-    return inverse * IN_FRONT < MOST_PER_M ? inverse * IN_FRONT : MOST_PER_M;
 }
 
 static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
@@ -86,7 +90,7 @@ static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
     for (int32_t i = 0; i <= BANDS; i++) {
         grid->row_px[i] = row_at(camera, EDGE[i]);
     }
-    grid->inverse_in_front_per_m = inverse_in_front_per_m(camera);
+    fill_in_front(grid, camera);
 }
 
 void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision)
@@ -282,7 +286,7 @@ static nearness_t nearness_at(const bslam_turn_grid_t *grid, const bslam_vision_
         return (nearness_t){told_per_m < MOST_PER_M ? told_per_m : MOST_PER_M, TOLD_SD_PER_M};
     }
     if (line->edge_px[cell] >= vision->cameras[vision->camera].height_px - BSLAM_CELL_PX) {
-        return (nearness_t){grid->inverse_in_front_per_m, grid->inverse_in_front_per_m * IN_FRONT_SD};
+        return (nearness_t){grid->in_front_per_m, grid->in_front_sd_per_m};
     }
     return (nearness_t){USUAL_PER_M, USUAL_SD_PER_M};
 }

@@ -48,7 +48,8 @@ typedef struct bslam_turn_grid {
     bslam_real_t step_rad;   ///< to the next, to the right
     bslam_turn_place_t at_px[BSLAM_TURN_COLUMNS];  ///< in the half-resolution copy, 256ths of a pixel
     int16_t row_px[BSLAM_TURN_BANDS + 1];          ///< its rows between the bands, the lowest first
-    bslam_real_t inverse_in_front_per_m;  ///< one over the distance of what hides all the floor in view
+    bslam_real_t in_front_per_m;     ///< one over the distance of what hides all the floor in view,
+    bslam_real_t in_front_sd_per_m;  ///< and its standard deviation
 } bslam_turn_grid_t;
 
 /// The sine of a column's bearing over the distance of what is there, and that one's standard deviation.

@@ -80,8 +80,8 @@ def test_a_robot_that_is_sent_pictures_sees_and_maps_what_the_host_does(target, 
             count += len(seen)
             assert [one.bearing_rad for one in seen] == [one.bearing_rad for one in expected]
             assert all((a.signature == b.signature).all() for a, b in zip(seen, expected, strict=True))
-            *columns, _, kinds = columns_of(expected)
-            assert accounts == here.sightings(time_us, *columns, beacon_class=kinds)
+            *columns, _, kinds, scores = columns_of(expected)
+            assert accounts == here.sightings(time_us, *columns, beacon_class=kinds, score=scores)
             chain = here.fingerprint(chain)
             assert there.fingerprint(0) == chain
     assert count > 0

@@ -134,6 +134,79 @@ static void test_without_scores_a_beacon_is_believed_at_once(void **state)
     assert_true(is_confirmed(0));
 }
 
+static void test_a_score_that_speaks_against_it_starts_no_beacon(void **state)
+{
+    const bslam_account_t account = see(0.4);
+    assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(account.reason, BSLAM_REASON_TRIAL);
+    assert_false(account.has_beacon);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_int_equal(slam.counters.added, 0);
+}
+
+/// Whether there are scores is asked of the beacon.
+static void test_a_sighting_without_a_score_does_not_end_a_trial(void **state)
+{
+    (void)see(1.5);
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(see(0).reason, BSLAM_REASON_TRIAL);
+    }
+    assert_false(is_confirmed(0));
+}
+
+static void test_a_beacon_on_trial_has_no_time_to_be_confirmed_in(void **state)
+{
+    slam.params.confirm_window_us = STEP_US;
+    (void)see(1.0);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(see(0.6).reason, BSLAM_REASON_TRIAL);
+    }
+    start(BSLAM_ASSOCIATION_SVM);
+    slam.params.confirm_window_us = STEP_US;
+    (void)see(0);
+    (void)see_at(1.5, 0);
+    (void)see_at(1.5, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+}
+
+static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
+{
+    slam.params.gate_d2 = BSLAM_R(0.5);
+    (void)see(1.5);
+    const bslam_account_t account = see_at(0.27, 1.5);
+    assert_int_equal(account.outcome, BSLAM_OUTCOME_REJECTED);
+    assert_int_equal(account.reason, BSLAM_REASON_GATE);
+    assert_true(account.test_ratio > 1);
+    assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);
+}
+
+/// One that becomes confirmed in a frame does not change what becomes of the others in it.
+static void test_the_order_of_a_frame_does_not_matter(void **state)
+{
+    slam.params.trust_beacons = 1;
+    for (int i = 0; i < 5; i++) {
+        (void)see(1.5);
+    }
+    (void)see_at(-0.8, 0.6);
+    bslam_sighting_t seen[] = {unit_polar(0.2, 4, -1), unit_polar(-0.8, 4, -1)};
+    seen[0].score = BSLAM_R(1.5);
+    seen[1].score = BSLAM_R(0.6);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us + 1, seen, 2), BSLAM_OK);
+    assert_true(is_confirmed(0));
+    assert_int_equal(slam.accounts[1].outcome, BSLAM_OUTCOME_MATCHED);
+}
+
+static void test_views_do_not_run_over_while_scores_are_missing(void **state)
+{
+    slam.params.trust_sum = 0;
+    (void)see(0.6);
+    slam.ekf.beacons[0].views = 3;
+    for (int i = 0; i < 3; i++) {
+        (void)see(0.5001);
+    }
+    assert_int_equal(slam.ekf.beacons[0].views, 3);
+}
+
 static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **state)
 {
     slam.params.confirm_sightings = 9;
@@ -161,7 +234,7 @@ static void test_while_few_are_confirmed_all_are_believed(void **state)
 static void test_other_methods_do_not_ask_for_scores(void **state)
 {
     static const int32_t methods[] = {BSLAM_ASSOCIATION_KNOWN, BSLAM_ASSOCIATION_NEAREST,
-                                      BSLAM_ASSOCIATION_MAHALANOBIS};
+                                      BSLAM_ASSOCIATION_MAHALANOBIS, BSLAM_ASSOCIATION_JOINT};
     for (int i = 0; i < COUNT_OF(methods); i++) {
         start(methods[i]);
         assert_int_equal(see(0.1).outcome, BSLAM_OUTCOME_NEW);
@@ -180,6 +253,12 @@ int main(void)
         cmocka_unit_test_setup(test_a_confirmed_beacon_stays_whatever_it_scores, setup),
         cmocka_unit_test_setup(test_without_scores_a_beacon_is_believed_at_once, setup),
         cmocka_unit_test_setup(test_what_is_seen_surely_from_few_places_is_not_confirmed, setup),
+        cmocka_unit_test_setup(test_a_score_that_speaks_against_it_starts_no_beacon, setup),
+        cmocka_unit_test_setup(test_a_sighting_without_a_score_does_not_end_a_trial, setup),
+        cmocka_unit_test_setup(test_a_beacon_on_trial_has_no_time_to_be_confirmed_in, setup),
+        cmocka_unit_test_setup(test_a_sighting_beyond_the_gate_does_not_speak_for_it, setup),
+        cmocka_unit_test_setup(test_the_order_of_a_frame_does_not_matter, setup),
+        cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),
         cmocka_unit_test_setup(test_while_few_are_confirmed_all_are_believed, setup),
         cmocka_unit_test_setup(test_other_methods_do_not_ask_for_scores, setup),
     };
