@@ -53,8 +53,8 @@ def main() -> int:
         by_eye, by_wheels = (np.degrees(_drift_rad(one, steps)) for one in (rates, wheels))
         most, worst = np.quantile(by_eye, 0.99), by_eye.max()
         print(
-            f"heading after {span_s:2d} s: {_rms(by_eye):6.2f} deg rms by cameras, one in 100 above {most:5.1f}, "
-            f"worst {worst:4.0f}; {_rms(by_wheels):6.2f} rms by the wheels"
+            f"heading after {span_s:2d} s: {_rms(by_eye):6.2f} deg rms by cameras, "
+            f"one in 100 above {most:5.1f}, worst {worst:4.0f}; {_rms(by_wheels):6.2f} rms by the wheels"
         )
     return 0
 
