@@ -262,10 +262,10 @@ static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *b
     if (beacon->confirmed) {
         return false;
     }
-    if (bslam_slam_is_refuted(beacon)) {
+    if (beacon->views == 0 || beacon->score_sum < 0) {
         return true;
     }
-    // Of a detector with scores it is these that refute it.
+    // Of a detector with scores it is these that speak against it.
     if (window_us == 0 || beacon->has_scores || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }

@@ -38,9 +38,6 @@ void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
 /// matter.
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
 
-/// Whether as much speaks against it as for it.
-bool bslam_slam_is_refuted(const bslam_beacon_t *beacon);
-
 // ---- frame.c: the two halves of bslam_slam_sightings, for what looks at a frame before it is used ---------
 
 /// Checks a frame and takes the filter to its moment; *mount is where its sensor is on the robot. The

@@ -62,34 +62,30 @@ void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
     decide(slam, beacon);
 }
 
-static int confirmed_count(const bslam_ekf_t *ekf)
+/// A robot that knows few places takes what it gets.
+static bool knows_few(const bslam_slam_t *slam)
 {
-    int count = 0;
-    for (int b = 0; b < ekf->beacon_count; b++) {
-        count += ekf->beacons[b].confirmed ? 1 : 0;
+    int confirmed = 0;
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
+        confirmed += slam->ekf.beacons[b].confirmed ? 1 : 0;
     }
-    return count;
+    return confirmed < slam->params.trust_beacons;
 }
 
 static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
-    return !beacon->confirmed && beacon->has_scores && beacon->score_sum < slam->params.trust_sum;
+    return !beacon->confirmed && beacon->has_scores && beacon->score_sum < slam->params.trust_sum &&
+           !knows_few(slam);
 }
 
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
 {
-    const bool takes_all = confirmed_count(&slam->ekf) < slam->params.trust_beacons;
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
-        const bool is_tried = match->verdict == BSLAM_VERDICT_MATCH && !takes_all &&
-                              is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
+        const bool is_tried =
+            match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
         const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
                                 sightings[i].score < slam->params.trust_score;
         match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TRIAL : match->verdict;
     }
-}
-
-bool bslam_slam_is_refuted(const bslam_beacon_t *beacon)
-{
-    return !beacon->confirmed && (beacon->views == 0 || beacon->score_sum < 0);
 }
