@@ -118,7 +118,8 @@ def with_gyro(log, rates_radps, sigma_radps=0.02):
 def test_our_core_as_an_algorithm_makes_the_same_mistakes():
     log = first_steps(simulate(load_scenario("pairs"), seed=2), 400)
     classes = (1 + log.sightings.beacon_id % 2).astype(np.int64)
-    log = replace(log, sightings=replace(log.sightings, beacon_class=classes))
+    scores = 0.6 + np.arange(len(classes)) % 7 / 5
+    log = replace(log, sightings=replace(log.sightings, beacon_class=classes, score=scores))
     for association in ("nearest", "svm"):
         options = RunOptions(association=association)
         rival, own = run_algorithm(log, options, Bslam, ignore), run_log(log, options)
@@ -127,15 +128,19 @@ def test_our_core_as_an_algorithm_makes_the_same_mistakes():
         assert [one.true_id for one in rival.beacons] == [true_id for _, true_id in known]
         assert rival.pose.tolist() == own.pose.tolist()
     assert own.counts.sightings > 500
+    bare = replace(log, sightings=replace(log.sightings, score=None))
+    assert run_log(bare, options).counts.deferred < own.counts.deferred  # of which some were on trial
 
 
 def test_class_is_told_where_identities_are_not(made):
     log = made.circle_log(3, seed=1)
     signed = np.zeros((len(log.sightings.beacon_id), 71), np.float32)
     kinds = (log.sightings.beacon_id % 3).astype(np.int64)
-    log = replace(log, sightings=replace(log.sightings, signature=signed, beacon_class=kinds))
+    scores = np.where(kinds == 0, 0.0, 0.5 + kinds)
+    log = replace(log, sightings=replace(log.sightings, signature=signed, beacon_class=kinds, score=scores))
     scribe, _ = told(log, RunOptions(association="svm"))
     assert [one.beacon_class for one in scribe.calls[1][2]] == [None, 2, 2]
+    assert [one.score for one in scribe.calls[1][2]] == [None, 2.5, 2.5]
 
 
 def test_who_says_nothing_of_sightings_has_no_wrong_ones(made):

@@ -107,6 +107,19 @@ def test_a_map_goes_to_the_host_and_to_another_robot_which_finds_itself_in_it(ro
             other.load_map(bytes(70_000))
 
 
+def test_a_score_that_is_sent_puts_a_beacon_on_trial_as_on_the_host(robot_line):
+    told = []
+    with RemoteSlam(robot_line(), {"association": 3, "trust_beacons": 0}, 20) as robot:
+        for slam in (robot, Slam(robot.host_params, beacons_max=20)):
+            told.append([])
+            for step in range(8):
+                slam.odometry("wheels", 40_000 * (step + 1), 0.001, 0.001)
+                seen = slam.sightings(40_000 * (step + 1), [0.1], [4.0], [-1], [True], score=[2.0])
+                told[-1] += [(seen[0].result, seen[0].reason)]
+    assert told[0] == told[1]
+    assert told[0] == [("new", "none"), *[("deferred", "trial")] * 4, *[("matched", "none")] * 3]
+
+
 def test_a_map_that_changes_while_it_is_read_is_read_again(robot_line, log, monkeypatch):
     with RemoteSlam(robot_line(), {"association": 0}, 20) as robot:
         drive(robot, log, 0, 100)
