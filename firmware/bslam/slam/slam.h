@@ -39,7 +39,7 @@ typedef struct bslam_counters {
     uint32_t duplicates;        ///< of these, a second sighting of one beacon in a frame
     uint32_t unidentified;      ///< of these, without a label where identity is told
     uint32_t unmappable;        ///< of these, of a class that is not mappable
-    uint32_t deferred;          ///< left undecided
+    uint32_t deferred;          ///< left undecided, or of a beacon on trial
     uint32_t removed;           ///< provisional beacons taken out
     uint32_t settled;           ///< rays that became points
     uint32_t frozen;            ///< of the rejected, new in a frozen map

@@ -68,7 +68,8 @@ class Account:
     """What became of one sighting, for an algorithm that says so."""
 
     result: str
-    """ "matched" with a beacon of the map, "new" beacon, "rejected" (gated out), "deferred" (undecided)."""
+    """ "matched" with a beacon of the map, "new" beacon, "rejected" (gated out), "deferred" (undecided,
+    or it only says whether there is a beacon)."""
     beacon_uid: int | None = None
     """The beacon that it was matched with or that was made of it: a number that no other ever has."""
     reason: str = "none"

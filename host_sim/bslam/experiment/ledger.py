@@ -36,7 +36,7 @@ class Ledger:
     wrong_associations  matched with a beacon of another identity; a moving thing or clutter with any
     false_new           a new beacon although one of that identity is in the map
     missed              rejected, deferred or in a refused frame, although its beacon is in the map
-    deferred            left undecided
+    deferred            left undecided, or of a beacon that is on trial
     rejected            gated out, for whatever reason but that the detector calls it a moving thing
     """
 
