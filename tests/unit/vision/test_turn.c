@@ -104,6 +104,29 @@ static void test_see_driving_by_is_told_as_parallax(void **state)
     assert_near((double)turn.parallax_sd_rad_per_m, sin(1.1) * 0.1, 0.01);
 }
 
+static void hide_the_floor(void)
+{
+    for (int i = 0; i < BSLAM_COLUMNS_MAX; i++) {
+        vision.floor_line.distance_m[i] = 0;
+        vision.floor_line.edge_px[i] = (int16_t)vision.cameras[0].height_px;
+    }
+}
+
+/// A camera that sees no floor anywhere says nothing of how near things are, and that it does not know it.
+static void test_see_without_a_floor_little_is_known(void **state)
+{
+    vision.cameras[0].yaw_rad = BSLAM_R(1.1);
+    vision.cameras[0].z_m = 0;
+    bslam_turns_init(&turns, &vision);
+    look(0, 0, 0);
+    assert_true(sees_no_turn());
+    look(0, 0.08, 0.01);
+    hide_the_floor();
+    const bslam_turn_t turn = turn_seen();
+    assert_near((double)turn.parallax_rad_per_m, sin(1.1) * 0.25, 0.02);
+    assert_near((double)turn.parallax_sd_rad_per_m, sin(1.1) * 0.25, 0.02);
+}
+
 /// No floor to the frame's lower edge: what hides it is nearer than the floor seen there otherwise.
 static void test_see_what_hides_the_floor_is_near(void **state)
 {
@@ -112,10 +135,7 @@ static void test_see_what_hides_the_floor_is_near(void **state)
     look(0, 0, 0);
     assert_true(sees_no_turn());
     look(0, 0.08, 0.01);
-    for (int i = 0; i < BSLAM_COLUMNS_MAX; i++) {
-        vision.floor_line.distance_m[i] = 0;
-        vision.floor_line.edge_px[i] = (int16_t)camera->height_px;
-    }
+    hide_the_floor();
     const bslam_turn_t hidden = turn_seen();
     const double nearest_m =
         (double)(camera->z_m * camera->fy_px / ((bslam_real_t)camera->height_px - camera->cy_px));
@@ -180,6 +200,7 @@ int main(void)
         cmocka_unit_test_setup(test_see_a_turn_is_measured_to_a_part_of_a_column, start),
         cmocka_unit_test_setup(test_see_through_a_fisheye, start),
         cmocka_unit_test_setup(test_see_driving_by_is_told_as_parallax, start),
+        cmocka_unit_test_setup(test_see_without_a_floor_little_is_known, start),
         cmocka_unit_test_setup(test_see_what_hides_the_floor_is_near, start),
         cmocka_unit_test_setup(test_see_a_camera_that_turned_on_its_own_is_no_turn_of_the_robot, start),
         cmocka_unit_test_setup(test_see_each_camera_has_its_own_frame_before, start),
