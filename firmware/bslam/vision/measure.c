@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "bslam/math/trig.h"
+#include "bslam/vision/ends.h"
 #include "bslam/vision/part.h"
 #include "bslam/vision/signature.h"
 
@@ -312,6 +313,23 @@ static void measure_cut(const bslam_outline_t *found, const bslam_camera_t *came
     candidate->has_bearing = true;
 }
 
+/// The outline near the box, whose sides move to where it ends. False if there is none.
+static bool find_outline(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_size_t *size,
+                         bslam_box_t *box, bslam_outline_t *outline)
+{
+    const bslam_real_t depth = size->height_m > 0 ? size->depth_m / size->height_m : 0;
+    if (bslam_outline_find(frame, camera, box, depth, outline) != BSLAM_OK) {
+        return false;
+    }
+    const bslam_front_t front = {size->height_m, size->depth_m, size->narrow_m, size->wide_m};
+    bslam_box_t moved = *box;
+    if (bslam_ends_move(frame, camera, outline, &front, &moved) &&
+        bslam_outline_find(frame, camera, &moved, depth, outline) == BSLAM_OK) {
+        *box = moved;
+    }
+    return true;
+}
+
 bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *camera,
                              const bslam_box_t *rough, const bslam_size_t *size, bslam_candidate_t *candidate)
 {
@@ -322,14 +340,13 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     if (camera->width_px != frame->width_px || camera->height_px != frame->height_px) {
         return BSLAM_E_PARAMETER;
     }
+    bslam_box_t box = *rough;
     bslam_outline_t outline;
-    if (bad_size != BSLAM_OK ||
-        bslam_outline_find(frame, camera, rough, size->height_m > 0 ? size->depth_m / size->height_m : 0,
-                           &outline) != BSLAM_OK) {
+    if (bad_size != BSLAM_OK || !find_outline(frame, camera, size, &box, &outline)) {
         return BSLAM_E_RANGE;
     }
     const bslam_box_t found = box_around(&outline.quad);
-    const unsigned marks = marks_of(frame, camera, rough, &outline, &found);
+    const unsigned marks = marks_of(frame, camera, &box, &outline, &found);
     const unsigned sideways =
         BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_SMALL | BSLAM_MARK_SLANTED | BSLAM_MARK_PART;
     const unsigned upright = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
@@ -341,8 +358,7 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
         measure_outline(&outline, camera, size, (marks & upright) == 0U, candidate);
     } else if (is_cut_sideways(marks) && size->wide_m > 0) {
         // The outline's corners are not asked: without one end the slope of its level sides is a guess.
-        measure_cut(&outline, camera, size, (marks & sideways) | (cuts_of(frame, rough) & upright),
-                    candidate);
+        measure_cut(&outline, camera, size, (marks & sideways) | (cuts_of(frame, &box) & upright), candidate);
     }
     candidate->outline = found;
     if (bslam_signature(frame, &outline.quad, candidate->signature) != BSLAM_OK) {

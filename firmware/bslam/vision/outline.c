@@ -270,6 +270,8 @@ bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera
     if (!bslam_body_level(&body, frame, &search.facing, &level)) {
         return BSLAM_E_RANGE;
     }
+    found.body_left = found.left;
+    found.body_right = found.right;
     fit_front(&search, &body, &level);
     if (!end(&search)) {
         return BSLAM_E_RANGE;

@@ -28,6 +28,8 @@ typedef struct bslam_outline {
     bslam_real_t facing_rad;  ///< bearing of the plane's centre, in the robot's frame
     bslam_real_t left;        ///< across; left > right
     bslam_real_t right;
+    bslam_real_t body_left;  ///< across: its outermost upright sides, of the front or of a flank
+    bslam_real_t body_right;
     bslam_real_t top;  ///< up, at across = 0
     bslam_real_t bottom;
     bslam_real_t left_var;  ///< their variances: large where several lines may be the side

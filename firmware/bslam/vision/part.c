@@ -26,11 +26,7 @@ static float level_contrast(const bslam_frame_t *frame, const bslam_facing_t *fa
 {
     const bslam_stance_t stance = {(float)o->turn, 1e9f, -1e9f};
     const bslam_real_t at = name == BSLAM_SIDE_TOP ? o->top : o->bottom;
-    bslam_side_t side;
-    if (!bslam_side_scan(&side, frame, facing, name, at, strip.left, strip.right, o->pixel)) {
-        return -1;
-    }
-    return bslam_side_contrast(&side, &stance);
+    return bslam_side_contrast(frame, facing, name, at, strip.left, strip.right, &stance);
 }
 
 /// True if a level side goes on in the strip as it is within the outline, where its contrast is `inside`.
@@ -69,11 +65,13 @@ bool bslam_outline_is_part(const bslam_frame_t *frame, const bslam_camera_t *cam
     bslam_sin_cos(outline->facing_rad, &facing.sine, &facing.cosine);
     const strip_t within = {outline->left, outline->right};
     const float top = has_top ? level_contrast(frame, &facing, outline, BSLAM_SIDE_TOP, within) : 0;
-    const float bottom = level_contrast(frame, &facing, outline, BSLAM_SIDE_BOTTOM, within);
     for (int32_t end = 0; end < 2; end++) {
         const strip_t beyond = strip_beyond(frame, outline, end == 0);
-        if ((!has_top || goes_on(frame, &facing, outline, BSLAM_SIDE_TOP, top, beyond)) &&
-            goes_on(frame, &facing, outline, BSLAM_SIDE_BOTTOM, bottom, beyond)) {
+        if (has_top && !goes_on(frame, &facing, outline, BSLAM_SIDE_TOP, top, beyond)) {
+            continue;
+        }
+        const float bottom = level_contrast(frame, &facing, outline, BSLAM_SIDE_BOTTOM, within);
+        if (goes_on(frame, &facing, outline, BSLAM_SIDE_BOTTOM, bottom, beyond)) {
             return true;
         }
     }

@@ -129,9 +129,10 @@ static int32_t round_to_int(bslam_real_t x)
     return (int32_t)(x + (x < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
 }
 
-/// Adds the scan line through a point of the rough side, unless the frame has none there or it is the same as
-/// the one before. False if the lens does not see the point.
-static bool add_scan(bslam_side_t *side, const bslam_facing_t *facing, bslam_plane_point_t rough)
+/// Adds the scan line through a point of the rough side, from so many places outside it on, unless the frame
+/// has none there or it is the same as the one before. False if the lens does not see the point.
+static bool add_scan(bslam_side_t *side, const bslam_facing_t *facing, bslam_plane_point_t rough,
+                     int32_t reach_out)
 {
     bslam_real_t u_px;
     bslam_real_t v_px;
@@ -147,12 +148,19 @@ static bool add_scan(bslam_side_t *side, const bslam_facing_t *facing, bslam_pla
     const int32_t boundary = round_to_int(across);
     const float rest = (float)(across - (bslam_real_t)boundary);
     side->scan[i] = (int16_t)scan;
-    side->first[i] = (int16_t)(boundary + (side->backwards ? REACH_OUT : -REACH_OUT));
+    side->first[i] = (int16_t)(boundary + (side->backwards ? reach_out : -reach_out));
     side->at[i] = (float)rough.across;
-    side->base[i] = (float)REACH_OUT + (side->backwards ? -rest : rest);
+    side->base[i] = (float)reach_out + (side->backwards ? -rest : rest);
     fill_steps(side, i);
     side->count++;
     return true;
+}
+
+/// Where a scan line crosses a side, off its ends.
+static bslam_real_t along_side(bslam_real_t from, bslam_real_t to, int32_t index)
+{
+    const bslam_real_t part = (bslam_real_t)index / (BSLAM_SIDE_SCANS - 1);
+    return from + (to - from) * (END_MARGIN + part * (1 - 2 * END_MARGIN));
 }
 
 bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam_facing_t *facing,
@@ -168,33 +176,53 @@ bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam
         side->places = ends < PLACES - STRAIGHT_PLACES ? STRAIGHT_PLACES + (int32_t)ends : PLACES;
     }
     for (int32_t i = 0; i < BSLAM_SIDE_SCANS; i++) {
-        const bslam_real_t part = (bslam_real_t)i / (BSLAM_SIDE_SCANS - 1);
-        const bslam_real_t along = from + (to - from) * (END_MARGIN + part * (1 - 2 * END_MARGIN));
+        const bslam_real_t along = along_side(from, to, i);
         const bslam_plane_point_t point = {side->level ? along : at, side->level ? at : along};
-        if (!add_scan(side, facing, point)) {
+        if (!add_scan(side, facing, point, REACH_OUT)) {
             return false;
         }
     }
     return true;
 }
 
-/// Places inwards that a body's stance moves its edge by on a scan line.
+/// How much nearer than in the plane's middle a body is at a place across.
 ///
 /// Along the front 1/x is linear, 1/x = (1 + turn across) / x0; along a flank it is proportional to turn -
 /// across.
-static float tilt_of(const bslam_side_t *side, int32_t index, const bslam_stance_t *stance)
+static float nearness(const bslam_stance_t *stance, float across)
 {
-    const float across = side->at[index];
     const float corner = across > stance->left    ? stance->left
                          : across < stance->right ? stance->right
                                                   : across;
-    float near = 1.0f + stance->turn * corner;
-    if (corner != across) {
-        near *= (stance->turn - across) / (stance->turn - corner);
-    }
-    const float tilt = side->reach * (near - 1.0f);
+    const float near = 1.0f + stance->turn * corner;
+    return corner != across ? near * ((stance->turn - across) / (stance->turn - corner)) : near;
+}
+
+/// Places inwards that a body's stance moves its edge by on a scan line.
+static float tilt_of(const bslam_side_t *side, int32_t index, const bslam_stance_t *stance)
+{
+    const float tilt = side->reach * (nearness(stance, side->at[index]) - 1.0f);
     const float most = (float)PLACES;
     return tilt >= -most && tilt <= most ? tilt : most;  // out of the window, as is what has no place at all
+}
+
+float bslam_side_contrast(const bslam_frame_t *frame, const bslam_facing_t *facing, bslam_side_name_t name,
+                          bslam_real_t at, bslam_real_t from, bslam_real_t to, const bslam_stance_t *stance)
+{
+    bslam_side_t side;
+    begin(&side, frame, name);
+    side.places = 1;
+    int32_t sum = 0;
+    for (int32_t i = 0; i < BSLAM_SIDE_SCANS; i++) {
+        const bslam_real_t across = along_side(from, to, i);
+        const bslam_real_t near = (bslam_real_t)nearness(stance, (float)across);
+        const int32_t count = side.count;
+        if (!add_scan(&side, facing, (bslam_plane_point_t){across, at * near}, 0)) {
+            return -1;
+        }
+        sum += side.count > count ? side.steps[count][0] : 0;
+    }
+    return side.count > 0 ? (float)sum / ((float)sum + HALF_CONTRAST * (float)side.count) : -1;
 }
 
 /// One past the last line whose taps all lie in the window.
@@ -244,13 +272,6 @@ static int32_t fill_scores(const bslam_side_t *side, const bslam_stance_t *stanc
         best = scores[k] > scores[best] ? k : best;
     }
     return best;
-}
-
-float bslam_side_contrast(const bslam_side_t *side, const bslam_stance_t *stance)
-{
-    float contrast[PLACES] = {0};
-    (void)contrasts(side, stance, contrast);
-    return contrast[REACH_OUT];
 }
 
 float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance)

@@ -88,8 +88,11 @@ typedef struct bslam_line {
     float variance;  ///< and these shifts' variance, 0 if no other edge comes into question
 } bslam_line_t;
 
-/// Mean contrast along the rough side itself, turned as the stance is, as a share: 0 none, to 1.
-float bslam_side_contrast(const bslam_side_t *side, const bslam_stance_t *stance);
+/// Mean contrast along a level side of a body that stands so, between two places across, as a share: 0 none,
+/// to
+/// 1. `at`: its height at the place 0. Below 0 if the lens or the frame shows nothing of it.
+float bslam_side_contrast(const bslam_frame_t *frame, const bslam_facing_t *facing, bslam_side_name_t name,
+                          bslam_real_t at, bslam_real_t from, bslam_real_t to, const bslam_stance_t *stance);
 
 /// How likely the likeliest line of a stance is: the logarithm of its odds, but for a constant.
 float bslam_side_score(const bslam_side_t *side, const bslam_stance_t *stance);

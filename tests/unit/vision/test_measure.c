@@ -188,16 +188,65 @@ static void test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction(voi
     assert_true(!found.has_bearing && !found.has_range);
 }
 
-/// A detector's box that holds only the right half, the left half, or a slice.
+/// A detector's box that holds a slice too narrow to be looked beyond.
 static void test_measure_marks_a_part(void **state)
 {
     const unit_panel_t panel = poster(3, 0, 0.3);
-    const bslam_box_t parts[] = {{158, 27, 192, 102}, {127, 27, 150, 102}, {150, 27, 170, 102}};
-    for (int i = 0; i < COUNT_OF(parts); i++) {
-        const bslam_candidate_t found = measured_in(&panel, parts[i]);
-        assert_int_equal(found.marks, BSLAM_MARK_PART);
-        assert_true(!found.has_bearing && !found.has_range);
+    const bslam_candidate_t found = measured_in(&panel, (bslam_box_t){150, 27, 170, 102});
+    assert_int_equal(found.marks, BSLAM_MARK_PART);
+    assert_true(!found.has_bearing && !found.has_range);
+}
+
+/// A detector's box that holds only the right half of it, or the left one.
+static void test_measure_follows_the_level_sides_to_where_a_thing_ends(void **state)
+{
+    const unit_panel_t panel = poster(3, 0, 0.3);
+    const bslam_box_t halves[] = {{158, 27, 192, 102}, {127, 27, 158, 102}};
+    for (int i = 0; i < COUNT_OF(halves); i++) {
+        const bslam_candidate_t found = measured_in(&panel, halves[i]);
+        assert_int_equal(found.marks, 0);
+        assert_true(found.has_bearing && found.has_range);
+        assert_near(found.bearing_rad, 0, 0.5 / 277);
+        assert_near(found.range_m / 3, 1, 0.013);
     }
+}
+
+/// A box that reaches as far as a neighbour's edge, to either side: the level sides end before it.
+static void test_measure_is_not_led_to_a_neighbour(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panels[] = {
+        poster(3, 0, 0), {3, 0.7, 3, 0.55, 0.2, 1.9, 90, 60, 40}, {3, -0.55, 3, -0.7, 0.2, 1.9, 90, 60, 40}};
+    unit_picture_draw(&picture, &camera, WALL, panels, COUNT_OF(panels));
+    const bslam_box_t roughs[] = {{109, 27, 192, 102}, {127, 27, 210, 102}, {109, 27, 210, 102}};
+    for (int i = 0; i < COUNT_OF(roughs); i++) {
+        bslam_candidate_t found;
+        assert_int_equal(bslam_measure(&picture.frame, &camera, &roughs[i], &POSTER_SIZE, &found), BSLAM_OK);
+        assert_int_equal(found.marks, 0);
+        assert_near(found.bearing_rad, 0, 0.5 / 277);
+        assert_near(found.outline.left_px, 127.2, 1);
+        assert_near(found.outline.right_px, 191.8, 1);
+    }
+}
+
+/// Two posters that touch, so that level sides go on: how wide the kind is tells.
+static void test_measure_of_two_of_a_kind_goes_by_their_width(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panels[] = {poster(3, 0, 0), {3, 1.05, 3, 0.35, 0.7, 1.5, 120, 60, 60}};
+    unit_picture_draw(&picture, &camera, WALL, panels, COUNT_OF(panels));
+    const bslam_box_t both = {103, 27, 192, 102};
+    bslam_size_t size = HUNG_SIZE;
+    size.wide_m = BSLAM_R(0.72);
+    bslam_candidate_t found;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &both, &size, &found), BSLAM_OK);
+    assert_near(found.outline.left_px, 127.2, 1.5);
+    assert_near(found.bearing_rad, 0, 1.0 / 277);
+    size.wide_m = size.narrow_m = 0;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &both, &size, &found), BSLAM_OK);
+    assert_true(found.bearing_rad > BSLAM_R(0.02) || found.marks != 0);
 }
 
 static void test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked(void **state)
@@ -439,6 +488,9 @@ int main(void)
         cmocka_unit_test(test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is),
         cmocka_unit_test(test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction),
         cmocka_unit_test(test_measure_marks_a_part),
+        cmocka_unit_test(test_measure_follows_the_level_sides_to_where_a_thing_ends),
+        cmocka_unit_test(test_measure_is_not_led_to_a_neighbour),
+        cmocka_unit_test(test_measure_of_two_of_a_kind_goes_by_their_width),
         cmocka_unit_test(test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked),
         cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
         cmocka_unit_test(test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim),

@@ -1,0 +1,26 @@
+/// Where the upright sides are that an outline missed: a detector's box may reach as far as a neighbour's
+/// edge, or end at a bar or a rib within the object. Inside of measure.c; MATH "Outline".
+///
+/// An outline is looked for a few pixels around a box. Farther off, the level sides tell: along the object
+/// they are seen, beyond it they are not.
+#ifndef BSLAM_VISION_ENDS_H
+#define BSLAM_VISION_ENDS_H
+
+#include "bslam/vision/outline.h"
+
+/// A front's height and its least and greatest width, as far as known, for how wide it may be seen; 0: not
+/// known.
+typedef struct bslam_front {
+    bslam_real_t height_m;
+    bslam_real_t depth_m;
+    bslam_real_t narrow_m;
+    bslam_real_t wide_m;
+} bslam_front_t;
+
+/// Moves the left and the right side of the box that an outline was found in, each by up to 30 pixels, to
+/// where the level sides, an upright edge and the width together say they are. True if one moved: the outline
+/// is to be found anew there.
+bool bslam_ends_move(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_outline_t *outline,
+                     const bslam_front_t *front, bslam_box_t *box);
+
+#endif
