@@ -46,7 +46,7 @@ def test_limits_hold_in_any_size(
         BSLAM_SIGHTINGS_MAX=sightings,
         BSLAM_HISTORY_MAX=history,
         BSLAM_REAL_DOUBLE=real_double,
-        STEPS=steps,
+        UNIT_LIMITS_STEPS=steps,
     )
     assert built.returncode == 0, built.stderr
     result = subprocess.run([program], check=False, capture_output=True, text=True)

@@ -7,8 +7,8 @@
 #include "bslam/bslam.h"
 
 #define STEP_US 40000
-#ifndef STEPS
-#define STEPS 300
+#ifndef UNIT_LIMITS_STEPS
+#define UNIT_LIMITS_STEPS 300
 #endif
 /// Twice as many beacons stand around as the map holds, up to a number that keeps the test quick.
 #define WORLD_MAX 64
@@ -139,7 +139,7 @@ static void run_full(bool directions_only)
         start(&drive, params_of(kind), 5 + (uint64_t)kind);
         drive.directions_only = directions_only;
         see(&drive);
-        for (int i = 0; i < STEPS; i++) {
+        for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
             move(&drive);
             see(&drive);
         }
@@ -192,7 +192,7 @@ static void test_every_method_of_association_at_full_size_stays_sound(void **sta
         params.nearest_threshold_m = BSLAM_R(0.2);
         static drive_t drive;
         start(&drive, params, 6);
-        for (int i = 0; i < STEPS; i++) {
+        for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
             // Directions and distances in turn.
             drive.directions_only = i % 2 == 1;
             see(&drive);
@@ -208,7 +208,7 @@ static void test_removing_at_random_between_frames_stays_sound(void **state)
     for (int kind = 0; kind < 12; kind++) {
         static drive_t drive;
         start(&drive, params_of(kind), 17 + (uint64_t)kind);
-        for (int i = 0; i < STEPS; i++) {
+        for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
             drive.directions_only = i % 3 == 1;
             see(&drive);
             move(&drive);
@@ -232,7 +232,7 @@ static void test_window_removes_and_gives_the_room_back(void **state)
     params.association = 2;
     static drive_t drive;
     start(&drive, params, 8);
-    for (int i = 0; i < STEPS; i++) {
+    for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
         drive.directions_only = i % 2 == 1;
         see(&drive);
         move(&drive);
@@ -255,7 +255,7 @@ static void test_known_beacons_fill_the_map_and_localise(void **state)
                          BSLAM_OK);
     }
     assert_int_equal(bslam_slam_add_known_beacon(&drive.slam, BSLAM_BEACONS_MAX, 0, 0), BSLAM_E_MAP_FULL);
-    for (int i = 0; i < STEPS; i++) {
+    for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
         move(&drive);
         see(&drive);
     }
