@@ -271,6 +271,54 @@ static void test_in_a_frozen_map_it_waits_no_longer(void **state)
     assert_int_equal(waits_of_another(40), 1000000 / STEP_US);
 }
 
+enum { GONE, TO_THE_LEFT, TO_THE_RIGHT, ON_TRIAL, THINGS };
+
+static const double THINGS_M[THINGS][2] = {{2, 2}, {-6, 0.5}, {-6, -0.5}, {2, -3}};
+
+/// The robot goes 4 m, a decimetre a frame, forwards or back on its line, and sees all things but perhaps
+/// one.
+static void pass_by(double from_m, double step_m, bool sees_the_gone, double trial_score)
+{
+    for (int k = 1; k <= 40; k++) {
+        const bslam_odometry_reading_t went = {.source = BSLAM_ODOMETRY_WHEELS,
+                                               .time_us = now_us + STEP_US,
+                                               .left_m = real(step_m),
+                                               .right_m = real(step_m)};
+        now_us += STEP_US;
+        assert_int_equal(bslam_slam_odometry(&slam, &went), BSLAM_OK);
+        bslam_sighting_t seen[THINGS];
+        float signatures[THINGS][BSLAM_SAMPLE_FEATURES];
+        int count = 0;
+        for (int thing = sees_the_gone ? 0 : 1; thing < THINGS; thing++) {
+            const double x_m = THINGS_M[thing][0] - (from_m + step_m * k), y_m = THINGS_M[thing][1];
+            seen[count] = unit_polar(atan2(y_m, x_m), hypot(x_m, y_m), -1);
+            seen[count].score = real(thing == ON_TRIAL ? trial_score : 0);
+            seen[count].signature = signature_of(thing, k, signatures[count]);
+            count++;
+        }
+        assert_int_equal(bslam_slam_sightings(&slam, now_us, seen, count), BSLAM_OK);
+    }
+}
+
+/// A frame with something on trial in it is as clear as one without.
+static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.vanish_views = 3;
+    params.trust_beacons = 0;
+    params.trust_sum = params.confirm_sum = 1000;
+    start(params);
+    pass_by(0, 0.1, true, 1.0);
+    pass_by(4, -0.1, true, 1.0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), THINGS);
+    assert_int_equal(looks.counters.vanished, 0);
+    const uint32_t deferred = slam.counters.deferred;
+    pass_by(0, 0.1, false, 1.0);
+    assert_int_equal(slam.counters.deferred - deferred, 40);
+    assert_int_equal(looks.counters.vanished, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), THINGS - 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -287,6 +335,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
         cmocka_unit_test_setup(test_a_match_that_a_young_machine_is_against_waits_for_a_second, setup),
         cmocka_unit_test_setup(test_in_a_frozen_map_it_waits_no_longer, setup),
+        cmocka_unit_test_setup(test_what_has_vanished_is_noticed_while_another_is_on_trial, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
