@@ -29,8 +29,6 @@ static const float WIDE_LOOK = 0.08f;
 // The ends of level sides tell nothing of what they are like in the middle: so much of them at each end.
 static const bslam_real_t END_SHARE = BSLAM_R(0.25);
 
-static const bslam_stance_t FLAT = {0.0f, 1e9f, -1e9f};
-
 typedef struct contrast {
     float top;
     float bottom;
@@ -75,8 +73,8 @@ static bslam_stance_t stance_of(const bslam_outline_t *o)
 {
     const bslam_real_t least = o->pixel / 2;
     const bool left_flank = o->body_left - o->left > least, right_flank = o->right - o->body_right > least;
-    return (bslam_stance_t){(float)o->turn, left_flank ? (float)o->left : FLAT.left,
-                            right_flank ? (float)o->right : FLAT.right};
+    return (bslam_stance_t){(float)o->turn, left_flank ? (float)o->left : BSLAM_FLAT.left,
+                            right_flank ? (float)o->right : BSLAM_FLAT.right};
 }
 
 /// What the strip between two places says, a step, for being the object's.
@@ -126,7 +124,7 @@ static bool edge_evidence(const end_t *end, int32_t step, float *evidence)
         side.count == 0) {
         return false;
     }
-    *evidence = BY_EDGE * bslam_side_score(&side, &FLAT);
+    *evidence = BY_EDGE * bslam_side_score(&side, &BSLAM_FLAT);
     return true;
 }
 

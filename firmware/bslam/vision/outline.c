@@ -16,8 +16,6 @@ static const bslam_real_t SLOPE_SHARE = BSLAM_R(0.2);
 // Beyond these a body is no flat thing on a wall.
 static const bslam_real_t DEPTH_MAX = 2;
 
-static const bslam_stance_t FLAT = {0.0f, 1e9f, -1e9f};
-
 typedef struct search {
     const bslam_frame_t *frame;
     bslam_facing_t facing;
@@ -110,9 +108,9 @@ static bool find_upright(const search_t *search, bslam_side_name_t name, bslam_r
     if (!bslam_side_scan(&side, search->frame, &search->facing, name, *across, o->top, o->bottom, o->pixel)) {
         return false;
     }
-    const bslam_line_t line = bslam_side_line(&side, &FLAT);
+    const bslam_line_t line = bslam_side_line(&side, &BSLAM_FLAT);
     bslam_edge_t edge;
-    bslam_side_trace(&side, &search->facing, &line, &FLAT, &edge);
+    bslam_side_trace(&side, &search->facing, &line, &BSLAM_FLAT, &edge);
     const fit_t fit = fit_edge(search, &edge, false);
     *across = place_of(search, &edge, &fit, *across, name == BSLAM_SIDE_LEFT ? -1 : 1, variance);
     return true;

@@ -24,7 +24,7 @@ typedef struct strip {
 static float level_contrast(const bslam_frame_t *frame, const bslam_facing_t *facing,
                             const bslam_outline_t *o, bslam_side_name_t name, strip_t strip)
 {
-    const bslam_stance_t stance = {(float)o->turn, 1e9f, -1e9f};
+    const bslam_stance_t stance = {(float)o->turn, BSLAM_FLAT.left, BSLAM_FLAT.right};
     const bslam_real_t at = name == BSLAM_SIDE_TOP ? o->top : o->bottom;
     return bslam_side_contrast(frame, facing, name, at, strip.left, strip.right, &stance);
 }

@@ -55,6 +55,9 @@ typedef struct bslam_stance {
     float right;
 } bslam_stance_t;
 
+/// Of what is flat and faces the eye: no flank at either end.
+static const bslam_stance_t BSLAM_FLAT = {0.0f, 1e9f, -1e9f};
+
 typedef struct bslam_side {
     const uint16_t *half;
     int32_t across;  ///< elements of `half` from a pixel to the next along a scan line
