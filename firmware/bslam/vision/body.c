@@ -11,10 +11,18 @@ static const float TURN_COST = 0.7f;
 // By how much the two sides' scores together tell turns apart better than either tells places: they change
 // together.
 static const float TURN_SHARPNESS = 1.5f;
+// What a front costs that is seen narrower or wider than it may be: by the square of the part by which it is.
+// At most so much, for something may stand before one of its ends. Both are in a side's scores.
+static const float WIDTH_COST = 60.0f;
+static const float WIDTH_COST_MAX = 6.0f;
+// A flank that is narrower is not told from the front, whole-frame pixels. The score of an edge between them
+// that speaks neither for a stance nor against it.
+static const float FLANK_MIN_PX = 4.0f;
+static const float CORNER_EVEN = 2.0f;
 
 bslam_stance_t bslam_body_stance(const bslam_body_t *body, bslam_real_t turn)
 {
-    const bslam_real_t back = body->depth * (body->top - body->bottom) / bslam_sqrt(1 + turn * turn);
+    const bslam_real_t back = body->shape.depth * (body->top - body->bottom) / bslam_sqrt(1 + turn * turn);
     bslam_real_t left = body->left;
     bslam_real_t right = body->right;
     for (int32_t i = 0; i < CORNER_STEPS; i++) {
@@ -33,6 +41,11 @@ bslam_real_t bslam_body_middle(const bslam_body_t *body, bslam_real_t turn)
     const bslam_real_t centre = (bslam_real_t)(stance.left + stance.right) / 2;
     return centre - half * half * turn / (1 + centre * turn);
 }
+
+typedef struct scene {
+    const bslam_frame_t *frame;
+    const bslam_facing_t *facing;
+} scene_t;
 
 typedef struct sides {
     bslam_side_t top;
@@ -53,8 +66,43 @@ static bslam_real_t turn_at(int32_t k, int32_t turns)
     return turns > 0 ? TURN_MAX * (bslam_real_t)k / (bslam_real_t)turns : 0;
 }
 
+/// What a stance costs at which the front is narrower or wider than it may be.
+static float width_cost(const bslam_body_t *body, const bslam_stance_t *stance)
+{
+    const float narrow = (float)body->shape.narrow, wide = (float)body->shape.wide;
+    const float both = (1.0f + stance->turn * stance->left) * (1.0f + stance->turn * stance->right);
+    const float seen = (stance->left - stance->right) / (float)(body->top - body->bottom);
+    const float width = seen * (float)bslam_sqrt((bslam_real_t)(1.0f + stance->turn * stance->turn)) / both;
+    if (!(wide > 0.0f) || !(width > 0.0f)) {
+        return 0.0f;
+    }
+    const float off = width < narrow ? narrow / width - 1.0f : width > wide ? width / wide - 1.0f : 0.0f;
+    const float cost = WIDTH_COST * off * off;
+    return cost < WIDTH_COST_MAX ? cost : WIDTH_COST_MAX;
+}
+
+/// What the edge between front and flank says for a stance at which a flank is seen: the front is the busy
+/// side of it, the flank the quiet one.
+static float corner_evidence(const scene_t *scene, const bslam_body_t *body, const bslam_stance_t *stance)
+{
+    const float left_flank = (float)body->left - stance->left,
+                right_flank = stance->right - (float)body->right;
+    const bool is_left = left_flank > right_flank;
+    const bslam_real_t corner = (bslam_real_t)(is_left ? stance->left : stance->right);
+    const bslam_real_t near = 1 + (bslam_real_t)stance->turn * corner;
+    bslam_side_t side;
+    if ((is_left ? left_flank : right_flank) < FLANK_MIN_PX * (float)body->pixel || !(near > 0) ||
+        !bslam_side_scan(&side, scene->frame, scene->facing, is_left ? BSLAM_SIDE_LEFT : BSLAM_SIDE_RIGHT,
+                         corner, body->top * near, body->bottom * near, body->pixel) ||
+        side.count == 0) {
+        return 0.0f;
+    }
+    return bslam_side_score(&side, &BSLAM_FLAT) - CORNER_EVEN;
+}
+
 /// The stance at which both sides are likeliest; what the others leave open goes into *level.
-static bslam_stance_t best_stance(const sides_t *sides, const bslam_body_t *body, bslam_level_t *level)
+static bslam_stance_t best_stance(const scene_t *scene, const sides_t *sides, const bslam_body_t *body,
+                                  bslam_level_t *level)
 {
     const int32_t turns = turn_count(sides, body);
     float scores[2 * TURNS_MAX + 1];
@@ -62,7 +110,8 @@ static bslam_stance_t best_stance(const sides_t *sides, const bslam_body_t *body
     for (int32_t k = 0; k <= 2 * turns; k++) {
         const bslam_stance_t stance = bslam_body_stance(body, turn_at(k - turns, turns));
         scores[k] = bslam_side_score(&sides->top, &stance) + bslam_side_score(&sides->bottom, &stance) -
-                    TURN_COST * stance.turn * stance.turn;
+                    TURN_COST * stance.turn * stance.turn - width_cost(body, &stance) +
+                    corner_evidence(scene, body, &stance);
         best = scores[k] > scores[best] ? k : best;
     }
     float whole = 0.0f;
@@ -93,7 +142,8 @@ bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, cons
                          body->right, body->pixel)) {
         return false;
     }
-    const bslam_stance_t stance = best_stance(&sides, body, level);
+    const scene_t scene = {frame, facing};
+    const bslam_stance_t stance = best_stance(&scene, &sides, body, level);
     const bslam_line_t top = bslam_side_line(&sides.top, &stance);
     const bslam_line_t bottom = bslam_side_line(&sides.bottom, &stance);
     bslam_side_trace(&sides.top, facing, &top, &stance, &level->top);

@@ -7,14 +7,21 @@
 
 #include "bslam/vision/side.h"
 
+/// What is known of an object's shape, as fractions of its height; 0: not known, or flat.
+typedef struct bslam_shape {
+    bslam_real_t depth;   ///< how far it stands out from the wall
+    bslam_real_t narrow;  ///< its front is so wide at least,
+    bslam_real_t wide;    ///< and at most
+} bslam_shape_t;
+
 /// What is known of a body before its turn is.
 typedef struct bslam_body {
     bslam_real_t left;  ///< outermost upright sides, across: of its front, or of a flank
     bslam_real_t right;
     bslam_real_t top;  ///< roughly, up
     bslam_real_t bottom;
-    bslam_real_t depth;  ///< how far it stands out from the wall, as a fraction of its height
     bslam_real_t pixel;  ///< size of a frame pixel
+    bslam_shape_t shape;
 } bslam_body_t;
 
 /// What is known of a turn before it is seen: its standard deviation. TURN_COST in body.c is the same.

@@ -8,15 +8,6 @@
 
 #include "bslam/vision/outline.h"
 
-/// A front's height and its least and greatest width, as far as known, for how wide it may be seen; 0: not
-/// known.
-typedef struct bslam_front {
-    bslam_real_t height_m;
-    bslam_real_t depth_m;
-    bslam_real_t narrow_m;
-    bslam_real_t wide_m;
-} bslam_front_t;
-
 /// Moves the left and the right side of the box that an outline was found in, each by up to 30 pixels, to
 /// where the level sides, an upright edge and the width together say they are. True if one moved: the outline
 /// is to be found anew there.

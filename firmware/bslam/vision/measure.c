@@ -317,14 +317,13 @@ static void measure_cut(const bslam_outline_t *found, const bslam_camera_t *came
 static bool find_outline(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_size_t *size,
                          bslam_box_t *box, bslam_outline_t *outline)
 {
-    const bslam_real_t depth = size->height_m > 0 ? size->depth_m / size->height_m : 0;
-    if (bslam_outline_find(frame, camera, box, depth, outline) != BSLAM_OK) {
+    const bslam_front_t front = {size->height_m, size->depth_m, size->narrow_m, size->wide_m};
+    if (bslam_outline_find(frame, camera, box, &front, outline) != BSLAM_OK) {
         return false;
     }
-    const bslam_front_t front = {size->height_m, size->depth_m, size->narrow_m, size->wide_m};
     bslam_box_t moved = *box;
     if (bslam_ends_move(frame, camera, outline, &front, &moved) &&
-        bslam_outline_find(frame, camera, &moved, depth, outline) == BSLAM_OK) {
+        bslam_outline_find(frame, camera, &moved, &front, outline) == BSLAM_OK) {
         *box = moved;
     }
     return true;

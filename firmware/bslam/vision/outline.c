@@ -157,7 +157,7 @@ static void fit_front(const search_t *search, const bslam_body_t *body, const bs
     bslam_outline_t *o = search->outline;
     bslam_real_t doubt = 1;
     o->turn = level->turn;
-    for (int32_t i = 0; i < (body->depth > 0 ? FRONT_STEPS : 1); i++) {
+    for (int32_t i = 0; i < (body->shape.depth > 0 ? FRONT_STEPS : 1); i++) {
         const bslam_stance_t stance = bslam_body_stance(body, o->turn);
         o->left = (bslam_real_t)stance.left;
         o->right = (bslam_real_t)stance.right;
@@ -180,6 +180,18 @@ static bool box_is_allowed(const bslam_frame_t *frame, const bslam_box_t *box)
            box->left_px >= BSLAM_R(-0.5) && box->top_px >= BSLAM_R(-0.5) &&
            box->right_px <= (bslam_real_t)frame->width_px - BSLAM_R(0.5) &&
            box->bottom_px <= (bslam_real_t)frame->height_px - BSLAM_R(0.5);
+}
+
+static bslam_shape_t shape_of(const bslam_front_t *front)
+{
+    const bslam_real_t scale = front->height_m > 0 ? 1 / front->height_m : 0;
+    return (bslam_shape_t){front->depth_m * scale, front->narrow_m * scale, front->wide_m * scale};
+}
+
+static bool shape_is_allowed(const bslam_shape_t *shape)
+{
+    return bslam_in_range(shape->depth, 0, DEPTH_MAX) && shape->narrow >= 0 && shape->wide >= shape->narrow &&
+           bslam_is_number(shape->wide);
 }
 
 /// The innermost place across that an upright edge of the rough box has, over its ends and its middle: a lens
@@ -251,19 +263,21 @@ static bool end(const search_t *search)
 }
 
 bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera_t *camera,
-                                  const bslam_box_t *rough, bslam_real_t depth, bslam_outline_t *outline)
+                                  const bslam_box_t *rough, const bslam_front_t *front,
+                                  bslam_outline_t *outline)
 {
+    const bslam_shape_t shape = shape_of(front);
     bslam_outline_t found = {0};
     search_t search = {.frame = frame,
                        .facing = {.camera = camera, .mounting = bslam_camera_mounting(camera)},
                        .outline = &found};
-    if (!box_is_allowed(frame, rough) || !bslam_in_range(depth, 0, DEPTH_MAX) || !begin(&search, rough) ||
+    if (!box_is_allowed(frame, rough) || !shape_is_allowed(&shape) || !begin(&search, rough) ||
         !find_upright(&search, BSLAM_SIDE_LEFT, &found.left, &found.left_var) ||
         !find_upright(&search, BSLAM_SIDE_RIGHT, &found.right, &found.right_var) ||
         !(found.left > found.right)) {
         return BSLAM_E_RANGE;
     }
-    const bslam_body_t body = {found.left, found.right, found.top, found.bottom, depth, found.pixel};
+    const bslam_body_t body = {found.left, found.right, found.top, found.bottom, found.pixel, shape};
     bslam_level_t level;
     if (!bslam_body_level(&body, frame, &search.facing, &level)) {
         return BSLAM_E_RANGE;

@@ -44,12 +44,20 @@ typedef struct bslam_outline {
     bslam_quad_t quad;   ///< the same corners in the frame
 } bslam_outline_t;
 
+/// What is known of an object's size; 0: not known, of the depth: it is flat.
+typedef struct bslam_front {
+    bslam_real_t height_m;
+    bslam_real_t depth_m;   ///< how far it stands out from the wall, 2 heights at the most
+    bslam_real_t narrow_m;  ///< its front is so wide at least,
+    bslam_real_t wide_m;    ///< and at most
+} bslam_front_t;
+
 /// Finds the outline near a rough box, which may be 4 pixels off on each side. A body that stands out from
-/// the wall shows a flank as well as its front: `depth`, as a fraction of its height, tells how much; the
-/// outline is then the front's. 0: it is flat. BSLAM_E_RANGE, and *outline unchanged, if the box is empty,
-/// lies outside the frame, or the lens sees no upright plane there.
+/// the wall shows a flank as well as its front: the outline is then the front's. How wide that is tells turns
+/// apart. BSLAM_E_RANGE, and *outline unchanged, if the box is empty, lies outside the frame, or the lens
+/// sees no upright plane there, or a size is none.
 BSLAM_MUST_CHECK bslam_status_t bslam_outline_find(const bslam_frame_t *frame, const bslam_camera_t *camera,
-                                                   const bslam_box_t *rough, bslam_real_t depth,
+                                                   const bslam_box_t *rough, const bslam_front_t *front,
                                                    bslam_outline_t *outline);
 
 #endif

@@ -12,6 +12,8 @@ static const bslam_real_t STRIP_SHARE = BSLAM_R(0.3);
 static const float BEYOND_MAX = 0.4f;
 // A level side of less contrast tells nothing of where it ends.
 static const float CONTRAST_MIN = 0.05f;
+// Along a flank that is narrower a level side goes on as along the front, as far as is seen.
+static const bslam_real_t FLANK_MIN_PX = 8;
 // A box this close to the frame's upper or lower edge has no side there.
 static const bslam_real_t CUT_PX = 4;
 
@@ -24,7 +26,10 @@ typedef struct strip {
 static float level_contrast(const bslam_frame_t *frame, const bslam_facing_t *facing,
                             const bslam_outline_t *o, bslam_side_name_t name, strip_t strip)
 {
-    const bslam_stance_t stance = {(float)o->turn, BSLAM_FLAT.left, BSLAM_FLAT.right};
+    const bslam_real_t least = FLANK_MIN_PX * o->pixel;
+    const bslam_stance_t stance = {(float)o->turn,
+                                   o->body_left - o->left > least ? (float)o->left : BSLAM_FLAT.left,
+                                   o->right - o->body_right > least ? (float)o->right : BSLAM_FLAT.right};
     const bslam_real_t at = name == BSLAM_SIDE_TOP ? o->top : o->bottom;
     return bslam_side_contrast(frame, facing, name, at, strip.left, strip.right, &stance);
 }
@@ -40,15 +45,16 @@ static bool goes_on(const bslam_frame_t *frame, const bslam_facing_t *facing, co
 static strip_t strip_beyond(const bslam_frame_t *frame, const bslam_outline_t *o, bool left)
 {
     const bslam_real_t last_px = (bslam_real_t)frame->width_px - 1;
-    const bslam_real_t room_px = (left ? o->quad.left_px : last_px - o->quad.right_px) - GAP_PX;
+    const bslam_real_t flank_px = (left ? o->body_left - o->left : o->right - o->body_right) / o->pixel;
+    const bslam_real_t room_px = (left ? o->quad.left_px : last_px - o->quad.right_px) - flank_px - GAP_PX;
     const bslam_real_t share = STRIP_SHARE * (o->left - o->right);
     const bslam_real_t least = STRIP_MIN_PX * o->pixel;
     const bslam_real_t room = room_px * o->pixel;
     const bslam_real_t wanted = share > least ? share : least;
     const bslam_real_t width = wanted < room ? wanted : room;
     const bslam_real_t gap = GAP_PX * o->pixel;
-    return left ? (strip_t){o->left + gap + width, o->left + gap}
-                : (strip_t){o->right - gap, o->right - gap - width};
+    return left ? (strip_t){o->body_left + gap + width, o->body_left + gap}
+                : (strip_t){o->body_right - gap, o->body_right - gap - width};
 }
 
 /// Both level sides must go on: beneath things on the floor its line always does. Of something cut off above,

@@ -197,6 +197,25 @@ static void test_measure_marks_a_part(void **state)
     assert_true(!found.has_bearing && !found.has_range);
 }
 
+/// The flank of a cabinet is no part of its front that goes on.
+static void test_measure_of_a_front_with_its_flank_is_no_part(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const bslam_size_t cabinet = {.height_m = BSLAM_R(1.8), .depth_m = BSLAM_R(0.4)};
+    // A front from (3.5, 0.5) to (4.1, -0.3), its left end nearer; its flank goes back from there.
+    const unit_panel_t panels[2] = {{3.5 + 0.32, 0.5 + 0.24, 3.5, 0.5, 0, 1.8, 110, 60, 25},
+                                    {3.5, 0.5, 4.1, -0.3, 0, 1.8, 170, 90, 40}};
+    unit_picture_draw(&picture, &camera, WALL, panels, 2);
+    const bslam_box_t left = box_of(&camera, &panels[0]), right = box_of(&camera, &panels[1]);
+    const bslam_box_t rough = {left.left_px, left.top_px, right.right_px, left.bottom_px};
+    bslam_candidate_t found;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &cabinet, &found), BSLAM_OK);
+    assert_int_equal(found.marks, 0);
+    assert_near(found.bearing_rad, atan2(0.1, 3.8), 2.5 / 277);
+    assert_near(found.range_m / real(hypot(0.1, 3.8)), 1, 0.02);
+}
+
 /// A detector's box that holds only the right half of it, or the left one.
 static void test_measure_follows_the_level_sides_to_where_a_thing_ends(void **state)
 {
@@ -488,6 +507,7 @@ int main(void)
         cmocka_unit_test(test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is),
         cmocka_unit_test(test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction),
         cmocka_unit_test(test_measure_marks_a_part),
+        cmocka_unit_test(test_measure_of_a_front_with_its_flank_is_no_part),
         cmocka_unit_test(test_measure_follows_the_level_sides_to_where_a_thing_ends),
         cmocka_unit_test(test_measure_is_not_led_to_a_neighbour),
         cmocka_unit_test(test_measure_of_two_of_a_kind_goes_by_their_width),

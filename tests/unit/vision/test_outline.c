@@ -10,6 +10,8 @@
 
 static const double WALL[3] = {180, 175, 160};
 
+static const bslam_front_t FLAT = {0, 0, 0, 0};
+
 /// A poster on a wall 4 m ahead, facing the camera.
 static unit_panel_t poster(void)
 {
@@ -56,7 +58,7 @@ static void test_find_a_facing_rectangle_from_a_box_three_pixels_off(void **stat
     for (int i = 0; i < COUNT_OF(offs); i++) {
         const bslam_box_t rough = box_off(left, top, right, bottom, offs[i]);
         bslam_outline_t outline;
-        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, 0, &outline), BSLAM_OK);
+        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &FLAT, &outline), BSLAM_OK);
         // The turn, which is hardly seen in a thing so narrow, moves the corners.
         assert_quad_near(&outline.quad, expected, 2 * SIDE_ERROR_PX);
         assert_near(outline.facing_rad + real(atan((double)outline.middle)), atan2(0.2, 4), 0.3 / 277.1);
@@ -76,7 +78,7 @@ static void test_find_a_turned_rectangle_as_a_trapezoid_with_its_middle_in_plan(
     static const double off[4] = {2, -2, -1, 3};
     const bslam_box_t rough = box_off(expected[0], expected[2], expected[1], expected[3], off);
     bslam_outline_t outline;
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, 0, &outline), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &FLAT, &outline), BSLAM_OK);
     assert_quad_near(&outline.quad, expected, 0.8);
     const double middle_rad = atan2((0.7 - 0.28) / 2, (3.2 + 4.2) / 2);
     assert_near(outline.facing_rad + real(atan((double)outline.middle)), middle_rad, 0.5 / 277.1);
@@ -113,7 +115,7 @@ static void test_find_through_a_wide_pitched_lens_gives_the_same_tangents(void *
     static const double off[4] = {1, 1, 1, -1};
     const bslam_box_t rough = box_off(bounds[0], bounds[1], bounds[2], bounds[3], off);
     bslam_outline_t outline;
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, 0, &outline), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &FLAT, &outline), BSLAM_OK);
     // Half a pixel of this lens is 0.005 rad.
     assert_near(outline.facing_rad + real(atan((double)outline.middle)), 0.6, 0.005);
     const double off_axis = cos((double)outline.facing_rad - 0.6);
@@ -134,13 +136,56 @@ static void test_find_takes_the_flank_of_a_body_off(void **state)
     const bslam_box_t rough = box_off(left, v_of(3.5, 1.6), right, v_of(3.5, 0), off);
     bslam_outline_t body;
     bslam_outline_t flat;
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, real(0.4 / 1.6), &body), BSLAM_OK);
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, 0, &flat), BSLAM_OK);
+    const bslam_front_t front = {.height_m = real(1.6), .depth_m = real(0.4)};
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &front, &body), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &FLAT, &flat), BSLAM_OK);
     const double middle_rad = atan2(0.1, 3.8);
     const double body_rad = (double)body.facing_rad + atan((double)body.middle);
     const double flat_rad = (double)flat.facing_rad + atan((double)flat.middle);
     assert_near(body_rad, middle_rad, 1.5 / 277.1);
     assert_true(fabs(flat_rad - middle_rad) > 2 * fabs(body_rad - middle_rad));
+}
+
+/// A cabinet 1.8 m high, .9 wide and .375 deep, 4 m away, whose front looks away from the camera by so many
+/// degrees: how far off its middle is found, degrees. Its flank is of the same colour, or darker.
+static double error_of_cabinet_deg(double slant_deg, bool flank_is_darker, bslam_front_t front)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const double at[2] = {4, 0.3}, sight_rad = atan2(at[1], at[0]);
+    const double along_rad =
+        sight_rad + (90 + slant_deg) * acos(-1) / 180;  // to its left end, the nearer one
+    const double to_left[2] = {0.45 * cos(along_rad), 0.45 * sin(along_rad)};
+    const double left[2] = {at[0] + to_left[0], at[1] + to_left[1]};
+    const double right[2] = {at[0] - to_left[0], at[1] - to_left[1]};
+    const double back[2] = {left[0] + 0.375 * sin(along_rad), left[1] - 0.375 * cos(along_rad)};
+    const double shade = flank_is_darker ? 0.65 : 1;
+    const unit_panel_t panels[2] = {
+        {back[0], back[1], left[0], left[1], 0, 1.8, 170 * shade, 90 * shade, 40 * shade},
+        {left[0], left[1], right[0], right[1], 0, 1.8, 170, 90, 40}};
+    unit_picture_draw(&picture, &camera, WALL, panels, 2);
+    const bslam_box_t rough = {real(u_of(back[0], back[1])), real(v_of(left[0], 1.8)),
+                               real(u_of(right[0], right[1])), real(v_of(left[0], 0))};
+    bslam_outline_t outline;
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &front, &outline), BSLAM_OK);
+    return fabs((double)outline.facing_rad + atan((double)outline.middle) - sight_rad) * 180 / acos(-1);
+}
+
+static void test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_them(void **state)
+{
+    static const double slants_deg[] = {50, 56};
+    const bslam_front_t cabinet = {.height_m = real(1.8), .depth_m = real(0.375)};
+    for (int i = 0; i < COUNT_OF(slants_deg); i++) {
+        assert_true(error_of_cabinet_deg(slants_deg[i], true, cabinet) < 0.5);
+        assert_true(error_of_cabinet_deg(slants_deg[i], false, cabinet) > 1);
+    }
+}
+
+static void test_find_is_nearer_where_it_knows_how_wide_the_front_is(void **state)
+{
+    const bslam_front_t any = {.height_m = real(1.8), .depth_m = real(0.375)};
+    const bslam_front_t known = {real(1.8), real(0.375), real(0.8), 1};
+    assert_true(error_of_cabinet_deg(56, false, known) < 0.7 * error_of_cabinet_deg(56, false, any));
 }
 
 static void test_find_in_dimmer_light_finds_the_same(void **state)
@@ -163,8 +208,8 @@ static void test_find_in_dimmer_light_finds_the_same(void **state)
                                real(v_of(3.4, 0.8)) - 2};
     bslam_outline_t in_bright;
     bslam_outline_t in_dim;
-    assert_int_equal(bslam_outline_find(&bright.frame, &camera, &rough, 0, &in_bright), BSLAM_OK);
-    assert_int_equal(bslam_outline_find(&dim.frame, &camera, &rough, 0, &in_dim), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&bright.frame, &camera, &rough, &FLAT, &in_bright), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&dim.frame, &camera, &rough, &FLAT, &in_dim), BSLAM_OK);
     assert_near(in_bright.quad.left_px, in_dim.quad.left_px, SIDE_ERROR_PX);
     assert_near(in_bright.quad.right_px, in_dim.quad.right_px, SIDE_ERROR_PX);
     assert_near(in_bright.quad.top_left_px, in_dim.quad.top_left_px, 2 * SIDE_ERROR_PX);
@@ -185,8 +230,8 @@ static void test_find_is_less_sure_where_two_edges_may_be_the_side(void **state)
                                real(v_of(4, 0.86))};
     bslam_outline_t sure;
     bslam_outline_t unsure;
-    assert_int_equal(bslam_outline_find(&plain.frame, &camera, &rough, 0, &sure), BSLAM_OK);
-    assert_int_equal(bslam_outline_find(&framed.frame, &camera, &rough, 0, &unsure), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&plain.frame, &camera, &rough, &FLAT, &sure), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&framed.frame, &camera, &rough, &FLAT, &unsure), BSLAM_OK);
     assert_true(unsure.top_var > 2 * sure.top_var);
     assert_true(unsure.left_var > 2 * sure.left_var);
     assert_true(unsure.middle_var > sure.middle_var);
@@ -199,7 +244,7 @@ static void test_find_where_nothing_is_keeps_the_box_and_doubts_it(void **state)
     unit_picture_fill(&picture, 120, 130, 140);
     const bslam_box_t rough = {100, 60, 180, 150};
     bslam_outline_t outline;
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, 0, &outline), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &rough, &FLAT, &outline), BSLAM_OK);
     // Turns that nothing speaks against move the corners by a pixel.
     assert_quad_near(&outline.quad, (const double[6]){100, 180, 60, 150, 60, 150}, 1);
     // Two pixels of the half-resolution copy.
@@ -226,8 +271,10 @@ static void test_find_at_every_edge_of_the_frame_reads_nothing_outside(void **st
         const bslam_box_t rough = {real(left), real(top), real(unit_random(&random, left, 319.5)),
                                    real(unit_random(&random, top, 239.5))};
         bslam_outline_t outline;
-        const bslam_status_t status =
-            bslam_outline_find(&picture.frame, camera, &rough, real(unit_random(&random, 0, 2)), &outline);
+        const double narrow_m = unit_random(&random, 0, 3);
+        const bslam_front_t front = {1, real(unit_random(&random, 0, 2)), real(narrow_m),
+                                     real(unit_random(&random, narrow_m, 4))};
+        const bslam_status_t status = bslam_outline_find(&picture.frame, camera, &rough, &front, &outline);
         assert_true(status == BSLAM_OK || status == BSLAM_E_RANGE);
         if (status == BSLAM_OK) {
             found++;
@@ -251,9 +298,9 @@ static void test_find_refuses_a_box_that_reaches_to_straight_below(void **state)
     const bslam_box_t reaching = {36, 209, 287, 239};
     const bslam_box_t above = {120, 120, 200, 180};
     bslam_outline_t outline = {.left = 7};
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &reaching, 0, &outline), BSLAM_E_RANGE);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &reaching, &FLAT, &outline), BSLAM_E_RANGE);
     assert_true(outline.left == 7);
-    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &above, 0, &outline), BSLAM_OK);
+    assert_int_equal(bslam_outline_find(&picture.frame, &camera, &above, &FLAT, &outline), BSLAM_OK);
 }
 
 /// Looking up through a lens that bends straight lines much: an end of the upright side through the box's
@@ -273,7 +320,8 @@ static void test_find_refuses_a_box_of_which_the_lens_does_not_see_either_side(v
                                  {real(width - right), real(165.879), real(width - left), real(190.64)}};
     for (int i = 0; i < 2; i++) {
         bslam_outline_t outline = {.left = 7};
-        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &boxes[i], 0, &outline), BSLAM_E_RANGE);
+        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &boxes[i], &FLAT, &outline),
+                         BSLAM_E_RANGE);
         assert_true(outline.left == 7);
     }
 }
@@ -288,13 +336,14 @@ static void test_find_refuses_a_box_that_is_none(void **state)
                                {real(NAN), 10, 50, 50}, {10, 10, 50, real(NAN)}};
     bslam_outline_t outline = {.left = 7};
     for (int i = 0; i < COUNT_OF(bad); i++) {
-        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &bad[i], 0, &outline), BSLAM_E_RANGE);
+        assert_int_equal(bslam_outline_find(&picture.frame, &camera, &bad[i], &FLAT, &outline),
+                         BSLAM_E_RANGE);
     }
     const bslam_box_t good = {100, 100, 140, 150};
-    static const double depths[] = {-0.1, 2.1, NAN};
-    for (int i = 0; i < COUNT_OF(depths); i++) {
-        const bslam_status_t status =
-            bslam_outline_find(&picture.frame, &camera, &good, real(depths[i]), &outline);
+    const bslam_front_t none[] = {{1, real(-0.1), 0, 0}, {1, real(2.1), 0, 0}, {1, real(NAN), 0, 0},
+                                  {1, 0, 2, 1},          {1, 0, -1, 1},        {1, 0, 0, real(NAN)}};
+    for (int i = 0; i < COUNT_OF(none); i++) {
+        const bslam_status_t status = bslam_outline_find(&picture.frame, &camera, &good, &none[i], &outline);
         assert_int_equal(status, BSLAM_E_RANGE);
     }
     assert_true(outline.left == 7);
@@ -307,6 +356,8 @@ int main(void)
         cmocka_unit_test(test_find_a_turned_rectangle_as_a_trapezoid_with_its_middle_in_plan),
         cmocka_unit_test(test_find_through_a_wide_pitched_lens_gives_the_same_tangents),
         cmocka_unit_test(test_find_takes_the_flank_of_a_body_off),
+        cmocka_unit_test(test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_them),
+        cmocka_unit_test(test_find_is_nearer_where_it_knows_how_wide_the_front_is),
         cmocka_unit_test(test_find_in_dimmer_light_finds_the_same),
         cmocka_unit_test(test_find_is_less_sure_where_two_edges_may_be_the_side),
         cmocka_unit_test(test_find_where_nothing_is_keeps_the_box_and_doubts_it),

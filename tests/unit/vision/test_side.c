@@ -92,7 +92,7 @@ static void test_edge_is_traced_within_the_places_that_are_looked_at(void **stat
 static void test_body_whose_level_side_is_out_of_sight_has_no_level(void **state)
 {
     const bslam_facing_t ahead = facing();
-    const bslam_body_t seen = {pixels(50), pixels(-50), pixels(40), pixels(-40), 0, pixels(1)};
+    const bslam_body_t seen = {pixels(50), pixels(-50), pixels(40), pixels(-40), pixels(1), {0, 0, 0}};
     bslam_body_t too_high = seen;
     bslam_body_t too_low = seen;
     bslam_level_t level;
