@@ -22,11 +22,11 @@ CLASSES = (
     BeaconClass(
         "extinguisher", 0.60, 0.0, 1.10, 1.60, 0.01, 0.18, 0.48, 0.18, 0.18, 0.01
     ),  # round: it shows no flank
-    BeaconClass("radiator", 0.63, 0.12, 0.70, 0.70, 0.06, 0.0, 0.0, 0.8, 1.4, 0.05),
+    BeaconClass("radiator", 0.63, 0.12, 0.70, 0.70, 0.09, 0.0, 0.0, 0.8, 1.4, 0.05),
     BeaconClass("door", 2.00, 0.035, 2.00, 2.00, 0.01, 0.0, 0.0, 0.9, 0.9, 0.05),
-    BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.03, 0.0, 0.0, 0.9, 1.6, 0.01),
-    BeaconClass("poster", 0.84, 0.015, 1.92, 1.92, 0.05, 0.0, 0.0, 0.59, 0.59, 0.01),
-    BeaconClass("sign", 0.30, 0.015, 1.75, 2.35, 0.09, 0.0, 0.0, 0.3, 0.3, 0.1),
+    BeaconClass("window", 1.20, 0.04, 2.10, 2.10, 0.02, 0.0, 0.0, 0.9, 1.6, 0.01),
+    BeaconClass("poster", 0.84, 0.015, 1.92, 1.92, 0.02, 0.0, 0.0, 0.59, 0.59, 0.01),
+    BeaconClass("sign", 0.285, 0.015, 1.75, 2.35, 0.04, 0.0, 0.0, 0.3, 0.3, 0.1),
     BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02, 0.0, 0.0, 0.8, 1.0, 0.03),
 )
 """In the order of KINDS: whole heights, middling depths, where their upper sides are, how wide they are, and
