@@ -31,7 +31,8 @@ CLASSES = (
 )
 """In the order of KINDS: whole heights, middling depths, where their upper sides are, how wide they are, and
 what their looks make of a distance in training worlds (tools/measure_outline.py --style train). A radiator's
-height is what is outlined in the mean: its lower side is often found at the skirting or the floor. The last:
+height and a sign's are what is outlined in the mean: the lower side of the one is often found at the skirting
+or the floor, and a pale rim of the other is taken for the wall. The last:
 by how much the distances of one thing are off together over a drive (paper_room, drives 0:8): cabinets are
 taken for doors, and rims of signs for walls."""
 
