@@ -42,6 +42,20 @@ bslam_real_t bslam_body_middle(const bslam_body_t *body, bslam_real_t turn)
     return centre - half * half * turn / (1 + centre * turn);
 }
 
+bslam_real_t bslam_body_width(const bslam_stance_t *stance)
+{
+    const float both = (1.0f + stance->turn * stance->left) * (1.0f + stance->turn * stance->right);
+    return (bslam_real_t)(stance->left - stance->right) *
+           bslam_sqrt(1 + (bslam_real_t)(stance->turn * stance->turn)) / (bslam_real_t)both;
+}
+
+bslam_stance_t bslam_outline_stance(const bslam_outline_t *o, bslam_real_t flank_least)
+{
+    return (bslam_stance_t){(float)o->turn,
+                            o->body_left - o->left > flank_least ? (float)o->left : BSLAM_FLAT.left,
+                            o->right - o->body_right > flank_least ? (float)o->right : BSLAM_FLAT.right};
+}
+
 typedef struct scene {
     const bslam_frame_t *frame;
     const bslam_facing_t *facing;
@@ -70,9 +84,7 @@ static bslam_real_t turn_at(int32_t k, int32_t turns)
 static float width_cost(const bslam_body_t *body, const bslam_stance_t *stance)
 {
     const float narrow = (float)body->shape.narrow, wide = (float)body->shape.wide;
-    const float both = (1.0f + stance->turn * stance->left) * (1.0f + stance->turn * stance->right);
-    const float seen = (stance->left - stance->right) / (float)(body->top - body->bottom);
-    const float width = seen * (float)bslam_sqrt((bslam_real_t)(1.0f + stance->turn * stance->turn)) / both;
+    const float width = (float)(bslam_body_width(stance) / (body->top - body->bottom));
     if (!(wide > 0.0f) || !(width > 0.0f)) {
         return 0.0f;
     }

@@ -5,6 +5,7 @@
 #ifndef BSLAM_VISION_BODY_H
 #define BSLAM_VISION_BODY_H
 
+#include "bslam/vision/outline.h"
 #include "bslam/vision/side.h"
 
 /// What is known of an object's shape, as fractions of its height; 0: not known, or flat.
@@ -34,6 +35,13 @@ bslam_stance_t bslam_body_stance(const bslam_body_t *body, bslam_real_t turn);
 /// Where the front's middle is seen with this turn, across: half way in plan between the front's two ends, of
 /// which the farther one is seen nearer to it.
 bslam_real_t bslam_body_middle(const bslam_body_t *body, bslam_real_t turn);
+
+/// How wide a front that stands so is, in units of how far ahead it is.
+bslam_real_t bslam_body_width(const bslam_stance_t *stance);
+
+/// How an outline's body stands: its level sides run on along a flank that is at least so wide, across, and
+/// as along the front where it is narrower.
+bslam_stance_t bslam_outline_stance(const bslam_outline_t *outline, bslam_real_t flank_least);
 
 /// The upper and the lower edge, and the turn at which they were found.
 typedef struct bslam_level {

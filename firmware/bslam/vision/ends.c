@@ -1,7 +1,7 @@
 #include "bslam/vision/ends.h"
 
 #include "bslam/math/trig.h"
-#include "bslam/vision/side.h"
+#include "bslam/vision/body.h"
 
 // Places that a side may move to, from so many steps outwards to as many inwards; and how many steps are
 // looked along at first.
@@ -66,15 +66,6 @@ static contrast_t level_contrasts(const end_t *end, bslam_real_t left, bslam_rea
 {
     return (contrast_t){level_contrast(end, BSLAM_SIDE_TOP, left, right),
                         level_contrast(end, BSLAM_SIDE_BOTTOM, left, right)};
-}
-
-/// How a body's level sides run beyond what is seen of it: on along a flank, where there is one.
-static bslam_stance_t stance_of(const bslam_outline_t *o)
-{
-    const bslam_real_t least = o->pixel / 2;
-    const bool left_flank = o->body_left - o->left > least, right_flank = o->right - o->body_right > least;
-    return (bslam_stance_t){(float)o->turn, left_flank ? (float)o->left : BSLAM_FLAT.left,
-                            right_flank ? (float)o->right : BSLAM_FLAT.right};
 }
 
 /// What the strip between two places says, a step, for being the object's.
@@ -212,7 +203,7 @@ bool bslam_ends_move(const bslam_frame_t *frame, const bslam_camera_t *camera, c
                  .facing = &facing,
                  .outline = outline,
                  .front = front,
-                 .stance = stance_of(outline),
+                 .stance = bslam_outline_stance(outline, outline->pixel / 2),
                  .inmost = inmost};
     end.middle = level_contrasts(&end, outline->body_left - END_SHARE * width,
                                  outline->body_right + END_SHARE * width);
