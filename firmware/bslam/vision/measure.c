@@ -104,7 +104,7 @@ static bslam_bearing_t outline_bearing(const bslam_outline_t *o, const bslam_cam
     const bslam_real_t square = off_axis * off_axis;
     const bslam_real_t variance =
         (BEARING_FLOOR_RAD * BEARING_FLOOR_RAD + bslam_edge_variance(o, camera) / 2 + by_width * by_width +
-         BEARING_DOUBT * o->middle_var) *
+         BEARING_DOUBT * o->middle_var + o->ends_var) *
         (1 + square * square * square);
     return (bslam_bearing_t){bslam_angle_wrap(o->facing_rad + bslam_atan2(o->middle, 1)),
                              bslam_sqrt(variance)};
@@ -195,10 +195,12 @@ static bool find_outline(const bslam_frame_t *frame, const bslam_camera_t *camer
         return false;
     }
     bslam_box_t moved = *box;
-    if (bslam_ends_move(frame, camera, outline, &front, &moved) &&
-        bslam_outline_find(frame, camera, &moved, &front, outline) == BSLAM_OK) {
+    const bslam_ends_t ends = bslam_ends_move(frame, camera, outline, &front, &moved);
+    if (ends.moved && bslam_outline_find(frame, camera, &moved, &front, outline) == BSLAM_OK) {
         *box = moved;
     }
+    outline->middle += ends.offset;
+    outline->ends_var = ends.variance;
     return true;
 }
 
