@@ -38,6 +38,8 @@ static const bslam_real_t MISPLACED_SDS = 3;
 // What is seen narrower than this part of the least width of its kind has something before its side: less
 // would mark what is only seen a little more obliquely than its level sides tell.
 static const bslam_real_t HIDDEN_BELOW = BSLAM_R(0.8);
+// What is seen as wide as its kind may be at most, but for this part of it, is no part of one.
+static const bslam_real_t FULL_WITHIN = BSLAM_R(0.07);
 // Seen more obliquely than this, tangent, an object is marked and not measured.
 static const bslam_real_t TURN_MAX = BSLAM_R(1.5);
 // What is next to the frame's edge is whole if that is so likely.
@@ -74,14 +76,27 @@ static unsigned mark_if(bool is, unsigned mark)
     return is ? mark : 0U;
 }
 
+/// Whether a front is seen as wide as its kind can be: it has no more parts.
+static bool is_full(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size)
+{
+    if (!(size->height_m > 0) || !(size->wide_m > 0)) {
+        return false;
+    }
+    const bslam_ahead_t ahead = bslam_ahead_of_body(o, camera, size);
+    const bslam_real_t width = bslam_front_width_m(o, &ahead) / size->wide_m;
+    return ahead.inverse > 0 && width >= 1 - FULL_WITHIN && width <= 1 + FULL_WITHIN;
+}
+
 /// Marks of what the rough box, or the outline found near it, tells.
 static unsigned marks_of(const bslam_frame_t *frame, const bslam_camera_t *camera, const bslam_box_t *rough,
-                         const bslam_outline_t *outline, const bslam_box_t *found)
+                         const bslam_outline_t *outline, const bslam_size_t *size, const bslam_box_t *found)
 {
     const unsigned cuts = bslam_cut_marks(frame, rough) | bslam_cut_marks(frame, found);
     return cuts | mark_if(is_small(rough), BSLAM_MARK_SMALL) |
            mark_if(bslam_abs(outline->turn) > TURN_MAX, BSLAM_MARK_SLANTED) |
-           mark_if(bslam_outline_is_part(frame, camera, rough, outline, cuts), BSLAM_MARK_PART);
+           mark_if(((cuts & UPRIGHT) != 0U || !is_full(outline, camera, size)) &&
+                       bslam_outline_is_part(frame, camera, rough, outline, cuts),
+                   BSLAM_MARK_PART);
 }
 
 static bslam_box_t box_around(const bslam_quad_t *quad)
@@ -220,7 +235,7 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
         return BSLAM_E_RANGE;
     }
     const bslam_box_t found = box_around(&outline.quad);
-    const unsigned marks = marks_of(frame, camera, &box, &outline, &found);
+    const unsigned marks = marks_of(frame, camera, &box, &outline, size, &found);
     candidate->has_bearing = false;
     candidate->has_range = false;
     candidate->misplaced_sds = 0;
