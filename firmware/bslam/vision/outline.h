@@ -41,8 +41,8 @@ typedef struct bslam_outline {
     bslam_real_t middle;    ///< across, of the point half way between the two sides in plan
     bslam_real_t middle_var;
     bslam_real_t ends_var;  ///< of the middle, for what is open which lines its upright sides are; 0 as found
-    bslam_real_t pixel;  ///< size of a frame pixel in these units, at the centre
-    bslam_quad_t quad;   ///< the same corners in the frame
+    bslam_real_t pixel;     ///< size of a frame pixel in these units, at the centre
+    bslam_quad_t quad;      ///< the same corners in the frame
 } bslam_outline_t;
 
 /// What is known of an object's size; 0: not known, of the depth: it is flat.
