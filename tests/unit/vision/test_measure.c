@@ -146,9 +146,9 @@ static void test_measure_marks_what_is_cut_off(void **state)
     assert_true(top.has_bearing && !top.has_range && bottom.has_bearing && !bottom.has_range);
 }
 
-static void test_measure_marks_what_ends_close_to_the_frames_edge(void **state)
+static void test_measure_marks_what_goes_on_beyond_a_box_short_of_the_frames_edge(void **state)
 {
-    const unit_panel_t panel = poster(3, 0.45, 0);  // its left side is 6 px inside
+    const unit_panel_t panel = poster(3, 0.45, 0);  // its left side is 16 px outside
     const bslam_candidate_t found = measured_in(&panel, (bslam_box_t){5, 20, 74, 100});
     assert_true((found.marks & BSLAM_MARK_CUT_LEFT) != 0 && !found.has_bearing);
 }
@@ -173,6 +173,21 @@ static void test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is(vo
         assert_true((found.marks & mark) != 0 && found.has_bearing && !found.has_range);
         assert_true(found.bearing_sd_rad > BSLAM_R(0.02) && found.bearing_sd_rad < BSLAM_R(0.08));
         assert_near(found.bearing_rad, cases[i][0], 2 * (double)found.bearing_sd_rad);
+    }
+}
+
+/// Its side is seen 6 pixels inside the frame, and it is as wide as its kind.
+static void test_measure_of_what_ends_next_to_the_frames_edge_is_whole(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    for (int i = 0; i < 2; i++) {
+        const double bearing = i == 0 ? 0.39 : -0.39;
+        const unit_panel_t panel = poster(3, bearing, 0);
+        const bslam_candidate_t found = measured(&camera, &panel, &HUNG_SIZE);
+        assert_int_equal(found.marks, 0);
+        assert_true(found.has_bearing && found.has_range);
+        assert_near(found.bearing_rad, bearing, 0.5 / 277);
+        assert_near(found.range_m / 3, 1, 0.013);
     }
 }
 
@@ -214,6 +229,48 @@ static void test_measure_of_a_front_with_its_flank_is_no_part(void **state)
     assert_int_equal(found.marks, 0);
     assert_near(found.bearing_rad, atan2(0.1, 3.8), 2.5 / 277);
     assert_near(found.range_m / real(hypot(0.1, 3.8)), 1, 0.02);
+}
+
+/// Rails run along the wall where its level sides are. It is as wide as its kind, so it has no more parts;
+/// of a kind that may be wider it may be one.
+static void test_measure_of_a_front_as_wide_as_its_kind_is_no_part(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panels[] = {poster(3, 0, 0),
+                                   {3.01, 3, 3.01, -3, 1.44, 1.5, 60, 80, 150},
+                                   {3.01, 3, 3.01, -3, 0.7, 0.76, 60, 80, 150}};
+    unit_picture_draw(&picture, &camera, WALL, panels, COUNT_OF(panels));
+    const bslam_box_t rough = box_of(&camera, &panels[0]);
+    bslam_size_t size = HUNG_SIZE;
+    size.wide_m = BSLAM_R(1.2);
+    bslam_candidate_t found;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &found), BSLAM_OK);
+    assert_int_equal(found.marks, BSLAM_MARK_PART);
+    assert_true(!found.has_bearing && !found.has_range);
+    size.wide_m = BSLAM_R(0.7);
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &found), BSLAM_OK);
+    assert_int_equal(found.marks, 0);
+    assert_near(found.bearing_rad, 0, 0.7 / 277);
+}
+
+/// As light as the wall, so that its level sides are hardly seen and a neighbour's edge is the strongest: its
+/// colour ends where it does.
+static void test_measure_goes_by_the_colour_where_level_sides_are_pale(void **state)
+{
+    static unit_picture_t picture;
+    const bslam_camera_t camera = unit_pinhole();
+    unit_panel_t pale = poster(3, 0, 0);
+    pale.red = 176, pale.green = 168, pale.blue = 190;
+    const unit_panel_t panels[] = {pale, {3, 0.75, 3, 0.6, 0.2, 1.9, 90, 60, 40}};
+    unit_picture_draw(&picture, &camera, WALL, panels, COUNT_OF(panels));
+    const bslam_box_t rough = {104, 27, 192, 102};
+    bslam_size_t size = HUNG_SIZE;
+    size.wide_m = BSLAM_R(1.2);
+    bslam_candidate_t found;
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &found), BSLAM_OK);
+    assert_near(found.outline.left_px, 127.2, 1);
+    assert_near(found.bearing_rad, 0, 0.01);
 }
 
 /// A detector's box that holds only the right half of it, or the left one.
@@ -503,11 +560,14 @@ int main(void)
         cmocka_unit_test(test_measure_without_a_height_has_a_direction_only),
         cmocka_unit_test(test_measure_is_less_sure_of_what_is_farther_or_fainter),
         cmocka_unit_test(test_measure_marks_what_is_cut_off),
-        cmocka_unit_test(test_measure_marks_what_ends_close_to_the_frames_edge),
+        cmocka_unit_test(test_measure_marks_what_goes_on_beyond_a_box_short_of_the_frames_edge),
         cmocka_unit_test(test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is),
+        cmocka_unit_test(test_measure_of_what_ends_next_to_the_frames_edge_is_whole),
         cmocka_unit_test(test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction),
         cmocka_unit_test(test_measure_marks_a_part),
         cmocka_unit_test(test_measure_of_a_front_with_its_flank_is_no_part),
+        cmocka_unit_test(test_measure_of_a_front_as_wide_as_its_kind_is_no_part),
+        cmocka_unit_test(test_measure_goes_by_the_colour_where_level_sides_are_pale),
         cmocka_unit_test(test_measure_follows_the_level_sides_to_where_a_thing_ends),
         cmocka_unit_test(test_measure_is_not_led_to_a_neighbour),
         cmocka_unit_test(test_measure_of_two_of_a_kind_goes_by_their_width),
