@@ -1,5 +1,7 @@
 #include "bslam/vision/body.h"
 
+#include "bslam/math/falling.h"
+
 enum {
     TURNS_MAX = 5,    // turns tried to either side
     CORNER_STEPS = 3  // a flank's width depends on where its near corner is: rounds

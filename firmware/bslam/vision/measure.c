@@ -251,3 +251,16 @@ bslam_status_t bslam_measure(const bslam_frame_t *frame, const bslam_camera_t *c
     }
     return BSLAM_OK;
 }
+
+void bslam_measure_doubt(bslam_candidate_t *candidate, bslam_real_t relative_var)
+{
+    if (!candidate->has_range) {
+        return;
+    }
+    const bslam_real_t relative_sd = candidate->range_sd_m / candidate->range_m;
+    const bslam_real_t total = relative_sd * relative_sd + relative_var;
+    candidate->range_sd_m = candidate->range_m * bslam_sqrt(total);
+    candidate->range_scale_sd =
+        bslam_sqrt(candidate->range_scale_sd * candidate->range_scale_sd + relative_var);
+    candidate->has_range = total <= RANGE_SD_MAX * RANGE_SD_MAX;
+}

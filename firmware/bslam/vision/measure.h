@@ -43,4 +43,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_measure(const bslam_frame_t *frame, const 
                                               const bslam_box_t *rough, const bslam_size_t *size,
                                               bslam_candidate_t *candidate);
 
+/// Adds a relative variance to a candidate's distance, if it has one: of an error that all distances of the
+/// thing have in common. One that is less certain than 15 % then is none. O(1).
+void bslam_measure_doubt(bslam_candidate_t *candidate, bslam_real_t relative_var);
+
 #endif

@@ -115,11 +115,4 @@ typedef struct bslam_edge {
 void bslam_side_trace(const bslam_side_t *side, const bslam_facing_t *facing, const bslam_line_t *line,
                       const bslam_stance_t *stance, bslam_edge_t *edge);
 
-/// 1 / e^x for x >= 0, to 5 % where it is above 0.05; it falls off more slowly beyond, so that nothing is
-/// ruled out.
-static inline float bslam_falling(float x)
-{
-    return 1.0f / (1.0f + x * (1.0f + x * (0.5f + x * (1.0f / 6.0f + x * (1.0f / 24.0f)))));
-}
-
 #endif

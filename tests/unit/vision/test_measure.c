@@ -271,6 +271,11 @@ static void test_measure_goes_by_the_colour_where_level_sides_are_pale(void **st
     assert_int_equal(bslam_measure(&picture.frame, &camera, &rough, &size, &found), BSLAM_OK);
     assert_near(found.outline.left_px, 127.2, 1);
     assert_near(found.bearing_rad, 0, 0.01);
+    const bslam_real_t doubtful_sd_rad = found.bearing_sd_rad;
+    unit_picture_draw(&picture, &camera, WALL, panels, 1);
+    const bslam_box_t own = box_of(&camera, &pale);
+    assert_int_equal(bslam_measure(&picture.frame, &camera, &own, &size, &found), BSLAM_OK);
+    assert_true(found.bearing_sd_rad < BSLAM_R(0.7) * doubtful_sd_rad);
 }
 
 /// A detector's box that holds only the right half of it, or the left one.

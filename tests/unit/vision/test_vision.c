@@ -429,12 +429,12 @@ static void test_end_of_a_model_of_one_kind_there_is_no_second(void **state)
 static void test_end_candidate_becomes_its_second_kind_where_that_can_be_measured(void **state)
 {
     bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {
-        {.name = "tall", .height_m = 2, .top_low_m = 1.9f, .top_high_m = 2.1f},
+        {.name = "tall", .height_m = 0.33f, .top_low_m = 1.9f, .top_high_m = 2.1f},
         {.name = "small", .height_m = 0.3f, .top_low_m = 0.9f, .top_high_m = 1.0f}};
     const bslam_camera_t camera = camera_at(0);
     model.classes = kinds;
     take_all(UNIT_MODEL_CLASSES);
-    detector.kind_bias[1] = 1.5f;  // surer than the other by half a margin, though it would be 14 m away
+    detector.kind_bias[1] = 0.5f;  // a little surer than the other
     paint_room();
     paint(140, 60, 180, 100, 200, 30, 30);  // 0.3 m high, 2.1 m away its top is at 0.95 m
     // A body that is deeper than twice its height is no upright thing.
@@ -448,6 +448,47 @@ static void test_end_candidate_becomes_its_second_kind_where_that_can_be_measure
         assert_int_equal(found->beacon_class, i < 2 ? 2 : 1);
         assert_int_equal(found->second_class, i < 2 ? 1 : 2);
         assert_int_equal(found->has_range, i < 2);
+    }
+}
+
+/// A candidate of two kinds, the first surer by so much; the other is a fifth higher, or of no known height.
+static bslam_candidate_t found_with_margin(float margin, bool has_other_height)
+{
+    const bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {
+        {.name = "one", .height_m = 0.3f}, {.name = "other", .height_m = has_other_height ? 0.36f : 0}};
+    const bslam_camera_t camera = camera_at(0);
+    model.classes = kinds;
+    take_all(UNIT_MODEL_CLASSES);
+    detector.kind_bias[1] = 2 * margin;  // of two machines, of which the other says nothing
+    start_with(&camera);
+    paint_room();
+    paint(140, 60, 180, 100, 200, 30, 30);
+    int32_t count;
+    const bslam_candidate_t *found = found_in(show(0, true), &count);
+    assert_int_equal(count, 1);
+    assert_int_equal(found->beacon_class, 1);
+    assert_near(found->class_margin, (double)margin, 1e-6);
+    return *found;
+}
+
+/// Its distance is as open as its kind, and so is by what all its distances err alike.
+static void test_end_distance_is_less_sure_where_the_kind_is(void **state)
+{
+    const bslam_candidate_t known = found_with_margin(0.1f, false);
+    assert_true(known.has_range);
+    bslam_real_t surer_sd_m = known.range_sd_m;
+    for (int i = 0; i < 4; i++) {
+        const double margin = 1.7 - 0.5 * i;
+        const bslam_candidate_t found = found_with_margin((float)margin, true);
+        const double odds = exp(-3.3 * margin), share = odds / (1 + odds);
+        const double off = 0.2 * sqrt(share * (1 - share));
+        assert_true(found.has_range && found.range_m == known.range_m);
+        assert_true(found.range_sd_m > surer_sd_m);
+        assert_near(found.range_sd_m / found.range_m, hypot((double)(known.range_sd_m / known.range_m), off),
+                    0.1 * off);
+        assert_near(found.range_scale_sd, hypot((double)known.range_scale_sd, off), 0.1 * off);
+        assert_true(found.range_noise_sd_m == known.range_noise_sd_m);
+        surer_sd_m = found.range_sd_m;
     }
 }
 
@@ -794,6 +835,7 @@ int main(void)
         TEST(test_end_candidates_come_surest_first),
         TEST(test_end_of_a_model_of_one_kind_there_is_no_second),
         TEST(test_end_candidate_becomes_its_second_kind_where_that_can_be_measured),
+        TEST(test_end_distance_is_less_sure_where_the_kind_is),
         TEST(test_end_what_is_smaller_than_its_small_kind_is_less_sure),
         TEST(test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s),
         TEST(test_end_outline_of_something_else_is_not_taken),
