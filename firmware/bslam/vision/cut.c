@@ -1,7 +1,7 @@
 #include "bslam/vision/cut.h"
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/falling.h"
+#include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/ahead.h"
 #include "bslam/vision/body.h"

@@ -1,6 +1,6 @@
 #include "bslam/vision/ends.h"
 
-#include "bslam/math/falling.h"
+#include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/body.h"
 #include "bslam/vision/shade.h"

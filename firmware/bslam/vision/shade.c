@@ -8,31 +8,25 @@ static const bslam_real_t MARGIN = BSLAM_R(0.15);
 // Colours that are so far apart are half told apart.
 static const float HALF = 5.0f;
 
-/// Adds the colours along the upright line at a place across; false if the frame does not show it.
-static bool add_line(const bslam_frame_t *frame, const bslam_facing_t *facing, const bslam_outline_t *o,
-                     bslam_real_t at, bslam_rgb_t *sum)
+bool bslam_line_colours(const bslam_frame_t *frame, const bslam_facing_t *facing, bslam_real_t at,
+                        bslam_real_t top, bslam_real_t bottom, int32_t count,
+                        bslam_rgb_t colours[BSLAM_LINE_POINTS_MAX])
 {
-    const bslam_real_t near = 1 + o->turn * at;
-    const bslam_real_t margin = MARGIN * (o->top - o->bottom);
+    const bslam_real_t margin = MARGIN * (top - bottom);
+    const bslam_plane_point_t upper = {at, top - margin}, lower = {at, bottom + margin};
     bslam_real_t upper_u, upper_v, lower_u, lower_v;
-    if (!bslam_facing_to_frame(facing, (bslam_plane_point_t){at, (o->top - margin) * near}, &upper_u,
-                               &upper_v) ||
-        !bslam_facing_to_frame(facing, (bslam_plane_point_t){at, (o->bottom + margin) * near}, &lower_u,
-                               &lower_v)) {
+    if (!bslam_facing_to_frame(facing, upper, &upper_u, &upper_v) ||
+        !bslam_facing_to_frame(facing, lower, &lower_u, &lower_v)) {
         return false;
     }
     const bslam_real_t width = (bslam_real_t)frame->width_px, height = (bslam_real_t)frame->height_px;
-    for (int32_t i = 0; i < POINTS; i++) {
-        const bslam_real_t part = (bslam_real_t)i / (POINTS - 1);
+    for (int32_t i = 0; i < count; i++) {
+        const bslam_real_t part = (bslam_real_t)i / (bslam_real_t)(count - 1);
         const bslam_real_t u = upper_u + part * (lower_u - upper_u), v = upper_v + part * (lower_v - upper_v);
         if (!(u >= 0 && v >= 0 && u < width && v < height)) {
             return false;
         }
-        const int32_t pixel = (int32_t)v / 2 * (frame->width_px / 2) + (int32_t)u / 2;
-        const bslam_rgb_t colour = bslam_rgb_of_565(frame->half[pixel]);
-        sum->red += colour.red;
-        sum->green += colour.green;
-        sum->blue += colour.blue;
+        colours[i] = bslam_rgb_of_565(frame->half[(int32_t)v / 2 * (frame->width_px / 2) + (int32_t)u / 2]);
     }
     return true;
 }
@@ -43,9 +37,17 @@ bool bslam_shade_between(const bslam_frame_t *frame, const bslam_facing_t *facin
 {
     bslam_rgb_t sum = {0, 0, 0};
     for (int32_t i = 0; i < LINES; i++) {
-        const bslam_real_t part = ((bslam_real_t)i + BSLAM_R(0.5)) / LINES;
-        if (!add_line(frame, facing, outline, from + part * (to - from), &sum)) {
+        const bslam_real_t at = from + ((bslam_real_t)i + BSLAM_R(0.5)) / LINES * (to - from);
+        const bslam_real_t near = 1 + outline->turn * at;
+        bslam_rgb_t colours[BSLAM_LINE_POINTS_MAX];
+        if (!bslam_line_colours(frame, facing, at, outline->top * near, outline->bottom * near, POINTS,
+                                colours)) {
             return false;
+        }
+        for (int32_t k = 0; k < POINTS; k++) {
+            sum.red += colours[k].red;
+            sum.green += colours[k].green;
+            sum.blue += colours[k].blue;
         }
     }
     const float count = (float)(LINES * POINTS), mean = (sum.red + sum.green + sum.blue) / 3;

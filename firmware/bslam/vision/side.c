@@ -5,7 +5,7 @@
 
 #include "bslam/math/bounds.h"
 #include "bslam/math/bytes.h"
-#include "bslam/math/falling.h"
+#include "bslam/math/logarithm.h"
 
 enum { CHANNELS = 3, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
 // Places for a side that does not turn away from the rough box.

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/falling.h"
+#include "bslam/math/logarithm.h"
 #include "bslam/math/lanes.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/features.h"
@@ -34,6 +34,9 @@ _Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
 /// margin stands for. Both are a logistic regression's over 5683 things in training worlds.
 #define MISPLACED_MARGIN 0.4f
 #define CLASS_SHARPNESS 3.3f
+/// From this margin on the other kind is so rare, below 4 %, that a filter's gate is the better remedy: a
+/// standard deviation would take from all what few deserve.
+#define CLASS_SURE 1.0f
 /// What a candidate of a kind no higher than SMALL_KIND_M loses where it is lower than its kind: so much for
 /// each unit of the natural logarithm beyond SMALL_FREE, SMALL_LOSS_MAX at most, since the floor line errs
 /// too.
@@ -359,7 +362,7 @@ static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *
 static void doubt_class(const bslam_vision_t *vision, bslam_candidate_t *candidate)
 {
     const bslam_beacon_class_t *classes = vision->model->classes;
-    if (candidate->second_class == BSLAM_CLASS_NONE || !candidate->has_range) {
+    if (candidate->second_class == BSLAM_CLASS_NONE || candidate->class_margin > CLASS_SURE) {
         return;
     }
     const float height_m = classes[candidate->beacon_class - 1].height_m;

@@ -476,9 +476,11 @@ static void test_end_distance_is_less_sure_where_the_kind_is(void **state)
 {
     const bslam_candidate_t known = found_with_margin(0.1f, false);
     assert_true(known.has_range);
+    const bslam_candidate_t sure = found_with_margin(1.1f, true);
+    assert_true(sure.range_sd_m == known.range_sd_m && sure.range_scale_sd == known.range_scale_sd);
     bslam_real_t surer_sd_m = known.range_sd_m;
-    for (int i = 0; i < 4; i++) {
-        const double margin = 1.7 - 0.5 * i;
+    for (int i = 0; i < 3; i++) {
+        const double margin = 0.9 - 0.4 * i;
         const bslam_candidate_t found = found_with_margin((float)margin, true);
         const double odds = exp(-3.3 * margin), share = odds / (1 + odds);
         const double off = 0.2 * sqrt(share * (1 - share));
