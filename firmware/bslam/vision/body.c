@@ -12,9 +12,6 @@ enum {
 // The largest turn that is looked for; and what one costs before it is seen: 1 / (2 BSLAM_TURN_SD²).
 static const bslam_real_t TURN_MAX = BSLAM_R(1.8);
 static const float TURN_COST = 0.7f;
-// By how much the two sides' scores together tell turns apart better than either tells places: they change
-// together.
-static const float TURN_SHARPNESS = 1.5f;
 // What a front costs that is seen narrower or wider than it may be: by the square of the part by which it is.
 // At most so much, for something may stand before one of its ends. Both are in a side's scores.
 static const float WIDTH_COST = 60.0f;
@@ -193,21 +190,22 @@ static bslam_stance_t best_stance(const scene_t *scene, const sides_t *sides, co
                     flank_evidence(scene, body, &stance, busy);
         best = scores[k] > scores[best] ? k : best;
     }
+    const bslam_real_t middle = bslam_body_middle(body, turn_at(best - turns, turns));
     float whole = 0.0f;
     float first = 0.0f;
     float second = 0.0f;
     for (int32_t k = 0; k <= 2 * turns; k++) {
         const bool same = k - best >= -1 && k - best <= 1;  // the edges' slopes will tell more closely
-        const float away = same ? 0.0f : (float)turn_at(k - best, turns);
-        const float share = bslam_falling(TURN_SHARPNESS * (scores[best] - scores[k]));
+        const float away = same ? 0.0f : (float)(bslam_body_middle(body, turn_at(k - turns, turns)) - middle);
+        const float share = bslam_falling(scores[best] - scores[k]);
         whole += share;
         first += share * away;
         second += share * away * away;
     }
     const float mean = first / whole;
     level->turn = turn_at(best - turns, turns);
-    level->turn_offset = (bslam_real_t)mean;
-    level->turn_var = (bslam_real_t)(second / whole - mean * mean);
+    level->middle_offset = (bslam_real_t)mean;
+    level->middle_var = (bslam_real_t)(second / whole - mean * mean);
     return bslam_body_stance(body, level->turn);
 }
 

@@ -48,8 +48,9 @@ typedef struct bslam_level {
     bslam_edge_t top;
     bslam_edge_t bottom;
     bslam_real_t turn;
-    bslam_real_t turn_offset;  ///< from there to the mean of all turns, by their probabilities,
-    bslam_real_t turn_var;     ///< and these turns' variance
+    bslam_real_t
+        middle_offset;        ///< from the front's middle there to the mean of all, by their probabilities,
+    bslam_real_t middle_var;  ///< and these places' variance
 } bslam_level_t;
 
 /// Finds them. Two lines that are level in the room meet at the horizon, so one turn serves both. False if

@@ -163,13 +163,11 @@ static void fit_front(const search_t *search, const bslam_body_t *body, const bs
         o->right = (bslam_real_t)stance.right;
         doubt = fit_level(search, body, level);
     }
-    o->turn += doubt * level->turn_offset;
-    o->turn_var += doubt * level->turn_var;
-    o->middle = bslam_body_middle(body, o->turn);
+    o->middle = bslam_body_middle(body, o->turn) + doubt * level->middle_offset;
     const bslam_real_t turn_sd = bslam_sqrt(o->turn_var);
     const bslam_real_t by_turn =
         (bslam_body_middle(body, o->turn + turn_sd) - bslam_body_middle(body, o->turn - turn_sd)) / 2;
-    o->middle_var = (o->left_var + o->right_var) / 4 + by_turn * by_turn;
+    o->middle_var = (o->left_var + o->right_var) / 4 + by_turn * by_turn + doubt * level->middle_var;
 }
 
 // --- The whole

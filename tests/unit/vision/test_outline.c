@@ -146,9 +146,17 @@ static void test_find_takes_the_flank_of_a_body_off(void **state)
     assert_true(fabs(flat_rad - middle_rad) > 2 * fabs(body_rad - middle_rad));
 }
 
+enum { DRAWERS = 5 };
+
+// So much of the light that the front reflects do its drawers.
+static const double FAINT = 0.92;
+
+typedef enum cabinet { CABINET_PLAIN, CABINET_DARK_FLANK, CABINET_DRAWERS } cabinet_t;
+
 /// A cabinet 1.8 m high, .9 wide and .375 deep, 4 m away, whose front looks away from the camera by so many
-/// degrees: how far off its middle is found, degrees. Its flank is of the same colour, or darker.
-static double error_of_cabinet_deg(double slant_deg, bool flank_is_darker, bslam_front_t front)
+/// degrees: how far off its middle is found, degrees. Its flank is of the front's colour, or darker, or the
+/// front has drawers.
+static double error_of_cabinet_deg(double slant_deg, cabinet_t looks, bslam_front_t front)
 {
     static unit_picture_t picture;
     const bslam_camera_t camera = unit_pinhole();
@@ -159,11 +167,19 @@ static double error_of_cabinet_deg(double slant_deg, bool flank_is_darker, bslam
     const double left[2] = {at[0] + to_left[0], at[1] + to_left[1]};
     const double right[2] = {at[0] - to_left[0], at[1] - to_left[1]};
     const double back[2] = {left[0] + 0.375 * sin(along_rad), left[1] - 0.375 * cos(along_rad)};
-    const double shade = flank_is_darker ? 0.65 : 1;
-    const unit_panel_t panels[2] = {
+    const double shade = looks == CABINET_DARK_FLANK ? 0.65 : 1;
+    unit_panel_t panels[2 + DRAWERS] = {
         {back[0], back[1], left[0], left[1], 0, 1.8, 170 * shade, 90 * shade, 40 * shade},
         {left[0], left[1], right[0], right[1], 0, 1.8, 170, 90, 40}};
-    unit_picture_draw(&picture, &camera, WALL, panels, 2);
+    for (int i = 0; i < DRAWERS; i++) {
+        // Within a frame of a tenth of the width, a little before the front.
+        const double x[2] = {0.9 * left[0] + 0.1 * right[0], 0.1 * left[0] + 0.9 * right[0]};
+        const double y[2] = {0.9 * left[1] + 0.1 * right[1], 0.1 * left[1] + 0.9 * right[1]};
+        const double near = 0.999, low_m = 0.2 + 0.3 * i;
+        panels[2 + i] = (unit_panel_t){near * x[0],  near * y[0], near * x[1], near * y[1], low_m,
+                                       low_m + 0.15, FAINT * 170, FAINT * 90,  FAINT * 40};
+    }
+    unit_picture_draw(&picture, &camera, WALL, panels, looks == CABINET_DRAWERS ? COUNT_OF(panels) : 2);
     const bslam_box_t rough = {real(u_of(back[0], back[1])), real(v_of(left[0], 1.8)),
                                real(u_of(right[0], right[1])), real(v_of(left[0], 0))};
     bslam_outline_t outline;
@@ -176,16 +192,27 @@ static void test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_the
     static const double slants_deg[] = {50, 56};
     const bslam_front_t cabinet = {.height_m = real(1.8), .depth_m = real(0.375)};
     for (int i = 0; i < COUNT_OF(slants_deg); i++) {
-        assert_true(error_of_cabinet_deg(slants_deg[i], true, cabinet) < 0.5);
-        assert_true(error_of_cabinet_deg(slants_deg[i], false, cabinet) > 1);
+        assert_true(error_of_cabinet_deg(slants_deg[i], CABINET_DARK_FLANK, cabinet) < 0.5);
+        assert_true(error_of_cabinet_deg(slants_deg[i], CABINET_PLAIN, cabinet) > 1);
+    }
+}
+
+static void test_find_tells_the_front_by_what_is_on_it(void **state)
+{
+    static const double slants_deg[] = {53, 58};
+    const bslam_front_t cabinet = {.height_m = real(1.8), .depth_m = real(0.375)};
+    for (int i = 0; i < COUNT_OF(slants_deg); i++) {
+        assert_true(error_of_cabinet_deg(slants_deg[i], CABINET_DRAWERS, cabinet) < 0.5);
+        assert_true(error_of_cabinet_deg(slants_deg[i], CABINET_PLAIN, cabinet) > 1);
     }
 }
 
 static void test_find_is_nearer_where_it_knows_how_wide_the_front_is(void **state)
 {
     const bslam_front_t any = {.height_m = real(1.8), .depth_m = real(0.375)};
-    const bslam_front_t known = {real(1.8), real(0.375), real(0.8), 1};
-    assert_true(error_of_cabinet_deg(56, false, known) < 0.7 * error_of_cabinet_deg(56, false, any));
+    const bslam_front_t known = {real(1.8), real(0.375), real(0.87), real(0.93)};
+    assert_true(error_of_cabinet_deg(56, CABINET_PLAIN, known) <
+                0.7 * error_of_cabinet_deg(56, CABINET_PLAIN, any));
 }
 
 static void test_find_in_dimmer_light_finds_the_same(void **state)
@@ -357,6 +384,7 @@ int main(void)
         cmocka_unit_test(test_find_through_a_wide_pitched_lens_gives_the_same_tangents),
         cmocka_unit_test(test_find_takes_the_flank_of_a_body_off),
         cmocka_unit_test(test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_them),
+        cmocka_unit_test(test_find_tells_the_front_by_what_is_on_it),
         cmocka_unit_test(test_find_is_nearer_where_it_knows_how_wide_the_front_is),
         cmocka_unit_test(test_find_in_dimmer_light_finds_the_same),
         cmocka_unit_test(test_find_is_less_sure_where_two_edges_may_be_the_side),
