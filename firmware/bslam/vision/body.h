@@ -25,7 +25,7 @@ typedef struct bslam_body {
     bslam_shape_t shape;
 } bslam_body_t;
 
-/// What is known of a turn before it is seen: its standard deviation. TURN_COST in body.c is the same.
+/// What is known of a turn before it is seen: its standard deviation. TURN_COST in turns.c is the same.
 #define BSLAM_TURN_SD BSLAM_R(0.85)
 
 /// The body with this turn: its visible flank taken off. The flank's rear corner is `depth` behind the
