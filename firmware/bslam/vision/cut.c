@@ -21,6 +21,7 @@ static const float WHOLE_BY_NARROW = 16.4f;
 static const float WHOLE_NARROW = 0.3f;
 static const float WHOLE_BY_WIDE = 7.3f;
 static const float WHOLE_WIDE_PX = 30.0f;
+static const float WIDE_MOST_PX = 1000.0f;
 static const float WHOLE_BY_UPRIGHT = 5.4f;
 static const float WHOLE_BY_EDGE = 4.2f;
 static const float WHOLE_BY_BOX_PX = 0.45f;
@@ -76,7 +77,7 @@ float bslam_cut_whole_chance(const bslam_frame_t *frame, const bslam_camera_t *c
                                           : (bslam_real_t)frame->width_px - BSLAM_R(0.5) - rough->right_px;
     const float level = bslam_outline_beyond(frame, camera, o, is_left);
     const bslam_stance_t front = {(float)o->turn, (float)o->left, (float)o->right};
-    const float wide_px = (float)(bslam_body_width(&front) / o->pixel);
+    const float wide_px = bslam_clampf((float)(bslam_body_width(&front) / o->pixel), 0.0f, WIDE_MOST_PX);
     const float edge_px = (float)(bslam_sqrt(is_left ? o->left_var : o->right_var) / o->pixel);
     const bool is_cut_upright = (marks & (BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM)) != 0U;
     const float odds = WHOLE_BIAS - WHOLE_BY_LEVEL * (level < 0.0f ? LEVEL_UNKNOWN : level) -
@@ -91,7 +92,7 @@ float bslam_cut_whole_chance(const bslam_frame_t *frame, const bslam_camera_t *c
 bool bslam_cut_bearing(const bslam_outline_t *outline, const bslam_camera_t *camera, const bslam_size_t *size,
                        unsigned marks, bslam_bearing_t *bearing)
 {
-    if (!(size->wide_m > 0)) {
+    if (!(size->wide_m > 0) || !(size->height_m > 0)) {
         return false;
     }
     // The outline's corners are not asked: without one end the slope of its level sides is a guess.

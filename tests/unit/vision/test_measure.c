@@ -191,6 +191,16 @@ static void test_measure_of_what_ends_next_to_the_frames_edge_is_whole(void **st
     }
 }
 
+static void test_measure_of_what_is_cut_off_and_of_unknown_height_tells_no_direction(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0.5, 0);
+    bslam_size_t size = HUNG_SIZE;
+    size.height_m = 0;
+    const bslam_candidate_t found = measured(&camera, &panel, &size);
+    assert_true((found.marks & BSLAM_MARK_CUT_LEFT) != 0 && !found.has_bearing && !found.has_range);
+}
+
 static void test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction(void **state)
 {
     static unit_picture_t picture;
@@ -568,6 +578,7 @@ int main(void)
         cmocka_unit_test(test_measure_marks_what_goes_on_beyond_a_box_short_of_the_frames_edge),
         cmocka_unit_test(test_measure_of_what_is_cut_off_tells_roughly_where_its_middle_is),
         cmocka_unit_test(test_measure_of_what_ends_next_to_the_frames_edge_is_whole),
+        cmocka_unit_test(test_measure_of_what_is_cut_off_and_of_unknown_height_tells_no_direction),
         cmocka_unit_test(test_measure_of_what_is_cut_off_on_both_sides_tells_no_direction),
         cmocka_unit_test(test_measure_marks_a_part),
         cmocka_unit_test(test_measure_of_a_front_with_its_flank_is_no_part),
