@@ -98,7 +98,7 @@ typedef struct bslam_box {
 
 /// Why a candidate is not, or not fully, measured; bits of bslam_candidate_t.marks.
 enum {
-    BSLAM_MARK_CUT_LEFT = 1,  ///< reaches the frame's edge: the outline goes on outside
+    BSLAM_MARK_CUT_LEFT = 1,  ///< reaches the frame's edge: the outline may go on outside
     BSLAM_MARK_CUT_RIGHT = 2,
     BSLAM_MARK_CUT_TOP = 4,
     BSLAM_MARK_CUT_BOTTOM = 8,

@@ -25,14 +25,16 @@ typedef struct bslam_size {
 /// a body's flank is taken for a part of its front, and its middle is off by half of what the flank takes.
 ///
 /// Marked and not measured: what is small (less than 5 px wide or 8 px high), or seen to be turned by a
-/// tangent of more than 1.5; and a part, whose level sides go on beyond it. What is cut off to the left or to
-/// the right has a rough direction, from the end that is seen and how wide its kind is, if that is known;
-/// what is cut off on both sides has none. What is cut off above or below has a direction and no distance;
-/// nor has one whose distance would be less certain than 15 %, or that would hang elsewhere than its kind.
-/// What is much narrower than its kind is taken for half hidden: marked, its direction as rough as what is
-/// missing makes it, its distance by its height. That something hides less of it, or of a kind whose width is
-/// not known, is not noticed. A candidate without has_bearing must not be used.
-/// Signature values are 0 where none could be taken.
+/// tangent of more than 1.5; and a part, whose level sides go on beyond it, unless it is as wide as its kind
+/// can be. What is cut off to the left or to the right has a rough direction, from the end that is seen and
+/// how wide its kind is, if that is known; what is cut off on both sides has none. What ends within 7 pixels
+/// of the frame's edge may be either: its direction is the mean of both by how likely they are, and it bears
+/// no mark from a chance of 0.9 on that it is whole. What is cut off above or below has a direction and no
+/// distance; nor has one whose distance would be less certain than 15 %, or that would hang elsewhere than
+/// its kind. What is much narrower than its kind is taken for half hidden: marked, its direction as rough as
+/// what is missing makes it, its distance by its height. That something hides less of it, or of a kind whose
+/// width is not known, is not noticed. A candidate without has_bearing must not be used. Signature values are
+/// 0 where none could be taken.
 ///
 /// The standard deviations are those of the errors left, of which a large part repeats from frame to frame:
 /// they come from the object's looks, not from noise (docs/EXPERIMENTS.md). BSLAM_E_NOT_FINITE: the box or
