@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/logarithm.h"
 #include "bslam/math/lanes.h"
+#include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/features.h"
 #include "bslam/vision/glance.h"
