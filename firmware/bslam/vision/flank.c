@@ -12,7 +12,9 @@ static const float CORNER_EVEN = 2.0f;
 // 3329 cabinets and radiators of training worlds.
 static const float BY_BUSY = 5.4f;
 static const float BUSY_COST = 4.2f;
-static const float BUSY_HALF = 6.0f;
+static const float BUSY_HALF = 4.0f;
+// Parts of an upright line.
+enum { LINE_PARTS = 3, PART_POINTS = BSLAM_LINE_POINTS_MAX / LINE_PARTS };
 
 /// What the edge between front and flank says for a stance at which a flank is seen, to the left or to the
 /// right: the front is the busy side of it, the flank the quiet one.
@@ -31,6 +33,32 @@ static float corner_evidence(const bslam_frame_t *frame, const bslam_facing_t *f
     return bslam_side_score(&side, &BSLAM_FLAT) - CORNER_EVEN;
 }
 
+/// Standard deviation of the light at some points.
+static float spread_of(const bslam_rgb_t *colours, int32_t count)
+{
+    float sum = 0, squares = 0;
+    for (int32_t k = 0; k < count; k++) {
+        const float light = (colours[k].red + colours[k].green + colours[k].blue) / 3;
+        sum += light;
+        squares += light * light;
+    }
+    const float mean = sum / (float)count;
+    const float variance = squares / (float)count - mean * mean;
+    return variance > 0 ? (float)bslam_sqrt((bslam_real_t)variance) : 0;
+}
+
+/// The mean over the parts of an upright line but the busiest: there something may stand before the body.
+static float busyness_of_line(const bslam_rgb_t colours[BSLAM_LINE_POINTS_MAX])
+{
+    float sum = 0, most = 0;
+    for (int32_t i = 0; i < LINE_PARTS; i++) {
+        const float spread = spread_of(colours + i * PART_POINTS, PART_POINTS);
+        sum += spread;
+        most = spread > most ? spread : most;
+    }
+    return (sum - most) / (LINE_PARTS - 1);
+}
+
 bslam_busyness_t bslam_busyness_of(const bslam_frame_t *frame, const bslam_facing_t *facing,
                                    const bslam_body_t *body)
 {
@@ -43,15 +71,7 @@ bslam_busyness_t bslam_busyness_of(const bslam_frame_t *frame, const bslam_facin
                                 body->top, body->bottom, BSLAM_LINE_POINTS_MAX, colours)) {
             continue;
         }
-        float sum = 0, squares = 0;
-        for (int32_t k = 0; k < BSLAM_LINE_POINTS_MAX; k++) {
-            const float light = (colours[k].red + colours[k].green + colours[k].blue) / 3;
-            sum += light;
-            squares += light * light;
-        }
-        const float mean = sum / BSLAM_LINE_POINTS_MAX;
-        const float variance = squares / BSLAM_LINE_POINTS_MAX - mean * mean;
-        busy.lines[i] = variance > 0 ? (float)bslam_sqrt((bslam_real_t)variance) : 0;
+        busy.lines[i] = busyness_of_line(colours);
     }
     return busy;
 }

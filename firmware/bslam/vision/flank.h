@@ -8,8 +8,8 @@
 /// Upright lines of a body that are looked along, from left to right.
 #define BSLAM_BUSY_LINES 16
 
-/// How much the light changes along each: standard deviations, of 255; below 0 where the frame does not show
-/// it.
+/// How much the light changes along each, but for its busiest third: standard deviations, of 255; below 0
+/// where the frame does not show it.
 typedef struct bslam_busyness {
     float lines[BSLAM_BUSY_LINES];
 } bslam_busyness_t;

@@ -18,8 +18,12 @@ enum { STRAIGHT_PLACES = 15 };
 enum { TAPS = 5, TAPS_OUTSIDE = 3 };
 static const float TAP[TAPS] = {-2.2f, -2.6f, 2.6f, 5.0f, 2.1f};
 static const float HALF_CONTRAST = 20.0f;
-// The same for the square of the distance from the rough box, half-resolution pixels.
-static const float ROUGH_COST = 0.35f;
+// How far off the rough side may be: standard deviations in half-resolution pixels, of any side, and as a
+// part of the side's length. What is large is boxed by what is within it as easily as by its frame.
+static const float ROUGH_SD = 1.0f;
+static const float ROUGH_SD_SHARE = 0.06f;
+// A line is likelier than another by so much more than their scores say.
+static const float LINE_SHARPNESS = 1.25f;
 
 // Scan lines stay this far from the ends of a side, as a fraction of it.
 static const bslam_real_t END_MARGIN = BSLAM_R(0.12);
@@ -164,12 +168,20 @@ static bslam_real_t along_side(bslam_real_t from, bslam_real_t to, int32_t index
     return from + (to - from) * (END_MARGIN + part * (1 - 2 * END_MARGIN));
 }
 
+/// What a line costs a place away from the rough side, by how long that is, half-resolution pixels.
+static float rough_cost(float length)
+{
+    const float by_length = ROUGH_SD_SHARE * length;
+    return 0.5f / (ROUGH_SD * ROUGH_SD + by_length * by_length);
+}
+
 bool bslam_side_scan(bslam_side_t *side, const bslam_frame_t *frame, const bslam_facing_t *facing,
                      bslam_side_name_t name, bslam_real_t at, bslam_real_t from, bslam_real_t to,
                      bslam_real_t pixel)
 {
     begin(side, frame, name);
     side->places = STRAIGHT_PLACES;
+    side->rough_cost = rough_cost((float)((to - from) / (2 * pixel)));
     if (side->level) {
         side->reach = (float)((side->backwards ? at : -at) / (2 * pixel));
         const bslam_real_t ends =
@@ -269,7 +281,7 @@ static int32_t fill_scores(const bslam_side_t *side, const bslam_stance_t *stanc
         const float away = (float)(k - REACH_OUT) + outermost;
         const float *taps = contrast + k - TAPS_OUTSIDE;
         scores[k] = TAP[0] * taps[0] + TAP[1] * taps[1] + TAP[2] * taps[2] + TAP[3] * taps[3] +
-                    TAP[4] * taps[4] - ROUGH_COST * away * away;
+                    TAP[4] * taps[4] - side->rough_cost * away * away;
         best = scores[k] > scores[best] ? k : best;
     }
     return best;
@@ -290,7 +302,7 @@ bslam_line_t bslam_side_line(const bslam_side_t *side, const bslam_stance_t *sta
     float first = 0.0f;
     float second = 0.0f;
     for (int32_t k = TAPS_OUTSIDE; k < end; k++) {
-        const float share = bslam_falling(scores[best] - scores[k]);
+        const float share = bslam_falling(LINE_SHARPNESS * (scores[best] - scores[k]));
         const float away =
             bslam_magnitude(k - best) <= 1 ? 0.0f : (float)(k - best);  // neighbours are the same edge
         whole += share;

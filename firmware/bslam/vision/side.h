@@ -68,6 +68,7 @@ typedef struct bslam_side {
     bool level;      ///< an upper or lower side: scan lines are columns
     bool backwards;  ///< inwards is towards smaller coordinates
     float reach;     ///< places by which a level side is farther inwards where it is nearer by all of itself
+    float rough_cost;  ///< of a line, by the square of its places away from the rough side
     int32_t count;
     int16_t scan[BSLAM_SIDE_SCANS];   ///< coordinate of each line,
     int16_t first[BSLAM_SIDE_SCANS];  ///< of its boundary at place 0,

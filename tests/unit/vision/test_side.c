@@ -48,15 +48,21 @@ static void test_point_far_outside_the_frame_is_not_looked_for(void **state)
     }
 }
 
+/// Darker to the right of a boundary of the half-resolution copy.
+static void darken_from(int boundary, uint8_t light)
+{
+    for (int y = 0; y < UNIT_PICTURE_HEIGHT / 2; y++) {
+        for (int x = boundary; x < UNIT_PICTURE_WIDTH / 2; x++) {
+            unit_picture_set(&picture, x, y, light, light, light);
+        }
+    }
+}
+
 /// Black to the right of boundary `boundary` of the half-resolution copy.
 static void draw_edge(int boundary)
 {
     unit_picture_fill(&picture, 200, 200, 200);
-    for (int y = 0; y < UNIT_PICTURE_HEIGHT / 2; y++) {
-        for (int x = boundary; x < UNIT_PICTURE_WIDTH / 2; x++) {
-            unit_picture_set(&picture, x, y, 0, 0, 0);
-        }
-    }
+    darken_from(boundary, 0);
 }
 
 /// How many points are found along a line, so many places inwards of a left side at boundary 60.
@@ -89,6 +95,27 @@ static void test_edge_is_traced_within_the_places_that_are_looked_at(void **stat
     }
 }
 
+/// Places inwards of a left side at boundary 60, so many pixels high, at which its likeliest line is.
+static int likeliest_line(int height_px)
+{
+    const bslam_facing_t ahead = facing();
+    bslam_side_t side;
+    assert_true(bslam_side_scan(&side, &picture.frame, &ahead, BSLAM_SIDE_LEFT,
+                                pixels(159.5 - (2 * 60 - 0.5)), pixels(-height_px / 2.0),
+                                pixels(height_px / 2.0), pixels(1)));
+    return (int)bslam_side_line(&side, &FLAT).shift;
+}
+
+static void test_line_of_a_long_side_may_be_farther_from_the_rough_one(void **state)
+{
+    // A frame three places wide, and what it frames.
+    unit_picture_fill(&picture, 200, 200, 200);
+    darken_from(57, 170);
+    darken_from(60, 120);
+    assert_int_equal(likeliest_line(30), 0);
+    assert_int_equal(likeliest_line(180), -3);
+}
+
 static void test_body_whose_level_side_is_out_of_sight_has_no_level(void **state)
 {
     const bslam_facing_t ahead = facing();
@@ -109,6 +136,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_point_far_outside_the_frame_is_not_looked_for),
         cmocka_unit_test(test_edge_is_traced_within_the_places_that_are_looked_at),
+        cmocka_unit_test(test_line_of_a_long_side_may_be_farther_from_the_rough_one),
         cmocka_unit_test(test_body_whose_level_side_is_out_of_sight_has_no_level),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
