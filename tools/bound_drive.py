@@ -7,10 +7,13 @@ distance of its way from the true one. What errs then is what the pictures say.
 
 They do not say how their errors hang together, so the sightings are believed in several ways: as they are
 told, directions alone, and with three times the standard deviation. With --sizes the distances to each beacon
-are first divided by what they err in the median over the drive, which only the truth tells.
+are first divided by what they err in the median over the drive, which only the truth tells. With --moments N
+there is no hindsight: looked at is where the robot is at N moments of each drive, by what it was told until
+then, and where its own filter has it.
 
     .venv/bin/python tools/bound_drive.py --seeds 1000:1020 --sigma 0.6
     .venv/bin/python tools/bound_drive.py --seeds 1000:1020 --sigma 0.6 --sizes
+    .venv/bin/python tools/bound_drive.py --seeds 1000:1020 --sigma 1.0 --moments 6
 """
 
 from __future__ import annotations
@@ -28,13 +31,16 @@ from bslam.algorithms.noise import range_sd_m
 from bslam.algorithms.smoother import Smoother
 from bslam.core.slam import Slam
 from bslam.experiment.align import Rigid
-from bslam.experiment.camera import CameraStore, camera_log
+from bslam.experiment.camera import TOLD_THRESHOLD, CameraStore, camera_log
+from bslam.experiment.metrics import evaluate
 from bslam.experiment.options import Number, RunOptions, core_params
+from bslam.experiment.runner import run_log
 from bslam.experiment.truth import truth_at
 from bslam.log import Log, Sightings
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 from camera_drives import arguments
+from measure_restart import part
 
 KNOWN_SD_M, UNKNOWN_SD_M = 1e-3, 1e3
 
@@ -129,30 +135,61 @@ def with_true_sizes(log: Log) -> Log:
     return replace(log, sightings=replace(seen, range_m=range_m, range_scale_sd=None))
 
 
+RANGED_WAYS = {name: way for name, way in WAYS.items() if way.has_range}
+
+
+def at_moments_m(
+    log: Log, options: RunOptions, params: Mapping[str, Number], moments: int
+) -> NDArray[np.float64]:
+    """How far off the MAP of what was told until then is, by each way to believe it with distances, and the
+    filter: (moments, ways + 1) m. NaN where the MAP of a part is not found.
+    """
+    found = evaluate(log, run_log(log, options), options, align=False)
+    assert found is not None
+    errors_m = np.full((moments, len(RANGED_WAYS) + 1), math.nan)
+    for row, share in zip(errors_m, (np.arange(moments) + 0.5) / moments, strict=True):
+        end = int(share * len(log.odometry.time_us))
+        so_far = part(log, 0, end)
+        try:
+            maps_m = [best_errors_m(so_far, params, way, UNKNOWN_SD_M)[-1] for way in RANGED_WAYS.values()]
+        except ArithmeticError:
+            continue
+        row[:] = *maps_m, found.error_m[end]
+    return errors_m
+
+
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sizes", action="store_true", help="distances to each beacon right in the median, by the truth"
     )
+    parser.add_argument("--moments", type=int, metavar="N", help="without hindsight, so often in each drive")
 
 
 def main() -> int:
     """Measures and prints."""
     args = arguments(__doc__, range(1000, 1020), _add_arguments)
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association="known", sigma_mps=args.sigma)
-    errors_m: list[list[float]] = []
+    options = RunOptions(sensor="camera", association="known", sigma_mps=args.sigma, observation="distance")
+    errors_m: list[NDArray[np.float64]] = []
     for count, seed in enumerate(args.seeds, 1):
-        log = camera_log(scenario, seed, args.sigma, None, rig, store)
+        log = camera_log(scenario, seed, args.sigma, None, rig, store, TOLD_THRESHOLD)
         params = Slam.defaults() | core_params(options, log)
         log = with_true_sizes(log) if args.sizes else log
         errors_m.append(
-            [float(best_errors_m(log, params, way, UNKNOWN_SD_M).mean()) for way in WAYS.values()]
+            at_moments_m(log, options, params, args.moments)
+            if args.moments
+            else np.array([[best_errors_m(log, params, way, UNKNOWN_SD_M).mean() for way in WAYS.values()]])
         )
         print(f"{count} of {len(args.seeds)} drives", flush=True)
     seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
     sizes = ", sizes" if args.sizes else ""
     print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}; told identities{sizes}")
-    for name, column in zip(WAYS, np.array(errors_m).T, strict=True):
+    if args.moments:
+        lost = int(np.isnan(np.array(errors_m)[:, :, 0]).sum())
+        print(f"without hindsight, {args.moments} moments of each drive; of {lost} the MAP was not found")
+    names = (*RANGED_WAYS, "the filter") if args.moments else (*WAYS,)
+    means_m = np.array([np.nanmean(one, axis=0) for one in errors_m])
+    for name, column in zip(names, means_m.T, strict=True):
         print(f"{name}: {100 * column.mean():.1f} cm, worst drive {100 * column.max():.0f}")
     return 0
 
