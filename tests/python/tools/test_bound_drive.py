@@ -4,7 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from bound_drive import KNOWN_SD_M, UNKNOWN_SD_M, WAYS, best_errors_m, with_true_sizes
+from bound_drive import (
+    KNOWN_SD_M,
+    RANGED_WAYS,
+    UNKNOWN_SD_M,
+    WAYS,
+    at_moments_m,
+    best_errors_m,
+    with_true_sizes,
+)
 from bound_restart import restarts
 from bslam.core.slam import Slam
 from bslam.experiment.options import RunOptions, core_params
@@ -55,3 +63,17 @@ def test_best_of_a_drive_is_as_good_as_its_sizes() -> None:
     assert right_m < 0.15
     assert mean_m(skewed) > 1.5 * right_m
     assert abs(mean_m(with_true_sizes(skewed)) - right_m) < 1e-3
+
+
+def test_best_on_the_way_knows_nothing_of_what_comes() -> None:
+    log = part(_log(), 0, 400)
+    options = RunOptions(association="known", sigma_mps=0.6)
+    params = Slam.defaults() | core_params(options, log)
+    errors_m = at_moments_m(log, options, params, 2)
+    assert errors_m.shape == (2, len(RANGED_WAYS) + 1)
+    assert 0 < errors_m.max() < 0.5
+    spoilt = log.sightings.range_m.copy()
+    spoilt[log.sightings.time_us > log.odometry.time_us[100]] *= 2
+    other_m = at_moments_m(replace(log, sightings=replace(log.sightings, range_m=spoilt)), options, params, 2)
+    np.testing.assert_array_equal(other_m[0], errors_m[0])
+    assert (other_m[1] != errors_m[1]).all()
