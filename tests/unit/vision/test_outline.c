@@ -204,6 +204,8 @@ static double rms_of_cabinet_deg(int from_deg, int to_deg, cabinet_t looks, bsla
 static void test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_them(void **state)
 {
     const bslam_front_t cabinet = {.height_m = real(1.8), .depth_m = real(0.375)};
+    assert_true(error_of_cabinet_deg(50, CABINET_DARK_FLANK, cabinet) < 0.5);
+    assert_true(error_of_cabinet_deg(56, CABINET_DARK_FLANK, cabinet) < 0.5);
     assert_true(rms_of_cabinet_deg(45, 58, CABINET_DARK_FLANK, cabinet) < 0.3);
     assert_true(rms_of_cabinet_deg(45, 58, CABINET_PLAIN, cabinet) > 1);
 }
@@ -211,7 +213,10 @@ static void test_find_tells_a_flank_as_wide_as_the_front_by_the_edge_between_the
 static void test_find_tells_the_front_by_what_is_on_it(void **state)
 {
     const bslam_front_t cabinet = {.height_m = real(1.8), .depth_m = real(0.375)};
+    assert_true(error_of_cabinet_deg(53, CABINET_DRAWERS, cabinet) < 0.5);
+    assert_true(error_of_cabinet_deg(58, CABINET_DRAWERS, cabinet) < 0.5);
     assert_true(rms_of_cabinet_deg(45, 58, CABINET_DRAWERS, cabinet) < 0.5);
+    assert_true(rms_of_cabinet_deg(45, 58, CABINET_PLAIN, cabinet) > 1);
     assert_true(rms_of_cabinet_deg(45, 58, CABINET_BEHIND, cabinet) < 0.5);
 }
 
