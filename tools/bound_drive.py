@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from bslam.algorithms.noise import range_sd_m
 from bslam.algorithms.smoother import Smoother
+from bslam.commands.arguments import positive_count
 from bslam.core.slam import Slam
 from bslam.experiment.align import Rigid
 from bslam.experiment.camera import TOLD_THRESHOLD, CameraStore, camera_log
@@ -162,7 +163,9 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sizes", action="store_true", help="distances to each beacon right in the median, by the truth"
     )
-    parser.add_argument("--moments", type=int, metavar="N", help="without hindsight, so often in each drive")
+    parser.add_argument(
+        "--moments", type=positive_count, metavar="N", help="without hindsight, so often in each drive"
+    )
 
 
 def main() -> int:
