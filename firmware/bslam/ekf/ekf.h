@@ -51,6 +51,9 @@ static inline int32_t bslam_beacon_dim(bslam_beacon_kind_t kind)
                                         : 0;
 }
 
+/// A beacon's class_lead at most: so many sightings in a row make anything something else.
+#define BSLAM_CLASS_LEAD_MAX 20
+
 /// A beacon of the map.
 typedef struct bslam_beacon {
     uint32_t uid;  ///< counts up from 0 with each beacon ever added; never used twice
@@ -68,6 +71,7 @@ typedef struct bslam_beacon {
     uint16_t views;      ///< sightings far apart that count towards its confirmation, less those against
     bool confirmed;
     uint8_t beacon_class;
+    uint8_t class_lead;        ///< by how many votes it leads, slam/scale.c
     bool has_scores;           ///< of its sightings
     bslam_real_t score_sum;    ///< what these say for its being a beacon at all
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
@@ -236,6 +240,20 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real
 /// doubtful. BSLAM_E_MAP_FULL. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
                                                     bslam_real_t sd_m, int *index);
+
+/// A ray that is seen with a distance becomes a sized beacon where on it the distance ends, of whose scale is
+/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "A beacon's
+/// own scale". O(n²).
+bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                           const bslam_sighting_t *sighting, int index, bslam_real_t scale_var);
+
+/// A point whose distances are measured from now on becomes a sized beacon, of whose scale is known this
+/// variance > 0, if there is room for it. O(n²) then.
+void bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
+
+/// A sized beacon is something else than was thought: its scale is 1 again, to this variance > 0, whatever
+/// was learned of it. Its place stays. O(n).
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);

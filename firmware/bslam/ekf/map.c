@@ -8,6 +8,8 @@
 #include "bslam/model/noise.h"
 
 static const bslam_real_t FAR_INVERSE_PER_M = BSLAM_R(1e-3);
+/// A distance tells where on a ray a point is unless it lies more across the ray than this, as a cosine.
+static const bslam_real_t ALONG_MIN = BSLAM_R(0.5);
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
 {
@@ -99,6 +101,12 @@ static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const b
     ekf->covariance[bslam_symmat_at(at, at - 1)] = by_range * point.y_by_range;
 }
 
+/// Values of the state beyond two a beacon that there is room for.
+static int room_of(const bslam_ekf_t *ekf)
+{
+    return 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;
+}
+
 static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                        const bslam_sighting_t *sighting)
 {
@@ -140,7 +148,7 @@ bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, con
 {
     const bool ray = !sighting->has_range;
     const bslam_real_t scale_var = bslam_unknown_scale_var(params, sighting);
-    const int room = 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;  // values beyond two a beacon
+    const int room = room_of(ekf);
     if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && room < 2)) {
         return BSLAM_E_MAP_FULL;
     }
@@ -184,6 +192,53 @@ bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_rea
     ekf->beacons[*index].known_y_m = y_m;
     ekf->beacons[*index].confirmed = true;
     return BSLAM_OK;
+}
+
+// ---- scales -----------------------------------------------------------------------------------------------
+
+/// The value at `at` becomes the scale of a thing that was not seen yet.
+static void begin_scale(bslam_ekf_t *ekf, int at, bslam_real_t scale_var)
+{
+    for (int j = 0; j < ekf->dim; j++) {
+        bslam_symmat_set(ekf->covariance, at, j, j == at ? scale_var : 0);
+    }
+    ekf->mean[at] = 1;
+}
+
+/// Puts a place in for one more state value, which the caller fills; beacons behind it move down.
+static void insert_value(bslam_ekf_t *ekf, int at)
+{
+    bslam_symmat_insert(ekf->covariance, ekf->dim, at);
+    for (int i = ekf->dim; i > at; i--) {
+        ekf->mean[i] = ekf->mean[i - 1];
+    }
+    ekf->dim++;
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        if (ekf->beacons[b].at >= at) {
+            ekf->beacons[b].at++;
+        }
+    }
+}
+
+void bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
+{
+    bslam_beacon_t *beacon = &ekf->beacons[index];
+    if (beacon->kind != BSLAM_BEACON_POINT || room_of(ekf) < 1) {
+        return;
+    }
+    const int at = beacon->at + BSLAM_POINT_DIM;
+    insert_value(ekf, at);
+    begin_scale(ekf, at, scale_var);
+    beacon->kind = BSLAM_BEACON_SIZED;
+    ekf->sized_count++;
+}
+
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    if (beacon->kind == BSLAM_BEACON_SIZED) {
+        begin_scale(ekf, beacon->at + BSLAM_POINT_DIM, scale_var);
+    }
 }
 
 // ---- shrinking --------------------------------------------------------------------------------------------
@@ -252,6 +307,104 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, 
     return 4 * distance_sd * along < params->ray_linear_limit * square;
 }
 
+/// A point by what the state has: how it goes with that, and what it errs besides.
+typedef struct place {
+    bslam_real_t x_m;
+    bslam_real_t y_m;
+    bslam_row_t x_row;
+    bslam_row_t y_row;
+    bslam_sym2_t own;
+} place_t;
+
+/// The values at `at` and behind it become the point.
+static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
+{
+    bslam_real_t *x_column = ekf->pending[0];
+    bslam_real_t *y_column = ekf->pending[1];
+    bslam_symmat_times_two(ekf->covariance, ekf->dim, &place->x_row, &place->y_row, x_column, y_column);
+    const bslam_real_t xx = bslam_ekf_dot(&place->x_row, x_column) + place->own.xx;
+    const bslam_real_t xy = bslam_ekf_dot(&place->x_row, y_column) + place->own.xy;
+    const bslam_real_t yy = bslam_ekf_dot(&place->y_row, y_column) + place->own.yy;
+    for (int i = 0; i < ekf->dim; i++) {
+        bslam_symmat_set(ekf->covariance, i, at, x_column[i]);
+        bslam_symmat_set(ekf->covariance, i, at + 1, y_column[i]);
+    }
+    bslam_symmat_set(ekf->covariance, at, at, xx);
+    bslam_symmat_set(ekf->covariance, at + 1, at, xy);
+    bslam_symmat_set(ekf->covariance, at + 1, at + 1, yy);
+    ekf->mean[at] = place->x_m;
+    ekf->mean[at + 1] = place->y_m;
+}
+
+/// Where on the ray at `at` a sighting's distance ends, MATH (48a). *along: the point as the sensor sees it,
+/// by its distance. False: nowhere, or so much across the ray that the distance does not tell.
+static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t range_m, int at,
+                         place_t *place, bslam_real_t by_range[2])
+{
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
+    bslam_real_t ux, uy;
+    bslam_sin_cos(ekf->mean[at + 2], &uy, &ux);
+    const bslam_real_t wx = ekf->mean[at] - sensor.pose.x_m;
+    const bslam_real_t wy = ekf->mean[at + 1] - sensor.pose.y_m;
+    const bslam_real_t across = ux * wy - uy * wx;
+    const bslam_real_t square = range_m * range_m - across * across;
+    if (!(square > range_m * range_m * ALONG_MIN * ALONG_MIN)) {
+        return false;
+    }
+    const bslam_real_t reach_m = bslam_sqrt(square);
+    const bslam_real_t length_m = reach_m - (wx * ux + wy * uy);
+    if (!(length_m > 0)) {
+        return false;
+    }
+    const bslam_real_t ex = (wx + length_m * ux) / range_m, ey = (wy + length_m * uy) / range_m;
+    const bslam_real_t c = reach_m / range_m;
+    const bslam_real_t turn = length_m * (uy * ex - ux * ey) / c;  // d length / d direction
+    by_range[0] = ux / c;
+    by_range[1] = uy / c;
+    *place = (place_t){.x_m = ekf->mean[at] + length_m * ux, .y_m = ekf->mean[at + 1] + length_m * uy};
+    const bslam_real_t by_theta = ex * sensor.x_by_theta + ey * sensor.y_by_theta;
+    place->x_row = (bslam_row_t){
+        .base = {by_range[0] * ex, by_range[0] * ey, by_range[0] * by_theta},
+        .other = {1 - by_range[0] * ex, -by_range[0] * ey, ux * turn - length_m * uy, 0},
+        .at = (uint16_t)at,
+        .dim = BSLAM_RAY_DIM,
+    };
+    place->y_row = (bslam_row_t){
+        .base = {by_range[1] * ex, by_range[1] * ey, by_range[1] * by_theta},
+        .other = {-by_range[1] * ex, 1 - by_range[1] * ey, uy * turn + length_m * ux, 0},
+        .at = (uint16_t)at,
+        .dim = BSLAM_RAY_DIM,
+    };
+    return true;
+}
+
+bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+                           const bslam_sighting_t *sighting, int index, bslam_real_t scale_var)
+{
+    bslam_beacon_t *beacon = &ekf->beacons[index];
+    const int at = beacon->at;
+    const bslam_real_t range_m = sighting->range_m;
+    place_t place;
+    bslam_real_t by_range[2];
+    if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, mount, range_m, at, &place, by_range)) {
+        return false;
+    }
+    const bslam_real_t variance = bslam_scaled_range_variance_m2(params, sighting, range_m, scale_var);
+    place.own.xx = by_range[0] * by_range[0] * variance;
+    place.own.xy = by_range[0] * by_range[1] * variance;
+    place.own.yy = by_range[1] * by_range[1] * variance;
+    set_place(ekf, at, &place);
+    begin_scale(ekf, at + 2, scale_var);
+    bslam_symmat_set(ekf->covariance, at + 2, at, -scale_var * range_m * by_range[0]);
+    bslam_symmat_set(ekf->covariance, at + 2, at + 1, -scale_var * range_m * by_range[1]);
+    remove_values(ekf, at + BSLAM_SIZED_DIM, BSLAM_RAY_DIM - BSLAM_SIZED_DIM);
+    beacon->kind = BSLAM_BEACON_SIZED;
+    ekf->ray_count--;
+    ekf->sized_count++;
+    return true;
+}
+
 bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                           int index)
 {
@@ -261,28 +414,12 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const 
         return false;
     }
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
-    bslam_real_t *x_row = ekf->pending[0];
-    bslam_real_t *y_row = ekf->pending[1];
-    bslam_row_t x_by_ray = {.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
-    bslam_row_t y_by_ray = x_by_ray;
-    memcpy(x_by_ray.other, point.x_by_ray, sizeof x_by_ray.other);
-    memcpy(y_by_ray.other, point.y_by_ray, sizeof y_by_ray.other);
-    bslam_symmat_times_two(ekf->covariance, ekf->dim, &x_by_ray, &y_by_ray, x_row, y_row);
-    bslam_sym2_t own = {0, 0, 0};
-    for (int k = 0; k < BSLAM_RAY_DIM; k++) {
-        own.xx += point.x_by_ray[k] * x_row[at + k];
-        own.xy += point.y_by_ray[k] * x_row[at + k];
-        own.yy += point.y_by_ray[k] * y_row[at + k];
-    }
-    for (int i = 0; i < ekf->dim; i++) {
-        bslam_symmat_set(ekf->covariance, i, at, x_row[i]);
-        bslam_symmat_set(ekf->covariance, i, at + 1, y_row[i]);
-    }
-    bslam_symmat_set(ekf->covariance, at, at, own.xx);
-    bslam_symmat_set(ekf->covariance, at + 1, at, own.xy);
-    bslam_symmat_set(ekf->covariance, at + 1, at + 1, own.yy);
-    ekf->mean[at] = point.x_m;
-    ekf->mean[at + 1] = point.y_m;
+    place_t place = {.x_m = point.x_m, .y_m = point.y_m};
+    place.x_row = (bslam_row_t){.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
+    place.y_row = place.x_row;
+    memcpy(place.x_row.other, point.x_by_ray, sizeof place.x_row.other);
+    memcpy(place.y_row.other, point.y_by_ray, sizeof place.y_row.other);
+    set_place(ekf, at, &place);
     remove_values(ekf, at + 2, BSLAM_RAY_DIM - BSLAM_POINT_DIM);
     beacon->kind = BSLAM_BEACON_POINT;
     ekf->ray_count--;

@@ -481,6 +481,22 @@ void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count)
     }
 }
 
+void bslam_symmat_insert(bslam_real_t *m, int n, int at)
+{
+    // Every element moves to a place behind its own, so descending order never overwrites what is still to be
+    // read.
+    for (int i = n; i > at; i--) {
+        const bslam_real_t *from = m + bslam_symmat_row(i - 1);
+        bslam_real_t *to = m + bslam_symmat_row(i);
+        for (int j = i; j > at; j--) {
+            to[j] = from[j - 1];
+        }
+        to[at] = 0;
+        memcpy(to, from, (size_t)at * sizeof *to);
+    }
+    memset(m + bslam_symmat_row(at), 0, (size_t)(at + 1) * sizeof *m);
+}
+
 bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise)
 {
     bslam_real_t *own = factor + bslam_symmat_row(i);

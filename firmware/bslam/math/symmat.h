@@ -95,6 +95,9 @@ void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t te
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
 void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count);
 
+/// Puts a row and a column of zeros in at place `at`; those from there on move down by one. O(n^2).
+void bslam_symmat_insert(bslam_real_t *m, int n, int at);
+
 /// One row of a Cholesky factorisation in place: row i of the array, a covariance's, becomes row i of the
 /// factor, which the rows before are already. raise: diagonal elements count as larger by this part, so that
 /// with n / 10^7 (float) a singular matrix passes in spite of rounding. False: with the rows before, it is no

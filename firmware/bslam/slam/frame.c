@@ -48,18 +48,6 @@ static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon
     slam->counters.frozen += reason == BSLAM_REASON_FROZEN ? 1u : 0u;
 }
 
-/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
-/// taken for something else, it has a direction only.
-static bslam_sighting_t sighting_of(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
-{
-    bslam_sighting_t taken = *sighting;
-    const bool differs = beacon->beacon_class != sighting->beacon_class &&
-                         beacon->beacon_class != BSLAM_CLASS_NONE &&
-                         sighting->beacon_class != BSLAM_CLASS_NONE;
-    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || !differs);
-    return taken;
-}
-
 static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
                        bslam_beacon_t *beacon, bslam_real_t distance2)
 {
@@ -106,7 +94,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     if (slam->smoother != NULL) {
-        const bslam_sighting_t taken = sighting_of(sighting, beacon);
+        const bslam_sighting_t taken = bslam_slam_taken_as(beacon, sighting);
         slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
     beacon->way_um = slam->way_um;
@@ -139,6 +127,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
     beacon->label = sighting->label;
     beacon->beacon_class = sighting->beacon_class;
+    beacon->class_lead = sighting->has_range ? 1 : 0;
     beacon->first_seen_us = time_us;
     beacon->last_seen_us = time_us;
     beacon->sightings = 1;
@@ -165,12 +154,14 @@ static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, cons
             fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
             const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
-            const bslam_sighting_t taken = sighting_of(&sightings[i], beacon);
-            if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon,
-                                     &slam->innovations[i]) != BSLAM_OK) {
+            const bslam_sighting_t taken = bslam_slam_taken_as(beacon, &sightings[i]);
+            bslam_innovation_t *innovation = &slam->innovations[i];
+            if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon, innovation) !=
+                BSLAM_OK) {
                 reject(slam, BSLAM_REASON_SINGULAR, beacon, &slam->accounts[i]);
                 match->verdict = BSLAM_VERDICT_REJECT;
             }
+            innovation->has_range = innovation->has_range && !match->range_used;
         }
     }
 }
@@ -182,6 +173,11 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                                                   const bslam_sighting_t *sightings, int count)
 {
     bslam_slam_try(slam, sightings, count);
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->matches[i];
+        match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&
+                            bslam_slam_begin_scale(slam, mount, match->beacon, &sightings[i]);
+    }
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->matches[i];
@@ -193,6 +189,12 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
         }
     }
     bslam_ekf_correct(&slam->ekf, &slam->params);
+    for (int i = 0; i < count; i++) {
+        if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH &&
+            slam->accounts[i].outcome == BSLAM_OUTCOME_MATCHED) {
+            bslam_slam_vote_class(slam, slam->matches[i].beacon, &sightings[i]);
+        }
+    }
     for (int i = 0; i < count; i++) {
         if (slam->matches[i].verdict != BSLAM_VERDICT_NEW) {
             continue;

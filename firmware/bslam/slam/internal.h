@@ -1,4 +1,5 @@
-/// What the files of this directory call of each other: motion.c, check.c, trust.c, frame.c, slam.c. Not for
+/// What the files of this directory call of each other: motion.c, check.c, trust.c, scale.c, frame.c,
+/// slam.c. Not for
 /// users.
 #ifndef BSLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_INTERNAL_H
@@ -37,6 +38,22 @@ void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
 /// refuted at once, into BSLAM_VERDICT_TRIAL. Before anything of the frame is used: its order does not
 /// matter.
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
+
+// ---- scale.c: what a beacon is taken for, and how much too long its distances are by that -----------------
+
+/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
+/// taken for something else, it has a direction only.
+bslam_sighting_t bslam_slam_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
+
+/// A beacon whose place came of directions has a scale from its first sighting with a distance on. Before the
+/// innovations of a frame are taken. True: the distance is used up, it says where on a ray the beacon is.
+/// O(n²).
+bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                            const bslam_sighting_t *sighting);
+
+/// What a fused sighting says for the beacon's class, which is what its sightings with a distance call it
+/// most often. With another class goes another scale. After the correction. O(n).
+void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting);
 
 // ---- frame.c: the two halves of bslam_slam_sightings, for what looks at a frame before it is used ---------
 

@@ -4,6 +4,7 @@ runs.
 
 from collections.abc import Iterator
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,6 +80,24 @@ def test_double_core_is_the_reference_with_other_values(
     kind: dict[str, float], values: dict[str, float]
 ) -> None:
     assert worst_deviation({**PARAMS, **kind, **values}, seed=7, steps=80, beacons=6, real="double") < DOUBLE
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=name)
+def test_double_core_is_the_reference_where_things_with_scales_are_measured_later(
+    kind: dict[str, float],
+) -> None:
+    """Rays, and points that rays became, get their scale from the first distance on."""
+    params = {**PARAMS, **kind, "range_scale_sd": 0.1}
+    slam, reference = Slam(params, real="double"), DenseEkf(params)
+    changes: set[tuple[str, str]] = set()
+    for k, step in enumerate(run(11, 120, 7, params)):
+        late = [s if k > 12 * s.label + 3 else replace(s, range_m=None) for s in step.sightings]
+        before = [beacon.kind for beacon in reference.beacons]
+        feed(slam, replace(step, sightings=late))
+        feed_reference(reference, replace(step, sightings=late))
+        changes |= set(zip(before, (beacon.kind for beacon in reference.beacons), strict=False))
+        assert deviations(slam, reference.mean, reference.covariance, reference.angles()) < DOUBLE, k
+    assert {("ray", "point"), ("ray", "sized"), ("point", "sized")} <= changes
 
 
 @pytest.mark.parametrize("delay_us", [40_000, 100_000, 250_000])

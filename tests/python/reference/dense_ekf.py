@@ -17,7 +17,9 @@ Coordinates of the error e of a state X, estimated as X̂:
 
 Conventions that the C core documents: all sightings of a frame are linearised at the estimate before the
 frame, and the estimate moves once at its end; then new beacons are added in the frame's order, and rays
-that are linear enough become points. There is no delay here: what came late is fed in the order of time.
+that are linear enough become points. Where things have scales, a point that is seen with a distance has one
+from then on, and a ray becomes a sized point where on it the distance ends, which is then used up; that
+comes before the frame's linearisation. There is no delay here: what came late is fed in the order of time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -374,11 +376,13 @@ class DenseEkf:
 
         mount: the sensor's pose on the robot.
         """
+        used = [self._begin_scale(sighting, mount) for sighting in sightings]
         measurements = []
-        for sighting in sightings:
+        for sighting, is_used in zip(sightings, used, strict=True):
             index = self.find(sighting.label)
             if index is not None:
-                measurements.append(self.measurement(sighting, index, mount))
+                parts = self.measurement(sighting, index, mount)
+                measurements.append(tuple(part[:1] for part in parts) if is_used else parts)
         if measurements:
             self._move(self._update_all(measurements))
         for sighting in sightings:
@@ -425,6 +429,36 @@ class DenseEkf:
         kind = "ray" if sighting.range_m is None else "sized" if is_sized else "point"
         beacon = Beacon(sighting.label, kind)
         self._change(placed, np.diag(noise), [*self.beacons, beacon])
+
+    def _begin_scale(self, sighting: Sighting, mount: Pose) -> bool:
+        """A point or a ray that is seen with a distance has a scale from then on, if things have any. True:
+        its distance is used up.
+        """
+        index, scale_sd = self.find(sighting.label), self.params["range_scale_sd"]
+        if index is None or sighting.range_m is None or not scale_sd > 0:
+            return False
+        kind, at = self.beacons[index].kind, self.at(index)
+        if kind not in ("point", "ray"):
+            return False
+
+        def sized(state, noise):  # type: ignore[no-untyped-def]
+            scale, behind = 1 + noise[0], at + self.beacons[index].size
+            if kind == "point":
+                return [*state[:behind], scale, *state[behind:]]
+            offset_x, offset_y = _turned(state[THETA], mount[0], mount[1])
+            to_x, to_y = state[at] - state[X] - offset_x, state[at + 1] - state[Y] - offset_y
+            c, s = np.cos(state[at + 2]), np.sin(state[at + 2])
+            # The length at which anchor + length (c, s) is as far from the sensor as was measured.
+            range_m = (sighting.range_m + noise[1]) / scale
+            half = to_x * c + to_y * s
+            length = np.sqrt(half**2 - to_x**2 - to_y**2 + range_m**2) - half
+            place = [state[at] + length * c, state[at + 1] + length * s]
+            return [*state[:at], *place, scale, *state[behind:]]
+
+        beacons = list(self.beacons)
+        beacons[index] = Beacon(sighting.label, "sized")
+        self._change(sized, np.diag([scale_sd**2, self._range_variance(sighting.range_m)]), beacons)
+        return kind == "ray"
 
     def remove(self, index: int) -> None:
         """Takes a beacon out: what is left of the state does not depend on it."""

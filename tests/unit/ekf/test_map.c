@@ -472,6 +472,184 @@ static void test_settle_ray_without_a_positive_inverse_distance_stays(void **sta
     }
 }
 
+// ---- scales -----------------------------------------------------------------------------------------------
+
+typedef struct measuring {
+    int dim;  // where the noise stands among the arguments
+    int at;   // where the ray does
+    double range_m;
+} measuring_t;
+
+/// The point of a ray that is as far from the sensor as was measured, and its scale. Noise: of the distance,
+/// of the scale.
+static void new_on_ray(const double *in, double *out, const void *context)
+{
+    const measuring_t *m = context;
+    double x, y, theta;
+    sensor_of(in, &x, &y, &theta);
+    const double *ray = &in[m->at];
+    out[2] = 1 + in[m->dim + 1];
+    const double range_m = (m->range_m + in[m->dim]) / out[2];
+    const double along = (x - ray[0]) * cos(ray[2]) + (y - ray[1]) * sin(ray[2]);
+    const double across = (x - ray[0]) * sin(ray[2]) - (y - ray[1]) * cos(ray[2]);
+    const double length = along + sqrt(range_m * range_m - across * across);
+    out[0] = ray[0] + length * cos(ray[2]);
+    out[1] = ray[1] + length * sin(ray[2]);
+}
+
+/// A distance of the point that is so far along beacon 2, a ray; and how much of it lies along the ray.
+static double range_along_ray(const bslam_ekf_t *ekf, double length_m, double *cosine)
+{
+    double in[UNIT_ARGUMENTS_MAX] = {0};
+    twin_values(ekf, in);
+    double x, y, theta;
+    sensor_of(in, &x, &y, &theta);
+    const double *ray = &in[ekf->beacons[2].at];
+    const double dx = ray[0] + length_m * cos(ray[2]) - x;
+    const double dy = ray[1] + length_m * sin(ray[2]) - y;
+    *cosine = (dx * cos(ray[2]) + dy * sin(ray[2])) / hypot(dx, dy);
+    return hypot(dx, dy);
+}
+
+static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
+{
+    unit_random_t random = {21};
+    int measured = 0;
+    for (int i = 0; i < 60; i++) {
+        bslam_params_t params;
+        bslam_ekf_t ekf = random_filter(&params, &random);
+        double cosine;
+        const double range_m = range_along_ray(&ekf, unit_random(&random, 1, 8), &cosine);
+        if (cosine < 0.55) {
+            continue;
+        }
+        measured++;
+        const int at = ekf.beacons[2].at;
+        const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
+        const double noise_var[] = {range_sd2, 0.09 * 0.09};
+        const measuring_t measuring = {ekf.dim, at, range_m};
+        twin_t expected = augmented(&ekf, new_on_ray, 3, noise_var, 2, &measuring);
+        const int n = ekf.dim;
+        dense_t reorder = dense_zero(n - 1, n + 3);
+        for (int k = 0; k < n - 1; k++) {
+            reorder.at[k][k < at ? k : k < at + 3 ? n + k - at : k + 1] = 1;
+        }
+        expected.mean = dense_product(&reorder, &expected.mean);
+        expected.covariance = dense_sandwich(&reorder, &expected.covariance);
+        const bslam_sighting_t sighting = unit_polar(3, range_m, 7);  // its direction is not asked for
+        assert_true(bslam_ekf_measure_ray(&ekf, &params, &mount, &sighting, 2, BSLAM_R(0.0081)));
+        assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_SIZED);
+        assert_int_equal(ekf.ray_count, 0);
+        assert_int_equal(ekf.sized_count, 1);
+        twin_assert(&ekf, &expected, TOLERANCE * 10);
+    }
+    assert_in_range(measured, 20, 60);
+}
+
+static void test_measure_ray_that_the_distance_does_not_end_on_stays(void **state)
+{
+    unit_random_t random = {22};
+    bslam_params_t params;
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_real_t *ray = &ekf.mean[ekf.beacons[2].at];
+    ekf.mean[BSLAM_STATE_X] = 0;
+    ekf.mean[BSLAM_STATE_Y] = 0;
+    ekf.mean[BSLAM_STATE_THETA] = 0;  // the sensor is at (.2, -.1)
+    ray[0] = BSLAM_R(0.2);
+    ray[1] = BSLAM_R(-2.1);
+    ray[2] = 0;  // passes the sensor 2 m away
+    const bslam_ekf_t before = ekf;
+    static const double ranges_m[] = {1.9, 2.0, 2.2, 2.3};  // short of it, or too much across
+    for (int i = 0; i < COUNT_OF(ranges_m); i++) {
+        const bslam_sighting_t seen = unit_polar(0, ranges_m[i], 7);
+        assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+    }
+    const bslam_sighting_t seen = unit_polar(0, 4, 7);
+    assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 0, BSLAM_R(0.01)));  // a point
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+    ray[0] = 6;  // begins behind where the distance ends
+    assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+    ray[0] = BSLAM_R(0.2);
+    assert_true(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+}
+
+/// Noise: of the scale.
+static void new_scale(const double *in, double *out, const void *context)
+{
+    out[0] = 1 + in[*(const int *)context];
+}
+
+static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **state)
+{
+    unit_random_t random = {23};
+    bslam_params_t params;
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    const int n = ekf.dim, at = ekf.beacons[0].at + 2;
+    const double noise_var[] = {0.0049};
+    twin_t expected = augmented(&ekf, new_scale, 1, noise_var, 1, &n);
+    dense_t reorder = dense_zero(n + 1, n + 1);
+    for (int k = 0; k <= n; k++) {
+        reorder.at[k][k < at ? k : k == at ? n : k - 1] = 1;
+    }
+    expected.mean = dense_product(&reorder, &expected.mean);
+    expected.covariance = dense_sandwich(&reorder, &expected.covariance);
+    const int next = ekf.beacons[1].at, ray = ekf.beacons[2].at;
+    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.0049));
+    assert_int_equal(ekf.beacons[0].kind, BSLAM_BEACON_SIZED);
+    assert_int_equal(ekf.sized_count, 1);
+    assert_int_equal(ekf.beacons[0].at, at - 2);
+    assert_int_equal(ekf.beacons[1].at, next + 1);
+    assert_int_equal(ekf.beacons[2].at, ray + 1);
+    twin_assert(&ekf, &expected, TOLERANCE);
+    const bslam_ekf_t before = ekf;
+    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01));  // has one
+    bslam_ekf_give_scale(&ekf, 2, BSLAM_R(0.01));  // a ray
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
+static void test_give_scale_beyond_their_room_is_not_done(void **state)
+{
+    const bslam_params_t params = unit_params();
+    bslam_ekf_t ekf;
+    bslam_ekf_init(&ekf, &params);
+    int index;
+    const bslam_sighting_t point = unit_polar(0.3, 3, 1), ray = unit_direction(0.1, 2);
+    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &point, &index), BSLAM_OK);
+    for (int i = 0; i < BSLAM_RAYS_MAX && ekf.beacon_count < BSLAM_BEACONS_MAX; i++) {
+        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &ray, &index), BSLAM_OK);
+    }
+    if (ekf.ray_count < BSLAM_RAYS_MAX) {  // as many rays as beacons: they never take all the room
+        ekf.ray_count = BSLAM_RAYS_MAX;
+    }
+    const bslam_ekf_t before = ekf;
+    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01));
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
+static void test_renew_scale_forgets_what_was_learned_of_it_and_nothing_else(void **state)
+{
+    unit_random_t random = {24};
+    bslam_params_t params;
+    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_sighting_t sighting = unit_polar(0.7, 4, 7);
+    sighting.range_scale_sd = BSLAM_R(0.1);
+    int index;
+    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+    const int at = ekf.beacons[index].at + 2;
+    ekf.mean[at] = BSLAM_R(1.2);
+    twin_t expected = twin_of(&ekf);
+    for (int i = 0; i < ekf.dim; i++) {
+        expected.covariance.at[i][at] = expected.covariance.at[at][i] = i == at ? 0.0025 : 0;
+    }
+    expected.mean.at[at][0] = 1;
+    bslam_ekf_renew_scale(&ekf, index, BSLAM_R(0.0025));
+    twin_assert(&ekf, &expected, TOLERANCE);
+    const bslam_ekf_t before = ekf;
+    bslam_ekf_renew_scale(&ekf, 0, BSLAM_R(0.01));  // a point
+    bslam_ekf_renew_scale(&ekf, 2, BSLAM_R(0.01));  // a ray
+    assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
 // ---- queries ----------------------------------------------------------------------------------------------
 
 static void test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point(void **state)
@@ -567,6 +745,11 @@ int main(void)
         cmocka_unit_test(test_settle_ray_what_is_no_ray_stays),
         cmocka_unit_test(test_settle_ray_without_a_positive_variance_stays),
         cmocka_unit_test(test_settle_ray_without_a_positive_inverse_distance_stays),
+        cmocka_unit_test(test_measure_ray_is_the_place_where_the_distance_ends),
+        cmocka_unit_test(test_measure_ray_that_the_distance_does_not_end_on_stays),
+        cmocka_unit_test(test_give_scale_puts_a_value_of_its_own_behind_the_point),
+        cmocka_unit_test(test_give_scale_beyond_their_room_is_not_done),
+        cmocka_unit_test(test_renew_scale_forgets_what_was_learned_of_it_and_nothing_else),
 
         cmocka_unit_test(test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point),
         cmocka_unit_test(test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it),

@@ -285,6 +285,27 @@ static void test_remove_every_stretch_of_every_size_is_the_naive_removal(void **
     }
 }
 
+// ---- insertion --------------------------------------------------------------------------------------------
+
+static void test_insert_at_every_place_puts_zeros_in_and_moves_the_rest(void **state)
+{
+    unit_random_t random = {15};
+    for (int n = 1; n <= 14; n++) {
+        for (int at = 0; at <= n; at++) {
+            pair_t pair = new_random_pair(&random, n + 1);  // with room for one more row
+            bslam_symmat_insert(pair.m, n, at);
+            for (int i = 0; i <= n; i++) {
+                for (int j = 0; j <= i; j++) {
+                    const double expected =
+                        i == at || j == at ? 0 : pair.naive[i < at ? i : i - 1][j < at ? j : j - 1];
+                    assert_near(bslam_symmat_get(pair.m, i, j), expected, 0);
+                }
+            }
+            free(pair.m);
+        }
+    }
+}
+
 // ---- definiteness -----------------------------------------------------------------------------------------
 
 static void test_is_positive_definite_matrix_is(void **state)
@@ -433,6 +454,7 @@ int main(void)
         cmocka_unit_test(test_add_rank4_with_zero_scales_changes_no_bit),
 
         cmocka_unit_test(test_remove_every_stretch_of_every_size_is_the_naive_removal),
+        cmocka_unit_test(test_insert_at_every_place_puts_zeros_in_and_moves_the_rest),
 
         cmocka_unit_test(test_is_positive_definite_matrix_is),
         cmocka_unit_test(test_is_positive_matrix_with_a_repeated_row_is),

@@ -1,0 +1,86 @@
+// What a beacon is taken for, and the scale that its distances have by that. MATH "A beacon's own scale".
+#include "bslam/model/noise.h"
+#include "bslam/slam/internal.h"
+
+/// What has been taken for two things may be neither: how much more its scale is then in doubt.
+static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
+
+/// Whether a sighting takes a beacon for what it is taken for, or does not say.
+static bool agrees(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    return beacon->beacon_class == sighting->beacon_class || beacon->beacon_class == BSLAM_CLASS_NONE ||
+           sighting->beacon_class == BSLAM_CLASS_NONE;
+}
+
+bslam_sighting_t bslam_slam_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    bslam_sighting_t taken = *sighting;
+    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || agrees(beacon, sighting));
+    return taken;
+}
+
+/// Its variance as a sighting with a distance tells it; 0: no beacon has a scale, or the smoother leads the
+/// filter, whose beacons have none.
+static bslam_real_t scale_variance(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
+{
+    return sighting->has_range && slam->smoother == NULL ? bslam_unknown_scale_var(&slam->params, sighting)
+                                                         : 0;
+}
+
+/// Whether a sighting's direction is that of a beacon.
+static bool points_at(const bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                      const bslam_sighting_t *sighting)
+{
+    bslam_sighting_t direction = *sighting;
+    bslam_innovation_t innovation;
+    bslam_real_t distance2;
+    direction.has_range = false;
+    return bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &direction, index, &innovation) ==
+               BSLAM_OK &&
+           bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK &&
+           (!(slam->params.gate_d2 > 0) || distance2 <= slam->params.gate_d2);
+}
+
+bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                            const bslam_sighting_t *sighting)
+{
+    bslam_beacon_t *beacon = &slam->ekf.beacons[index];
+    const bslam_beacon_kind_t kind = beacon->kind;
+    const bslam_real_t variance = scale_variance(slam, sighting);
+    if ((kind != BSLAM_BEACON_POINT && kind != BSLAM_BEACON_RAY) || !(variance > 0)) {
+        return false;
+    }
+    if (kind == BSLAM_BEACON_POINT) {
+        bslam_ekf_give_scale(&slam->ekf, index, variance);
+    } else if (!points_at(slam, mount, index, sighting) ||
+               !bslam_ekf_measure_ray(&slam->ekf, &slam->params, mount, sighting, index, variance)) {
+        return false;
+    }
+    beacon->beacon_class = sighting->beacon_class;
+    beacon->class_lead = 0;
+    return kind == BSLAM_BEACON_RAY;
+}
+
+void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting)
+{
+    bslam_beacon_t *beacon = &slam->ekf.beacons[index];
+    const bool votes = sighting->has_range && sighting->beacon_class != BSLAM_CLASS_NONE;
+    if (!votes || beacon->kind == BSLAM_BEACON_KNOWN) {
+        return;
+    }
+    // Boyer and Moore's majority vote.
+    if (agrees(beacon, sighting)) {
+        beacon->beacon_class = sighting->beacon_class;
+        beacon->class_lead = (uint8_t)(beacon->class_lead < BSLAM_CLASS_LEAD_MAX ? beacon->class_lead + 1
+                                                                                 : BSLAM_CLASS_LEAD_MAX);
+    } else if (beacon->class_lead > 0) {
+        beacon->class_lead--;
+    } else {
+        const bslam_real_t variance = scale_variance(slam, sighting);
+        beacon->beacon_class = sighting->beacon_class;
+        beacon->class_lead = 1;
+        if (variance > 0) {
+            bslam_ekf_renew_scale(&slam->ekf, index, variance + CONFUSED_VAR);
+        }
+    }
+}
