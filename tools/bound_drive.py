@@ -6,7 +6,8 @@ It is told which beacon each sighting shows, and sets out from the true way and 
 distance of its way from the true one. What errs then is what the pictures say.
 
 They do not say how their errors hang together, so the sightings are believed in several ways: as they are
-told, directions alone, and with three times the standard deviation. With --sizes the distances to each beacon
+told, directions alone, with three times the standard deviation, and with the size of each beacon, for each
+kind that it is taken for, estimated with all else. With --sizes the distances to each beacon
 are first divided by what they err in the median over the drive, which only the truth tells. With --moments N
 there is no hindsight: looked at is where the robot is at N moments of each drive, by what it was told until
 then, and where its own filter has it.
@@ -51,12 +52,14 @@ class Way(NamedTuple):
 
     factor: float  # of their standard deviations
     has_range: bool
+    rounds: int = 0  # of estimating by what the sizes err; 0: that is noise of each distance
 
 
 WAYS = {
     "as told": Way(1.0, True),
     "directions alone": Way(1.0, False),
     "a third as good": Way(3.0, True),
+    "sizes estimated": Way(1.0, True, 20),
 }
 
 
@@ -67,12 +70,79 @@ def best_errors_m(log: Log, params: Mapping[str, Number], way: Way, place_sd_m: 
     from_start = Rigid(*true[0, [2, 0, 1]].tolist()).inverse()
     poses = from_start.poses(true)
     poses[:, 2] = np.unwrap(poses[:, 2])
-    smoother = Smoother(params)
-    _add_steps(smoother, log, poses)
-    _add_sightings(smoother, log, params, from_start, way, place_sd_m)
-    smoother.set_out_from(poses)
-    smoother.solve()
-    return np.hypot(*(smoother.poses[:, :2] - poses[:, :2]).T)
+    sizes = _Sizes(log) if way.rounds and log.sightings.range_scale_sd is not None else None
+    scales: list[NDArray[np.float64]] = [np.ones(0 if sizes is None else sizes.count)]
+    steps: list[NDArray[np.float64]] = []
+    found, beacons_m = poses, None
+    while True:  # the joint optimum by turns: poses and places, then sizes
+        smoother = Smoother(params)
+        _add_steps(smoother, log, poses)
+        told = log if sizes is None else sizes.without(scales[-1])
+        _add_sightings(smoother, told, params, from_start, way, place_sd_m)
+        smoother.set_out_from(found, beacons_m)
+        smoother.solve()
+        found, beacons_m = smoother.poses, smoother.beacons
+        if sizes is None or len(scales) > way.rounds:
+            return np.hypot(*(found[:, :2] - poses[:, :2]).T)
+        steps.append(sizes.likeliest(found, beacons_m) - scales[-1])
+        scales.append(_extrapolated(scales, steps))
+
+
+def _extrapolated(
+    points: list[NDArray[np.float64]], steps: list[NDArray[np.float64]], memory: int = 5
+) -> NDArray[np.float64]:
+    """Where a repetition that goes from points[k] to points[k] + steps[k] ends, by Anderson's mixing."""
+    along = np.column_stack([np.zeros_like(points[-1]), *np.diff(points[-memory:], axis=0)])
+    change = np.column_stack([np.zeros_like(steps[-1]), *np.diff(steps[-memory:], axis=0)])
+    share = np.linalg.lstsq(change, steps[-1], rcond=1e-9)[0]
+    return points[-1] + steps[-1] - (along + change) @ share
+
+
+class _Sizes:
+    """By what the distances are too long of each beacon and kind that it is taken for: `count` factors."""
+
+    def __init__(self, log: Log) -> None:
+        seen = log.sightings
+        assert log.beacons is not None
+        assert seen.range_sd_m is not None and seen.range_scale_sd is not None
+        numbers = {one: number for number, one in enumerate(log.beacons.beacon_id.tolist())}
+        kinds = np.zeros(len(seen.time_us)) if seen.beacon_class is None else seen.beacon_class
+        self._log, self._range_sd_m, self._scale_sd = log, seen.range_sd_m, seen.range_scale_sd
+        self._of: list[tuple[int, NDArray[np.intp]]] = [
+            (numbers[beacon], np.flatnonzero((seen.beacon_id == beacon) & of_kind))
+            for beacon in numbers
+            for kind in np.unique(kinds)
+            if ((seen.beacon_id == beacon) & (of_kind := np.isfinite(seen.range_m) & (kinds == kind))).any()
+        ]
+        self.count = len(self._of)
+
+    def without(self, scales: NDArray[np.float64]) -> Log:
+        """The log with distances of the right sizes, of which nothing is in doubt."""
+        factor = np.ones(len(self._range_sd_m))
+        for scale, (_, rows) in zip(scales, self._of, strict=True):
+            factor[rows] = scale
+        seen = self._log.sightings
+        right = replace(
+            seen, range_m=seen.range_m / factor, range_sd_m=self._range_sd_m / factor, range_scale_sd=None
+        )
+        return replace(self._log, sightings=right)
+
+    def likeliest(self, poses: NDArray[np.float64], beacons_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The factors that fit best if all is where it is said to be, and each is 1 but for its doubt."""
+        scales = np.ones(self.count)
+        for k, (number, rows) in enumerate(self._of):
+            at = poses[[_step(self._log, row) for row in rows], :2]
+            distance_m = np.hypot(*(beacons_m[number] - at).T)
+            weight = 1 / np.maximum(self._range_sd_m[rows], 1e-6) ** 2
+            prior = 1 / np.maximum(np.median(self._scale_sd[rows]), 1e-3) ** 2
+            fits = prior + np.sum(weight * distance_m * self._log.sightings.range_m[rows])
+            scales[k] = fits / (prior + np.sum(weight * distance_m**2))
+        return scales
+
+
+def _step(log: Log, row: int) -> int:
+    """The pose that a sighting was taken from."""
+    return int(np.argmin(np.abs(log.odometry.time_us - log.sightings.time_us[row])))
 
 
 def _add_steps(smoother: Smoother, log: Log, poses: NDArray[np.float64]) -> None:
@@ -102,11 +172,10 @@ def _add_sightings(
     }
     for row, seen in enumerate(log.sightings.beacon_id.tolist()):
         if seen in number:
-            step = int(np.argmin(np.abs(log.odometry.time_us - log.sightings.time_us[row])))
             bearing_rad, range_m, *sds = _told(log.sightings, row, params)
             distance_m = range_m if way.has_range else math.nan
             smoother.add_sighting(
-                step, number[seen], bearing_rad, distance_m, *(way.factor * sd for sd in sds)
+                _step(log, row), number[seen], bearing_rad, distance_m, *(way.factor * sd for sd in sds)
             )
 
 

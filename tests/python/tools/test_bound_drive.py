@@ -16,7 +16,7 @@ from bound_drive import (
 from bound_restart import restarts
 from bslam.core.slam import Slam
 from bslam.experiment.options import RunOptions, core_params
-from bslam.log import Log
+from bslam.log import Log, Sightings
 from bslam.world.simulate import load_scenario, simulate
 from measure_restart import DRIVEN_US, SWITCHED_ON_AT, part
 
@@ -63,6 +63,30 @@ def test_best_of_a_drive_is_as_good_as_its_sizes() -> None:
     assert right_m < 0.15
     assert mean_m(skewed) > 1.5 * right_m
     assert abs(mean_m(with_true_sizes(skewed)) - right_m) < 1e-3
+
+
+def test_best_with_sizes_estimated_finds_what_each_beacon_and_kind_errs_by() -> None:
+    log = part(_log(), 0, 1000)
+    params = Slam.defaults() | core_params(RunOptions(association="known", sigma_mps=0.6), log)
+    seen = log.sightings
+    count = len(seen.time_us)
+    kind = np.where(np.arange(count) % 3 == 0, 2, 1)
+    doubtful = replace(
+        seen,
+        range_m=seen.range_m * (1 + 0.1 * np.sin(seen.beacon_id) + 0.1 * (kind == 2)),
+        range_sd_m=0.03 * seen.range_m,
+        range_scale_sd=np.full(count, 0.2),
+        beacon_class=kind,
+    )
+
+    def mean_m(sightings: Sightings, way: str) -> float:
+        one = replace(log, sightings=sightings)
+        return float(best_errors_m(one, params, WAYS[way], UNKNOWN_SD_M).mean())
+
+    estimated_m = mean_m(doubtful, "sizes estimated")
+    assert estimated_m < 0.6 * mean_m(doubtful, "as told")
+    # Of whose scale nothing is in doubt, nothing is estimated.
+    assert mean_m(seen, "sizes estimated") == mean_m(seen, "as told")
 
 
 def test_best_on_the_way_knows_nothing_of_what_comes() -> None:
