@@ -108,12 +108,12 @@ class _Sizes:
         numbers = {one: number for number, one in enumerate(log.beacons.beacon_id.tolist())}
         kinds = np.zeros(len(seen.time_us)) if seen.beacon_class is None else seen.beacon_class
         self._log, self._range_sd_m, self._scale_sd = log, seen.range_sd_m, seen.range_scale_sd
-        self._of: list[tuple[int, NDArray[np.intp]]] = [
-            (numbers[beacon], np.flatnonzero((seen.beacon_id == beacon) & of_kind))
-            for beacon in numbers
-            for kind in np.unique(kinds)
-            if ((seen.beacon_id == beacon) & (of_kind := np.isfinite(seen.range_m) & (kinds == kind))).any()
-        ]
+        self._poses = np.array([_step(log, row) for row in range(len(seen.time_us))], dtype=np.intp)
+        self._of: list[tuple[int, NDArray[np.intp]]] = []
+        for beacon, number in numbers.items():
+            of_beacon = (seen.beacon_id == beacon) & np.isfinite(seen.range_m)
+            for kind in np.unique(kinds[of_beacon]):
+                self._of.append((number, np.flatnonzero(of_beacon & (kinds == kind))))
         self.count = len(self._of)
 
     def without(self, scales: NDArray[np.float64]) -> Log:
@@ -131,8 +131,7 @@ class _Sizes:
         """The factors that fit best if all is where it is said to be, and each is 1 but for its doubt."""
         scales = np.ones(self.count)
         for k, (number, rows) in enumerate(self._of):
-            at = poses[[_step(self._log, row) for row in rows], :2]
-            distance_m = np.hypot(*(beacons_m[number] - at).T)
+            distance_m = np.hypot(*(beacons_m[number] - poses[self._poses[rows], :2]).T)
             weight = 1 / np.maximum(self._range_sd_m[rows], 1e-6) ** 2
             prior = 1 / np.maximum(np.median(self._scale_sd[rows]), 1e-3) ** 2
             fits = prior + np.sum(weight * distance_m * self._log.sightings.range_m[rows])

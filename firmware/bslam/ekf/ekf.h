@@ -248,8 +248,8 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var);
 
 /// A point whose distances are measured from now on becomes a sized beacon, of whose scale is known this
-/// variance > 0, if there is room for it. O(n²) then.
-void bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
+/// variance > 0. False: it is no point, or there is no room for it. O(n²).
+bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 
 /// A sized beacon is something else than was thought: its scale is 1 again, to this variance > 0, whatever
 /// was learned of it. Its place stays. O(n).

@@ -220,17 +220,18 @@ static void insert_value(bslam_ekf_t *ekf, int at)
     }
 }
 
-void bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
+bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
 {
     bslam_beacon_t *beacon = &ekf->beacons[index];
     if (beacon->kind != BSLAM_BEACON_POINT || room_of(ekf) < 1) {
-        return;
+        return false;
     }
     const int at = beacon->at + BSLAM_POINT_DIM;
     insert_value(ekf, at);
     begin_scale(ekf, at, scale_var);
     beacon->kind = BSLAM_BEACON_SIZED;
     ekf->sized_count++;
+    return true;
 }
 
 void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
@@ -336,8 +337,8 @@ static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
     ekf->mean[at + 1] = place->y_m;
 }
 
-/// Where on the ray at `at` a sighting's distance ends, MATH (48a). *along: the point as the sensor sees it,
-/// by its distance. False: nowhere, or so much across the ray that the distance does not tell.
+/// Where on the ray at `at` a sighting's distance ends, MATH (48a), and how that goes with the
+/// distance. False: nowhere, or so much across the ray that the distance does not tell.
 static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t range_m, int at,
                          place_t *place, bslam_real_t by_range[2])
 {

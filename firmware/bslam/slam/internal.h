@@ -1,6 +1,5 @@
-/// What the files of this directory call of each other: motion.c, check.c, trust.c, scale.c, frame.c,
-/// slam.c. Not for
-/// users.
+/// What the files of this directory call of each other: motion.c, check.c, trust.c, scale.c, frame.c, slam.c.
+/// Not for users.
 #ifndef BSLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_INTERNAL_H
 

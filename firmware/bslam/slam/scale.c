@@ -45,20 +45,19 @@ bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int i
                             const bslam_sighting_t *sighting)
 {
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
-    const bslam_beacon_kind_t kind = beacon->kind;
+    const bool is_ray = beacon->kind == BSLAM_BEACON_RAY;
     const bslam_real_t variance = scale_variance(slam, sighting);
-    if ((kind != BSLAM_BEACON_POINT && kind != BSLAM_BEACON_RAY) || !(variance > 0)) {
+    if (!(variance > 0) || (is_ray && !points_at(slam, mount, index, sighting))) {
         return false;
     }
-    if (kind == BSLAM_BEACON_POINT) {
-        bslam_ekf_give_scale(&slam->ekf, index, variance);
-    } else if (!points_at(slam, mount, index, sighting) ||
-               !bslam_ekf_measure_ray(&slam->ekf, &slam->params, mount, sighting, index, variance)) {
-        return false;
+    const bool begins =
+        is_ray ? bslam_ekf_measure_ray(&slam->ekf, &slam->params, mount, sighting, index, variance)
+               : bslam_ekf_give_scale(&slam->ekf, index, variance);
+    if (begins) {
+        beacon->beacon_class = sighting->beacon_class;
+        beacon->class_lead = 0;
     }
-    beacon->beacon_class = sighting->beacon_class;
-    beacon->class_lead = 0;
-    return kind == BSLAM_BEACON_RAY;
+    return begins && is_ray;
 }
 
 void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting)

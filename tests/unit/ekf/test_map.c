@@ -594,7 +594,7 @@ static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **stat
     expected.mean = dense_product(&reorder, &expected.mean);
     expected.covariance = dense_sandwich(&reorder, &expected.covariance);
     const int next = ekf.beacons[1].at, ray = ekf.beacons[2].at;
-    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.0049));
+    assert_true(bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.0049)));
     assert_int_equal(ekf.beacons[0].kind, BSLAM_BEACON_SIZED);
     assert_int_equal(ekf.sized_count, 1);
     assert_int_equal(ekf.beacons[0].at, at - 2);
@@ -602,8 +602,8 @@ static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **stat
     assert_int_equal(ekf.beacons[2].at, ray + 1);
     twin_assert(&ekf, &expected, TOLERANCE);
     const bslam_ekf_t before = ekf;
-    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01));  // has one
-    bslam_ekf_give_scale(&ekf, 2, BSLAM_R(0.01));  // a ray
+    assert_false(bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01)));  // has one
+    assert_false(bslam_ekf_give_scale(&ekf, 2, BSLAM_R(0.01)));  // a ray
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 
@@ -622,7 +622,7 @@ static void test_give_scale_beyond_their_room_is_not_done(void **state)
         ekf.ray_count = BSLAM_RAYS_MAX;
     }
     const bslam_ekf_t before = ekf;
-    bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01));
+    assert_false(bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.01)));
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 

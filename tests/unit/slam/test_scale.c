@@ -222,6 +222,20 @@ static void test_point_that_is_seen_with_a_distance_is_sized_from_then_on(void *
     assert_true(slam.ekf.mean[beacon()->at] > 4);
 }
 
+/// Its class is voted for as any other's.
+static void test_point_without_room_for_a_scale_stays_one(void **state)
+{
+    bslam_sighting_t first = called(DOOR, 1);
+    first.range_scale_sd = 0;
+    see(first);
+    see(first);
+    slam.ekf.sized_count = 2 * BSLAM_RAYS_MAX;  // as if others had it all
+    see(called(CABINET, 1));
+    assert_int_equal(beacon()->kind, BSLAM_BEACON_POINT);
+    assert_int_equal(beacon()->beacon_class, DOOR);
+    assert_int_equal(beacon()->class_lead, 1);
+}
+
 static void test_known_beacon_is_what_it_was_given_as(void **state)
 {
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 1, 4, 0), BSLAM_OK);
@@ -261,6 +275,7 @@ int main(void)
         cmocka_unit_test_setup(test_ray_that_a_distance_from_elsewhere_is_taken_for_stays, setup),
         cmocka_unit_test_setup(test_ray_without_any_scale_is_as_ever, setup),
         cmocka_unit_test_setup(test_point_that_is_seen_with_a_distance_is_sized_from_then_on, setup),
+        cmocka_unit_test_setup(test_point_without_room_for_a_scale_stays_one, setup),
         cmocka_unit_test_setup(test_known_beacon_is_what_it_was_given_as, setup),
         cmocka_unit_test_setup(test_with_a_smoother_no_beacon_changes_its_kind, setup),
     };
