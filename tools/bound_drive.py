@@ -37,7 +37,7 @@ from bslam.experiment.camera import TOLD_THRESHOLD, CameraStore, camera_log
 from bslam.experiment.metrics import evaluate
 from bslam.experiment.options import Number, RunOptions, core_params
 from bslam.experiment.runner import run_log
-from bslam.experiment.truth import truth_at
+from bslam.experiment.truth import gyro_rates, truth_at
 from bslam.log import Log, Sightings
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
@@ -147,12 +147,11 @@ def _step(log: Log, row: int) -> int:
 def _add_steps(smoother: Smoother, log: Log, poses: NDArray[np.float64]) -> None:
     odometry = log.odometry
     gaps_s = np.diff(odometry.time_us, prepend=odometry.time_us[0]) * 1e-6
-    turn_radps = np.full(len(gaps_s), math.nan) if odometry.gyro_radps is None else odometry.gyro_radps
-    rows = zip(gaps_s, odometry.a, odometry.b, turn_radps, poses, strict=True)
-    next(rows)  # which leads to the first pose
-    for dt_s, left_m, right_m, gyro_radps, pose in rows:
+    gyros = (one[-len(gaps_s) + 1 :] for one in gyro_rates(log))  # the first row leads to the first pose
+    moves = zip(gaps_s[1:], odometry.a[1:], odometry.b[1:], poses[1:], *gyros, strict=True)
+    for dt_s, left_m, right_m, pose, *gyro in moves:
         x_m, y_m, theta_rad = pose.tolist()
-        smoother.add_step(dt_s, left_m, right_m, (x_m, y_m, theta_rad), gyro_radps)
+        smoother.add_step(dt_s, left_m, right_m, (x_m, y_m, theta_rad), *gyro)
 
 
 def _add_sightings(

@@ -127,6 +127,7 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
         reading.omega_radps = is_wheels ? 0 : b;
     }
     reading.gyro_radps = bslam_link_get_real(reader);
+    reading.gyro_sd_radps = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
         const uint32_t began = port_ticks();
         keep(session, bslam_slam_odometry(&session->slam, &reading));

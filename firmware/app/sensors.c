@@ -37,6 +37,7 @@ static void use_reading(session_t *session, const bslam_odometry_reading_t *read
     bslam_link_put_u32(&out, reading->right_ticks);
     bslam_link_put_u8(&out, reading->has_gyro ? SESSION_HAS_GYRO : 0);
     bslam_link_put_real(&out, reading->gyro_radps);
+    bslam_link_put_real(&out, reading->gyro_sd_radps);
     session_put_step(session, &out);
     session_send(session, &out);
 }

@@ -159,8 +159,7 @@ static int open_eyes(session_t *session)
 #endif
 }
 
-/// What was stored; else the defaults, but that what a camera sees has no label, and that its turn rates are
-/// rough.
+/// What was stored; else the defaults, but that what a camera sees has no label.
 static uint8_t start_with_params(session_t *session, bool has_eyes)
 {
     int bad_id = NO_DETAIL;
@@ -173,9 +172,6 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
     }
     if (has_eyes) {
         session->params.association = SESSION_LOOKS ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
-#if SESSION_TURNS
-        session->params.gyro_sd_radps = turning_sd_radps(&session->seeing.vision);
-#endif
     }
     return session_start_over(session, &bad_id);
 }

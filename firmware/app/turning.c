@@ -5,10 +5,21 @@
 #define SPEED_SD_LEAST_MPS 0.01f  // where the parameters say that the wheels hardly err
 #define SPEED_SD_MOST_MPS 100.0f
 
+/// A lens of 180 degrees among the cameras makes all rates rough.
+static bslam_real_t least_sd_radps(const bslam_vision_t *vision)
+{
+    for (int i = 0; i < vision->camera_count; i++) {
+        if (vision->cameras[i].lens == BSLAM_LENS_EQUIDISTANT) {
+            return BSLAM_VISUAL_GYRO_WIDE_SD_RADPS;
+        }
+    }
+    return BSLAM_VISUAL_GYRO_SD_RADPS;
+}
+
 void turning_start(turning_t *turning, const bslam_vision_t *vision)
 {
     bslam_turns_init(&turning->turns, vision);
-    bslam_visual_gyro_init(&turning->gyro);
+    bslam_visual_gyro_init(&turning->gyro, least_sd_radps(vision));
     bslam_odometry_init(&turning->wheels);
     turning->is_waiting = false;
 }
@@ -55,7 +66,9 @@ void turning_see(turning_t *turning, const bslam_vision_t *vision, int camera, i
     const bool tells = bslam_turns_see(&turning->turns, vision, &turn);
     const bslam_status_t status = bslam_visual_gyro_take(&turning->gyro, camera, tells ? &turn : NULL);
     if (status == BSLAM_OK && turning->is_waiting) {
-        turning->reading.has_gyro = bslam_visual_gyro_rate(&turning->gyro, &turning->reading.gyro_radps);
+        bslam_odometry_reading_t *reading = &turning->reading;
+        reading->has_gyro =
+            bslam_visual_gyro_rate(&turning->gyro, &reading->gyro_radps, &reading->gyro_sd_radps);
     }
 }
 
@@ -65,16 +78,6 @@ bool turning_end_wait(turning_t *turning, bslam_odometry_reading_t *reading)
     turning->is_waiting = false;
     *reading = turning->reading;
     return was_waiting;
-}
-
-bslam_real_t turning_sd_radps(const bslam_vision_t *vision)
-{
-    for (int i = 0; i < vision->camera_count; i++) {
-        if (vision->cameras[i].lens == BSLAM_LENS_EQUIDISTANT) {
-            return BSLAM_VISUAL_GYRO_WIDE_SD_RADPS;
-        }
-    }
-    return BSLAM_VISUAL_GYRO_SD_RADPS;
 }
 
 #endif

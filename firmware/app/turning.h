@@ -32,14 +32,11 @@ bool turning_wait(turning_t *turning, const bslam_vision_t *vision, const bslam_
                   const bslam_odometry_reading_t *reading);
 
 /// The front end has finished a camera's picture of that moment. If a reading of the same moment waits, it
-/// has a gyro's rate from now on, where the picture tells.
+/// has a gyro's rate and its noise from now on, where the picture tells.
 void turning_see(turning_t *turning, const bslam_vision_t *vision, int camera, int64_t time_us);
 
 /// The reading that waits, which waits no longer. False: none does.
 bool turning_end_wait(turning_t *turning, bslam_odometry_reading_t *reading);
-
-/// The noise of these rates, for the parameter gyro_sd_radps.
-bslam_real_t turning_sd_radps(const bslam_vision_t *vision);
 
 #endif
 #endif

@@ -36,6 +36,8 @@ ODOMETRY_COLUMNS = {
 }
 GYRO = "gyro_radps"
 """Column of odometry that a robot without a gyro leaves out."""
+GYRO_SD = "gyro_sd_radps"
+"""Column of odometry that a gyro which does not know how well it tells leaves out."""
 SIGHTING_NUMBERS = ("bearing_sd_rad", "range_sd_m", "range_scale_sd", "score")
 """Columns of sightings that a detector may leave out."""
 CLASS = "beacon_class"
@@ -70,6 +72,7 @@ class Odometry:
     gyro_radps: NDArray[np.float64] | None = (
         None  # (n,) mean turn rate over the same interval; NaN: not told there; None: no gyro
     )
+    gyro_sd_radps: NDArray[np.float64] | None = None  # (n,) its own noise; 0, None: gyro_sigma_radps
 
 
 @dataclass(frozen=True)
@@ -219,6 +222,8 @@ def write_folder(log: Log, path: str | Path) -> None:
     a_name, b_name = ODOMETRY_COLUMNS[odometry.kind]
     gyro_radps = odometry.gyro_radps
     gyro = {} if gyro_radps is None else {GYRO: _texts_or_empty(gyro_radps)}
+    if odometry.gyro_sd_radps is not None:
+        gyro[GYRO_SD] = _texts(odometry.gyro_sd_radps, float)
     tables: dict[str, dict[str, list[str]] | None] = {
         "odometry": {
             "time_us": _texts(odometry.time_us, int),
@@ -255,6 +260,7 @@ def first_steps(log: Log, steps: int) -> Log:
         a=log.odometry.a[kept],
         b=log.odometry.b[kept],
         gyro_radps=None if log.odometry.gyro_radps is None else log.odometry.gyro_radps[kept],
+        gyro_sd_radps=None if log.odometry.gyro_sd_radps is None else log.odometry.gyro_sd_radps[kept],
     )
     seen = log.sightings.time_us <= odometry.time_us[-1]
     columns = {one.name: getattr(log.sightings, one.name) for one in fields(log.sightings)}
@@ -332,6 +338,7 @@ _COLUMNS = {
     "v_mps": _NUMBER,
     "omega_radps": _NUMBER,
     GYRO: Column("a number from -1000 to 1000, or empty", lambda v: np.abs(v) <= 1000.0, empty=math.nan),
+    GYRO_SD: Column("0 or a number from 1e-6 to 100", lambda v: (v == 0.0) | ((v >= 1e-6) & (v <= 100.0))),
     "beacon_id": Column(
         f"an integer from 0 to {BEACON_ID_MAX}, or empty in sightings",
         lambda values: is_count(values) & (values <= BEACON_ID_MAX),
@@ -375,14 +382,15 @@ def _columns(*names: str) -> dict[str, Column]:
 
 def _read_odometry(folder: Path, robot: Robot) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
-    table = read_table(_require_csv(folder, "odometry"), layouts, _columns(GYRO))
+    table = read_table(_require_csv(folder, "odometry"), layouts, _columns(GYRO, GYRO_SD))
     table.require_rows("allowed: at least one")
     table.require_order("time_us", strict=True)
     kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
     if kind == "ticks":
         _require_tick_range(table, robot)
     a, b = table.values[a_name], table.values[b_name]
-    return Odometry(kind, table.integers("time_us"), a, b, table.values.get(GYRO))
+    gyro = (table.values.get(GYRO), table.values.get(GYRO_SD))
+    return Odometry(kind, table.integers("time_us"), a, b, *gyro)
 
 
 def _require_tick_range(table: Table, robot: Robot) -> None:

@@ -128,6 +128,7 @@ bslam_odometry_reading_t fuzz_reading(fuzz_input_t *input, int64_t now_us)
     }
     if (reading.has_gyro) {
         reading.gyro_radps = fuzz_real(input, -4, 4);
+        reading.gyro_sd_radps = fuzz_real(input, 0, 2);
     }
     return reading;
 }

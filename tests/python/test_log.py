@@ -138,6 +138,10 @@ def test_write_then_read_keeps_the_gyro_and_where_it_said_nothing(tmp_path: Path
     write_folder(log, tmp_path)
     assert_same_log(log, read_folder(tmp_path))
     assert first_steps(log, 1).odometry.gyro_radps == pytest.approx([1.0 / 3.0])
+    log = replace(log, odometry=replace(log.odometry, gyro_sd_radps=np.array([0.125, 0.0])))
+    write_folder(log, tmp_path)
+    assert_same_log(log, read_folder(tmp_path))
+    assert first_steps(log, 1).odometry.gyro_sd_radps == pytest.approx([0.125])
 
 
 finite = st.floats(-1e6, 1e6)

@@ -50,8 +50,8 @@ typedef struct bslam_match {
     bslam_real_t score;      ///< svm: log odds of that beacon against a new one; else 0
     bslam_real_t lead;       ///< svm: by how much the score leads that of any other beacon, and of a new one
     bool sure;               ///< svm: sure enough to learn from; else false
-    bool range_used;         ///< within a frame: the distance has said where on a ray the beacon is
-    int32_t waits_for;       ///< svm: index of the beacon that it is kept from for a while; else -1
+    bool range_used;  ///< within a frame: the distance has said where on a ray the beacon is, or does not fit
+    int32_t waits_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
 } bslam_match_t;
 
 /// All a method may look at.

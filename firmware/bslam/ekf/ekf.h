@@ -51,8 +51,9 @@ static inline int32_t bslam_beacon_dim(bslam_beacon_kind_t kind)
                                         : 0;
 }
 
-/// A beacon's class_lead at most: so many sightings in a row make anything something else.
-#define BSLAM_CLASS_LEAD_MAX 20
+/// A beacon's class_lead and distance_lead at most: so many sightings in a row make anything something else,
+/// or of another size.
+#define BSLAM_LEAD_MAX 20
 
 /// A beacon of the map.
 typedef struct bslam_beacon {
@@ -72,6 +73,7 @@ typedef struct bslam_beacon {
     bool confirmed;
     uint8_t beacon_class;
     uint8_t class_lead;        ///< by how many votes it leads, slam/scale.c
+    uint8_t distance_lead;     ///< by how many more its distances fitted than did not
     bool has_scores;           ///< of its sightings
     bslam_real_t score_sum;    ///< what these say for its being a beacon at all
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
@@ -251,9 +253,11 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const
 /// variance > 0. False: it is no point, or there is no room for it. O(n²).
 bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 
-/// A sized beacon is something else than was thought: its scale is 1 again, to this variance > 0, whatever
-/// was learned of it. Its place stays. O(n).
-void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
+/// A sized beacon is something else than was thought: its scale is 1 again, to this variance and more_var >
+/// 0, whatever was learned of it. All means stay, but what hung on the scale becomes as doubtful as if that
+/// had been doubted by more_var more from the start. No correction may be under way. O(n²).
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int index, bslam_real_t scale_var,
+                           bslam_real_t more_var);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);

@@ -10,6 +10,9 @@
 static const bslam_real_t FAR_INVERSE_PER_M = BSLAM_R(1e-3);
 /// A distance tells where on a ray a point is unless it lies more across the ray than this, as a cosine.
 static const bslam_real_t ALONG_MIN = BSLAM_R(0.5);
+/// A scale is never taken for surer than this, where doubt is added: a difference of variances has to be
+/// told.
+static const bslam_real_t SCALE_VAR_MIN = BSLAM_R(1e-6);
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
 {
@@ -234,11 +237,28 @@ bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
     return true;
 }
 
-void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
+/// What hangs on a scale becomes as doubtful as if that had been doubted by more_var more from the start,
+/// when it was by scale_var: a measurement of negative variance takes back what is too much. What is thought
+/// stays.
+static void doubt_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int at, bslam_real_t scale_var,
+                        bslam_real_t more_var)
+{
+    const bslam_real_t left_var = ekf->covariance[bslam_symmat_at(at, at)];
+    bslam_real_t var = scale_var > left_var ? scale_var : left_var;
+    var = var > SCALE_VAR_MIN ? var : SCALE_VAR_MIN;
+    const bslam_row_t row = {.other = {1}, .at = (uint16_t)at, .dim = 1};
+    bslam_ekf_apply_scalar(ekf, &row, 0, -(var + var * var / more_var));
+    bslam_ekf_correct(ekf, params);
+}
+
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int index, bslam_real_t scale_var,
+                           bslam_real_t more_var)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
     if (beacon->kind == BSLAM_BEACON_SIZED) {
-        begin_scale(ekf, beacon->at + BSLAM_POINT_DIM, scale_var);
+        const int at = beacon->at + BSLAM_POINT_DIM;
+        doubt_scale(ekf, params, at, scale_var, more_var);
+        begin_scale(ekf, at, scale_var + more_var);
     }
 }
 

@@ -9,6 +9,8 @@ static const int64_t TIME_MAX_US = INT64_MAX / 2;
 static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
 /// More than this in one interval is no motion of a robot: 16 turns.
 static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
+/// Limits of a reading's own gyro noise, as of the parameter gyro_sd_radps.
+static const bslam_real_t GYRO_SD_MIN_RADPS = BSLAM_R(1e-6), GYRO_SD_MAX_RADPS = BSLAM_R(100.0);
 
 /// Travel of both wheels in one interval.
 typedef struct wheel_travel {
@@ -156,6 +158,17 @@ static bool is_jump(const bslam_params_t *params, const wheel_travel_t *travel, 
            bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * params->wheelbase_m;
 }
 
+static bslam_status_t check_gyro(const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
+{
+    const bslam_real_t sd_radps = reading->gyro_sd_radps;
+    if (!bslam_is_number(reading->gyro_radps) || !bslam_is_number(sd_radps)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    const bool is_far = bslam_abs(reading->gyro_radps) * dt_s > TURN_MAX_RAD;
+    const bool is_odd = sd_radps != 0 && !bslam_in_range(sd_radps, GYRO_SD_MIN_RADPS, GYRO_SD_MAX_RADPS);
+    return is_far || is_odd ? BSLAM_E_RANGE : BSLAM_OK;
+}
+
 /// Kalman update of (forward, turn) with the turn that the gyro measured.
 static void fuse_gyro(bslam_motion_t *motion, bslam_real_t gyro_turn_rad, bslam_real_t gyro_var_rad2)
 {
@@ -179,11 +192,9 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     const int32_t dt_us = odometry->has_time ? (int32_t)(reading->time_us - odometry->time_us) : 0;
     const bslam_real_t dt_s = (bslam_real_t)dt_us * SECONDS_PER_US;
     if (reading->has_gyro) {
-        if (!bslam_is_number(reading->gyro_radps)) {
-            return BSLAM_E_NOT_FINITE;
-        }
-        if (bslam_abs(reading->gyro_radps) * dt_s > TURN_MAX_RAD) {
-            return BSLAM_E_RANGE;
+        const bslam_status_t gyro_status = check_gyro(reading, dt_s);
+        if (gyro_status != BSLAM_OK) {
+            return gyro_status;
         }
     }
     wheel_travel_t travel;
@@ -199,7 +210,9 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
     if (odometry->has_time) {
         travel_to_motion(params, &travel, dt_s, unseen_s(odometry, params, reading, dt_s), motion);
         if (reading->has_gyro) {
-            fuse_gyro(motion, reading->gyro_radps * dt_s, square(params->gyro_sd_radps * dt_s));
+            const bslam_real_t own_sd_radps = reading->gyro_sd_radps;
+            const bslam_real_t sd_radps = own_sd_radps > 0 ? own_sd_radps : params->gyro_sd_radps;
+            fuse_gyro(motion, reading->gyro_radps * dt_s, square(sd_radps * dt_s));
         }
     } else {
         *motion = (bslam_motion_t){0};

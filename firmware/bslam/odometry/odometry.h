@@ -25,7 +25,8 @@ typedef struct bslam_odometry_reading {
     bslam_real_t v_mps;
     bslam_real_t omega_radps;
     bool has_gyro;
-    bslam_real_t gyro_radps;  ///< mean turn rate over the interval; read only if has_gyro
+    bslam_real_t gyro_radps;     ///< mean turn rate over the interval; read only if has_gyro
+    bslam_real_t gyro_sd_radps;  ///< noise of this one, as that is; 0: the parameter gyro_sd_radps
 } bslam_odometry_reading_t;
 
 /// What the next reading is compared with.
@@ -48,7 +49,8 @@ void bslam_odometry_restart(bslam_odometry_t *odometry);
 
 /// The motion since the reading before, into *motion. O(1).
 /// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 4 s. BSLAM_E_NOT_FINITE,
-/// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, an unknown source),
+/// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, a noise of it that is not 0
+/// and outside the limits of the parameter, an unknown source),
 /// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
 /// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
 /// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.

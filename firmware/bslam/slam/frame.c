@@ -176,7 +176,8 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
         match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&
-                            bslam_slam_begin_scale(slam, mount, match->beacon, &sightings[i]);
+                            (bslam_slam_begin_scale(slam, mount, match->beacon, &sightings[i]) ||
+                             !bslam_slam_vote_distance(slam, mount, match->beacon, &sightings[i]));
     }
     take_innovations(slam, mount, sightings, count);
     for (int i = 0; i < count; i++) {

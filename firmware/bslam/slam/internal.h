@@ -50,6 +50,12 @@ bslam_sighting_t bslam_slam_taken_as(const bslam_beacon_t *beacon, const bslam_s
 bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
                             const bslam_sighting_t *sighting);
 
+/// Whether a matched sighting's distance counts. One that does not fit where the direction does counts no
+/// longer, but against the beacon's size; where most of late did not fit, that is forgotten, and this one
+/// counts. Before the innovations of a frame are taken. O(1), O(n) where it is forgotten.
+bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                              const bslam_sighting_t *sighting);
+
 /// What a fused sighting says for the beacon's class, which is what its sightings with a distance call it
 /// most often. With another class goes another scale. After the correction. O(n).
 void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting);

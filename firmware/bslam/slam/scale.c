@@ -2,7 +2,8 @@
 #include "bslam/model/noise.h"
 #include "bslam/slam/internal.h"
 
-/// What has been taken for two things may be neither: how much more its scale is then in doubt.
+/// What has been taken for two things, or measured as two sizes, may be neither: how much more its scale is
+/// then in doubt.
 static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
 
 /// Whether a sighting takes a beacon for what it is taken for, or does not say.
@@ -27,15 +28,15 @@ static bslam_real_t scale_variance(const bslam_slam_t *slam, const bslam_sightin
                                                          : 0;
 }
 
-/// Whether a sighting's direction is that of a beacon.
-static bool points_at(const bslam_slam_t *slam, const bslam_pose_t *mount, int index,
-                      const bslam_sighting_t *sighting)
+/// Whether a sighting, or its direction alone, passes a beacon's gate.
+static bool fits(const bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                 const bslam_sighting_t *sighting, bool with_range)
 {
-    bslam_sighting_t direction = *sighting;
+    bslam_sighting_t looked_at = *sighting;
     bslam_innovation_t innovation;
     bslam_real_t distance2;
-    direction.has_range = false;
-    return bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &direction, index, &innovation) ==
+    looked_at.has_range = looked_at.has_range && with_range;
+    return bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &looked_at, index, &innovation) ==
                BSLAM_OK &&
            bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK &&
            (!(slam->params.gate_d2 > 0) || distance2 <= slam->params.gate_d2);
@@ -47,7 +48,7 @@ bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int i
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
     const bool is_ray = beacon->kind == BSLAM_BEACON_RAY;
     const bslam_real_t variance = scale_variance(slam, sighting);
-    if (!(variance > 0) || (is_ray && !points_at(slam, mount, index, sighting))) {
+    if (!(variance > 0) || (is_ray && !fits(slam, mount, index, sighting, false))) {
         return false;
     }
     const bool begins =
@@ -60,6 +61,35 @@ bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int i
     return begins && is_ray;
 }
 
+static uint8_t one_more(uint8_t lead)
+{
+    return (uint8_t)(lead < BSLAM_LEAD_MAX ? lead + 1 : BSLAM_LEAD_MAX);
+}
+
+bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
+                              const bslam_sighting_t *sighting)
+{
+    bslam_beacon_t *beacon = &slam->ekf.beacons[index];
+    const bslam_sighting_t taken = bslam_slam_taken_as(beacon, sighting);
+    if (beacon->kind != BSLAM_BEACON_SIZED || !taken.has_range) {
+        return true;
+    }
+    if (fits(slam, mount, index, &taken, true)) {
+        beacon->distance_lead = one_more(beacon->distance_lead);
+        return true;
+    }
+    if (!fits(slam, mount, index, &taken, false)) {
+        return true;  // nothing of it fits, which the gate will find
+    }
+    if (beacon->distance_lead > 0) {
+        beacon->distance_lead--;
+        return false;
+    }
+    const bslam_real_t variance = scale_variance(slam, sighting);
+    bslam_ekf_renew_scale(&slam->ekf, &slam->params, index, variance, CONFUSED_VAR);
+    return true;
+}
+
 void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting)
 {
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
@@ -70,8 +100,7 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
     // Boyer and Moore's majority vote.
     if (agrees(beacon, sighting)) {
         beacon->beacon_class = sighting->beacon_class;
-        beacon->class_lead = (uint8_t)(beacon->class_lead < BSLAM_CLASS_LEAD_MAX ? beacon->class_lead + 1
-                                                                                 : BSLAM_CLASS_LEAD_MAX);
+        beacon->class_lead = one_more(beacon->class_lead);
     } else if (beacon->class_lead > 0) {
         beacon->class_lead--;
     } else {
@@ -79,7 +108,7 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
         beacon->beacon_class = sighting->beacon_class;
         beacon->class_lead = 1;
         if (variance > 0) {
-            bslam_ekf_renew_scale(&slam->ekf, index, variance + CONFUSED_VAR);
+            bslam_ekf_renew_scale(&slam->ekf, &slam->params, index, variance, CONFUSED_VAR);
         }
     }
 }

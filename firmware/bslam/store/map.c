@@ -166,7 +166,8 @@ static void take_record(const target_t *target, const record_t *record)
     bslam_beacon_t *beacon = &ekf->beacons[index];
     *beacon = record->beacon;
     beacon->confirmed = true;
-    beacon->class_lead = BSLAM_CLASS_LEAD_MAX;
+    beacon->class_lead = BSLAM_LEAD_MAX;
+    beacon->distance_lead = BSLAM_LEAD_MAX;
     beacon->known_x_m = record->x_m;
     beacon->known_y_m = record->y_m;
     beacon->way_um = target->slam->way_um - LONG_WAY_UM;

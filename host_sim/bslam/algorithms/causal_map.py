@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 
-from bslam.algorithms.noise import measured_motion
+from bslam.algorithms.noise import NO_GYRO, measured_motion
 from bslam.algorithms.protocol import Landmark, Setup, Sighting
 from bslam.algorithms.smoother import Smoother
 from bslam.motion import Pose, move_on_arc
@@ -36,24 +36,24 @@ class CausalMap:
         self._times_us: list[int] = []
         self._number_of: dict[int, int] = {}
         self._solved_steps = 0
-        self._gyro_radps = math.nan  # of the step to come
+        self._gyro = NO_GYRO  # of the step to come
 
-    def gyro(self, time_us: int, rate_radps: float) -> None:
+    def gyro(self, time_us: int, rate_radps: float, sd_radps: float) -> None:
         """See `Gyroscopic`."""
-        self._gyro_radps = rate_radps
+        self._gyro = (rate_radps, sd_radps)
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
-        p, gyro_radps = self._parameters, self._gyro_radps
+        p, gyro = self._parameters, self._gyro
         dt_s = (time_us - self._times_us[-1]) * 1e-6
-        way_m, turn_rad = measured_motion(p, dt_s, left_m, right_m, gyro_radps)[0].tolist()
+        way_m, turn_rad = measured_motion(p, dt_s, left_m, right_m, *gyro)[0].tolist()
         half_turn_m = 0.5 * turn_rad * p["wheelbase_m"]
         pose = move_on_arc(
             self._smoother.last_pose, way_m - half_turn_m, way_m + half_turn_m, p["wheelbase_m"]
         )
-        self._smoother.add_step(dt_s, left_m, right_m, pose, gyro_radps)
+        self._smoother.add_step(dt_s, left_m, right_m, pose, *gyro)
         self._times_us.append(time_us)
-        self._gyro_radps = math.nan
+        self._gyro = NO_GYRO
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""

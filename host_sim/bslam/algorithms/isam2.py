@@ -11,7 +11,7 @@ import numpy as np
 from gtsam.symbol_shorthand import L, X
 from numpy.typing import NDArray
 
-from bslam.algorithms.noise import measured_motion, range_sd_m
+from bslam.algorithms.noise import NO_GYRO, measured_motion, range_sd_m
 from bslam.algorithms.protocol import Landmark, Setup, Sighting
 from bslam.motion import Pose
 
@@ -46,7 +46,7 @@ class Isam2:
         self._pose = gtsam.Pose2()
         self._times_us: list[int] = []
         self._places: dict[int, NDArray[np.float64]] = {}
-        self._gyro_radps = math.nan  # of the step to come
+        self._gyro = NO_GYRO  # of the step to come
         self._begin_batch()
         start = gtsam.noiseModel.Isotropic.Sigma(3, _START_SD)
         self._factors.add(gtsam.PriorFactorPose2(X(0), self._pose, start))
@@ -55,16 +55,16 @@ class Isam2:
     def _begin_batch(self) -> None:
         self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
 
-    def gyro(self, time_us: int, rate_radps: float) -> None:
+    def gyro(self, time_us: int, rate_radps: float, sd_radps: float) -> None:
         """See `Gyroscopic`."""
-        self._gyro_radps = rate_radps
+        self._gyro = (rate_radps, sd_radps)
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
         p = self._p
         dt_s = (time_us - self._times_us[-1]) * 1e-6
-        (way_m, turn_rad), spread = measured_motion(p, dt_s, left_m, right_m, self._gyro_radps)
-        self._gyro_radps = math.nan
+        (way_m, turn_rad), spread = measured_motion(p, dt_s, left_m, right_m, *self._gyro)
+        self._gyro = NO_GYRO
         twist = np.array([way_m, 0.0, turn_rad])
         covariance = np.zeros((3, 3))
         covariance[np.ix_([0, 2], [0, 2])] = spread

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.algorithms.noise import measured_motion, range_sd_m
+from bslam.algorithms.noise import NO_GYRO, measured_motion, range_sd_m
 from bslam.algorithms.protocol import Landmark, Setup, Sighting
 from bslam.errors import BslamError
 from bslam.motion import Pose, move_on_arc
@@ -76,28 +76,28 @@ class MrptEkf:
         p = self._p
         self._write([p["bearing_sd_rad"], p["mount_x_m"], p["mount_y_m"], p["mount_yaw_rad"]])
         self._time_us: int | None = None
-        self._gyro_radps = math.nan
+        self._gyro = NO_GYRO
         self._move: list[float] = [0.0] * 10  # whether there is one, the move, its covariance
         self._seen: list[Sighting] = []
         self._pose: Pose = (0.0, 0.0, 0.0)
         self._covariance = np.zeros((3, 3))
 
-    def gyro(self, time_us: int, rate_radps: float) -> None:
+    def gyro(self, time_us: int, rate_radps: float, sd_radps: float) -> None:
         """See `Gyroscopic`."""
-        self._gyro_radps = rate_radps
+        self._gyro = (rate_radps, sd_radps)
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
         assert self._time_us is not None
         p, dt_s = self._p, (time_us - self._time_us) * 1e-6
-        (way_m, turn_rad), covariance = measured_motion(p, dt_s, left_m, right_m, self._gyro_radps)
+        (way_m, turn_rad), covariance = measured_motion(p, dt_s, left_m, right_m, *self._gyro)
         half_turn_m = 0.5 * turn_rad * p["wheelbase_m"]
         end = move_on_arc((0.0, 0.0, 0.0), way_m - half_turn_m, way_m + half_turn_m, p["wheelbase_m"])
         c, s = math.cos(0.5 * turn_rad), math.sin(0.5 * turn_rad)
         by_read = np.array([[c, -0.5 * way_m * s], [s, 0.5 * way_m * c], [0.0, 1.0]])
         spread = by_read @ covariance @ by_read.T
         self._move = [1.0, *end, *spread[np.triu_indices(3)].tolist()]
-        self._time_us, self._gyro_radps = time_us, math.nan
+        self._time_us, self._gyro = time_us, NO_GYRO
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -41,20 +42,29 @@ def motion_covariance(
     return covariance
 
 
+NO_GYRO: Final = (math.nan, math.nan)
+"""Rate and noise where no gyro tells."""
+
+
 def measured_motion(
-    p: Mapping[str, int | float], dt_s: Any, left_m: Any, right_m: Any, gyro_radps: Any
+    p: Mapping[str, int | float],
+    dt_s: Any,
+    left_m: Any,
+    right_m: Any,
+    gyro_radps: Any,
+    gyro_sd_radps: Any,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(way m, turn rad) (..., 2) of steps by wheels and gyro, scaled, and its covariance, MATH (5), (6).
 
-    gyro_radps: NaN where there is none.
+    gyro_radps: NaN where there is none. gyro_sd_radps: its noise.
     """
-    dt_s, left_m, right_m, rate = (
-        np.asarray(one, dtype=np.float64) for one in (dt_s, left_m, right_m, gyro_radps)
+    dt_s, left_m, right_m, rate, rate_sd = (
+        np.asarray(one, dtype=np.float64) for one in (dt_s, left_m, right_m, gyro_radps, gyro_sd_radps)
     )
     read = np.stack([0.5 * (left_m + right_m), (right_m - left_m) / p["wheelbase_m"]], axis=-1)
     covariance = motion_covariance(p, dt_s, left_m, right_m)
     told = np.isfinite(rate)
-    total = covariance[..., 1, 1] + (p["gyro_sd_radps"] * dt_s) ** 2
+    total = covariance[..., 1, 1] + np.where(told, rate_sd * dt_s, 1.0) ** 2
     gain = np.where(told[..., np.newaxis], covariance[..., 1] / total[..., np.newaxis], 0.0)
     off_rad = np.where(told, rate, 0.0) * dt_s - read[..., 1]
     read = read + gain * off_rad[..., np.newaxis]

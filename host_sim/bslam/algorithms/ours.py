@@ -14,6 +14,7 @@ from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.motion import Pose
 
+_NO_GYRO: tuple[None, float] = (None, 0.0)
 _BY_LOOKS = 3  # the parameter `association` of the method that learns what beacons look like
 
 
@@ -35,20 +36,20 @@ class Bslam:
         """See `Algorithm`. Nothing inside is random."""
         self._slam = self._new()
         self._accounts: Sequence[Account] | None = None
-        self._gyro_radps: float | None = None  # of the step to come
+        self._gyro: tuple[float | None, float] = _NO_GYRO  # of the step to come
 
-    def gyro(self, time_us: int, rate_radps: float) -> None:
+    def gyro(self, time_us: int, rate_radps: float, sd_radps: float) -> None:
         """See `Gyroscopic`."""
-        self._gyro_radps = rate_radps
+        self._gyro = (rate_radps, sd_radps)
 
     def odometry(self, time_us: int, left_m: float, right_m: float) -> None:
         """See `Algorithm`."""
         try:
-            self._slam.odometry("wheels", time_us, left_m, right_m, self._gyro_radps)
+            self._slam.odometry("wheels", time_us, left_m, right_m, *self._gyro)
         except CoreError:
             return  # the core has counted it
         finally:
-            self._gyro_radps = None
+            self._gyro = _NO_GYRO
 
     def observe(self, time_us: int, sightings: Sequence[Sighting]) -> None:
         """See `Algorithm`."""

@@ -101,7 +101,8 @@ class Algorithm(Protocol):
     image's sightings (None: it refused the image), and `uids() -> Iterable[int]` of the beacons in its map,
     provisional ones included.
 
-    Of robots with a gyro, a class that has `gyro(time_us, rate_radps)` is told what it says (`Gyroscopic`).
+    Of robots with a gyro, a class that has `gyro(time_us, rate_radps, sd_radps)` is told what it says
+    (`Gyroscopic`).
 
     An exception ends the run and is reported with the algorithm's name; so do a pose or map that is not
     finite, and a call that takes longer than --call-limit.
@@ -130,10 +131,11 @@ class Algorithm(Protocol):
 
 
 class Gyroscopic(Algorithm, Protocol):
-    """An algorithm that takes a gyro. `robot.gyro_sigma_radps` is its noise."""
+    """An algorithm that takes a gyro."""
 
-    def gyro(self, time_us: int, rate_radps: float) -> None:
+    def gyro(self, time_us: int, rate_radps: float, sd_radps: float) -> None:
         """How fast the robot turned on the way that the next `odometry`, of the same stamp, tells of.
 
-        The mean over that time, to the left positive. Not called for a step without a reading.
+        The mean over that time, to the left positive, and its noise, independent of others. Not called for a
+        step without a reading.
         """

@@ -51,7 +51,8 @@ class Smoother:
     ) -> None:
         self._p = parameters
         self._first_range_ln = first_range_ln
-        self._steps: list[tuple[float, float, float, float]] = []  # dt_s, left_m, right_m, gyro_radps
+        # dt_s, left_m, right_m, gyro_radps, gyro_sd_radps
+        self._steps: list[tuple[float, float, float, float, float]] = []
         # pose, beacon, bearing_rad, range_m, bearing_sd_rad, range_sd_m
         self._seen: list[tuple[int, int, float, float, float, float]] = []
         self._priors: list[tuple[int, float, float, float]] = []  # beacon, x_m, y_m, sd_m
@@ -95,9 +96,10 @@ class Smoother:
         right_m: float,
         pose: tuple[float, float, float],
         gyro_radps: float = math.nan,
+        gyro_sd_radps: float = math.nan,
     ) -> None:
         """A reading of odometry, and the pose that it leads to from the last one. NaN: no gyro."""
-        self._steps.append((dt_s, left_m, right_m, gyro_radps))
+        self._steps.append((dt_s, left_m, right_m, gyro_radps, gyro_sd_radps))
         self._new_poses.append(pose)
 
     def add_beacon(self, x_m: float, y_m: float, sd_m: float) -> int:
@@ -267,14 +269,14 @@ class _Problem:
     def __init__(
         self,
         parameters: Mapping[str, int | float],
-        steps: list[tuple[float, float, float, float]],
+        steps: list[tuple[float, float, float, float, float]],
         seen: list[tuple[int, int, float, float, float, float]],
         priors: list[tuple[int, float, float, float]],
         guesses: list[tuple[int, int, float, float]],
     ) -> None:
         self._p = parameters
-        self._dt_s, left_m, right_m, gyro_radps = np.array(steps, dtype=np.float64).reshape(-1, 4).T
-        self._measured, covariance = measured_motion(parameters, self._dt_s, left_m, right_m, gyro_radps)
+        self._dt_s, *told = np.array(steps, dtype=np.float64).reshape(-1, 5).T
+        self._measured, covariance = measured_motion(parameters, self._dt_s, *told)
         self._odometry_weight = np.linalg.inv(np.linalg.cholesky(covariance))
         self._with_speeds = bool(parameters["velocity_states"]) and len(steps) > 0
         if self._with_speeds:

@@ -263,9 +263,8 @@ def _input_of(told: Told) -> Reading | Frame:
     """What the filter was given."""
     report, time_us = told.report, told.time_us
     if isinstance(report, PoseReport):
-        return Reading(
-            "ticks", time_us, report.left_ticks, report.right_ticks, report.gyro_radps, told.refused
-        )
+        ticks, gyro = (report.left_ticks, report.right_ticks), (report.gyro_radps, report.gyro_sd_radps)
+        return Reading("ticks", time_us, *ticks, *gyro, told.refused)
     seen, silent = told.seen, [-1] * len(told.seen)
     signatures = [one.signature for one in seen if one.signature is not None]
     return Frame(

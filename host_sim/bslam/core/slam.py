@@ -170,8 +170,19 @@ class Slam:
         """Goes on with a chain of fingerprints of the state (`bslam_slam_fingerprint`)."""
         return int(self._lib.bslam_slam_fingerprint(self._slam, before))
 
-    def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
+    def odometry(
+        self,
+        kind: str,
+        time_us: int,
+        a: float,
+        b: float,
+        gyro_radps: float | None = None,
+        gyro_sd_radps: float = 0.0,
+    ) -> None:
         """One reading of kind "wheels" (a, b = left_m, right_m), "ticks" (counters), "velocity" (m/s, rad/s).
+
+        gyro_radps: the mean turn rate since the reading before, if a gyro tells one; gyro_sd_radps: its own
+        noise, 0: as the parameter of that name says.
 
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
@@ -188,6 +199,7 @@ class Slam:
             raise BslamError(f"odometry at {time_us} us ({name_a} {a}, {name_b} {b}): {error}") from error
         reading.has_gyro = gyro_radps is not None
         reading.gyro_radps = gyro_radps or 0.0
+        reading.gyro_sd_radps = gyro_sd_radps
         status = self._lib.bslam_slam_odometry(self._slam, reading)
         if status:
             self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")

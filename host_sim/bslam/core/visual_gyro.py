@@ -11,15 +11,15 @@ from bslam.core.vision import Turn
 class VisualGyro:
     """As bslam_visual_gyro_t: `advance` to each reading of the wheels, then `take` that time's frames."""
 
-    SD_RADPS = 0.2
-    """Noise of the rate, for a log's `gyro_sigma_radps` (BSLAM_VISUAL_GYRO_SD_RADPS)."""
+    SD_RADPS = 0.085
+    """What a rate errs by at least, for a log's `gyro_sigma_radps` (BSLAM_VISUAL_GYRO_SD_RADPS)."""
     WIDE_SD_RADPS = 1.0
     """The same if a lens is equidistant (BSLAM_VISUAL_GYRO_WIDE_SD_RADPS)."""
 
-    def __init__(self) -> None:
+    def __init__(self, least_sd_radps: float) -> None:
         self._library = vision_library()
         self._gyro = self._library.ffi.new("bslam_visual_gyro_t *")
-        self._library.lib.bslam_visual_gyro_init(self._gyro)
+        self._library.lib.bslam_visual_gyro_init(self._gyro, least_sd_radps)
 
     def advance(self, time_us: int, speed_mps: float, speed_sd_mps: float) -> None:
         """Go on to a time; the forward speed since the time before, by the wheels. BslamError if refused."""
@@ -33,7 +33,7 @@ class VisualGyro:
         status = library.lib.bslam_visual_gyro_take(self._gyro, camera, given)
         library.ensure(status, f"visual gyro, camera {camera}: {turn}")
 
-    def rate_radps(self) -> float | None:
-        """The mean turn rate over the last step; None where it is not known."""
-        rate = self._library.ffi.new("bslam_real_t *")
-        return rate[0] if self._library.lib.bslam_visual_gyro_rate(self._gyro, rate) else None
+    def rate(self) -> tuple[float, float] | None:
+        """The turn rate of the last step and its noise, rad/s; None where it is not known."""
+        rate, sd = (self._library.ffi.new("bslam_real_t *") for _ in range(2))
+        return (rate[0], sd[0]) if self._library.lib.bslam_visual_gyro_rate(self._gyro, rate, sd) else None

@@ -50,11 +50,11 @@ class Eye:
                 self._frame = Frames(self._sightings(glance.rows), self._options)
         return self._frame is not None and self._frame.waiting_before(until_us)
 
-    def gyro_radps(self, row: int, time_us: int) -> float | None:
+    def gyro(self, row: int, time_us: int) -> tuple[float | None, float]:
         """As `runner.FrameFeed`: the frame of that time is looked at now."""
         self.waiting_before(time_us + 1)
         rate_radps = float(self._compass.rates_radps[row])
-        return None if math.isnan(rate_radps) else rate_radps
+        return None if math.isnan(rate_radps) else rate_radps, float(self._compass.sds_radps[row])
 
     def take(self) -> tuple[int, Sequence[int], list[Any]]:
         """As `runner.FrameFeed`."""

@@ -132,8 +132,8 @@ class _Rerun:
         if reading.refused is None:
             self._end_row()
             self.rows.seen.append(False)
-        inputs = (reading.kind, reading.time_us, reading.a, reading.b, reading.gyro_radps)
-        _, refused = self._try("odometry", *inputs)
+        gyro = (reading.gyro_radps, reading.gyro_sd_radps)
+        _, refused = self._try("odometry", reading.kind, reading.time_us, reading.a, reading.b, *gyro)
         self._chain()
         self._answer(reading, refused)
 

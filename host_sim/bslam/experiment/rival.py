@@ -81,13 +81,13 @@ class _Drive:
         self._observe_start(times_us)
         self._keep(0)
         travel = zip(
-            *(one.tolist() for one in (*wheel_travel(self._log), gyro_rates(self._log))), strict=True
+            *(one.tolist() for one in (*wheel_travel(self._log), *gyro_rates(self._log))), strict=True
         )
         feel = getattr(algorithm, "gyro", None)
-        for step, (left_m, right_m, rate_radps) in enumerate(travel, start=1):
+        for step, (left_m, right_m, rate_radps, sd_radps) in enumerate(travel, start=1):
             began = clock()
             if feel is not None and not math.isnan(rate_radps):
-                feel(times_us[step], rate_radps)
+                feel(times_us[step], rate_radps, sd_radps)
             algorithm.odometry(times_us[step], left_m, right_m)
             self._observe_until(times_us[step + 1] if step + 1 < len(times_us) else None)
             self._keep(step)

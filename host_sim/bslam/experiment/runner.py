@@ -63,8 +63,9 @@ class FrameFeed(Protocol):
     def take(self) -> tuple[int, Sequence[int], list[Any]]:
         """Time, true identities, and the columns of the next frame, see `columns_for_filter`."""
 
-    def gyro_radps(self, row: int, time_us: int) -> float | None:
-        """What the gyro says with a row of odometry; asked before the row is fed. None: nothing."""
+    def gyro(self, row: int, time_us: int) -> tuple[float | None, float]:
+        """What the gyro says with a row of odometry, rad/s (None: nothing), and that one's own noise (0: not
+        said); asked before the row is fed."""
 
 
 def run_log(
@@ -82,7 +83,7 @@ def run_log(
     beacons to hold. `record` is the file of the recording to make. `frames` are taken in place of the log's
     sightings.
     """
-    frames = frames or Frames(log.sightings, options, log.odometry.gyro_radps)
+    frames = frames or Frames(log.sightings, options, log.odometry)
     params, beacons = core_params(options, log), beacons_to_hold(log, options)
     if slam_factory is None and options.target != "host":
         if options.kept_map is not None:
@@ -217,9 +218,9 @@ class _Run:
 
     def _read(self, kind: str, row: int, time_us: int, a: float, b: float) -> int:
         """Feed a row of odometry, and what the gyro says with it; CPU time of the core, ns."""
-        gyro_radps = self.frames.gyro_radps(row, time_us)
+        gyro = self.frames.gyro(row, time_us)
         began = self._clock()
-        self._try(self.slam.odometry, kind, time_us, a, b, gyro_radps)
+        self._try(self.slam.odometry, kind, time_us, a, b, *gyro)
         return self._clock() - began
 
     def _start_clock(self, time_us: int) -> None:
@@ -370,6 +371,16 @@ def _as_written(value: Number) -> Number:
     return value if isinstance(value, int) else float(f"{value:.7g}")
 
 
+def gyro_of(odometry: Odometry) -> list[tuple[float | None, float]]:
+    """What the gyro says with each row, see `FrameFeed.gyro`; empty: there is none."""
+    if odometry.gyro_radps is None:
+        return []
+    rates_radps = [None if math.isnan(rate) else rate for rate in odometry.gyro_radps.tolist()]
+    sds_radps = odometry.gyro_sd_radps
+    own = [0.0] * len(rates_radps) if sds_radps is None else sds_radps.tolist()
+    return list(zip(rates_radps, own, strict=True))
+
+
 class Frames:
     """Sightings in frames of equal time, as the filter is to see them: without what it must not know."""
 
@@ -377,9 +388,9 @@ class Frames:
         self,
         sightings: Sightings,
         options: RunOptions,
-        gyro_radps: NDArray[np.float64] | None = None,
+        odometry: Odometry | None = None,
     ) -> None:
-        self._gyro_radps = None if gyro_radps is None else gyro_radps.tolist()
+        self._gyro = [] if odometry is None else gyro_of(odometry)
         times = sightings.time_us
         first = np.flatnonzero(np.diff(times, prepend=-1))
         self._bounds = [*first.tolist(), len(times)]
@@ -391,11 +402,9 @@ class Frames:
         self._score = None if sightings.score is None else sightings.score.tolist()
         self._next = 0
 
-    def gyro_radps(self, row: int, time_us: int) -> float | None:
-        """As `FrameFeed.gyro_radps`: what the log says."""
-        if self._gyro_radps is None or math.isnan(self._gyro_radps[row]):
-            return None
-        return self._gyro_radps[row]
+    def gyro(self, row: int, time_us: int) -> tuple[float | None, float]:
+        """As `FrameFeed.gyro`: what the log says."""
+        return self._gyro[row] if self._gyro else (None, 0.0)
 
     def waiting_before(self, until_us: int | None) -> bool:
         """As `FrameFeed.waiting_before`."""

@@ -108,11 +108,13 @@ def wheel_travel(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return way_m - half_m, way_m + half_m
 
 
-def gyro_rates(log: Log) -> NDArray[np.float64]:
-    """Mean turn rate of each step by the gyro, rad/s, (n,); NaN where none tells."""
+def gyro_rates(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean turn rate of each step by the gyro, rad/s, and its noise, (n,) each; NaN where none tells."""
     steps = len(step_times_us(log)) - 1
-    rates = log.odometry.gyro_radps
-    return np.full(steps, np.nan) if rates is None else rates[len(rates) - steps :]
+    rates_radps, sds_radps = log.odometry.gyro_radps, log.odometry.gyro_sd_radps
+    rates = np.full(steps, np.nan) if rates_radps is None else rates_radps[len(rates_radps) - steps :]
+    own = np.zeros(steps) if sds_radps is None else sds_radps[len(sds_radps) - steps :]
+    return rates, np.where(own > 0.0, own, log.robot.gyro_sigma_radps)
 
 
 def _travel_of_ticks(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -75,7 +75,7 @@ _KNOWN_BEACON = struct.Struct("<iff")
 _UID = struct.Struct("<I")
 _PARAM_ID = struct.Struct("<H")
 _PARAM = struct.Struct("<Hf")
-_REPORT = struct.Struct("<BIIBf")
+_REPORT = struct.Struct("<BIIBff")
 _CAMERA = struct.Struct("<BBHH9fB")
 _SEEN = struct.Struct("<6fiBB")
 _LOOKED = struct.Struct("<4B")
@@ -126,11 +126,15 @@ def hello(session: int, wishes: Wishes) -> bytes:
     return _HELLO.pack(session, flags)
 
 
-def odometry(kind: str, a: float, b: float, gyro_radps: float | None) -> bytes:
+def odometry(
+    kind: str, a: float, b: float, gyro_radps: float | None = None, gyro_sd_radps: float = 0.0
+) -> bytes:
     """A reading; raises struct.error for counters that are no 32-bit numbers."""
     values = struct.pack("<II", int(a), int(b)) if kind == "ticks" else float32(a) + float32(b)
     has_gyro = gyro_radps is not None
-    return bytes((_SOURCES[kind], int(has_gyro))) + values + float32(gyro_radps or 0.0)
+    return (
+        bytes((_SOURCES[kind], int(has_gyro))) + values + float32(gyro_radps or 0.0) + float32(gyro_sd_radps)
+    )
 
 
 def payload_max(sightings_max: int) -> int:
@@ -296,13 +300,15 @@ class PoseReport:
     left_ticks: int
     right_ticks: int
     gyro_radps: float | None  # what its gyro, or its cameras, told with it
+    gyro_sd_radps: float  # by what that errs; 0: as the parameter says
     step: Step
 
 
 def read_pose_report(payload: bytes) -> PoseReport:
-    status, left_ticks, right_ticks, flags, rate_radps = _REPORT.unpack_from(payload)
+    status, left_ticks, right_ticks, flags, rate_radps, sd_radps = _REPORT.unpack_from(payload)
     gyro_radps = rate_radps if flags & 1 else None
-    return PoseReport(status, left_ticks, right_ticks, gyro_radps, read_step(payload[_REPORT.size :]))
+    step = read_step(payload[_REPORT.size :])
+    return PoseReport(status, left_ticks, right_ticks, gyro_radps, sd_radps, step)
 
 
 def read_look(body: bytes) -> tuple[list[RawAccount], int, int]:

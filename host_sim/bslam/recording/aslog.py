@@ -76,7 +76,10 @@ def _odometry(recording: Recording, readings: list[Reading]) -> Odometry:
         raise BslamError(f"{recording.path}: odometry at {time_us[place]} us: allowed: after the one before")
     a, b = (np.array([getattr(one, name) for one in readings], dtype=np.float64) for name in "ab")
     gyro_radps = np.array([one.gyro_radps for one in readings], dtype=np.float64)  # None becomes NaN
-    return Odometry(kinds[0], time_us, a, b, None if np.isnan(gyro_radps).all() else gyro_radps)
+    if np.isnan(gyro_radps).all():
+        return Odometry(kinds[0], time_us, a, b)
+    gyro_sd_radps = np.array([one.gyro_sd_radps for one in readings], dtype=np.float64)
+    return Odometry(kinds[0], time_us, a, b, gyro_radps, gyro_sd_radps if gyro_sd_radps.any() else None)
 
 
 def _sightings(frames: list[Frame]) -> Sightings:

@@ -53,6 +53,7 @@ class Reading:
     a: int | float
     b: int | float
     gyro_radps: float | None = None
+    gyro_sd_radps: float = 0.0
     refused: str | None = None
 
 
@@ -142,12 +143,14 @@ def _start_from(content: Json) -> Start:
 def _reading_to(one: Reading) -> Json:
     a_name, b_name = ODOMETRY_COLUMNS[one.kind]
     words = {"time_us": one.time_us, "kind": one.kind, a_name: one.a, b_name: one.b}
-    return words | {"gyro_radps": one.gyro_radps, "refused": one.refused}
+    gyro = {"gyro_radps": one.gyro_radps, "gyro_sd_radps": one.gyro_sd_radps}
+    return words | gyro | {"refused": one.refused}
 
 
 def _reading_from(content: Json) -> Reading:
     a, b = (content[name] for name in ODOMETRY_COLUMNS[content["kind"]])
-    return Reading(content["kind"], content["time_us"], a, b, content["gyro_radps"], content["refused"])
+    gyro = (content["gyro_radps"], content["gyro_sd_radps"])
+    return Reading(content["kind"], content["time_us"], a, b, *gyro, content["refused"])
 
 
 def _frame_to(one: Frame) -> Json:

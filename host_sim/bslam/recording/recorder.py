@@ -38,10 +38,19 @@ class Recorder:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._slam, name)
 
-    def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
+    def odometry(
+        self,
+        kind: str,
+        time_us: int,
+        a: float,
+        b: float,
+        gyro_radps: float | None = None,
+        gyro_sd_radps: float = 0.0,
+    ) -> None:
         """As `Slam.odometry`."""
-        _, refusal = self._attempt("odometry", kind, time_us, a, b, gyro_radps)
-        self._end_step(Reading(kind, time_us, a, b, gyro_radps, _status(refusal)), refusal)
+        inputs = (kind, time_us, a, b, gyro_radps, gyro_sd_radps)
+        _, refusal = self._attempt("odometry", *inputs)
+        self._end_step(Reading(*inputs, _status(refusal)), refusal)
 
     def sightings(
         self,

@@ -100,6 +100,7 @@ SCHEMAS: dict[str, Json] = {
         time_us=_WHOLE,
         kind=_TEXT,
         gyro_radps=_NUMBER,
+        gyro_sd_radps=_NUMBER,
         refused=_TEXT,
         **{name: _NUMBER for names in ODOMETRY_COLUMNS.values() for name in names},
     ),

@@ -128,10 +128,18 @@ class RemoteSlam:
         steps = min(self._values["history_steps"], self._client.info.history_max)
         return self.params | {"history_steps": steps}
 
-    def odometry(self, kind: str, time_us: int, a: float, b: float, gyro_radps: float | None = None) -> None:
+    def odometry(
+        self,
+        kind: str,
+        time_us: int,
+        a: float,
+        b: float,
+        gyro_radps: float | None = None,
+        gyro_sd_radps: float = 0.0,
+    ) -> None:
         """As `Slam.odometry`."""
         what = f"odometry at {time_us} us ({a}, {b})"
-        payload = _packed(what, messages.odometry, kind, a, b, gyro_radps)
+        payload = _packed(what, messages.odometry, kind, a, b, gyro_radps, gyro_sd_radps)
         self._take_step(self._client.ask(Message.ODOMETRY, payload, time_us), what)
 
     def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:

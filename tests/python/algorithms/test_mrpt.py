@@ -64,7 +64,7 @@ def test_gyro_and_noise_of_the_wheels_reach_it(log):
         algorithm.pose()
         for step in range(1, 11):
             if rate_radps is not None:
-                algorithm.gyro(40_000 * step, rate_radps)
+                algorithm.gyro(40_000 * step, rate_radps, log.robot.gyro_sigma_radps)
             algorithm.odometry(40_000 * step, 0.016, 0.016)
             pose = algorithm.pose()
         assert pose == pytest.approx((0.16, 0.0, 0.0), abs=1e-9)

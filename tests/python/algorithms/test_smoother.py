@@ -43,8 +43,9 @@ def drive(p, steps, seed=4, has_range=True, has_gyro=False, sds=(), first_range_
         guess = move_on_arc(smoother.last_pose, left_m, right_m, p["wheelbase_m"])
         turn_radps = (wheels[1] - wheels[0]) / p["wheelbase_m"] / STEP_S
         told = has_gyro and step % 2 == 0
-        gyro_radps = turn_radps + p["gyro_sd_radps"] * rng.standard_normal() if told else math.nan
-        smoother.add_step(STEP_S, left_m, right_m, guess, gyro_radps)
+        gyro_sd_radps = (0.02 if step % 4 == 0 else 0.1) if told else math.nan
+        gyro_radps = turn_radps + gyro_sd_radps * rng.standard_normal()
+        smoother.add_step(STEP_S, left_m, right_m, guess, gyro_radps, gyro_sd_radps)
         if step % 3 == 0:
             look(smoother, p, true, step, rng, has_range, sds)
     return smoother
@@ -147,7 +148,7 @@ def gtsam_graph(gtsam, p, solved, start):
 
     for number, place in enumerate(start.beacons):
         values.insert(1000 + number, place)
-    for k, (dt_s, left_m, right_m, gyro_radps) in enumerate(solved._steps):
+    for k, (dt_s, left_m, right_m, gyro_radps, gyro_sd_radps) in enumerate(solved._steps):
         values.insert(k + 1, gtsam.Pose2(*start.poses[k + 1]))
         read = np.array([0.5 * (left_m + right_m), 0.0, (right_m - left_m) / p["wheelbase_m"]])
         covariance = np.zeros((3, 3))
@@ -157,7 +158,7 @@ def gtsam_graph(gtsam, p, solved, start):
         if p["velocity_states"]:
             add_speeds(gtsam, p, add, k, dt_s)
         if math.isfinite(gyro_radps):
-            turned, sd_rad = gyro_radps * dt_s, p["gyro_sd_radps"] * dt_s
+            turned, sd_rad = gyro_radps * dt_s, gyro_sd_radps * dt_s
             add([k, k + 1], lambda a, b, t=turned: twist(gtsam, a, b)[[2]] - t, [[sd_rad**2]])
     for beacon, *place, sd_m in solved._priors:
         spread = gtsam.noiseModel.Isotropic.Sigma(2, sd_m)

@@ -336,6 +336,11 @@ def test_odometry_gyro_is_taken_beside_the_wheels() -> None:
     without.odometry("wheels", 40_000, 0.01, 0.01)
     # A gyro that is all but exact decides the turn.
     assert with_gyro.pose()[2] == pytest.approx(0.02, abs=1e-5)
+    doubtful = started(params)  # its own noise goes before the parameter
+    doubtful.odometry("wheels", 40_000, 0.01, 0.01, gyro_radps=0.5, gyro_sd_radps=100.0)
+    assert abs(doubtful.pose()[2]) < 1e-3
+    with pytest.raises(CoreError, match="BSLAM_E_RANGE"):
+        doubtful.odometry("wheels", 80_000, 0.01, 0.01, gyro_radps=0.5, gyro_sd_radps=-0.1)
     assert without.pose()[2] == 0.0
 
 

@@ -79,7 +79,10 @@ def test_gyro_is_told_to_who_takes_it_before_the_wheels_of_its_step(made):
     calls = [call for call in scribe.calls if call[0] in ("gyro", "odometry")]
     assert [call[0] for call in calls] == ["gyro", "odometry", "odometry", *["gyro", "odometry"] * 2]
     rates = [call[1:] for call in calls if call[0] == "gyro"]
-    assert rates == [(made.step_us * k, rate) for k, rate in ((1, 0.3), (3, 0.1), (4, -0.2))]
+    assert rates == [(made.step_us * k, rate, 0.02) for k, rate in ((1, 0.3), (3, 0.1), (4, -0.2))]
+    own = replace(log, odometry=replace(log.odometry, gyro_sd_radps=np.array([0.5, 0.0, 0.0, 0.25])))
+    calls = told(own, RunOptions(), listening)[0].calls
+    assert [call[3] for call in calls if call[0] == "gyro"] == [0.5, 0.02, 0.25]
     deaf, _ = told(log, RunOptions())
     assert {call[0] for call in deaf.calls} == {"reset", "observe", "odometry"}
 

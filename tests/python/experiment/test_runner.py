@@ -39,8 +39,8 @@ class Recorder:
         if len(self.calls) - 1 in self.refuse:
             raise CoreError("BSLAM_E_TIME", "refused")
 
-    def odometry(self, kind, time_us, a, b, gyro_radps):
-        self._take(kind, time_us, a, b, *(() if gyro_radps is None else (gyro_radps,)))
+    def odometry(self, kind, time_us, a, b, gyro_radps, gyro_sd_radps):
+        self._take(kind, time_us, a, b, *(() if gyro_radps is None else (gyro_radps, gyro_sd_radps)))
 
     def sightings(self, time_us, bearing_rad, range_m, label, mappable, *more):
         self._take("frame", time_us, bearing_rad, range_m, label, mappable, *more)
@@ -191,7 +191,10 @@ def test_the_first_row_of_velocities_only_marks_the_start(log):
 def test_a_gyro_s_rates_go_with_their_rows(log):
     odometry = replace(log.odometry, gyro_radps=np.array([0.25] + [math.nan] * (len(log.odometry.a) - 1)))
     _, recorder = run(replace(log, odometry=odometry))
-    assert [call[4:] for call in recorder.calls if call[0] == "wheels"][:2] == [(0.25,), ()]
+    assert [call[4:] for call in recorder.calls if call[0] == "wheels"][:2] == [(0.25, 0.0), ()]
+    own = replace(odometry, gyro_sd_radps=np.full(len(odometry.a), 0.5))
+    _, recorder = run(replace(log, odometry=own))
+    assert [call[4:] for call in recorder.calls if call[0] == "wheels"][:2] == [(0.25, 0.5), ()]
 
 
 def test_ticks_are_whole_numbers(made, log):

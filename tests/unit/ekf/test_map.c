@@ -626,28 +626,61 @@ static void test_give_scale_beyond_their_room_is_not_done(void **state)
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 
-static void test_renew_scale_forgets_what_was_learned_of_it_and_nothing_else(void **state)
+/// The filter with a sized beacon, whose scale was doubted so much at first.
+static bslam_ekf_t with_sized(bslam_params_t *params, double scale_sd, int *index)
 {
     unit_random_t random = {24};
-    bslam_params_t params;
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(params, &random);
     bslam_sighting_t sighting = unit_polar(0.7, 4, 7);
-    sighting.range_scale_sd = BSLAM_R(0.1);
+    sighting.range_scale_sd = real(scale_sd);
+    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &sighting, index), BSLAM_OK);
+    return ekf;
+}
+
+/// All else is then as if the scale had been so doubtful from the start, and is not known any more.
+static void test_renew_scale_leaves_what_hung_on_it_as_doubtful_as_it_would_have_been(void **state)
+{
+    bslam_params_t params;
     int index;
-    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+    bslam_ekf_t ekf = with_sized(&params, 0.05, &index);
+    const bslam_ekf_t doubted = with_sized(&params, sqrt(0.0025 + 0.01), &index);
     const int at = ekf.beacons[index].at + 2;
     ekf.mean[at] = BSLAM_R(1.2);
     twin_t expected = twin_of(&ekf);
+    expected.covariance = twin_of(&doubted).covariance;
     for (int i = 0; i < ekf.dim; i++) {
-        expected.covariance.at[i][at] = expected.covariance.at[at][i] = i == at ? 0.0025 : 0;
+        expected.covariance.at[i][at] = expected.covariance.at[at][i] = i == at ? 0.0125 : 0;
     }
     expected.mean.at[at][0] = 1;
-    bslam_ekf_renew_scale(&ekf, index, BSLAM_R(0.0025));
+    bslam_ekf_renew_scale(&ekf, &params, index, BSLAM_R(0.0025), BSLAM_R(0.01));
     twin_assert(&ekf, &expected, TOLERANCE);
+    assert_true(bslam_symmat_get(ekf.covariance, at - 2, at - 2) >
+                (bslam_real_t)1.1 *
+                    bslam_symmat_get(with_sized(&params, 0.05, &index).covariance, at - 2, at - 2));
     const bslam_ekf_t before = ekf;
-    bslam_ekf_renew_scale(&ekf, 0, BSLAM_R(0.01));  // a point
-    bslam_ekf_renew_scale(&ekf, 2, BSLAM_R(0.01));  // a ray
+    bslam_ekf_renew_scale(&ekf, &params, 0, BSLAM_R(0.01), BSLAM_R(0.01));  // a point
+    bslam_ekf_renew_scale(&ekf, &params, 2, BSLAM_R(0.01), BSLAM_R(0.01));  // a ray
     assert_memory_equal(&ekf, &before, sizeof ekf);
+}
+
+/// Whatever was said of it before: a scale that is doubted more than was told adds doubt all the same.
+static void test_renew_scale_never_takes_doubt_away(void **state)
+{
+    static const double scale_vars[] = {0, 1e-8, 1e-4, 0.0025, 0.2};
+    for (size_t i = 0; i < sizeof scale_vars / sizeof scale_vars[0]; i++) {
+        bslam_params_t params;
+        int index;
+        bslam_ekf_t ekf = with_sized(&params, 0.05, &index);
+        const bslam_ekf_t before = ekf;
+        bslam_ekf_renew_scale(&ekf, &params, index, real(scale_vars[i]), BSLAM_R(0.01));
+        for (int k = 0; k < ekf.dim; k++) {
+            const bool is_scale = k == ekf.beacons[index].at + 2;
+            const double was = is_scale ? scale_vars[i] : bslam_symmat_get(before.covariance, k, k);
+            assert_true((double)bslam_symmat_get(ekf.covariance, k, k) >= was * (1 - 1e-5));
+        }
+        static bslam_real_t scratch[sizeof ekf.covariance / sizeof ekf.covariance[0]];
+        assert_true(bslam_symmat_is_positive(ekf.covariance, ekf.dim, scratch));
+    }
 }
 
 // ---- queries ----------------------------------------------------------------------------------------------
@@ -749,7 +782,8 @@ int main(void)
         cmocka_unit_test(test_measure_ray_that_the_distance_does_not_end_on_stays),
         cmocka_unit_test(test_give_scale_puts_a_value_of_its_own_behind_the_point),
         cmocka_unit_test(test_give_scale_beyond_their_room_is_not_done),
-        cmocka_unit_test(test_renew_scale_forgets_what_was_learned_of_it_and_nothing_else),
+        cmocka_unit_test(test_renew_scale_leaves_what_hung_on_it_as_doubtful_as_it_would_have_been),
+        cmocka_unit_test(test_renew_scale_never_takes_doubt_away),
 
         cmocka_unit_test(test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point),
         cmocka_unit_test(test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it),

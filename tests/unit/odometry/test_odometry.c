@@ -396,6 +396,28 @@ static void test_read_gyro_turn_of_many_revolutions_is_refused(void **state)
     assert_refused(&odometry, &params, with_gyro(wheels(START_US + STEP_US, 0, 0), -1e12), BSLAM_E_RANGE);
 }
 
+static void test_read_gyro_noise_that_is_none_is_refused(void **state)
+{
+    const bslam_params_t params = unit_params();
+    const bslam_odometry_t odometry = started();
+    static const struct {
+        double sd_radps;
+        bslam_status_t expected;
+    } bad[] = {{NAN, BSLAM_E_NOT_FINITE},
+               {INFINITY, BSLAM_E_NOT_FINITE},
+               {-0.1, BSLAM_E_RANGE},
+               {1e-7, BSLAM_E_RANGE},
+               {101, BSLAM_E_RANGE}};
+    for (int i = 0; i < COUNT_OF(bad); i++) {
+        bslam_odometry_reading_t reading = with_gyro(wheels(START_US + STEP_US, 0, 0), 0.1);
+        reading.gyro_sd_radps = real(bad[i].sd_radps);
+        assert_refused(&odometry, &params, reading, bad[i].expected);
+        reading.has_gyro = false;
+        bslam_odometry_t fine = odometry;
+        (void)read_ok(&fine, &params, reading);  // nobody reads it
+    }
+}
+
 static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(void **state)
 {
     bslam_params_t params = unit_params();
@@ -531,6 +553,12 @@ static void test_read_gyro_is_fused_as_the_information_form_has_it(void **state)
         assert_near(fused.forward_turn_cov_mrad, expected.forward_turn_cov_mrad, rounding_of(1e-4));
         assert_near(fused.turn_var_rad2, expected.turn_var_rad2, rounding_of(1e-3));
         assert_true(fused.turn_var_rad2 > 0);
+        params.gyro_sd_radps = 7;  // a reading's own noise goes before
+        bslam_odometry_t own = started();
+        bslam_odometry_reading_t with_noise = with_gyro(reading, 0.8);
+        with_noise.gyro_sd_radps = real(sds[i]);
+        const bslam_motion_t same = read_ok(&own, &params, with_noise);
+        assert_memory_equal(&same, &fused, sizeof same);
     }
 }
 
@@ -574,6 +602,7 @@ int main(void)
         cmocka_unit_test(test_read_wheel_faster_than_possible_is_a_jump),
         cmocka_unit_test(test_read_turn_of_many_revolutions_is_a_jump),
         cmocka_unit_test(test_read_gyro_turn_of_many_revolutions_is_refused),
+        cmocka_unit_test(test_read_gyro_noise_that_is_none_is_refused),
         cmocka_unit_test(test_read_after_an_encoder_reset_the_next_ticks_are_the_reference),
         cmocka_unit_test(test_read_jump_of_another_source_leaves_the_tick_reference),
         cmocka_unit_test(test_restart_starts_clock_and_ticks_anew),

@@ -101,10 +101,10 @@ static void test_class_is_what_its_distances_call_it_most_often(void **state)
 
 static void test_class_changes_after_so_many_sightings_however_long_it_was_another(void **state)
 {
-    for (int i = 0; i < 3 * BSLAM_CLASS_LEAD_MAX; i++) {
+    for (int i = 0; i < 3 * BSLAM_LEAD_MAX; i++) {
         see(called(DOOR, 1));
     }
-    for (int i = 0; i < BSLAM_CLASS_LEAD_MAX; i++) {
+    for (int i = 0; i < BSLAM_LEAD_MAX; i++) {
         see(called(CABINET, 1));
         assert_int_equal(beacon()->beacon_class, DOOR);
     }
@@ -156,11 +156,11 @@ static void test_class_is_not_voted_for_by_what_starts_a_beacon(void **state)
 
 static void test_another_class_has_another_scale_in_more_doubt(void **state)
 {
-    for (int i = 0; i < 2 * BSLAM_CLASS_LEAD_MAX; i++) {
+    for (int i = 0; i < 2 * BSLAM_LEAD_MAX; i++) {
         see(called(DOOR, 1));
     }
     slam.ekf.mean[beacon()->at + 2] = BSLAM_R(1.05);  // as if it had been learned
-    for (int i = 0; i < BSLAM_CLASS_LEAD_MAX; i++) {
+    for (int i = 0; i < BSLAM_LEAD_MAX; i++) {
         see(called(CABINET, 1.1));
         assert_near(scale(), 1.05, 1e-5);
     }
@@ -169,6 +169,46 @@ static void test_another_class_has_another_scale_in_more_doubt(void **state)
     assert_near(variance(2), 0.0025 + 0.01, 1e-6);
     see(called(CABINET, 1.1));  // its distances count from now on
     assert_true(scale() > 1.01);
+}
+
+static bool passes(double factor)
+{
+    const double before_m = (double)slam.ekf.mean[beacon()->at];
+    see(called(DOOR, factor));
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);  // its direction is right
+    return fabs((double)slam.ekf.mean[beacon()->at] - before_m) > 1e-4 || fabs(scale() - 1) > 1e-4;
+}
+
+/// Two sizes take turns: its distances are those of the one that is measured more often.
+static void test_distances_that_do_not_fit_are_not_used_while_they_are_fewer(void **state)
+{
+    for (int i = 0; i < 5; i++) {
+        see(called(DOOR, 1));
+    }
+    assert_int_equal(beacon()->distance_lead, 4);  // the first one has nothing to fit
+    for (int i = 0; i < 4; i++) {
+        assert_false(passes(1.4));
+    }
+    assert_int_equal(beacon()->distance_lead, 0);
+    see(called(DOOR, 1));
+    assert_near(scale(), 1, 1e-5);
+    assert_false(passes(1.4));
+    assert_true(passes(1.4));  // and now it is the other
+    assert_true(slam.ekf.mean[beacon()->at] * slam.ekf.mean[beacon()->at + 2] > 4 * 1.2);
+}
+
+/// However long it was of one size.
+static void test_another_size_is_believed_after_so_many_distances(void **state)
+{
+    for (int i = 0; i < 3 * BSLAM_LEAD_MAX; i++) {
+        see(called(DOOR, 1));
+    }
+    for (int i = 0; i < BSLAM_LEAD_MAX; i++) {
+        assert_false(passes(1.4));
+    }
+    const double place_var_m2 = variance(0);
+    assert_true(passes(1.4));
+    assert_true(variance(0) > 1.5 * place_var_m2);  // what the old size said of the place is doubted
 }
 
 /// As much is known of place and scale as if the distance had been there at first: a direction from the same
@@ -267,6 +307,8 @@ int main(void)
         cmocka_unit_test_setup(test_distance_of_something_else_is_not_used, setup),
         cmocka_unit_test_setup(test_class_is_what_its_distances_call_it_most_often, setup),
         cmocka_unit_test_setup(test_class_changes_after_so_many_sightings_however_long_it_was_another, setup),
+        cmocka_unit_test_setup(test_distances_that_do_not_fit_are_not_used_while_they_are_fewer, setup),
+        cmocka_unit_test_setup(test_another_size_is_believed_after_so_many_distances, setup),
         cmocka_unit_test_setup(test_class_is_not_voted_for_by_directions_nor_by_what_has_none, setup),
         cmocka_unit_test_setup(test_class_is_not_voted_for_by_what_is_gated_out, setup),
         cmocka_unit_test_setup(test_class_is_not_voted_for_by_what_starts_a_beacon, setup),

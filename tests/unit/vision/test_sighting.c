@@ -26,7 +26,7 @@ static void test_sighting_of_a_whole_thing_has_its_noise_and_what_all_its_distan
     assert_near(told.bearing_rad, candidate.bearing_rad, 0);
     assert_near(told.bearing_sd_rad, 0.005, 1e-8);  // 3 and 4 mrad
     assert_near(told.range_m, 5, 0);
-    assert_near(told.range_sd_m, sqrt(0.3 * 0.3 + 0.1 * 0.1), 1e-6);  // 2 % of 5 m besides
+    assert_near(told.range_sd_m, sqrt(0.3 * 0.3 + 0.05 * 0.05), 1e-6);  // 1 % of 5 m besides
     assert_near(told.range_scale_sd, candidate.range_scale_sd, 0);
     assert_int_equal(told.beacon_class, 3);
     assert_near(told.score, 1.25, 0);
