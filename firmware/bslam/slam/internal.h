@@ -52,12 +52,12 @@ bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int i
 
 /// Whether a matched sighting's distance counts. One that does not fit where the direction does counts no
 /// longer, but against the beacon's size; where most of late did not fit, that is forgotten, and this one
-/// counts. Before the innovations of a frame are taken. O(1), O(n) where it is forgotten.
+/// counts. Before the innovations of a frame are taken. O(1), O(n²) where it is forgotten.
 bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
                               const bslam_sighting_t *sighting);
 
 /// What a fused sighting says for the beacon's class, which is what its sightings with a distance call it
-/// most often. With another class goes another scale. After the correction. O(n).
+/// most often. With another class goes another scale. After the correction. O(n²).
 void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t *sighting);
 
 // ---- frame.c: the two halves of bslam_slam_sightings, for what looks at a frame before it is used ---------
