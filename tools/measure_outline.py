@@ -35,6 +35,7 @@ SLANT_RAD_MAX = np.radians(60.0)
 OVERLAP_MIN = 0.5
 DISTANCES_M = ((1.5, 2.5), (2.5, 3.5), (3.5, 5.0), (5.0, 7.0), (7.0, 12.0))
 MOVED_M = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.5)
+CONTRADICTED_SDS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 SURE = (0.0, 0.015, 0.02, 0.03, 0.04, 0.06, 0.10, 0.15)
 
 ERROR = np.dtype(
@@ -49,6 +50,7 @@ ERROR = np.dtype(
         ("bearing_sd", np.float64),
         ("range", np.float64),  # error, a fraction of the distance; NaN: not measured
         ("range_sd", np.float64),
+        ("misplaced_sds", np.float64),
         ("marked", np.bool_),  # as half hidden
         ("plain", np.bool_),  # no mark at all: the direction is told as a good one
     ]
@@ -140,7 +142,8 @@ def errors_of_world(seed: int, rig: str, style: str, hidden: Hidden, jitter_px: 
                 distance_sd = candidate.range_sd_m / seen.range_m
             row = (seed, step, seen.beacon_id, seen.kind, seen.range_m, (x_m, y_m))
             marks = candidate.marks if candidate is not None else frozenset()
-            told = (bearing, bearing_sd, distance, distance_sd)
+            misplaced_sds = candidate.misplaced_sds if candidate is not None else np.nan
+            told = (bearing, bearing_sd, distance, distance_sd, misplaced_sds)
             rows.append((*row, *told, "hidden" in marks, not marks))
     return np.array(rows, ERROR)
 
@@ -195,6 +198,10 @@ def print_tables(errors: Errors) -> None:
             f"{100 * low:g}-{100 * high:g} %",
             middle[(middle["range_sd"] >= low) & (middle["range_sd"] < high)],
         )
+    print("2.5-7 m, by how many standard deviations its sides contradict each other:")
+    for low, high in pairwise(CONTRADICTED_SDS):
+        off = middle["misplaced_sds"]
+        print_line(f"{low}-{high}", middle[(off >= low) & (off < high)])
 
 
 def correlations(errors: Errors, what: str) -> list[tuple[int, float]]:

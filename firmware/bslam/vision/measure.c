@@ -145,6 +145,14 @@ static void mark_hidden(const bslam_outline_t *o, const bslam_size_t *size, cons
     }
 }
 
+/// How many times its noise a distance errs by, whose two sides contradict each other: one of them is then
+/// another edge, which it will be in the next frames as well.
+static bslam_real_t contradiction(const bslam_ahead_t *ahead)
+{
+    const bslam_real_t square = ahead->residual_sds * ahead->residual_sds;
+    return square > 1 ? square : 1;
+}
+
 /// Direction, and distance if the height is known, with what is left of their errors when the outline is
 /// known.
 static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size,
@@ -156,7 +164,10 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
         return;
     }
     const bslam_ahead_t ahead = bslam_ahead_of_body(o, camera, size);
-    const bslam_real_t relative_var = RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var;
+    const bslam_real_t times = contradiction(&ahead);
+    const bslam_real_t noise_var = ahead.noise_var * times * times;
+    const bslam_real_t relative_var =
+        RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var + (noise_var - ahead.noise_var);
     candidate->misplaced_sds = (float)ahead.residual_sds;
     const bool hangs_right = ahead.residual_sds <= MISPLACED_SDS && ahead.inverse > 0;
     if (hangs_right) {
@@ -168,9 +179,8 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
     }
     candidate->range_m = bslam_sqrt(1 + o->middle * o->middle) / ahead.inverse;
     candidate->range_sd_m = candidate->range_m * bslam_sqrt(relative_var);
-    candidate->range_noise_sd_m = candidate->range_m * bslam_sqrt(ahead.noise_var);
-    candidate->range_scale_sd =
-        size->scale_sd > 0 ? size->scale_sd : bslam_sqrt(relative_var - ahead.noise_var);
+    candidate->range_noise_sd_m = candidate->range_m * bslam_sqrt(noise_var);
+    candidate->range_scale_sd = size->scale_sd > 0 ? size->scale_sd : bslam_sqrt(relative_var - noise_var);
     candidate->has_range = relative_var <= RANGE_SD_MAX * RANGE_SD_MAX;
 }
 

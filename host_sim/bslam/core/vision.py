@@ -89,6 +89,7 @@ class Candidate:
     class_margin: float
     score: float
     marks: frozenset[str]
+    misplaced_sds: float  # by how many standard deviations it hangs where its kind does not
     signature: NDArray[np.float32]  # (71,)
     object: str | None  # of the recogniser's, None: none of them
     object_margin: float  # what the recogniser says for the likeliest
@@ -335,6 +336,7 @@ class FrontEnd:
             class_margin=found.class_margin,
             score=found.score,
             marks=frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1),
+            misplaced_sds=found.misplaced_sds,
             signature=self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32),
             object=self._objects[found.object].name if found.object >= 0 else None,
             object_margin=found.object_margin,

@@ -36,6 +36,7 @@ def candidate(outline=(0.0, 0.0, 320.0, 240.0), bearing_rad=0.1, range_m=2.0):
         object_margin=0.0,
         score=1.0,
         marks=frozenset(),
+        misplaced_sds=0.0,
         signature=np.full(SIGNATURE_SIZE, 0.5, dtype=np.float32),
         told=None if bearing_rad is None else Told(0.011, 0.05 if range_m else 0.0, 0.02 if range_m else 0.0),
     )

@@ -32,6 +32,7 @@ def candidate(box, **changes):
         "class_margin": 1.0,
         "score": 0.7,
         "marks": frozenset(),
+        "misplaced_sds": 0.0,
         "signature": np.zeros(71, np.float32),
         "object": None,
         "object_margin": 0.0,

@@ -363,6 +363,31 @@ static void test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind
     assert_true(wrong.has_bearing && !wrong.has_range && wrong.misplaced_sds > 3);
 }
 
+/// It hangs a little off, so that there is a distance: as much noisier as the square of how far it is off.
+static void test_measure_is_less_sure_of_a_distance_whose_sides_contradict_each_other(void **state)
+{
+    const bslam_camera_t camera = unit_pinhole();
+    const unit_panel_t panel = poster(3, 0.1, 0.2);
+    bslam_size_t size = POSTER_SIZE;
+    size.top_low_m = size.top_high_m = BSLAM_R(1.5);
+    const bslam_candidate_t right = measured(&camera, &panel, &size);
+    const double plain = (double)(right.range_noise_sd_m / right.range_m);
+    assert_true(right.misplaced_sds < 1);
+    int contradicted = 0;
+    for (int i = 1; i <= 8; i++) {
+        size.top_low_m = size.top_high_m = BSLAM_R(1.5) + BSLAM_R(0.02) * (bslam_real_t)i;
+        const bslam_candidate_t off = measured(&camera, &panel, &size);
+        const double square = (double)off.misplaced_sds * (double)off.misplaced_sds;
+        if (off.has_range && square > 1) {
+            const double times = (double)(off.range_noise_sd_m / off.range_m) / plain;
+            assert_true(times > 0.8 * square && times < 1.25 * square);
+            assert_true(off.range_sd_m > off.range_noise_sd_m);
+            contradicted++;
+        }
+    }
+    assert_true(contradicted >= 2);
+}
+
 /// A rim of the wall's colour: by the height alone the poster seems farther; its place tells.
 static void test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim(void **state)
 {
@@ -589,6 +614,7 @@ int main(void)
         cmocka_unit_test(test_measure_of_two_of_a_kind_goes_by_their_width),
         cmocka_unit_test(test_measure_of_a_part_that_goes_on_out_of_the_frame_is_marked),
         cmocka_unit_test(test_measure_takes_no_distance_of_what_hangs_elsewhere_than_its_kind),
+        cmocka_unit_test(test_measure_is_less_sure_of_a_distance_whose_sides_contradict_each_other),
         cmocka_unit_test(test_measure_of_a_kind_with_a_known_place_survives_a_pale_rim),
         cmocka_unit_test(test_measure_takes_no_distance_where_height_and_width_contradict_each_other),
         cmocka_unit_test(test_measure_takes_the_distance_of_the_body_where_the_neck_is_not_found),

@@ -494,6 +494,42 @@ static void test_end_distance_is_less_sure_where_the_kind_is(void **state)
     }
 }
 
+/// What the frame cuts off on the right, of two kinds, the first surer by so much: 0.3 to 0.4 m wide; the
+/// other so wide.
+static bslam_candidate_t cut_with_margin(float margin, float other_m)
+{
+    const bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {
+        {.name = "one", .height_m = 0.3f, .narrow_m = 0.3f, .wide_m = 0.4f},
+        {.name = "other", .height_m = 0.3f, .narrow_m = other_m, .wide_m = other_m}};
+    const bslam_camera_t camera = camera_at(0);
+    model.classes = kinds;
+    take_all(UNIT_MODEL_CLASSES);
+    detector.kind_bias[1] = 2 * margin;
+    start_with(&camera);
+    paint_room();
+    paint(290, 60, 320, 100, 200, 30, 30);
+    int32_t count;
+    const bslam_candidate_t *found = found_in(show(0, true), &count);
+    assert_int_equal(found->beacon_class, 1);
+    assert_true(found->has_bearing && (found->marks & BSLAM_MARK_CUT_RIGHT) != 0);
+    return *found;
+}
+
+/// It may be the other kind, and then goes on as far as that does: its direction is the mean of both.
+static void test_end_direction_of_what_is_cut_off_is_less_sure_where_the_kind_is(void **state)
+{
+    const bslam_candidate_t narrow = cut_with_margin(30, 0);  // of the other's width nothing is known
+    const bslam_candidate_t wide = cut_with_margin(0, 1.5f);
+    assert_true(wide.bearing_rad < narrow.bearing_rad - 0.05f);
+    assert_true(wide.bearing_sd_rad > 0.05f && wide.bearing_sd_rad > 2 * narrow.bearing_sd_rad);
+    const bslam_candidate_t surer = cut_with_margin(1, 1.5f);
+    assert_true(surer.bearing_rad > wide.bearing_rad && surer.bearing_rad < narrow.bearing_rad);
+    assert_true(surer.bearing_sd_rad < wide.bearing_sd_rad);
+    const double odds = exp(-1.2), chance = odds / (1 + odds);
+    assert_near((double)(narrow.bearing_rad - surer.bearing_rad),
+                2 * chance * (double)(narrow.bearing_rad - wide.bearing_rad), 0.005);
+}
+
 /// The score of a square so many pixels high, 2.29 m away, taken for a thing so high; -1 if it is none.
 static float score_of(int side_px, float height_m)
 {
@@ -837,6 +873,7 @@ int main(void)
         TEST(test_end_candidates_come_surest_first),
         TEST(test_end_of_a_model_of_one_kind_there_is_no_second),
         TEST(test_end_candidate_becomes_its_second_kind_where_that_can_be_measured),
+        TEST(test_end_direction_of_what_is_cut_off_is_less_sure_where_the_kind_is),
         TEST(test_end_distance_is_less_sure_where_the_kind_is),
         TEST(test_end_what_is_smaller_than_its_small_kind_is_less_sure),
         TEST(test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s),
