@@ -3,6 +3,9 @@
 // Beacons that have left for being in one's place before it is that one that leaves.
 enum { OUSTED_MAX = 3 };
 
+// Things of two classes are two, unless their middles are nearer to each other than any two hang or stand.
+static const bslam_real_t TWO_CLASSES_M = BSLAM_R(0.2);
+
 static bool is_seen(const bslam_ekf_t *ekf, int index, int64_t time_us)
 {
     return ekf->beacons[index].last_seen_us == time_us;
@@ -14,8 +17,9 @@ static bool has_place(const bslam_beacon_t *beacon)
     return beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_SIZED;
 }
 
-/// Whether two beacons may stand in the same place, as far as the map knows.
-static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
+/// Whether two beacons may stand in the same place, as far as the map knows; no farther apart than so far.
+static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b,
+                         bslam_real_t apart_m)
 {
     const int at = ekf->beacons[a].at;
     const int bt = ekf->beacons[b].at;
@@ -24,7 +28,7 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     }
     const bslam_real_t dx = ekf->mean[at] - ekf->mean[bt];
     const bslam_real_t dy = ekf->mean[at + 1] - ekf->mean[bt + 1];
-    if (dx * dx + dy * dy > params->double_m * params->double_m) {
+    if (dx * dx + dy * dy > apart_m * apart_m) {
         return false;
     }
     const bslam_real_t *p = ekf->covariance;
@@ -39,7 +43,8 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->double_d2 * det;
 }
 
-/// A door and the sign beside it are two, however little the map knows of where they stand.
+/// A door and the sign beside it are two, however little the map knows of where they stand. A cabinet that is
+/// taken for a door again and again is one.
 static bool are_of_two_classes(const bslam_looks_t *looks, int a, int b)
 {
     const uint8_t one = bslam_looks_class(looks, a), other = bslam_looks_class(looks, b);
@@ -72,7 +77,13 @@ static int find_other(const bslam_looks_t *looks, const bslam_ekf_t *ekf, const 
                       int index)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
-        if (b != index && !are_of_two_classes(looks, index, b) && is_one_place(ekf, params, index, b)) {
+        if (b == index) {
+            continue;
+        }
+        const bool are_two = are_of_two_classes(looks, index, b);
+        const bslam_real_t apart_m =
+            are_two && TWO_CLASSES_M < params->double_m ? TWO_CLASSES_M : params->double_m;
+        if (is_one_place(ekf, params, index, b, apart_m)) {
             return b;
         }
     }

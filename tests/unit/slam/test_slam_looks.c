@@ -232,6 +232,24 @@ static void test_a_neighbour_of_another_class_stays_if_never_seen_with_it(void *
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
 }
 
+/// What was first seen beside a beacon turns out to be so near to it that no two things hang or stand so: it
+/// is one, taken for two classes.
+static void test_what_is_called_of_two_classes_in_one_place_is_one(void **state)
+{
+    for (int view = 0; view < 20; view++) {
+        see_as(0, view, 0, 1);
+    }
+    int view = 0;
+    while (looks.counters.retired == 0 && view < 200) {
+        assert_true(view < 10 || bslam_slam_beacon_count(&slam) == 2);
+        see_as(2, view, view < 10 ? 0.1 : 0.02, 6);
+        view++;
+    }
+    assert_true(view > 10);
+    assert_int_equal(looks.counters.retired, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+}
+
 /// Object 1, where beacon 0 of object 0 has not been seen for long, in this many frames; how many were kept
 /// from that beacon.
 static uint32_t waits_of_another(int frames)
@@ -333,6 +351,7 @@ int main(void)
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
         cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
+        cmocka_unit_test_setup(test_what_is_called_of_two_classes_in_one_place_is_one, setup),
         cmocka_unit_test_setup(test_a_match_that_a_young_machine_is_against_waits_for_a_second, setup),
         cmocka_unit_test_setup(test_in_a_frozen_map_it_waits_no_longer, setup),
         cmocka_unit_test_setup(test_what_has_vanished_is_noticed_while_another_is_on_trial, setup),
