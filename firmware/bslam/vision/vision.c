@@ -338,6 +338,16 @@ static float misplacement(const bslam_candidate_t *candidate)
     return MISPLACED_MARGIN * (half_square < 1.0f ? half_square : 1.0f);
 }
 
+/// The candidate as its second kind would be measured; false if that cannot be.
+static bool measure_as_second(const bslam_vision_t *vision, const bslam_frame_t *frame,
+                              const bslam_box_t *rough, const bslam_candidate_t *candidate,
+                              bslam_candidate_t *other)
+{
+    const bslam_size_t size = size_of(&vision->model->classes[candidate->second_class - 1]);
+    *other = *candidate;
+    return bslam_measure(frame, &vision->cameras[vision->camera], rough, &size, other) == BSLAM_OK;
+}
+
 /// Where the second kind hangs better, so much that it outweighs the margin, the candidate becomes that: a
 /// cabinet is often taken for a door, but would end in the air as one.
 static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *frame,
@@ -347,10 +357,9 @@ static void try_second_class(const bslam_vision_t *vision, const bslam_frame_t *
     if (candidate->second_class == BSLAM_CLASS_NONE || !(misplacement(candidate) > candidate->class_margin)) {
         return;
     }
-    bslam_candidate_t other = *candidate;
-    const bslam_size_t size = size_of(&vision->model->classes[candidate->second_class - 1]);
-    if (bslam_measure(frame, &vision->cameras[vision->camera], rough, &size, &other) == BSLAM_OK &&
-        other.has_range && misplacement(&other) + candidate->class_margin < misplacement(candidate)) {
+    bslam_candidate_t other;
+    if (measure_as_second(vision, frame, rough, candidate, &other) && other.has_range &&
+        misplacement(&other) + candidate->class_margin < misplacement(candidate)) {
         other.beacon_class = candidate->second_class;
         other.second_class = candidate->beacon_class;
         other.class_margin = -candidate->class_margin;
@@ -388,10 +397,8 @@ static void doubt_cut(const bslam_vision_t *vision, const bslam_frame_t *frame, 
         (candidate->marks & (BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT)) == 0U) {
         return;
     }
-    bslam_candidate_t other = *candidate;
-    const bslam_size_t size = size_of(&vision->model->classes[candidate->second_class - 1]);
-    if (bslam_measure(frame, &vision->cameras[vision->camera], rough, &size, &other) != BSLAM_OK ||
-        !other.has_bearing) {
+    bslam_candidate_t other;
+    if (!measure_as_second(vision, frame, rough, candidate, &other) || !other.has_bearing) {
         return;
     }
     const float margin = candidate->class_margin > 0 ? candidate->class_margin : 0;
