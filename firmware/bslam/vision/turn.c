@@ -4,8 +4,9 @@
 
 #include "bslam/math/bounds.h"
 #include "bslam/math/trig.h"
+#include "bslam/vision/shift.h"
 
-enum { BANDS = BSLAM_TURN_BANDS, COLUMNS = BSLAM_TURN_COLUMNS, SHIFT_MAX = BSLAM_TURN_SHIFT_MAX };
+enum { BANDS = BSLAM_TURN_BANDS };
 
 // Edges of the bands, tangents of the elevation. All lie above the floor, whose pattern moves otherwise than
 // the walls'.
@@ -15,15 +16,12 @@ static const bslam_real_t EDGE[BANDS + 1] = {BSLAM_R(-0.03), BSLAM_R(0.03), BSLA
 enum { NEIGHBOURS = 8 };
 // Steps of a pattern's values in one of luma (of a half-resolution pixel, 0 to 187).
 enum { VALUE_STEPS = 2, VALUE_MAX = 127 };
-enum { SEARCH_STEP = BSLAM_TURN_SEARCH_STEP };
 // Patterns that differ by more than this part of what they are show no shift.
 static const bslam_real_t MISMATCH_MAX = BSLAM_R(0.2);
-// Refinement of the shift: steps of Gauss and Newton, with weights of Cauchy's kind.
-enum { REFINEMENTS = 3 };
-static const bslam_real_t LEAST_RESIDUAL = BSLAM_R(0.3);
-// Residuals are no noise but things that changed, alike over columns and bands: so many count as one.
-static const bslam_real_t ALIKE = 225;
-static const bslam_real_t ROUNDING_VAR = BSLAM_R(0.17);  // of a residual, from two rounded values
+// By how much the way between two frames of a camera changes from frame to frame, and how little is known of
+// it at most.
+static const bslam_real_t WAY_SD_M = BSLAM_R(0.002);
+static const bslam_real_t WAY_SD_MOST_M = BSLAM_R(0.02);
 // One over the distance of things, 1/m: how much it errs where the floor line tells it (most things stand
 // where the floor ends, some before); what it is taken for where nothing does, and how much that errs; the
 // largest.
@@ -96,6 +94,7 @@ static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
 void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision)
 {
     memset(turns, 0, sizeof *turns);
+    turns->way.variance_m2 = WAY_SD_MOST_M * WAY_SD_MOST_M;
     for (int32_t i = 0; i < vision->camera_count; i++) {
         make_grid(&turns->grids[i], &vision->cameras[i]);
     }
@@ -156,121 +155,6 @@ static void make_pattern(bslam_turns_t *turns, const bslam_turn_grid_t *grid, co
     }
 }
 
-/// sums[i]: of the squares of columns i - SEARCH_STEP, i - 2 SEARCH_STEP and so on.
-static void sum_squares(const bslam_turn_pattern_t *pattern, int32_t columns, int32_t *sums)
-{
-    memset(sums, 0, SEARCH_STEP * sizeof sums[0]);
-    for (int32_t i = 0; i < columns; i++) {
-        int32_t squares = 0;
-        for (int32_t band = 0; band < BANDS; band++) {
-            squares += pattern->values[band][i] * pattern->values[band][i];
-        }
-        sums[i + SEARCH_STEP] = sums[i] + squares;
-    }
-}
-
-/// Two patterns, the later shifted against the earlier: its column i is the other's column i + shift.
-typedef struct bslam_pattern_pair {
-    const bslam_turn_pattern_t *before;
-    const bslam_turn_pattern_t *now;
-    int32_t columns;
-} pattern_pair_t;
-
-typedef struct bslam_pattern_match {
-    bslam_real_t shift;          // columns
-    bslam_real_t mismatch;       // part of the patterns' squares
-    bslam_real_t mean_residual;  // of a value
-} pattern_match_t;
-
-/// Sum of the products of columns first, first + SEARCH_STEP and so on with those they are shifted to.
-static int32_t product_sum(const pattern_pair_t *pair, int32_t first, int32_t end, int32_t shift)
-{
-    int32_t sum = 0;
-    for (int32_t band = 0; band < BANDS; band++) {
-        const int8_t *now = pair->now->values[band], *before = pair->before->values[band];
-        for (int32_t i = first; i < end; i += SEARCH_STEP) {
-            sum += now[i] * before[i + shift];
-        }
-    }
-    return sum;
-}
-
-/// The whole shift by which the patterns differ least. sums: room for both patterns'.
-static pattern_match_t search(const pattern_pair_t *pair, int32_t sums[2][COLUMNS + SEARCH_STEP])
-{
-    const int32_t *now_squares = sums[0], *before_squares = sums[1];
-    sum_squares(pair->now, pair->columns, sums[0]);
-    sum_squares(pair->before, pair->columns, sums[1]);
-    // Of a narrow frame half must stay in view.
-    const int32_t reach = pair->columns / 2 < SHIFT_MAX ? pair->columns / 2 : SHIFT_MAX;
-    pattern_match_t best = {.mismatch = 2};
-    for (int32_t shift = -reach; shift <= reach; shift++) {
-        const int32_t first = shift < 0 ? -shift : 0;
-        const int32_t count = (pair->columns - (shift > 0 ? shift : 0) - first) / SEARCH_STEP;
-        const int32_t end = first + count * SEARCH_STEP;
-        const int32_t squares = now_squares[end] - now_squares[first] + before_squares[end + shift] -
-                                before_squares[first + shift];
-        const bslam_real_t differing = (bslam_real_t)(squares - 2 * product_sum(pair, first, end, shift));
-        const bslam_real_t mismatch = differing / (bslam_real_t)(squares + 1);
-        if (mismatch < best.mismatch) {
-            best.shift = (bslam_real_t)shift;
-            best.mismatch = mismatch;
-            best.mean_residual = bslam_sqrt(differing / (bslam_real_t)(BANDS * count));
-        }
-    }
-    return best;
-}
-
-/// Weighted sums over the columns that both frames show.
-typedef struct bslam_turn_sums {
-    bslam_real_t weight;
-    bslam_real_t residual2;  // weighted
-    bslam_real_t residual;   // absolute, not weighted
-    bslam_real_t slope2;     // weighted
-    bslam_real_t slope_residual;
-    bslam_real_t parallax;     // slope2 of each column times its parallax
-    bslam_real_t parallax_sd;  // and times that one's
-    int32_t count;
-} turn_sums_t;
-
-static void add_column(turn_sums_t *sums, const pattern_pair_t *pair, int32_t now, bslam_real_t at,
-                       bslam_real_t scale, bslam_turn_column_t column)
-{
-    const int32_t left = (int32_t)at;
-    const bslam_real_t part = at - (bslam_real_t)left;
-    bslam_real_t slope2 = 0;
-    for (int32_t band = 0; band < BANDS; band++) {
-        const int8_t *before = &pair->before->values[band][left];
-        const bslam_real_t slope = (bslam_real_t)(before[1] - before[0]);
-        const bslam_real_t residual = (bslam_real_t)(pair->now->values[band][now] - before[0]) - slope * part;
-        const bslam_real_t ratio = residual / (2 * scale);
-        const bslam_real_t weight = 1 / (1 + ratio * ratio);
-        sums->weight += weight;
-        sums->residual2 += weight * residual * residual;
-        sums->residual += bslam_abs(residual);
-        sums->slope_residual += weight * slope * residual;
-        slope2 += weight * slope * slope;
-    }
-    sums->slope2 += slope2;
-    sums->parallax += slope2 * column.parallax_per_m;
-    sums->parallax_sd += slope2 * column.parallax_sd_per_m;
-    sums->count += BANDS;
-}
-
-/// All columns, as the patterns lie at a shift.
-static turn_sums_t add_columns(const pattern_pair_t *pair, bslam_real_t shift, bslam_real_t scale,
-                               const bslam_turn_column_t *columns)
-{
-    turn_sums_t sums = {0};
-    for (int32_t i = 0; i < pair->columns; i++) {
-        const bslam_real_t at = (bslam_real_t)i + shift;
-        if (at >= 0 && at < (bslam_real_t)(pair->columns - 1)) {
-            add_column(&sums, pair, i, at, scale, columns[i]);
-        }
-    }
-    return sums;
-}
-
 /// How near things are above a cell of the floor line: one over their distance, 1/m, and its noise.
 typedef struct bslam_nearness {
     bslam_real_t per_m;
@@ -308,34 +192,33 @@ static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *visi
     }
 }
 
+/// What is thought of the way before a frame is looked at: that of the frame before, by about.
+static void doubt_way(bslam_turn_way_t *way)
+{
+    way->variance_m2 += WAY_SD_M * WAY_SD_M;
+    if (way->variance_m2 > WAY_SD_MOST_M * WAY_SD_MOST_M) {
+        way->variance_m2 = WAY_SD_MOST_M * WAY_SD_MOST_M;
+    }
+}
+
 static bool compare(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
 {
     const int32_t camera = vision->camera;
     const bslam_turn_grid_t *grid = &turns->grids[camera];
-    const pattern_pair_t pair = {&turns->before[camera], &turns->now, vision->cameras[camera].width_px / 2};
-    pattern_match_t match = search(&pair, turns->square_sums);
+    const bslam_pattern_pair_t pair = {&turns->before[camera], &turns->now,
+                                       vision->cameras[camera].width_px / 2, grid->step_rad};
+    const bslam_pattern_match_t match = bslam_shift_search(&pair, &turns->squares);
+    doubt_way(&turns->way);
     if (!(match.mismatch < MISMATCH_MAX)) {
         return false;
     }
     look_along(grid, vision, pair.columns, turns->columns);
-    turn_sums_t sums = {0};
-    for (int32_t i = 0; i < REFINEMENTS; i++) {
-        sums = add_columns(&pair, match.shift, match.mean_residual + LEAST_RESIDUAL, turns->columns);
-        if (!(sums.slope2 > 0)) {
-            return false;
-        }
-        const bslam_real_t step = sums.slope_residual / sums.slope2;
-        match.shift += step < -1 ? -1 : step > 1 ? 1 : step;
-        match.mean_residual = sums.residual / (bslam_real_t)sums.count;
+    bslam_turn_t found;
+    if (!bslam_shift_fit(&pair, &match, turns->columns, &turns->way, &found)) {
+        return false;
     }
-    const bslam_real_t residual_var = sums.residual2 / sums.weight + ROUNDING_VAR;
-    const bslam_real_t shift_var = ALIKE * residual_var / sums.slope2;
-    turn->turn_rad =
-        -match.shift * grid->step_rad - bslam_angle_wrap(pair.now->yaw_rad - pair.before->yaw_rad);
-    turn->variance_rad2 = shift_var * grid->step_rad * grid->step_rad;
-    turn->mismatch = match.mismatch;
-    turn->parallax_rad_per_m = sums.parallax / sums.slope2;
-    turn->parallax_sd_rad_per_m = sums.parallax_sd / sums.slope2;
+    found.turn_rad -= bslam_angle_wrap(pair.now->yaw_rad - pair.before->yaw_rad);
+    *turn = found;
     return true;
 }
 

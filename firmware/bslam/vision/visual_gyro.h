@@ -16,7 +16,7 @@
 
 /// What the rate of a step errs by at least. Errors of some steps follow each other; this is what their sum
 /// over seconds asks for.
-#define BSLAM_VISUAL_GYRO_SD_RADPS 0.085f
+#define BSLAM_VISUAL_GYRO_SD_RADPS 0.04f
 /// The same through a lens of 180 degrees: its columns are coarse, and what is beside the robot moves most.
 #define BSLAM_VISUAL_GYRO_WIDE_SD_RADPS 1.0f
 

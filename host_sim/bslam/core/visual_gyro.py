@@ -11,7 +11,7 @@ from bslam.core.vision import Turn
 class VisualGyro:
     """As bslam_visual_gyro_t: `advance` to each reading of the wheels, then `take` that time's frames."""
 
-    SD_RADPS = 0.085
+    SD_RADPS = 0.04
     """What a rate errs by at least, for a log's `gyro_sigma_radps` (BSLAM_VISUAL_GYRO_SD_RADPS)."""
     WIDE_SD_RADPS = 1.0
     """The same if a lens is equidistant (BSLAM_VISUAL_GYRO_WIDE_SD_RADPS)."""
