@@ -22,7 +22,7 @@ static const bslam_real_t RATE_SD_PER_SQRT_S = BSLAM_R(0.75);  // rad/s
 static const bslam_real_t SPEED_SD = BSLAM_R(0.2);             // m/s
 static const bslam_real_t SPEED_SD_PER_SQRT_S = BSLAM_R(0.12);
 // How much nearer things are than the turn's parallax has it, in that one's standard deviations.
-static const bslam_real_t NEARNESS_SD = 1;
+static const bslam_real_t NEARNESS_SD = 2;
 static const bslam_real_t NEARNESS_LASTS_S = BSLAM_R(0.6);
 // A frame's turn: least noise, and how much more for patterns that match badly.
 static const bslam_real_t TURN_SD = BSLAM_R(0.001);
@@ -30,7 +30,7 @@ static const bslam_real_t TURN_SD_PER_MISMATCH = BSLAM_R(0.02);
 // Turns farther off than this many standard deviations are seen past something near that the floor line does
 // not show, if that can be; else they are refused, and so many in a row believed.
 static const bslam_real_t GATE = 5;
-static const bslam_real_t NEAR_SD = 5;
+static const bslam_real_t NEAR_SD = 20;  // which is 1/m or so at the side
 enum { REFUSED_MAX = 4 };
 static const bslam_real_t TOLD_SD = BSLAM_R(0.4);  // rad/s
 // How the heading's variance grows is averaged over so long, or a map would be told of an error, correct it
