@@ -203,7 +203,8 @@ static bslam_real_t step(shift_state_t *state, const shift_sums_t *sums, const b
     const bslam_real_t prior = 1 / thought->variance_m2;
     const bslam_real_t b = sums->slope_shift + (thought->way_m - state->way_m) * prior;
     // Solved for the way first: its share is what the shift leaves.
-    const bslam_real_t information = sums->slope2 - sums->slope * sums->slope / sums->weight + prior;
+    const bslam_real_t spread = sums->slope2 - sums->slope * sums->slope / sums->weight;
+    const bslam_real_t information = (spread > 0 ? spread : 0) + prior;  // rounded, it may be below 0
     const bslam_real_t way_m = (b - sums->slope * sums->shift / sums->weight) / information;
     const bslam_real_t shift = (sums->shift - sums->slope * way_m) / sums->weight;
     state->way_m += within(way_m, WAY_STEP_MAX_M);
