@@ -1,9 +1,11 @@
 """Pictures over the link: the robot's own front end sees what the host's sees, to the bit."""
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +207,28 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_e
     assert looks >= len(shots) and count > 0
 
 
+def wheel_speeds(told, params):
+    """What a robot that turns on the spot makes of its readings: forward speed and its noise, m/s."""
+    least_mps, speeds = 0.01, [(0.0, 0.01)]
+    for before, one in pairwise(told):
+        dt_s = (one.time_us - before.time_us) * 1e-6
+        way_m = [
+            (getattr(one.report, f"{side}_ticks") - getattr(before.report, f"{side}_ticks"))
+            / params["ticks_per_revolution"]
+            * 2
+            * np.pi
+            * params[f"{side}_radius_m"]
+            for side in ("left", "right")
+        ]
+        sds_mps = params["left_speed_sd_mps"], params["right_speed_sd_mps"]
+        variance_m2 = sum((sd_mps * dt_s) ** 2 for sd_mps in sds_mps) / 4
+        variance_m2 += params["travel_sd_per_sqrt_m"] ** 2 * sum(map(abs, way_m)) / 4
+        variance_m2 += params["forward_sd_per_sqrt_s"] ** 2 * dt_s
+        variance_m2 += params["forward_sd_per_sqrt_m"] ** 2 * abs(sum(way_m) / 2)
+        speeds.append((sum(way_m) / 2 / dt_s, max(math.sqrt(variance_m2) / dt_s, least_mps)))
+    return speeds
+
+
 CLOSE = 90  # readings a turn, a picture at each: near enough to the one before to tell the turn
 
 
@@ -223,13 +247,14 @@ def test_its_pictures_tell_how_fast_it_turns_as_on_the_host(camera, tmp_path, mo
         found.append([(one.report.gyro_radps, one.report.gyro_sd_radps) for one in told])
     assert found[0] == found[1]
     eyes, gyro, expected = FrontEnd([camera]), VisualGyro(VisualGyro.SD_RADPS), []
-    for one, picture in zip(told, shots_of(path, camera, CLOSE), strict=False):
-        gyro.advance(one.time_us, 0.0, 0.01)
+    speeds = wheel_speeds(told, robot.host_params)
+    for one, picture, speed in zip(told, shots_of(path, camera, CLOSE), speeds, strict=False):
+        gyro.advance(one.time_us, *speed)
         gyro.take(0, eyes.see(picture).turn)
         expected.append(gyro.rate())
     assert found[0][0] == (None, 0.0) and expected[0] is None
     rates = np.array(found[0][1:])
-    np.testing.assert_allclose(rates, expected[1:], rtol=1e-3)  # but for what the wheels say of the speed
+    np.testing.assert_allclose(rates, expected[1:], rtol=1e-5)
     assert (rates[:, 1] >= np.float32(VisualGyro.SD_RADPS)).all()
     assert np.mean(rates[:, 0]) == pytest.approx(2 * np.pi / CLOSE / 0.04, rel=0.01)
 
