@@ -135,9 +135,9 @@ bslam_params_t unit_params(void)
     p.confirm_sightings = 4;
     p.confirm_window_us = 0;
     p.trust_score = BSLAM_R(0.5);
-    p.trust_sum = 7;
+    p.trust_sum = 6;
+    p.trust_first_sum = 3;
     p.trust_beacons = 4;
-    p.confirm_sum = 10;
     return p;
 }
 

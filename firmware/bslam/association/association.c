@@ -21,12 +21,6 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     return mappable;
 }
 
-bool bslam_classes_differ(const bslam_sighting_t *sighting, const bslam_beacon_t *beacon)
-{
-    return sighting->beacon_class != BSLAM_CLASS_NONE && beacon->beacon_class != BSLAM_CLASS_NONE &&
-           sighting->beacon_class != beacon->beacon_class;
-}
-
 /// Leaves each beacon to the nearest of the sightings that chose it, the first of equals.
 static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
@@ -162,7 +156,7 @@ static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2
             continue;
         }
         for (int b = 0; b < frame->ekf->beacon_count; b++) {
-            if (bslam_classes_differ(sighting, &frame->ekf->beacons[b])) {
+            if (bslam_ekf_classes_differ(&frame->ekf->beacons[b], sighting)) {
                 continue;
             }
             const bslam_real_t d2 = distance2(frame, sighting, b);

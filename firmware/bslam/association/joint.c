@@ -52,7 +52,7 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
     const bslam_sighting_t *sighting = &frame->sightings[search->sightings[level]];
     bslam_innovation_t innovation;
     bslam_real_t distance2;
-    if (bslam_classes_differ(sighting, &frame->ekf->beacons[beacon]) ||
+    if (bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting) ||
         bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_ekf_distance2(frame->ekf, &innovation, &distance2) != BSLAM_OK ||
@@ -121,7 +121,7 @@ static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_ma
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         bslam_innovation_t innovation;
         bslam_real_t distance2;
-        if (!bslam_classes_differ(&frame->sightings[i], &frame->ekf->beacons[b]) &&
+        if (!bslam_ekf_classes_differ(&frame->ekf->beacons[b], &frame->sightings[i]) &&
             bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &frame->sightings[i], b,
                                  &innovation) == BSLAM_OK &&
             bslam_ekf_distance2(frame->ekf, &innovation, &distance2) == BSLAM_OK &&

@@ -5,6 +5,8 @@
 #include "bslam/math/logarithm.h"
 #include "bslam/model/noise.h"
 
+static const bslam_real_t LN_NINE = BSLAM_R(2.197224577);
+
 /// A sighting against a beacon.
 typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against a new one
@@ -21,6 +23,13 @@ static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
 static bslam_real_t log_new(const bslam_params_t *params, const bslam_sighting_t *sighting)
 {
     return bslam_ln(sighting->has_range ? params->new_per_m2 * sighting->range_m : params->new_per_rad);
+}
+
+/// Log density, in 1/m, of a distance that says nothing because the thing is taken for another kind: between
+/// a third and three times of what it is.
+static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting_t *sighting)
+{
+    return sighting->has_range && !taken->has_range ? -bslam_ln(LN_NINE * sighting->range_m) : 0;
 }
 
 /// What looks add to the score.
@@ -58,10 +67,12 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
                   const bslam_sample_t *sample, candidate_t *found)
 {
     const bslam_sighting_t *sighting = &frame->sightings[i];
+    const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
+    const bslam_sighting_t taken = bslam_ekf_taken_as(other, sighting);
     bslam_innovation_t innovation;
     bslam_weight_t weight;
-    if ((frame->looks == NULL && bslam_classes_differ(sighting, &frame->ekf->beacons[beacon])) ||
-        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+    if ((frame->looks == NULL && bslam_ekf_classes_differ(other, sighting)) ||
+        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_given_weigh(frame->ekf, given, &innovation, &weight) != BSLAM_OK) {
         return false;
@@ -71,7 +82,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     if (sample != NULL) {
         found->opinion = frame->answers->ask(frame->looks, frame->params, beacon, sample);
     }
-    found->score = weight.log_density - log_new(frame->params, sighting) +
+    found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
                    again_odds(frame, beacon);
     return true;
@@ -112,7 +123,8 @@ static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam
 static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
     const bool is_young = best->opinion.weight < 0.5f;
-    return best->score > 0 && is_young && looks_score(frame->params, &best->opinion) < 0 &&
+    const bool is_likely = best->score > 0 && best->score < frame->params->learn_lead;
+    return is_likely && is_young && looks_score(frame->params, &best->opinion) < 0 &&
            seen_ago_us(frame, beacon) > frame->params->wait_us &&
            !frame->answers->has_waited(frame->looks, frame->params, beacon, frame->time_us);
 }
@@ -175,9 +187,11 @@ static int next_to_settle(const bslam_match_t *matches, int count)
 /// Takes a match into what is given for the others.
 static void give(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, const bslam_match_t *match)
 {
+    const bslam_sighting_t taken =
+        bslam_ekf_taken_as(&frame->ekf->beacons[match->beacon], &frame->sightings[i]);
     bslam_innovation_t innovation;
-    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &frame->sightings[i], match->beacon,
-                             &innovation) == BSLAM_OK) {
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, match->beacon, &innovation) ==
+        BSLAM_OK) {
         (void)bslam_given_add(frame->ekf, given, &innovation);
     }
 }

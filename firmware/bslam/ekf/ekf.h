@@ -154,6 +154,13 @@ typedef struct bslam_innovation {
     bslam_row_t bearing_row;
 } bslam_innovation_t;
 
+/// True if a beacon and a sighting have classes, and not the same.
+bool bslam_ekf_classes_differ(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
+
+/// A sighting as it shows a beacon. How much too long a beacon's distances are goes with what it is taken
+/// for: taken for something else, a sighting has a direction only.
+bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
+
 /// Innovation of a sighting if it shows beacon `index`, at the mean and covariance before the frame: take all
 /// of a frame before the first bslam_ekf_fuse. BSLAM_E_SINGULAR: the beacon stands at the sensor, or is a ray
 /// without a positive inverse distance and the sighting has a distance. O(1).

@@ -173,6 +173,20 @@ static bslam_real_t range_variance_m2(const bslam_params_t *params, const bslam_
                                           has_scale ? 0 : bslam_unknown_scale_var(params, sighting));
 }
 
+bool bslam_ekf_classes_differ(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    return sighting->beacon_class != BSLAM_CLASS_NONE && beacon->beacon_class != BSLAM_CLASS_NONE &&
+           sighting->beacon_class != beacon->beacon_class;
+}
+
+bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    bslam_sighting_t taken = *sighting;
+    taken.has_range = taken.has_range &&
+                      (beacon->kind != BSLAM_BEACON_SIZED || !bslam_ekf_classes_differ(beacon, sighting));
+    return taken;
+}
+
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
                                     const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)

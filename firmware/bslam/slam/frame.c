@@ -94,7 +94,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     if (slam->smoother != NULL) {
-        const bslam_sighting_t taken = bslam_slam_taken_as(beacon, sighting);
+        const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, sighting);
         slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
     beacon->way_um = slam->way_um;
@@ -154,7 +154,7 @@ static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, cons
             fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
             const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
-            const bslam_sighting_t taken = bslam_slam_taken_as(beacon, &sightings[i]);
+            const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, &sightings[i]);
             bslam_innovation_t *innovation = &slam->innovations[i];
             if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon, innovation) !=
                 BSLAM_OK) {

@@ -40,10 +40,6 @@ void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int c
 
 // ---- scale.c: what a beacon is taken for, and how much too long its distances are by that -----------------
 
-/// What is fused of a sighting. How much too long a beacon's distances are goes with what it is taken for:
-/// taken for something else, it has a direction only.
-bslam_sighting_t bslam_slam_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
-
 /// A beacon whose place came of directions has a scale from its first sighting with a distance on. Before the
 /// innovations of a frame are taken. True: the distance is used up, it says where on a ray the beacon is.
 /// O(n²).

@@ -6,20 +6,6 @@
 /// then in doubt.
 static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
 
-/// Whether a sighting takes a beacon for what it is taken for, or does not say.
-static bool agrees(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
-{
-    return beacon->beacon_class == sighting->beacon_class || beacon->beacon_class == BSLAM_CLASS_NONE ||
-           sighting->beacon_class == BSLAM_CLASS_NONE;
-}
-
-bslam_sighting_t bslam_slam_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
-{
-    bslam_sighting_t taken = *sighting;
-    taken.has_range = taken.has_range && (beacon->kind != BSLAM_BEACON_SIZED || agrees(beacon, sighting));
-    return taken;
-}
-
 /// Its variance as a sighting with a distance tells it; 0: no beacon has a scale, or the smoother leads the
 /// filter, whose beacons have none.
 static bslam_real_t scale_variance(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
@@ -70,7 +56,7 @@ bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int
                               const bslam_sighting_t *sighting)
 {
     bslam_beacon_t *beacon = &slam->ekf.beacons[index];
-    const bslam_sighting_t taken = bslam_slam_taken_as(beacon, sighting);
+    const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, sighting);
     if (beacon->kind != BSLAM_BEACON_SIZED || !taken.has_range) {
         return true;
     }
@@ -98,7 +84,7 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
         return;
     }
     // Boyer and Moore's majority vote.
-    if (agrees(beacon, sighting)) {
+    if (!bslam_ekf_classes_differ(beacon, sighting)) {
         beacon->beacon_class = sighting->beacon_class;
         beacon->class_lead = one_more(beacon->class_lead);
     } else if (beacon->class_lead > 0) {

@@ -98,6 +98,7 @@ typedef struct bslam_slam {
     int64_t last_frame_us;
     bool has_frame;
     bool confirmed_now;                  ///< within a frame: it has confirmed a beacon
+    bool measures_distance;              ///< some sighting had one
     bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
     bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
     bslam_looks_t *looks;                ///< the caller's; NULL: none attached

@@ -12,11 +12,15 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
     return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
-static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+/// What has no distance from a sensor that measures some is of another size than it is taken for, or stands
+/// elsewhere: however sure the detector is of it, that says nothing for a beacon.
+static void add_score(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
+    slam->measures_distance = slam->measures_distance || sighting->has_range;
     if (has_score(slam, sighting)) {
+        const bslam_real_t high = slam->measures_distance && !sighting->has_range ? 0 : SCORE_HIGH;
         const bslam_real_t above = sighting->score - slam->params.trust_score;
-        beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > SCORE_HIGH ? SCORE_HIGH : above;
+        beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > high ? high : above;
         beacon->has_scores = true;
     }
 }
@@ -39,7 +43,7 @@ static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_r
 
 static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon)
 {
-    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->params.confirm_sum;
+    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->params.trust_sum;
     if (!beacon->confirmed && is_sure && beacon->views >= slam->params.confirm_sightings) {
         beacon->confirmed = true;
         slam->confirmed_now = true;
@@ -62,7 +66,7 @@ void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
     decide(slam, beacon);
 }
 
-/// A robot that knows few places takes what it gets.
+/// A robot that knows few places loses more by waiting.
 static bool knows_few(const bslam_slam_t *slam)
 {
     int confirmed = 0;
@@ -74,8 +78,9 @@ static bool knows_few(const bslam_slam_t *slam)
 
 static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
-    return !beacon->confirmed && beacon->has_scores && beacon->score_sum < slam->params.trust_sum &&
-           !knows_few(slam);
+    const bslam_params_t *params = &slam->params;
+    return !beacon->confirmed && beacon->has_scores &&
+           beacon->score_sum < (knows_few(slam) ? params->trust_first_sum : params->trust_sum);
 }
 
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)

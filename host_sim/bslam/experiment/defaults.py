@@ -24,7 +24,7 @@ CAMERA: Final[dict[str, int | float]] = {
 }
 
 # With identity unknown, besides: the detector believes in things that are no beacon, mostly for a few metres
-# of way. A beacon counts once the robot has seen it from ten places (and surely enough: confirm_sum), and
+# of way. A beacon counts once the robot has seen it from ten places (and surely enough: trust_sum), and
 # nothing is thrown away. Its errors are its own for a metre of way, so one beacon mapped twice stands in two
 # places. Tried on paper_room, seeds 0:8 and 100:112, and pairs, 100:108.
 CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {

@@ -225,6 +225,27 @@ static void test_a_class_counts_as_its_log_odds_say(void **state)
     assert_near(d.matches[0].score, position_score(&params, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
 }
 
+/// How much too long a beacon's distances are goes with its class: taken for another, a sighting has but a
+/// direction, and a distance that may be anything from a third to three times of what it is.
+static void test_a_distance_by_another_class_is_not_held_against_it(void **state)
+{
+    const bslam_params_t params = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    assert_true(bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.0036)));
+    ekf.beacons[0].beacon_class = 3;
+    bslam_sighting_t seen = unit_polar(0.01, 2, -1), direction = unit_direction(0.01, -1);
+    seen.beacon_class = direction.beacon_class = 4;
+    const double score = (double)decide(&ekf, &params, &direction, 1).matches[0].score;
+    const double of_distance = log((double)params.new_per_rad) - log((double)params.new_per_m2 * 2);
+    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, score + of_distance - log(2 * log(9)),
+                1e-3);
+    unit_assert_decided(&decide(&ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE,
+                        0);
+    seen.beacon_class = 3;
+    unit_assert_decided(&decide(&ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE,
+                        -1);
+}
+
 static void test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known(void **state)
 {
     bslam_params_t params = svm_params();
@@ -298,15 +319,20 @@ static void test_alike_but_where_the_robot_stands_is_new(void **state)
 
 static const float ALIKE[BSLAM_SAMPLE_FEATURES] = {1.0f};
 
-/// Where a match waits, and where nothing in the way of it does: a sighting in the beacon's place, 9 s after
-/// that was seen last, when a machine of so many samples has such a value.
-static void assert_waits(double value, int samples, int32_t wait_us, bool waits)
+/// A sighting a little off the beacon's place: that position is for it does not settle it.
+static bslam_sighting_t seen_aside(void)
+{
+    return seen_with(unit_polar(0.06, 4, -1), ALIKE);
+}
+
+/// Where a match waits, and where nothing in the way of it does: a sighting in the beacon's place, or a
+/// little off it, 9 s after that was seen last, when a machine of so many samples has such a value.
+static void assert_waits(double value, int samples, int32_t wait_us, bslam_sighting_t seen, bool waits)
 {
     bslam_params_t params = svm_params();
     params.wait_us = wait_us;
     const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     give_machine(0, value, samples);
-    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
     const decision_t d = decide_at(9000000, &ekf, &params, &seen, 1);
     assert_int_equal(d.matches[0].waits_for, waits ? 0 : -1);
     if (waits) {
@@ -319,10 +345,11 @@ static void assert_waits(double value, int samples, int32_t wait_us, bool waits)
 
 static void test_a_match_waits_where_a_young_machine_is_against_it(void **state)
 {
-    assert_waits(0.1, 2, 1000000, true);
-    assert_waits(0.15, 2, 1000000, false);  // for it: 4 * 0.15 - 0.5 > 0
-    assert_waits(-0.1, 3, 1000000, false);  // old enough to be weighed
-    assert_waits(-0.1, 2, 0, false);
+    assert_waits(0.1, 2, 1000000, seen_aside(), true);
+    assert_waits(0.15, 2, 1000000, seen_aside(), false);  // for it: 4 * 0.15 - 0.5 > 0
+    assert_waits(-0.1, 3, 1000000, seen_aside(), false);  // old enough to be weighed
+    assert_waits(-0.1, 2, 0, seen_aside(), false);
+    assert_waits(-0.1, 2, 1000000, seen_with(unit_polar(0, 4, -1), ALIKE), false);  // position is enough
 }
 
 static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
@@ -330,7 +357,7 @@ static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
     const bslam_params_t params = svm_params();
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     give_machine(0, -0.1, 2);
-    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
+    const bslam_sighting_t seen = seen_aside();
     ekf.beacons[0].last_seen_us = 5000000;
     const int64_t times_us[] = {4900000, 5000000, 6000000, 6000001};
     for (int i = 0; i < 4; i++) {
@@ -344,7 +371,7 @@ static void test_a_match_that_has_waited_is_made(void **state)
     const bslam_params_t params = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     give_machine(0, -0.1, 2);
-    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), ALIKE);
+    const bslam_sighting_t seen = seen_aside();
     bslam_looks_note_wait(&looks, &params, 0, 9000000);
     unit_assert_decided(&decide_at(9999998, &ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_DEFER,
                         BSLAM_REASON_AMBIGUOUS, -1);
@@ -530,6 +557,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_a_class_counts_as_its_log_odds_say, setup),
+        cmocka_unit_test_setup(test_a_distance_by_another_class_is_not_held_against_it, setup),
         cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),

@@ -261,7 +261,8 @@ static uint32_t waits_of_another(int frames)
     return slam.counters.deferred - before;
 }
 
-/// Two beacons are known and out of view for long, their machines of few samples.
+/// Two beacons are known and out of view for long, their machines of few samples. However well a place fits,
+/// it does not settle which of them is seen.
 static void start_to_wait(void)
 {
     bslam_params_t params = svm_params();
@@ -269,6 +270,7 @@ static void start_to_wait(void)
     params.wait_us = 1000000;
     start(params);
     see_two(6);
+    slam.params.learn_lead = 100;
     for (int i = 0; i < 50; i++) {
         see(NULL, 0);
     }
@@ -324,7 +326,7 @@ static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **s
     bslam_params_t params = svm_params();
     params.vanish_views = 3;
     params.trust_beacons = 0;
-    params.trust_sum = params.confirm_sum = 1000;
+    params.trust_sum = 1000;
     start(params);
     pass_by(0, 0.1, true, 1.0);
     pass_by(4, -0.1, true, 1.0);

@@ -16,8 +16,8 @@ static void start(int32_t association)
     params.association = association;
     params.trust_score = BSLAM_R(0.5);
     params.trust_sum = 4;
+    params.trust_first_sum = 2;
     params.trust_beacons = 0;
-    params.confirm_sum = 6;
     params.confirm_sightings = 3;
     params.confirm_window_us = 0;
     int bad_id;
@@ -69,7 +69,7 @@ static bool is_confirmed(int index)
     return view.confirmed;
 }
 
-/// Each speaks for it by 1: with four it is believed, with six confirmed.
+/// Each speaks for it by 1: with four it is believed.
 static void test_until_a_beacon_is_believed_its_sightings_move_nothing(void **state)
 {
     assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_NEW);
@@ -85,23 +85,21 @@ static void test_until_a_beacon_is_believed_its_sightings_move_nothing(void **st
         assert_int_equal(account.beacon_uid, uid);
         assert_memory_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
         assert_memory_equal(slam.ekf.covariance, unmoved.covariance, sizeof unmoved.covariance);
-        assert_false(is_confirmed(0));
+        assert_int_equal(is_confirmed(0), i == 2);
     }
     assert_int_equal(slam.counters.deferred, 3);
     assert_int_equal(see_at(0.21, 1.5).outcome, BSLAM_OUTCOME_MATCHED);
     assert_memory_not_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
-    assert_false(is_confirmed(0));
-    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
-    assert_true(is_confirmed(0));
 }
 
 static void test_one_sighting_says_so_much_at_most(void **state)
 {
     assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_NEW);  // 1.5
     assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_false(is_confirmed(0));
     assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);  // 4.5
-    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_MATCHED);
     assert_true(is_confirmed(0));
+    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_MATCHED);
 }
 
 static void test_what_more_speaks_against_than_for_leaves(void **state)
@@ -184,13 +182,16 @@ static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
 static void test_the_order_of_a_frame_does_not_matter(void **state)
 {
     slam.params.trust_beacons = 1;
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 3; i++) {
         (void)see(1.5);
     }
-    (void)see_at(-0.8, 0.6);
+    for (int i = 0; i < 3; i++) {
+        (void)see_at(-0.8, 1.25);
+    }
     bslam_sighting_t seen[] = {unit_polar(0.2, 4, -1), unit_polar(-0.8, 4, -1)};
     seen[0].score = BSLAM_R(1.5);
     seen[1].score = BSLAM_R(0.6);
+    assert_false(is_confirmed(0));
     assert_int_equal(bslam_slam_sightings(&slam, now_us + 1, seen, 2), BSLAM_OK);
     assert_true(is_confirmed(0));
     assert_int_equal(slam.accounts[1].outcome, BSLAM_OUTCOME_MATCHED);
@@ -198,7 +199,6 @@ static void test_the_order_of_a_frame_does_not_matter(void **state)
 
 static void test_views_do_not_run_over_while_scores_are_missing(void **state)
 {
-    slam.params.trust_sum = 0;
     (void)see(0.6);
     slam.ekf.beacons[0].views = 3;
     for (int i = 0; i < 3; i++) {
@@ -218,17 +218,54 @@ static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **sta
     assert_true(is_confirmed(0));
 }
 
-/// A robot that knows no place yet takes what it gets.
-static void test_while_few_are_confirmed_all_are_believed(void **state)
+/// A robot that knows no place yet is content with less: two sightings of 1, and not four.
+static void test_while_few_are_confirmed_less_is_believed(void **state)
 {
     slam.params.trust_beacons = 1;
-    (void)see(1.5);
-    for (int i = 0; i < 5; i++) {
-        assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
-    }
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_NEW);
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_false(is_confirmed(0));
+    assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
     assert_true(is_confirmed(0));
     assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_NEW);
-    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_DEFERRED);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_DEFERRED);
+    }
+    assert_int_equal(see_at(-0.8, 1.5).outcome, BSLAM_OUTCOME_MATCHED);
+}
+
+/// The robot stands, and sees one thing in this direction without a distance.
+static void see_direction(double score)
+{
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+    bslam_sighting_t seen = unit_polar(0.2, 4, -1);
+    seen.has_range = false;
+    seen.score = real(score);
+    now_us += STEP_US;
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_slam_sightings(&slam, now_us, &seen, 1), BSLAM_OK);
+}
+
+static void test_without_the_distance_that_others_have_a_score_says_nothing_for_it(void **state)
+{
+    (void)see(1.5);
+    for (int i = 0; i < 5; i++) {
+        see_direction(3);
+        assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_TRIAL);
+    }
+    assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);
+    see_direction(0.25);  // against it, as ever
+    assert_near(slam.ekf.beacons[0].score_sum, 0.75, 1e-6);
+}
+
+static void test_where_there_are_no_distances_scores_say_as_much(void **state)
+{
+    for (int i = 0; i < 4; i++) {
+        see_direction(1.5);
+    }
+    assert_near(slam.ekf.beacons[0].score_sum, 4, 1e-6);
+    assert_true(is_confirmed(0));
 }
 
 static void test_other_methods_do_not_ask_for_scores(void **state)
@@ -259,7 +296,9 @@ int main(void)
         cmocka_unit_test_setup(test_a_sighting_beyond_the_gate_does_not_speak_for_it, setup),
         cmocka_unit_test_setup(test_the_order_of_a_frame_does_not_matter, setup),
         cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),
-        cmocka_unit_test_setup(test_while_few_are_confirmed_all_are_believed, setup),
+        cmocka_unit_test_setup(test_while_few_are_confirmed_less_is_believed, setup),
+        cmocka_unit_test_setup(test_without_the_distance_that_others_have_a_score_says_nothing_for_it, setup),
+        cmocka_unit_test_setup(test_where_there_are_no_distances_scores_say_as_much, setup),
         cmocka_unit_test_setup(test_other_methods_do_not_ask_for_scores, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
