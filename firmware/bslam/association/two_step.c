@@ -240,10 +240,23 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_given_t *given, bs
     }
 }
 
-/// Whether a sighting clearly looks like a beacon that is not seen in this frame and that could be here,
-/// though that is no candidate: a beacon that the map has in the wrong place, rather than a new one.
-static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
-                               const bslam_match_t *matches)
+/// Whether some beacon that counts was where it should be, of late: the robot's pose is not what is wrong.
+static bool is_placed(const bslam_sighting_frame_t *frame)
+{
+    for (int b = 0; b < frame->ekf->beacon_count; b++) {
+        if (frame->ekf->beacons[b].confirmed && seen_ago_us(frame, b) <= frame->params->wait_us) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// A beacon that a sighting clearly looks like, that is not seen in this frame and that could be here, though
+/// it is no candidate: the map has it in the wrong place, rather than that there is a new one; -1: there is
+/// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
+/// it will never be found.
+static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
+                              const bslam_match_t *matches)
 {
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
@@ -252,11 +265,13 @@ static bool looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_
         if (!is_taken(frame, matches, b) && weigh(frame, given, i, b, sample, &one) &&
             one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
-            looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high) {
-            return true;
+            looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high &&
+            !(is_placed(frame) &&
+              frame->answers->has_waited(frame->looks, frame->params, b, frame->time_us))) {
+            return b;
         }
     }
-    return false;
+    return -1;
 }
 
 /// Whether a sighting's distance is too doubtful to start a beacon: from afar a Gaussian is no likeness of
@@ -287,11 +302,10 @@ static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *give
     } else if (!is_near && is_far(frame, i, matches)) {
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_FAR;
-    } else if (!is_near && looks_like_another(frame, given, i, matches)) {
-        match->reason = BSLAM_REASON_LOOKS;
     } else if (!is_near) {
-        match->verdict = BSLAM_VERDICT_NEW;
-        match->reason = BSLAM_REASON_NONE;
+        match->waits_for = looks_like_another(frame, given, i, matches);
+        match->verdict = match->waits_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;
+        match->reason = match->waits_for < 0 ? BSLAM_REASON_NONE : BSLAM_REASON_LOOKS;
     }
 }
 

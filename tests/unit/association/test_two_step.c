@@ -302,6 +302,34 @@ static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_anot
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
+/// Waited for as long as is waited for anything, it is new, if the robot is where it thinks: another beacon
+/// was seen where it should be.
+static void test_far_but_clearly_alike_is_new_after_a_while(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const double two[2][2] = {{4, 0}, {0, 4}};
+    bslam_ekf_t ekf = unit_map_of(&params, two, 2);
+    const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
+    give_machine(0, 2, 16);
+    const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
+    ekf.beacons[1].confirmed = true;
+    ekf.beacons[1].last_seen_us = 9500000;
+    bslam_looks_note_wait(&looks, &params, 0, 9000000);
+    decision_t d = decide_at(9999998, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    assert_int_equal(d.matches[0].waits_for, 0);
+    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    assert_int_equal(d.matches[0].waits_for, -1);
+    ekf.beacons[1].last_seen_us = 8900000;
+    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    ekf.beacons[1].last_seen_us = 9500000;
+    ekf.beacons[1].confirmed = false;
+    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+}
+
 /// From where the sensor is it has no direction.
 static void test_alike_but_where_the_robot_stands_is_new(void **state)
 {
@@ -569,6 +597,7 @@ int main(void)
         cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
         cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_not_new, setup),
+        cmocka_unit_test_setup(test_far_but_clearly_alike_is_new_after_a_while, setup),
         cmocka_unit_test_setup(test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another,
                                setup),
         cmocka_unit_test_setup(test_alike_but_where_the_robot_stands_is_new, setup),
