@@ -135,7 +135,7 @@ bslam_params_t unit_params(void)
     p.confirm_sightings = 4;
     p.confirm_window_us = 0;
     p.trust_score = BSLAM_R(0.5);
-    p.trust_sum = 6;
+    p.trust_sum = BSLAM_R(6.5);
     p.trust_first_sum = 3;
     p.trust_beacons = 4;
     return p;

@@ -151,7 +151,7 @@
             "one not confirmed by then is removed (of told identity: if contradicted); 0: none") \
     REAL(trust_score, 0.5, -100.0, 100.0, \
          "svm: a detector's score speaks for a beacon by how much it is above this") \
-    REAL(trust_sum, 6.0, 0.0, 1e6, \
+    REAL(trust_sum, 6.5, 0.0, 1e6, \
          "svm: until those of a beacon come to this, it is not confirmed, nor its sightings used") \
     REAL(trust_first_sum, 3.0, 0.0, 1e6, "svm: which they are from this on") \
     INTEGER(trust_beacons, 4, 0, 250, "svm: while fewer than so many are confirmed")

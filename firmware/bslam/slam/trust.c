@@ -5,6 +5,8 @@
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 // What one sighting says at most: the next frame shows the same, and may be wrong the same way.
 static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5);
+// And one without a distance, of a sensor that measures some.
+static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 
 /// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
@@ -13,12 +15,12 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
 }
 
 /// What has no distance from a sensor that measures some is of another size than it is taken for, or stands
-/// elsewhere: however sure the detector is of it, that says nothing for a beacon.
+/// elsewhere, or pale: however sure the detector is of it, that says next to nothing for a beacon.
 static void add_score(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
     slam->measures_distance = slam->measures_distance || sighting->has_range;
     if (has_score(slam, sighting)) {
-        const bslam_real_t high = slam->measures_distance && !sighting->has_range ? 0 : SCORE_HIGH;
+        const bslam_real_t high = slam->measures_distance && !sighting->has_range ? BLIND_HIGH : SCORE_HIGH;
         const bslam_real_t above = sighting->score - slam->params.trust_score;
         beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > high ? high : above;
         beacon->has_scores = true;
