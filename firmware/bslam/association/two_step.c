@@ -55,11 +55,15 @@ static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
 }
 
 /// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
-/// its sighting is this one or was missed.
-static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, int beacon)
+/// its sighting is this one or was missed. As something else it was missed.
+static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
 {
     const int64_t ago_us = seen_ago_us(frame, beacon);
-    return ago_us > 0 && ago_us <= frame->params->again_us ? frame->params->again_odds : 0;
+    const bool is_just = ago_us > 0 && ago_us <= frame->params->again_us;
+    return is_just && !bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting)
+               ? frame->params->again_odds
+               : 0;
 }
 
 /// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
@@ -84,7 +88,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
-                   again_odds(frame, beacon);
+                   again_odds(frame, sighting, beacon);
     return true;
 }
 

@@ -116,6 +116,24 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
     }
 }
 
+/// Called something else it is not seen again.
+static void test_another_class_has_no_odds_of_being_seen_again(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_odds = BSLAM_R(4.2);
+    params.again_us = 200000;
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    ekf.beacons[0].last_seen_us = 1000000;
+    ekf.beacons[0].beacon_class = 3;
+    bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
+    seen.beacon_class = 3;
+    assert_near(decide_at(1000001, &ekf, &params, &seen, 1).matches[0].score,
+                position_score(&params, 4.1, 0.01) + 4.2, 1e-4);
+    seen.beacon_class = 4;
+    assert_near(decide_at(1000001, &ekf, &params, &seen, 1).matches[0].score,
+                position_score(&params, 4.1, 0.01), 1e-4);
+}
+
 /// From afar position says little, and a beacon that waits each time is never learned.
 static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
 {
@@ -589,6 +607,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),
+        cmocka_unit_test_setup(test_another_class_has_no_odds_of_being_seen_again, setup),
         cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
         cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
