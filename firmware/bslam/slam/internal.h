@@ -33,9 +33,9 @@ void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bsla
 void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
                             bslam_real_t distance2);
 
-/// Turns matches with beacons of which nobody knows yet whether they are any, and new ones that would be
-/// refuted at once, into BSLAM_VERDICT_TRIAL. Before anything of the frame is used: its order does not
-/// matter.
+/// Notes whether the sensor measures distances, and turns matches with beacons of which nobody knows yet
+/// whether they are any, and new ones that would be refuted at once, into BSLAM_VERDICT_TRIAL. Before
+/// anything of the frame is used: its order does not matter.
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
 
 // ---- scale.c: what a beacon is taken for, and how much too long its distances are by that -----------------

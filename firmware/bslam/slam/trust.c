@@ -16,9 +16,8 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
 
 /// What has no distance from a sensor that measures some is of another size than it is taken for, or stands
 /// elsewhere, or pale: however sure the detector is of it, that says next to nothing for a beacon.
-static void add_score(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
-    slam->measures_distance = slam->measures_distance || sighting->has_range;
     if (has_score(slam, sighting)) {
         const bslam_real_t high = slam->measures_distance && !sighting->has_range ? BLIND_HIGH : SCORE_HIGH;
         const bslam_real_t above = sighting->score - slam->params.trust_score;
@@ -88,6 +87,7 @@ static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
 {
     for (int i = 0; i < count; i++) {
+        slam->measures_distance = slam->measures_distance || sightings[i].has_range;
         bslam_match_t *match = &slam->matches[i];
         const bool is_tried =
             match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);

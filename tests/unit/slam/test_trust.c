@@ -259,6 +259,27 @@ static void test_without_the_distance_that_others_have_a_score_says_little_for_i
     assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);
 }
 
+/// The first frame with a distance says that there are some, whichever of its sightings has it.
+static void test_a_distance_later_in_the_frame_counts_as_much(void **state)
+{
+    bslam_sighting_t seen[] = {unit_polar(0.2, 4, -1), unit_polar(-0.8, 4, -1)};
+    seen[0].score = seen[1].score = BSLAM_R(1.5);
+    seen[0].has_range = false;
+    assert_int_equal(bslam_slam_sightings(&slam, 1, seen, 2), BSLAM_OK);
+    assert_near(slam.ekf.beacons[slam.ekf.beacons[0].kind == BSLAM_BEACON_RAY ? 0 : 1].score_sum, 0.05, 1e-6);
+}
+
+static void test_a_new_start_knows_of_no_distances(void **state)
+{
+    const bslam_params_t params = slam.params;
+    int bad_id;
+    (void)see(1.5);
+    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    now_us = 0;
+    see_direction(1.5);
+    assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);
+}
+
 static void test_where_there_are_no_distances_scores_say_as_much(void **state)
 {
     for (int i = 0; i < 4; i++) {
@@ -298,6 +319,8 @@ int main(void)
         cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),
         cmocka_unit_test_setup(test_while_few_are_confirmed_less_is_believed, setup),
         cmocka_unit_test_setup(test_without_the_distance_that_others_have_a_score_says_little_for_it, setup),
+        cmocka_unit_test_setup(test_a_distance_later_in_the_frame_counts_as_much, setup),
+        cmocka_unit_test_setup(test_a_new_start_knows_of_no_distances, setup),
         cmocka_unit_test_setup(test_where_there_are_no_distances_scores_say_as_much, setup),
         cmocka_unit_test_setup(test_other_methods_do_not_ask_for_scores, setup),
     };
