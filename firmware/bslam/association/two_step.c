@@ -244,17 +244,6 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_given_t *given, bs
     }
 }
 
-/// Whether some beacon that counts was where it should be, of late: the robot's pose is not what is wrong.
-static bool is_placed(const bslam_sighting_frame_t *frame)
-{
-    for (int b = 0; b < frame->ekf->beacon_count; b++) {
-        if (frame->ekf->beacons[b].confirmed && seen_ago_us(frame, b) <= frame->params->wait_us) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /// A beacon that a sighting clearly looks like, that is not seen in this frame and that could be here, though
 /// it is no candidate: the map has it in the wrong place, rather than that there is a new one; -1: there is
 /// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
@@ -270,7 +259,7 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t
             one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high &&
-            !(is_placed(frame) &&
+            !(bslam_is_placed(frame->ekf, frame->params, frame->time_us) &&
               frame->answers->has_waited(frame->looks, frame->params, b, frame->time_us))) {
             return b;
         }
@@ -292,21 +281,35 @@ static bool is_far(const bslam_sighting_frame_t *frame, int i, const bslam_match
            bslam_range_variance_m2(frame->params, sighting, sighting->range_m) > sd_m * sd_m;
 }
 
+/// Whether a sighting is too near to the beacon that fits it best to be new. Of one that was seen a few times
+/// long ago the map hardly knows where it stands, so that much is nearly it: what has a distance, and so a
+/// place, is new there if that is likelier.
+static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                    const bslam_match_t *match)
+{
+    if (match->beacon < 0 || match->score > 0) {
+        return match->beacon >= 0;
+    }
+    const bool is_old = !frame->ekf->beacons[match->beacon].confirmed &&
+                        seen_ago_us(frame, match->beacon) > frame->params->wait_us;
+    return match->score > -frame->params->defer_score && !(is_old && sighting->has_range);
+}
+
 /// What becomes of a sighting that matches no beacon.
 static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i,
                         bslam_match_t *matches)
 {
     bslam_match_t *match = &matches[i];
     const bool is_duplicate = match->reason == BSLAM_REASON_DUPLICATE;
-    const bool is_near = match->beacon >= 0 && match->score > -frame->params->defer_score;
+    const bool waits = is_near(frame, &frame->sightings[i], match);
     leave_open(match);
     if (is_duplicate) {
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_DUPLICATE;
-    } else if (!is_near && is_far(frame, i, matches)) {
+    } else if (!waits && is_far(frame, i, matches)) {
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_FAR;
-    } else if (!is_near) {
+    } else if (!waits) {
         match->waits_for = looks_like_another(frame, given, i, matches);
         match->verdict = match->waits_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;
         match->reason = match->waits_for < 0 ? BSLAM_REASON_NONE : BSLAM_REASON_LOOKS;

@@ -150,6 +150,7 @@ typedef struct bslam_innovation {
     bslam_real_t bearing_rad;
     bslam_real_t range_var_m2;  ///< of the measurement, at the predicted distance
     bslam_real_t bearing_var_rad2;
+    bslam_real_t gate_d2;  ///< beyond this squared Mahalanobis distance it is not used; 0: no gate
     bslam_row_t range_row;
     bslam_row_t bearing_row;
 } bslam_innovation_t;

@@ -200,6 +200,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     if (sighting->has_range && !(seen.range_m > 0)) {
         return BSLAM_E_SINGULAR;
     }
+    innovation->gate_d2 = params->gate_d2;
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting);
@@ -352,9 +353,9 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
-static bslam_status_t judge(const bslam_params_t *params, bslam_fusion_t *fusion)
+static bslam_status_t judge(const bslam_params_t *params, bslam_real_t gate_d2, bslam_fusion_t *fusion)
 {
-    if (params->gate_d2 > 0 && !(fusion->distance2 <= params->gate_d2)) {
+    if (gate_d2 > 0 && !(fusion->distance2 <= gate_d2)) {
         fusion->weight = 0;
         return BSLAM_E_RANGE;
     }
@@ -405,7 +406,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     if (status != BSLAM_OK) {
         return status;
     }
-    status = judge(params, fusion);
+    status = judge(params, innovation->gate_d2, fusion);
     if (status != BSLAM_OK) {
         return status;
     }

@@ -31,9 +31,9 @@ static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bsla
     account->weight = 0;
 }
 
-static bslam_real_t test_ratio(const bslam_params_t *params, bslam_real_t distance2)
+static bslam_real_t test_ratio(bslam_real_t gate_d2, bslam_real_t distance2)
 {
-    return params->gate_d2 > 0 && distance2 >= 0 ? distance2 / params->gate_d2 : -1;
+    return gate_d2 > 0 && distance2 >= 0 ? distance2 / gate_d2 : -1;
 }
 
 static void reject(bslam_slam_t *slam, bslam_reason_t reason, const bslam_beacon_t *beacon,
@@ -64,7 +64,7 @@ static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_
     if (beacon != NULL && slam->params.gate_d2 > 0 && match->distance2 > slam->params.gate_d2) {
         reject(slam, BSLAM_REASON_GATE, beacon, account);
         beacon->gated++;
-        account->test_ratio = test_ratio(&slam->params, match->distance2);
+        account->test_ratio = test_ratio(slam->params.gate_d2, match->distance2);
         return;
     }
     fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TRIAL, beacon);
@@ -86,11 +86,11 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     if (status != BSLAM_OK) {
         reject(slam, status == BSLAM_E_RANGE ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon, account);
         beacon->gated += status == BSLAM_E_RANGE ? 1u : 0u;
-        account->test_ratio = test_ratio(&slam->params, fusion.distance2);
+        account->test_ratio = test_ratio(innovation->gate_d2, fusion.distance2);
         return;
     }
     fill_account(account, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE, beacon);
-    account->test_ratio = test_ratio(&slam->params, fusion.distance2);
+    account->test_ratio = test_ratio(innovation->gate_d2, fusion.distance2);
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     if (slam->smoother != NULL) {
@@ -141,11 +141,23 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     account->weight = 1;
 }
 
+/// The gate of a frame. Where looks have told whom a sighting shows, and for a while nothing has been where
+/// it should be, it is the pose that errs: all that association takes for a candidate is used.
+static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
+{
+    const bslam_params_t *params = &slam->params;
+    const bool opens = params->association == BSLAM_ASSOCIATION_SVM && params->gate_d2 > 0 &&
+                       params->gate_d2 < params->candidate_d2 &&
+                       !bslam_is_placed(&slam->ekf, params, time_us);
+    return opens ? params->candidate_d2 : params->gate_d2;
+}
+
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
 /// them before the first is fused, so that the order within a frame does not matter.
-static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sightings,
-                             int count)
+static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                             const bslam_sighting_t *sightings, int count)
 {
+    const bslam_real_t gate_d2 = gate_of(slam, time_us);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
         if (match->verdict == BSLAM_VERDICT_REJECT) {
@@ -162,6 +174,7 @@ static void take_innovations(bslam_slam_t *slam, const bslam_pose_t *mount, cons
                 match->verdict = BSLAM_VERDICT_REJECT;
             }
             innovation->has_range = innovation->has_range && !match->range_used;
+            innovation->gate_d2 = gate_d2;
         }
     }
 }
@@ -179,7 +192,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                             (bslam_slam_begin_scale(slam, mount, match->beacon, &sightings[i]) ||
                              !bslam_slam_vote_distance(slam, mount, match->beacon, &sightings[i]));
     }
-    take_innovations(slam, mount, sightings, count);
+    take_innovations(slam, time_us, mount, sightings, count);
     for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->matches[i];
         if (match->verdict == BSLAM_VERDICT_TRIAL) {

@@ -3,8 +3,9 @@
 #include "bslam/slam/internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
-// What one sighting says at most: the next frame shows the same, and may be wrong the same way.
-static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5);
+// What one sighting says at most: the next frame shows the same, and may be wrong the same way. One that is
+// surer than that is hardly ever of anything else, and says as much as a few.
+static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
 // And one without a distance, of a sensor that measures some.
 static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 
@@ -14,14 +15,25 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
     return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
-/// What has no distance from a sensor that measures some is of another size than it is taken for, or stands
-/// elsewhere, or pale: however sure the detector is of it, that says next to nothing for a beacon.
+/// What a sighting's score says for a beacon. What has no distance from a sensor that measures some is of
+/// another size than it is taken for, or stands elsewhere, or pale: however sure the detector is of it, that
+/// says next to nothing.
+static bslam_real_t evidence(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
+{
+    const bslam_real_t above = sighting->score - slam->params.trust_score;
+    if (above < SCORE_LOW) {
+        return SCORE_LOW;
+    }
+    if (slam->measures_distance && !sighting->has_range) {
+        return above > BLIND_HIGH ? BLIND_HIGH : above;
+    }
+    return above > SCORE_HIGH ? SURE : above;
+}
+
 static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
 {
     if (has_score(slam, sighting)) {
-        const bslam_real_t high = slam->measures_distance && !sighting->has_range ? BLIND_HIGH : SCORE_HIGH;
-        const bslam_real_t above = sighting->score - slam->params.trust_score;
-        beacon->score_sum += above < SCORE_LOW ? SCORE_LOW : above > high ? high : above;
+        beacon->score_sum += evidence(slam, sighting);
         beacon->has_scores = true;
     }
 }

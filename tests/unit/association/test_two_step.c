@@ -143,6 +143,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     const double far_away[1][2] = {{20, 0}};
     bslam_ekf_t ekf = unit_map_of(&params, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
+    ekf.beacons[0].confirmed = true;
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
@@ -216,6 +217,28 @@ static void test_between_match_and_new_a_sighting_waits(void **state)
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     d = decide(&ekf, &params, other, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+}
+
+/// A beacon that the map hardly knows is nearly everything: where a sighting has a place of its own it is
+/// new.
+static void test_what_is_nearly_an_old_beacon_that_does_not_count_is_new(void **state)
+{
+    const bslam_params_t params = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    ekf.beacons[0].confirmed = false;
+    bslam_sighting_t seen = unit_polar(0, 4.72, -1);
+    decision_t d = decide_at(params.wait_us, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    d = decide_at(params.wait_us + 1, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    ekf.beacons[0].confirmed = true;
+    d = decide_at(params.wait_us + 1, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    ekf.beacons[0].confirmed = false;
+    seen = unit_polar(0.11, 4, -1);
+    seen.has_range = false;
+    d = decide_at(params.wait_us + 1, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
@@ -614,6 +637,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_is_as_none, setup),
         cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
         cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
+        cmocka_unit_test_setup(test_what_is_nearly_an_old_beacon_that_does_not_count_is_new, setup),
         cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_not_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_new_after_a_while, setup),

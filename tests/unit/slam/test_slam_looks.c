@@ -339,9 +339,42 @@ static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **s
     assert_int_equal(bslam_slam_beacon_count(&slam), THINGS - 1);
 }
 
+static void drive_on(int64_t us)
+{
+    for (const int64_t end_us = now_us + us; now_us < end_us; now_us += STEP_US) {
+        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+        assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    }
+}
+
+/// A robot that has turned unseen finds nothing where it should be: its gate must not keep it from all that
+/// it knows.
+static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.gate_d2 = 9;
+    start(params);
+    see_two(40);
+    const double off_rad = 0.085;
+    see_object(0, 50, off_rad);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_REJECTED);
+    assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
+    const double distance2 = 9 * (double)slam.accounts[0].test_ratio;
+    assert_true(distance2 > 12 && distance2 < 25);
+    drive_on(params.wait_us - 2 * STEP_US);
+    see_object(0, 51, off_rad);
+    assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
+    see_object(0, 52, off_rad);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(slam.accounts[0].test_ratio < 1);
+    see_object(1, 53, 1 - off_rad);  // and is closed again
+    assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),

@@ -92,14 +92,27 @@ static void test_until_a_beacon_is_believed_its_sightings_move_nothing(void **st
     assert_memory_not_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
 }
 
+/// Up to 1.5 above the score of what may be either, as it is; beyond that as much as a few.
 static void test_one_sighting_says_so_much_at_most(void **state)
 {
-    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_NEW);  // 1.5
-    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);
+    (void)see(2);
+    assert_near(slam.ekf.beacons[0].score_sum, 1.5, 1e-6);
+    (void)see(2.001);
+    assert_near(slam.ekf.beacons[0].score_sum, 5.5, 1e-6);
+    (void)see(1000);
+    assert_near(slam.ekf.beacons[0].score_sum, 9.5, 1e-6);
+    (void)see(-1000);
+    assert_near(slam.ekf.beacons[0].score_sum, 8.5, 1e-6);
+}
+
+/// It has to be seen from places as any other.
+static void test_one_sure_sighting_is_believed_but_does_not_confirm(void **state)
+{
+    assert_int_equal(see(3).outcome, BSLAM_OUTCOME_NEW);
+    assert_int_equal(see(1).outcome, BSLAM_OUTCOME_MATCHED);
     assert_false(is_confirmed(0));
-    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_DEFERRED);  // 4.5
+    assert_int_equal(see(1).outcome, BSLAM_OUTCOME_MATCHED);
     assert_true(is_confirmed(0));
-    assert_int_equal(see(1000).outcome, BSLAM_OUTCOME_MATCHED);
 }
 
 static void test_what_more_speaks_against_than_for_leaves(void **state)
@@ -307,6 +320,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_until_a_beacon_is_believed_its_sightings_move_nothing, setup),
         cmocka_unit_test_setup(test_one_sighting_says_so_much_at_most, setup),
+        cmocka_unit_test_setup(test_one_sure_sighting_is_believed_but_does_not_confirm, setup),
         cmocka_unit_test_setup(test_what_more_speaks_against_than_for_leaves, setup),
         cmocka_unit_test_setup(test_a_confirmed_beacon_stays_whatever_it_scores, setup),
         cmocka_unit_test_setup(test_without_scores_a_beacon_is_believed_at_once, setup),
