@@ -259,7 +259,7 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t
             one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high &&
-            !(bslam_is_placed(frame->ekf, frame->params, frame->time_us) &&
+            !(bslam_is_placed(frame->ekf, frame->params, b, frame->time_us) &&
               frame->answers->has_waited(frame->looks, frame->params, b, frame->time_us))) {
             return b;
         }

@@ -148,7 +148,7 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     const bslam_params_t *params = &slam->params;
     const bool opens = params->association == BSLAM_ASSOCIATION_SVM && params->gate_d2 > 0 &&
                        params->gate_d2 < params->candidate_d2 &&
-                       !bslam_is_placed(&slam->ekf, params, time_us);
+                       !bslam_is_placed(&slam->ekf, params, -1, time_us);
     return opens ? params->candidate_d2 : params->gate_d2;
 }
 

@@ -365,6 +365,10 @@ static void test_far_but_clearly_alike_is_new_after_a_while(void **state)
     ekf.beacons[1].last_seen_us = 8900000;
     d = decide_at(10000000, &ekf, &params, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
+    ekf.beacons[0].confirmed = true;  // that one itself is no witness
+    ekf.beacons[0].last_seen_us = 9500000;
+    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_LOOKS, -1);
     ekf.beacons[1].last_seen_us = 9500000;
     ekf.beacons[1].confirmed = false;
     d = decide_at(10000000, &ekf, &params, &seen, 1);
