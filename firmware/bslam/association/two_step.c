@@ -287,12 +287,12 @@ static bool is_far(const bslam_sighting_frame_t *frame, int i, const bslam_match
 static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                     const bslam_match_t *match)
 {
-    if (match->beacon < 0 || match->score > 0) {
-        return match->beacon >= 0;
+    if (match->beacon < 0) {
+        return false;
     }
     const bool is_old = !frame->ekf->beacons[match->beacon].confirmed &&
                         seen_ago_us(frame, match->beacon) > frame->params->wait_us;
-    return match->score > -frame->params->defer_score && !(is_old && sighting->has_range);
+    return match->score > (is_old && sighting->has_range ? 0 : -frame->params->defer_score);
 }
 
 /// What becomes of a sighting that matches no beacon.

@@ -4,7 +4,7 @@
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 // What one sighting says at most: the next frame shows the same, and may be wrong the same way. One that is
-// surer than that is hardly ever of anything else, and says as much as a few.
+// surer than that and has a distance is hardly ever of anything else, and says as much as a few.
 static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
 // And one without a distance, of a sensor that measures some.
 static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
@@ -24,10 +24,12 @@ static bslam_real_t evidence(const bslam_slam_t *slam, const bslam_sighting_t *s
     if (above < SCORE_LOW) {
         return SCORE_LOW;
     }
-    if (slam->measures_distance && !sighting->has_range) {
-        return above > BLIND_HIGH ? BLIND_HIGH : above;
+    const bool is_blind = slam->measures_distance && !sighting->has_range;
+    const bslam_real_t high = is_blind ? BLIND_HIGH : SCORE_HIGH;
+    if (above <= high) {
+        return above;
     }
-    return above > SCORE_HIGH ? SURE : above;
+    return sighting->has_range ? SURE : high;
 }
 
 static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)

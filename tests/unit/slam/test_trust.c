@@ -300,6 +300,8 @@ static void test_where_there_are_no_distances_scores_say_as_much(void **state)
     }
     assert_near(slam.ekf.beacons[0].score_sum, 4, 1e-6);
     assert_true(is_confirmed(0));
+    see_direction(1000);  // but no more
+    assert_near(slam.ekf.beacons[0].score_sum, 5.5, 1e-6);
 }
 
 static void test_other_methods_do_not_ask_for_scores(void **state)
