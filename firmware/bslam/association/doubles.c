@@ -1,10 +1,16 @@
 #include "bslam/association/doubles.h"
 
+#include "bslam/math/trig.h"
+
 // Beacons that have left for being in one's place before it is that one that leaves.
 enum { OUSTED_MAX = 3 };
 
 // Things of two classes are two, unless their middles are nearer to each other than any two hang or stand.
 static const bslam_real_t TWO_CLASSES_M = BSLAM_R(0.2);
+
+// Two sightings of one thing: their directions differ by less than three of the difference's deviations, and
+// neither is twice as far off as the other.
+static const bslam_real_t ONE_DIRECTION_SD = BSLAM_R(4.24), FARTHER2 = 4;
 
 static bool is_seen(const bslam_ekf_t *ekf, int index, int64_t time_us)
 {
@@ -43,6 +49,32 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->double_d2 * det;
 }
 
+/// Where a beacon is from the robot: its direction in the map, and its squared distance.
+static bslam_real_t direction_of(const bslam_ekf_t *ekf, int index, bslam_real_t *distance2_m2)
+{
+    const int at = ekf->beacons[index].at;
+    const bslam_real_t dx_m = ekf->mean[at] - ekf->mean[0];
+    const bslam_real_t dy_m = ekf->mean[at + 1] - ekf->mean[1];
+    *distance2_m2 = dx_m * dx_m + dy_m * dy_m;
+    return bslam_atan2(dy_m, dx_m);
+}
+
+/// Whether two beacons stand one behind the other, as the robot sees it, and one of them was hardly ever
+/// seen: two distances of one far thing, each of which began a beacon.
+static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
+{
+    const uint32_t few = (uint32_t)params->doubt_sightings;
+    if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b]) ||
+        (ekf->beacons[a].sightings >= few && ekf->beacons[b].sightings >= few)) {
+        return false;
+    }
+    bslam_real_t one_m2, other_m2;
+    const bslam_real_t one_rad = direction_of(ekf, a, &one_m2);
+    const bslam_real_t other_rad = direction_of(ekf, b, &other_m2);
+    return bslam_abs(bslam_angle_wrap(one_rad - other_rad)) <= ONE_DIRECTION_SD * params->bearing_sd_rad &&
+           one_m2 < FARTHER2 * other_m2 && other_m2 < FARTHER2 * one_m2;
+}
+
 /// A door and the sign beside it are two, however little the map knows of where they stand. A cabinet that is
 /// taken for a door again and again is one.
 static bool are_of_two_classes(const bslam_looks_t *looks, int a, int b)
@@ -62,20 +94,22 @@ static bool count_pair(bslam_look_t *younger, uint32_t older_uid, bool together,
     return younger->alone >= limit;
 }
 
-/// Which of two leaves: the one with fewer sightings, unless others have left for the same beacon again and
-/// again: then that one is no longer there.
-static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, int a, int b)
+/// Which of two leaves: the one with fewer sightings, unless others have left for being in the same place
+/// again and again: then what was there is there no longer.
+static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, int a, int b, bool in_place)
 {
     const int less = ekf->beacons[a].sightings < ekf->beacons[b].sightings ? a : b;
     const int more = less == a ? b : a;
-    looks->of[more].ousted++;
-    return looks->of[more].ousted >= OUSTED_MAX ? more : less;
+    looks->of[more].ousted = (uint8_t)(looks->of[more].ousted + (in_place ? 1 : 0));
+    return in_place && looks->of[more].ousted >= OUSTED_MAX ? more : less;
 }
 
-/// The oldest other beacon that beacon `index` may be; BSLAM_NO_DOUBLE if there is none.
+/// The oldest other beacon that beacon `index` may be: one in its place, or else one in its direction;
+/// BSLAM_NO_DOUBLE if there is none.
 static int find_other(const bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                      int index)
+                      int index, bool *in_place)
 {
+    int in_direction = BSLAM_NO_DOUBLE;
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (b == index) {
             continue;
@@ -83,18 +117,24 @@ static int find_other(const bslam_looks_t *looks, const bslam_ekf_t *ekf, const 
         const bool are_two = are_of_two_classes(looks, index, b);
         const bslam_real_t apart_m =
             are_two && TWO_CLASSES_M < params->double_m ? TWO_CLASSES_M : params->double_m;
-        if (is_one_place(ekf, params, index, b, apart_m)) {
+        *in_place = is_one_place(ekf, params, index, b, apart_m);
+        if (*in_place) {
             return b;
         }
+        if (in_direction == BSLAM_NO_DOUBLE && !are_two && is_one_direction(ekf, params, index, b)) {
+            in_direction = b;
+        }
     }
-    return BSLAM_NO_DOUBLE;
+    return in_direction;
 }
 
 int bslam_doubles_settle(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
                          int64_t time_us)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
-        const int other = is_seen(ekf, b, time_us) ? find_other(looks, ekf, params, b) : BSLAM_NO_DOUBLE;
+        bool in_place = false;
+        const int other =
+            is_seen(ekf, b, time_us) ? find_other(looks, ekf, params, b, &in_place) : BSLAM_NO_DOUBLE;
         if (other == BSLAM_NO_DOUBLE) {
             continue;
         }
@@ -104,7 +144,7 @@ int bslam_doubles_settle(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bsl
                        params->doubt_sightings)) {
             looks->of[younger].alone = 0;
             looks->counters.retired++;
-            return who_leaves(looks, ekf, b, other);
+            return who_leaves(looks, ekf, b, other, in_place);
         }
     }
     return BSLAM_NO_DOUBLE;

@@ -219,6 +219,47 @@ static void test_a_neighbour_seen_with_the_other_stays(void **state)
     assert_int_equal(looks.counters.retired, 0);
 }
 
+static void see_away(int object, int view, double bearing_rad, double range_m)
+{
+    float signature[BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen = unit_polar(bearing_rad, range_m, -1);
+    seen.signature = signature_of(object, view, signature);
+    see(&seen, 1);
+}
+
+/// A thing measured at 4 m so many times, then, in such a direction, at so many metres until it is a beacon
+/// of its own and for ten frames more; how many beacons there are then.
+static int beacons_of_two_distances(int times, double bearing_rad, double range_m)
+{
+    start(svm_params());
+    for (int view = 0; view < times; view++) {
+        see_away(2, view, 0, 4);
+    }
+    for (int view = 0; view < 10; view++) {
+        see_away(3, view, bearing_rad, range_m);
+    }
+    return bslam_slam_beacon_count(&slam);
+}
+
+/// One distance in a thousand is measured much too short, and begins a beacon before the thing itself.
+static void test_what_was_seen_a_few_times_in_front_of_another_is_retired(void **state)
+{
+    assert_int_equal(beacons_of_two_distances(3, 0.01, 7), 1);
+    assert_int_equal(looks.counters.retired, 1);
+    assert_int_equal(looks.of[0].ousted, 0);
+    bslam_beacon_view_t left;
+    assert_int_equal(bslam_slam_beacon(&slam, 0, &left), BSLAM_OK);
+    assert_near(left.x_m, 7, 0.5);
+}
+
+static void test_what_stands_apart_or_was_seen_often_is_not_retired(void **state)
+{
+    assert_int_equal(beacons_of_two_distances(3, 0.2, 7), 2);  // beside it
+    assert_int_equal(beacons_of_two_distances(3, 0, 8.5), 2);  // more than twice as far
+    assert_int_equal(beacons_of_two_distances(5, 0, 7), 2);    // as often as doubt_sightings
+    assert_int_equal(looks.counters.retired, 0);
+}
+
 /// As in test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, but the detector tells them apart.
 static void test_a_neighbour_of_another_class_stays_if_never_seen_with_it(void **state)
 {
@@ -383,6 +424,8 @@ int main(void)
         cmocka_unit_test_setup(test_attaching_again_forgets, setup),
         cmocka_unit_test_setup(test_a_beacon_removed_while_its_machine_trains_is_forgotten, setup),
         cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
+        cmocka_unit_test_setup(test_what_was_seen_a_few_times_in_front_of_another_is_retired, setup),
+        cmocka_unit_test_setup(test_what_stands_apart_or_was_seen_often_is_not_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
         cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
