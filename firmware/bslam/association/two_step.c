@@ -54,6 +54,12 @@ static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
     return frame->time_us - frame->ekf->beacons[beacon].last_seen_us;
 }
 
+/// Whether a beacon does not count, and was not seen for a while.
+static bool is_old(const bslam_sighting_frame_t *frame, int beacon)
+{
+    return !frame->ekf->beacons[beacon].confirmed && seen_ago_us(frame, beacon) > frame->params->wait_us;
+}
+
 /// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
 /// its sighting is this one or was missed. As something else it was missed.
 static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
@@ -66,6 +72,15 @@ static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_
                : 0;
 }
 
+/// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
+/// not count the map hardly knows where it stands, and its machine knows little, so that most things may be
+/// it: what is called something else is another.
+static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+{
+    const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
+    return bslam_ekf_classes_differ(other, sighting) && (frame->looks == NULL || is_old(frame, beacon));
+}
+
 /// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
 static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int i, int beacon,
                   const bslam_sample_t *sample, candidate_t *found)
@@ -75,7 +90,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     const bslam_sighting_t taken = bslam_ekf_taken_as(other, sighting);
     bslam_innovation_t innovation;
     bslam_weight_t weight;
-    if ((frame->looks == NULL && bslam_ekf_classes_differ(other, sighting)) ||
+    if (is_another_kind(frame, sighting, beacon) ||
         bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_given_weigh(frame->ekf, given, &innovation, &weight) != BSLAM_OK) {
@@ -290,9 +305,8 @@ static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t 
     if (match->beacon < 0) {
         return false;
     }
-    const bool is_old = !frame->ekf->beacons[match->beacon].confirmed &&
-                        seen_ago_us(frame, match->beacon) > frame->params->wait_us;
-    return match->score > (is_old && sighting->has_range ? 0 : -frame->params->defer_score);
+    const bool may_be_new = sighting->has_range && is_old(frame, match->beacon);
+    return match->score > (may_be_new ? 0 : -frame->params->defer_score);
 }
 
 /// What becomes of a sighting that matches no beacon.

@@ -185,7 +185,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                                                   const bslam_pose_t *mount,
                                                   const bslam_sighting_t *sightings, int count)
 {
-    bslam_slam_try(slam, sightings, count);
+    bslam_slam_try(slam, time_us, sightings, count);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
         match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&

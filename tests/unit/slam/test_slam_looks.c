@@ -412,10 +412,40 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
     assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
 }
 
+/// Two beacons that were seen with distances, out of view for so long, and a heading of so much doubt: what
+/// becomes of the first as it is seen then.
+static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_range)
+{
+    start(svm_params());
+    see_two(20);
+    drive_on(us);
+    const bslam_pose_t pose = bslam_ekf_pose(&slam.ekf);
+    bslam_ekf_set_pose(&slam.ekf, &pose, BSLAM_R(1e-4), real(heading_var_rad2));
+    float signature[BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen = unit_polar(0.02, 4, -1);
+    seen.has_range = has_range;
+    seen.signature = signature_of(0, 60, signature);
+    see(&seen, 1);
+    return slam.accounts[0];
+}
+
+/// A direction alone turns the robot to whatever it is taken for.
+static void test_where_the_heading_is_in_doubt_a_direction_alone_waits(void **state)
+{
+    const int64_t long_us = svm_params().wait_us;
+    const bslam_account_t account = see_after(long_us, 0.011, false);
+    assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(account.reason, BSLAM_REASON_AMBIGUOUS);
+    assert_int_equal(see_after(long_us, 0.011, true).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(see_after(long_us, 0.009, false).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(see_after(long_us - STEP_US, 0.011, false).outcome, BSLAM_OUTCOME_MATCHED);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
+        cmocka_unit_test_setup(test_where_the_heading_is_in_doubt_a_direction_alone_waits, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),
