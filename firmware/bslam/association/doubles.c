@@ -95,13 +95,15 @@ static bool count_pair(bslam_look_t *younger, uint32_t older_uid, bool together,
 }
 
 /// Which of two leaves: the one with fewer sightings, unless others have left for being in the same place
-/// again and again: then what was there is there no longer.
-static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, int a, int b, bool in_place)
+/// again and again while it was not seen: then what was there is there no longer.
+static int who_leaves(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params, int a,
+                      int b, bool in_place, int64_t time_us)
 {
     const int less = ekf->beacons[a].sightings < ekf->beacons[b].sightings ? a : b;
     const int more = less == a ? b : a;
-    looks->of[more].ousted = (uint8_t)(looks->of[more].ousted + (in_place ? 1 : 0));
-    return in_place && looks->of[more].ousted >= OUSTED_MAX ? more : less;
+    const bool is_ousted = in_place && time_us - ekf->beacons[more].last_seen_us > params->wait_us;
+    looks->of[more].ousted = (uint8_t)(looks->of[more].ousted + (is_ousted ? 1 : 0));
+    return is_ousted && looks->of[more].ousted >= OUSTED_MAX ? more : less;
 }
 
 /// The oldest other beacon that beacon `index` may be: one in its place, or else one in its direction;
@@ -144,7 +146,7 @@ int bslam_doubles_settle(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bsl
                        params->doubt_sightings)) {
             looks->of[younger].alone = 0;
             looks->counters.retired++;
-            return who_leaves(looks, ekf, b, other, in_place);
+            return who_leaves(looks, ekf, params, b, other, in_place, time_us);
         }
     }
     return BSLAM_NO_DOUBLE;

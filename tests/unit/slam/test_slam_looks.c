@@ -62,6 +62,14 @@ static void see(const bslam_sighting_t *sightings, int count)
     assert_int_equal(bslam_slam_sightings(&slam, now_us, sightings, count), BSLAM_OK);
 }
 
+static void drive_on(int64_t us)
+{
+    for (const int64_t end_us = now_us + us; now_us < end_us; now_us += STEP_US) {
+        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
+        assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    }
+}
+
 /// Two beacons 4 m away, of objects 0 and 1, for so many frames.
 static void see_two(int frames)
 {
@@ -174,15 +182,32 @@ static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **s
     assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_E_NO_BEACON);
 }
 
-/// Another object where beacon 0 is, as well as its distance tells, which is not seen with it.
+/// Object 2 where beacon 0 is, as well as its distance tells, until so many are retired.
+static void see_another_in_its_place(uint32_t retired)
+{
+    for (int view = 0; looks.counters.retired < retired && view < 200; view++) {
+        see_object(2, view, 0.1);
+    }
+    assert_int_equal(looks.counters.retired, retired);
+}
+
+static bool is_in_map(uint32_t uid)
+{
+    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
+        bslam_beacon_view_t beacon;
+        assert_int_equal(bslam_slam_beacon(&slam, b, &beacon), BSLAM_OK);
+        if (beacon.uid == uid) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void **state)
 {
     see_two(20);
-    int view = 0;
-    while (looks.counters.retired == 0 && view < 60) {
-        see_object(2, view++, 0.1);
-    }
-    assert_int_equal(looks.counters.retired, 1);
+    drive_on(slam.params.wait_us);
+    see_another_in_its_place(1);
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
     assert_int_equal(looks.of[0].ousted, 1);
 }
@@ -190,18 +215,23 @@ static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void *
 static void test_what_keeps_being_replaced_is_gone_itself(void **state)
 {
     see_two(20);
-    bslam_beacon_view_t first;
-    assert_int_equal(bslam_slam_beacon(&slam, 0, &first), BSLAM_OK);
-    int view = 0;
-    while (looks.counters.retired < 3 && view < 200) {
-        see_object(2, view++, 0.1);
+    const uint32_t first_uid = slam.ekf.beacons[0].uid;
+    drive_on(slam.params.wait_us);
+    see_another_in_its_place(3);
+    assert_false(is_in_map(first_uid));
+}
+
+/// What begins beside a beacon that is seen all the while has not replaced it.
+static void test_what_is_seen_between_is_not_gone(void **state)
+{
+    see_two(20);
+    const uint32_t first_uid = slam.ekf.beacons[0].uid;
+    for (uint32_t retired = 1; retired <= 4; retired++) {
+        see_another_in_its_place(retired);
+        see_object(0, 100 + (int)retired, 0);
     }
-    assert_int_equal(looks.counters.retired, 3);
-    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
-        bslam_beacon_view_t beacon;
-        assert_int_equal(bslam_slam_beacon(&slam, b, &beacon), BSLAM_OK);
-        assert_int_not_equal(beacon.uid, first.uid);
-    }
+    assert_true(is_in_map(first_uid));
+    assert_int_equal(looks.of[0].ousted, 0);
 }
 
 static void test_a_neighbour_seen_with_the_other_stays(void **state)
@@ -380,14 +410,6 @@ static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **s
     assert_int_equal(bslam_slam_beacon_count(&slam), THINGS - 1);
 }
 
-static void drive_on(int64_t us)
-{
-    for (const int64_t end_us = now_us + us; now_us < end_us; now_us += STEP_US) {
-        const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
-        assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
-    }
-}
-
 /// A robot that has turned unseen finds nothing where it should be: its gate must not keep it from all that
 /// it knows.
 static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while(void **state)
@@ -457,6 +479,7 @@ int main(void)
         cmocka_unit_test_setup(test_what_was_seen_a_few_times_in_front_of_another_is_retired, setup),
         cmocka_unit_test_setup(test_what_stands_apart_or_was_seen_often_is_not_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
+        cmocka_unit_test_setup(test_what_is_seen_between_is_not_gone, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
         cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
         cmocka_unit_test_setup(test_what_is_called_of_two_classes_in_one_place_is_one, setup),
