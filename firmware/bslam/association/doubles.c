@@ -52,9 +52,9 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
 /// Where a beacon is from the robot: its direction in the map, and its squared distance.
 static bslam_real_t direction_of(const bslam_ekf_t *ekf, int index, bslam_real_t *distance2_m2)
 {
-    const int at = ekf->beacons[index].at;
-    const bslam_real_t dx_m = ekf->mean[at] - ekf->mean[0];
-    const bslam_real_t dy_m = ekf->mean[at + 1] - ekf->mean[1];
+    bslam_real_t x_m, y_m;
+    bslam_ekf_beacon_position(ekf, index, &x_m, &y_m);
+    const bslam_real_t dx_m = x_m - ekf->mean[0], dy_m = y_m - ekf->mean[1];
     *distance2_m2 = dx_m * dx_m + dy_m * dy_m;
     return bslam_atan2(dy_m, dx_m);
 }
@@ -64,8 +64,7 @@ static bslam_real_t direction_of(const bslam_ekf_t *ekf, int index, bslam_real_t
 static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
 {
     const uint32_t few = (uint32_t)params->doubt_sightings;
-    if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b]) ||
-        (ekf->beacons[a].sightings >= few && ekf->beacons[b].sightings >= few)) {
+    if (ekf->beacons[a].sightings >= few && ekf->beacons[b].sightings >= few) {
         return false;
     }
     bslam_real_t one_m2, other_m2;

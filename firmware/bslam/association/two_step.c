@@ -74,11 +74,12 @@ static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_
 
 /// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
 /// not count the map hardly knows where it stands, and its machine knows little, so that most things may be
-/// it: what is called something else is another.
+/// it: what has a place of its own and is called something else is another.
 static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
 {
     const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
-    return bslam_ekf_classes_differ(other, sighting) && (frame->looks == NULL || is_old(frame, beacon));
+    return bslam_ekf_classes_differ(other, sighting) &&
+           (frame->looks == NULL || (sighting->has_range && is_old(frame, beacon)));
 }
 
 /// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.

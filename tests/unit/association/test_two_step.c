@@ -241,7 +241,7 @@ static void test_what_is_nearly_an_old_beacon_that_does_not_count_is_new(void **
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
-/// Nor is it what it is called otherwise than, however well the place fits.
+/// Nor is it what has a place and is called something else, however well the place fits.
 static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count_is_new(void **state)
 {
     const bslam_params_t params = svm_params();
@@ -249,11 +249,12 @@ static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count
     ekf.beacons[0].beacon_class = 2;
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = 6;
-    for (int k = 0; k < 4; k++) {
-        const bool is_long_ago = k % 2 != 0, is_unconfirmed = k / 2 != 0;
+    for (int k = 0; k < 8; k++) {
+        const bool is_long_ago = (k & 1) != 0, is_unconfirmed = (k & 2) != 0;
+        seen.has_range = (k & 4) != 0;
         ekf.beacons[0].confirmed = !is_unconfirmed;
         const decision_t d = decide_at(params.wait_us + (is_long_ago ? 1 : 0), &ekf, &params, &seen, 1);
-        const bool is_new = is_long_ago && is_unconfirmed;
+        const bool is_new = is_long_ago && is_unconfirmed && seen.has_range;
         unit_assert_decided(&d.matches[0], is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH,
                             BSLAM_REASON_NONE, is_new ? -1 : 0);
     }

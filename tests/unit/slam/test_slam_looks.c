@@ -290,6 +290,31 @@ static void test_what_stands_apart_or_was_seen_often_is_not_retired(void **state
     assert_int_equal(looks.counters.retired, 0);
 }
 
+/// Two directions alone have begun a beacon each, and one of the two is all that is seen from then on.
+static void test_a_ray_in_the_direction_of_another_is_retired(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_odds = 0;
+    start(params);
+    float signatures[2][BSLAM_SAMPLE_FEATURES];
+    bslam_sighting_t seen[] = {unit_polar(0.5, 4, -1), unit_polar(0.55, 4, -1)};
+    for (int k = 0; k < 2; k++) {
+        seen[k].has_range = false;
+        seen[k].signature = signature_of(2 + k, 0, signatures[k]);
+    }
+    see(seen, 2);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacons[0].kind, BSLAM_BEACON_RAY);
+    const uint32_t seen_uid = slam.ekf.beacons[1].uid;
+    for (int view = 0; view < slam.params.doubt_sightings; view++) {
+        assert_int_equal(looks.counters.retired, 0);
+        see_away(3, view, 0.55, 4);
+    }
+    assert_int_equal(looks.counters.retired, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacons[0].uid, seen_uid);
+}
+
 /// As in test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, but the detector tells them apart.
 static void test_a_neighbour_of_another_class_stays_if_never_seen_with_it(void **state)
 {
@@ -477,6 +502,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_beacon_removed_while_its_machine_trains_is_forgotten, setup),
         cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
         cmocka_unit_test_setup(test_what_was_seen_a_few_times_in_front_of_another_is_retired, setup),
+        cmocka_unit_test_setup(test_a_ray_in_the_direction_of_another_is_retired, setup),
         cmocka_unit_test_setup(test_what_stands_apart_or_was_seen_often_is_not_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_what_is_seen_between_is_not_gone, setup),
