@@ -138,7 +138,7 @@
          "svm: a decision value above this says that a beacon looks like another machine's") \
     INTEGER(share_sightings, 12, 1, 250, "svm: so often before it shares that machine, or leaves one again") \
     INTEGER(doubt_sightings, 25, 1, 250, \
-            "svm: of two beacons in one place, seen so often and never both, one is retired") \
+            "svm: of two beacons in one place or direction, seen so often and never both, one leaves") \
     INTEGER(vanish_views, 3, 0, 32, \
             "svm: one missed from so many directions from which it was seen before leaves (0: never)") \
     INTEGER(learn_budget, 600, 0, 1000000, "svm: pieces of training after each frame") \
