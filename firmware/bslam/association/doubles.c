@@ -1,7 +1,5 @@
 #include "bslam/association/doubles.h"
 
-#include "bslam/math/trig.h"
-
 // Beacons that have left for being in one's place before it is that one that leaves.
 enum { OUSTED_MAX = 3 };
 
@@ -49,29 +47,27 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->double_d2 * det;
 }
 
-/// Where a beacon is from the robot: its direction in the map, and its squared distance.
-static bslam_real_t direction_of(const bslam_ekf_t *ekf, int index, bslam_real_t *distance2_m2)
-{
-    bslam_real_t x_m, y_m;
-    bslam_ekf_beacon_position(ekf, index, &x_m, &y_m);
-    const bslam_real_t dx_m = x_m - ekf->mean[0], dy_m = y_m - ekf->mean[1];
-    *distance2_m2 = dx_m * dx_m + dy_m * dy_m;
-    return bslam_atan2(dy_m, dx_m);
-}
-
 /// Whether two beacons stand one behind the other, as the robot sees it, and one of them was hardly ever
-/// seen: two distances of one far thing, each of which began a beacon.
+/// seen: two distances of one far thing, each of which began a beacon. Without an arc tangent, by the sine of
+/// the angle between them: all pairs of what is seen are asked in every frame.
 static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
 {
     const uint32_t few = (uint32_t)params->doubt_sightings;
     if (ekf->beacons[a].sightings >= few && ekf->beacons[b].sightings >= few) {
         return false;
     }
-    bslam_real_t one_m2, other_m2;
-    const bslam_real_t one_rad = direction_of(ekf, a, &one_m2);
-    const bslam_real_t other_rad = direction_of(ekf, b, &other_m2);
-    return bslam_abs(bslam_angle_wrap(one_rad - other_rad)) <= ONE_DIRECTION_SD * params->bearing_sd_rad &&
-           one_m2 < FARTHER2 * other_m2 && other_m2 < FARTHER2 * one_m2;
+    const bslam_pose_t robot = bslam_ekf_pose(ekf);
+    bslam_real_t ax, ay, bx, by;
+    bslam_ekf_beacon_position(ekf, a, &ax, &ay);
+    bslam_ekf_beacon_position(ekf, b, &bx, &by);
+    ax -= robot.x_m;
+    ay -= robot.y_m;
+    bx -= robot.x_m;
+    by -= robot.y_m;
+    const bslam_real_t a2 = ax * ax + ay * ay, b2 = bx * bx + by * by;
+    const bslam_real_t cross = ax * by - ay * bx, apart = ONE_DIRECTION_SD * params->bearing_sd_rad;
+    return ax * bx + ay * by > 0 && cross * cross <= apart * apart * a2 * b2 && a2 < FARTHER2 * b2 &&
+           b2 < FARTHER2 * a2;
 }
 
 /// A door and the sign beside it are two, however little the map knows of where they stand. A cabinet that is

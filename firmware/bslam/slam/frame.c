@@ -1,8 +1,12 @@
 #include "bslam/association/doubles.h"
 #include "bslam/association/vanished.h"
+#include "bslam/math/symmat.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "bslam/slam/internal.h"
+
+// Six degrees: at the distance of a wall, as much as two beacons are apart.
+static const bslam_real_t DOUBTFUL_HEADING_RAD2 = BSLAM_R(0.01);
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 
@@ -152,6 +156,16 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     return opens ? params->candidate_d2 : params->gate_d2;
 }
 
+/// Whether a match would turn a doubtful heading to whatever it is taken for: it has no distance that might
+/// contradict it, and nothing that the robot knows has been where it should be for a while.
+static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting)
+{
+    const bslam_params_t *params = &slam->params;
+    return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
+           bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 &&
+           !bslam_is_placed(&slam->ekf, params, -1, time_us);
+}
+
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
 /// them before the first is fused, so that the order within a frame does not matter.
 static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
@@ -160,6 +174,10 @@ static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_po
     const bslam_real_t gate_d2 = gate_of(slam, time_us);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
+        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, &sightings[i])) {
+            match->verdict = BSLAM_VERDICT_DEFER;
+            match->reason = BSLAM_REASON_AMBIGUOUS;
+        }
         if (match->verdict == BSLAM_VERDICT_REJECT) {
             reject(slam, match->reason, NULL, &slam->accounts[i]);
         } else if (match->verdict == BSLAM_VERDICT_DEFER) {
@@ -185,7 +203,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                                                   const bslam_pose_t *mount,
                                                   const bslam_sighting_t *sightings, int count)
 {
-    bslam_slam_try(slam, time_us, sightings, count);
+    bslam_slam_try(slam, sightings, count);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
         match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&

@@ -34,10 +34,9 @@ void bslam_slam_trust_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
                             bslam_real_t distance2);
 
 /// Notes whether the sensor measures distances, and turns matches with beacons of which nobody knows yet
-/// whether they are any, and new ones that would be refuted at once, into BSLAM_VERDICT_TRIAL, and matches
-/// that say too little where the robot is in doubt into BSLAM_VERDICT_DEFER. Before anything of the frame is
-/// used: its order does not matter.
-void bslam_slam_try(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
+/// whether they are any, and new ones that would be refuted at once, into BSLAM_VERDICT_TRIAL. Before
+/// anything of the frame is used: its order does not matter.
+void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
 
 // ---- scale.c: what a beacon is taken for, and how much too long its distances are by that -----------------
 

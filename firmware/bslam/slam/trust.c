@@ -1,6 +1,5 @@
 // Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and
 // looks".
-#include "bslam/math/symmat.h"
 #include "bslam/slam/internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
@@ -9,8 +8,6 @@ static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
 // And one without a distance, of a sensor that measures some.
 static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
-// Six degrees: at the distance of a wall, as much as two beacons are apart.
-static const bslam_real_t DOUBTFUL_HEADING_RAD2 = BSLAM_R(0.01);
 
 /// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
@@ -101,17 +98,7 @@ static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
            beacon->score_sum < (knows_few(slam) ? params->trust_first_sum : params->trust_sum);
 }
 
-/// Whether a match would turn a doubtful heading to whatever it is taken for: it has no distance that might
-/// contradict it, and nothing that the robot knows has been where it should be for a while.
-static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting)
-{
-    const bslam_params_t *params = &slam->params;
-    return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
-           bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 &&
-           !bslam_is_placed(&slam->ekf, params, -1, time_us);
-}
-
-void bslam_slam_try(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+void bslam_slam_try(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
 {
     for (int i = 0; i < count; i++) {
         slam->measures_distance = slam->measures_distance || sightings[i].has_range;
@@ -120,11 +107,6 @@ void bslam_slam_try(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t 
             match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
         const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
                                 sightings[i].score < slam->params.trust_score;
-        if (is_tried || is_refuted) {
-            match->verdict = BSLAM_VERDICT_TRIAL;
-        } else if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, &sightings[i])) {
-            match->verdict = BSLAM_VERDICT_DEFER;
-            match->reason = BSLAM_REASON_AMBIGUOUS;
-        }
+        match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TRIAL : match->verdict;
     }
 }
