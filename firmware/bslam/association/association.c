@@ -37,11 +37,11 @@ static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *
     }
 }
 
-bool bslam_is_placed(const bslam_ekf_t *ekf, const bslam_params_t *params, int other_than, int64_t time_us)
+bool bslam_is_placed(const bslam_ekf_t *ekf, int64_t within_us, int other_than, int64_t time_us)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (b != other_than && ekf->beacons[b].confirmed &&
-            time_us - ekf->beacons[b].last_seen_us <= params->wait_us) {
+            time_us - ekf->beacons[b].last_seen_us <= within_us) {
             return true;
         }
     }

@@ -89,9 +89,9 @@ void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *mat
 /// together, the next after them, and at most joint_nodes choices are tried for each such group.
 void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
 
-/// Whether some beacon that counts, other than one (-1: whichever), was where it should be, of late
-/// (wait_us): then the robot's pose is not what is wrong. O(beacons).
-bool bslam_is_placed(const bslam_ekf_t *ekf, const bslam_params_t *params, int other_than, int64_t time_us);
+/// Whether some beacon that counts, other than one (-1: whichever), was where it should be within the last
+/// `within_us`: then the robot's pose is not what is wrong. O(beacons).
+bool bslam_is_placed(const bslam_ekf_t *ekf, int64_t within_us, int other_than, int64_t time_us);
 
 /// The method that params->association names.
 bslam_associate_fn bslam_associate_method(const bslam_params_t *params);

@@ -137,15 +137,26 @@ static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam
     return best->distance2 <= params->learn_d2 && lead >= params->learn_lead && looks_right;
 }
 
-/// Whether a match has to wait: a machine of few samples is against it, and its beacon is not in view. It may
-/// be another one that stands near, and the two are told apart once both are in view; or else the machine has
-/// not seen that side of its beacon yet.
+/// Whether a machine of few samples is against a match. It may be another beacon that stands near, and the
+/// two are told apart once both are in view; or else the machine has not seen that side of its beacon yet.
+static bool is_doubted(const bslam_sighting_frame_t *frame, const candidate_t *best)
+{
+    return best->opinion.weight < 0.5f && best->score < frame->params->learn_lead &&
+           looks_score(frame->params, &best->opinion) < 0;
+}
+
+/// Whether a match that little speaks for can wait: another beacon in view holds the robot in its place.
+static bool can_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+{
+    return frame->looks != NULL && best->score < frame->params->wait_score &&
+           bslam_is_placed(frame->ekf, frame->params->again_us, beacon, frame->time_us);
+}
+
+/// Whether a match has to wait. Not one with a beacon in view: that it was seen just now says more.
 static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
-    const bool is_young = best->opinion.weight < 0.5f;
-    const bool is_likely = best->score > 0 && best->score < frame->params->learn_lead;
-    return is_likely && is_young && looks_score(frame->params, &best->opinion) < 0 &&
-           seen_ago_us(frame, beacon) > frame->params->wait_us &&
+    return best->score > 0 && seen_ago_us(frame, beacon) > frame->params->wait_us &&
+           (is_doubted(frame, best) || can_wait(frame, beacon, best)) &&
            !frame->answers->has_waited(frame->looks, frame->params, beacon, frame->time_us);
 }
 
@@ -275,7 +286,7 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t
             one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->looks_high &&
-            !(bslam_is_placed(frame->ekf, frame->params, b, frame->time_us) &&
+            !(bslam_is_placed(frame->ekf, frame->params->wait_us, b, frame->time_us) &&
               frame->answers->has_waited(frame->looks, frame->params, b, frame->time_us))) {
             return b;
         }

@@ -152,7 +152,7 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     const bslam_params_t *params = &slam->params;
     const bool opens = params->association == BSLAM_ASSOCIATION_SVM && params->gate_d2 > 0 &&
                        params->gate_d2 < params->candidate_d2 &&
-                       !bslam_is_placed(&slam->ekf, params, -1, time_us);
+                       !bslam_is_placed(&slam->ekf, params->wait_us, -1, time_us);
     return opens ? params->candidate_d2 : params->gate_d2;
 }
 
@@ -163,7 +163,7 @@ static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sigh
     const bslam_params_t *params = &slam->params;
     return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
            bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 &&
-           !bslam_is_placed(&slam->ekf, params, -1, time_us);
+           !bslam_is_placed(&slam->ekf, params->wait_us, -1, time_us);
 }
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of

@@ -481,6 +481,37 @@ static void test_what_matches_no_beacon_waits_for_none(void **state)
     assert_int_equal(decide_at(9000000, &ekf, &params, &near, 1).matches[0].waits_for, -1);
 }
 
+/// A beacon that was not seen for long, and one elsewhere that was seen so long ago: whether a sighting waits
+/// for the first.
+static bool waits_beside(const bslam_params_t *params, int64_t other_ago_us, bool other_counts)
+{
+    static const double places[2][2] = {{4, 0}, {-4, 3}};
+    const int64_t time_us = 9000000;
+    bslam_ekf_t ekf = unit_map_of(params, places, 2);
+    ekf.beacons[1].confirmed = other_counts;
+    ekf.beacons[1].last_seen_us = time_us - other_ago_us;
+    const bslam_sighting_t seen = unit_polar(0.06, 4, -1);
+    return decide_at(time_us, &ekf, params, &seen, 1).matches[0].waits_for == 0;
+}
+
+/// A robot that another beacon holds in its place loses nothing by waiting.
+static void test_a_match_that_little_speaks_for_waits_while_another_is_in_view(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_us = 200000;
+    const double score = position_score(&params, 4, 0.06);
+    assert_true(score > 0.1 && score < params.learn_lead);
+    params.wait_score = real(score + 0.01);
+    assert_true(waits_beside(&params, 200000, true));
+    assert_false(waits_beside(&params, 200001, true));
+    assert_false(waits_beside(&params, 200000, false));
+    bslam_looks_note_wait(&looks, &params, 0, 9000000 - params.wait_us);
+    assert_false(waits_beside(&params, 200000, true));  // it has waited
+    bslam_looks_note_wait(&looks, &params, 0, 9000000 - params.wait_us / 2);
+    params.wait_score = real(score - 0.01);
+    assert_false(waits_beside(&params, 200000, true));
+}
+
 /// What waits holds no beacon for itself.
 static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **state)
 {
@@ -673,6 +704,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_match_does_not_wait_for_what_is_in_view, setup),
         cmocka_unit_test_setup(test_a_match_that_has_waited_is_made, setup),
         cmocka_unit_test_setup(test_what_matches_no_beacon_waits_for_none, setup),
+        cmocka_unit_test_setup(test_a_match_that_little_speaks_for_waits_while_another_is_in_view, setup),
         cmocka_unit_test_setup(test_a_beacon_that_one_sighting_waits_for_goes_to_another, setup),
         cmocka_unit_test_setup(test_one_to_one_the_clearest_choice_first, setup),
         cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),

@@ -441,6 +441,7 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
 {
     bslam_params_t params = svm_params();
     params.gate_d2 = 9;
+    params.wait_score = 0;
     start(params);
     see_two(40);
     const double off_rad = 0.085;
