@@ -15,6 +15,7 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     match->beacon = -1;
     match->distance2 = -1;
     match->score = 0;
+    match->view_score = 0;
     match->lead = 0;
     match->sure = false;
     match->waits_for = -1;

@@ -45,11 +45,12 @@ typedef enum bslam_verdict {
 typedef struct bslam_match {
     bslam_verdict_t verdict;
     bslam_reason_t reason;
-    int32_t beacon;          ///< index into the map for a match, else -1
-    bslam_real_t distance2;  ///< to the chosen beacon in the method's own measure; negative: not computed
-    bslam_real_t score;      ///< svm: log odds of that beacon against a new one; else 0
-    bslam_real_t lead;       ///< svm: by how much the score leads that of any other beacon, and of a new one
-    bool sure;               ///< svm: sure enough to learn from; else false
+    int32_t beacon;           ///< index into the map for a match, else -1
+    bslam_real_t distance2;   ///< to the chosen beacon in the method's own measure; negative: not computed
+    bslam_real_t score;       ///< svm: log odds of that beacon against a new one; else 0
+    bslam_real_t view_score;  ///< svm: the best one without again_odds since that beacon came into view
+    bslam_real_t lead;        ///< svm: by how much the score leads that of any other beacon, and of a new one
+    bool sure;                ///< svm: sure enough to learn from; else false
     bool range_used;  ///< within a frame: the distance has said where on a ray the beacon is, or does not fit
     int32_t waits_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
 } bslam_match_t;

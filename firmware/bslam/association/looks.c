@@ -140,6 +140,13 @@ static void note_class(bslam_look_t *look, uint8_t beacon_class)
     look->seen_as[beacon_class - 1]++;
 }
 
+// ---- views ------------------------------------------------------------------------------------------------
+
+void bslam_looks_note_view(bslam_looks_t *looks, int index, bslam_real_t view_score)
+{
+    looks->of[index].view_score = view_score;
+}
+
 // ---- waiting ----------------------------------------------------------------------------------------------
 
 /// How long matches with a beacon have waited; 0 if not, or if none did within the last wait_us.

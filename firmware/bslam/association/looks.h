@@ -43,6 +43,7 @@ typedef struct bslam_look {
     uint32_t missed_um;                      ///< the robot's way when it was seen last, or not expected
     uint8_t missed;                          ///< from how many directions, since it was seen last
     uint8_t seen_from[BSLAM_LOOKS_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
+    bslam_real_t view_score;                 ///< association.h: as of its last match
     uint32_t waited_us;                      ///< how long matches with it had waited by then; 0: not
     uint32_t waits_us;                       ///< when the last one did, modulo 72 minutes
 } bslam_look_t;
@@ -98,6 +99,9 @@ uint8_t bslam_looks_class(const bslam_looks_t *looks, int index);
 /// found for a beacon that has none. O(machines).
 void bslam_looks_teach(bslam_looks_t *looks, const bslam_params_t *params, int index, int count,
                        uint32_t way_um, const bslam_sighting_t *sighting);
+
+/// Beacon `index` was matched, or has begun, with this `view_score` (association.h).
+void bslam_looks_note_view(bslam_looks_t *looks, int index, bslam_real_t view_score);
 
 /// A match with beacon `index` waits at this moment: association.h, `waits_for`.
 void bslam_looks_note_wait(bslam_looks_t *looks, const bslam_params_t *params, int index, int64_t time_us);

@@ -6,10 +6,13 @@
 #include "bslam/model/noise.h"
 
 static const bslam_real_t LN_NINE = BSLAM_R(2.197224577);
+// Sightings of one view err together, but not in all: the best of them says so many times what it scores.
+static const bslam_real_t VIEW_WORTH = 2;
 
 /// A sighting against a beacon.
 typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against a new one
+    bslam_real_t view_score;
     bslam_real_t distance2;
     bslam_opinion_t opinion;
 } candidate_t;
@@ -60,16 +63,28 @@ static bool is_old(const bslam_sighting_frame_t *frame, int beacon)
     return !frame->ekf->beacons[beacon].confirmed && seen_ago_us(frame, beacon) > frame->params->wait_us;
 }
 
+/// The best score without again_odds that a beacon has had since it came into view, where its next one is
+/// this.
+static bslam_real_t view_score(const bslam_sighting_frame_t *frame, int beacon, bslam_real_t score)
+{
+    const bool is_in_view = frame->looks != NULL && seen_ago_us(frame, beacon) <= frame->params->wait_us;
+    return is_in_view && frame->looks->of[beacon].view_score > score ? frame->looks->of[beacon].view_score
+                                                                     : score;
+}
+
 /// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
-/// its sighting is this one or was missed. As something else it was missed.
+/// its sighting is this one or was missed. As something else it was missed; and whether it was in view at all
+/// is no surer than the best that spoke for it.
 static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                int beacon)
 {
     const int64_t ago_us = seen_ago_us(frame, beacon);
     const bool is_just = ago_us > 0 && ago_us <= frame->params->again_us;
-    return is_just && !bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting)
-               ? frame->params->again_odds
-               : 0;
+    if (!is_just || bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting)) {
+        return 0;
+    }
+    const bslam_real_t odds = frame->params->again_odds;
+    return frame->looks == NULL ? odds : clip(VIEW_WORTH * frame->looks->of[beacon].view_score, 0, odds);
 }
 
 /// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
@@ -103,8 +118,9 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
         found->opinion = frame->answers->ask(frame->looks, frame->params, beacon, sample);
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
-                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon) +
-                   again_odds(frame, sighting, beacon);
+                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
+    found->view_score = view_score(frame, beacon, found->score);
+    found->score += again_odds(frame, sighting, beacon);
     return true;
 }
 
@@ -167,7 +183,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
     bslam_match_t *match = &matches[i];
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
-    candidate_t best = {0, -1, {0.0f, 0.0f}};
+    candidate_t best = {.distance2 = -1};
     bslam_real_t second = 0;
     bool has_second = false;
     match->beacon = -1;
@@ -190,6 +206,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_given_t *given,
     }
     match->distance2 = best.distance2;
     match->score = best.score;
+    match->view_score = best.view_score;
     // Another beacon, or a new one, whose score is 0.
     match->lead = best.score - (has_second && second > 0 ? second : 0);
     match->sure = match->beacon >= 0 && is_sure(frame->params, &best, match->lead);

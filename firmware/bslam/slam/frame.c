@@ -241,18 +241,31 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 
 // ---- looks ------------------------------------------------------------------------------------------------
 
-static void note_waits(bslam_slam_t *slam, int64_t time_us, int count)
+static bool was_tried(const bslam_account_t *account)
+{
+    return account->reason == BSLAM_REASON_TRIAL && account->has_beacon;
+}
+
+/// Which matches wait, and how well those fit that were made. What has just begun is itself for sure.
+static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
 {
     for (int i = 0; i < count; i++) {
-        if (slam->matches[i].waits_for >= 0) {
-            bslam_looks_note_wait(slam->looks, &slam->params, slam->matches[i].waits_for, time_us);
+        const bslam_account_t *account = &slam->accounts[i];
+        const bslam_match_t *match = &slam->matches[i];
+        if (match->waits_for >= 0) {
+            bslam_looks_note_wait(slam->looks, &slam->params, match->waits_for, time_us);
+        } else if (account->outcome == BSLAM_OUTCOME_NEW) {
+            bslam_looks_note_view(slam->looks, bslam_slam_find_beacon(slam, account->beacon_uid),
+                                  slam->params.again_odds);
+        } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account)) {
+            bslam_looks_note_view(slam->looks, match->beacon, match->view_score);
         }
     }
 }
 
 void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
-    note_waits(slam, time_us, count);
+    note_matches(slam, time_us, count);
     if (slam->is_frozen) {
         return;
     }
@@ -260,8 +273,7 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
-        const bool is_tried = account->reason == BSLAM_REASON_TRIAL && account->has_beacon;
-        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || is_tried;
+        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account);
         all_matched = all_matched && is_matched;
         if (!is_new && !is_matched) {
             continue;

@@ -69,8 +69,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use);
 
-/// Notes which matches wait. Unless the map is frozen, machines learn from what a frame surely showed, and
-/// train for a bounded time.
+/// Notes which matches wait, and how well others fit. Unless the map is frozen, machines learn from what a
+/// frame surely showed, and train for a bounded time.
 void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
                             int count);
 

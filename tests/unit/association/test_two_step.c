@@ -108,12 +108,35 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     ekf.beacons[0].last_seen_us = 1000000;
+    bslam_looks_note_view(&looks, 0, BSLAM_R(2.1));  // enough for all of them
     const int64_t times_us[] = {1000000, 1000001, 1200000, 1200001};
     const double odds[] = {0, 4.2, 4.2, 0};
     for (int i = 0; i < 4; i++) {
         const decision_t d = decide_at(times_us[i], &ekf, &params, &seen, 1);
         assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01) + odds[i], 1e-4);
     }
+}
+
+/// That something was in view is no surer than the best that spoke for it.
+static void test_what_was_matched_with_little_is_hardly_held(void **state)
+{
+    bslam_params_t params = svm_params();
+    params.again_odds = BSLAM_R(4.2);
+    params.again_us = 200000;
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
+    const double alone = position_score(&params, 4.1, 0.01);
+    ekf.beacons[0].last_seen_us = 1000000;
+    const double views[] = {-3, 0, 0.5, 2, 50}, odds[] = {0, 0, 1, 4, 4.2};
+    for (int i = 0; i < 5; i++) {
+        bslam_looks_note_view(&looks, 0, real(views[i]));
+        const bslam_match_t just = decide_at(1100000, &ekf, &params, &seen, 1).matches[0];
+        assert_near(just.score, alone + odds[i], 1e-4);
+        assert_near(just.view_score, views[i] > alone ? views[i] : alone, 1e-4);
+    }
+    // Out of view for longer than `wait_us` it comes into view anew.
+    assert_near(decide_at(2000000, &ekf, &params, &seen, 1).matches[0].view_score, 50, 1e-4);
+    assert_near(decide_at(2000001, &ekf, &params, &seen, 1).matches[0].view_score, alone, 1e-4);
 }
 
 /// Called something else it is not seen again.
@@ -125,6 +148,7 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].beacon_class = 3;
+    bslam_looks_note_view(&looks, 0, params.again_odds);
     bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     seen.beacon_class = 3;
     assert_near(decide_at(1000001, &ekf, &params, &seen, 1).matches[0].score,
@@ -144,6 +168,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     bslam_ekf_t ekf = unit_map_of(&params, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].confirmed = true;
+    bslam_looks_note_view(&looks, 0, params.again_odds);
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
@@ -684,6 +709,7 @@ int main(void)
         cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),
+        cmocka_unit_test_setup(test_what_was_matched_with_little_is_hardly_held, setup),
         cmocka_unit_test_setup(test_another_class_has_no_odds_of_being_seen_again, setup),
         cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),

@@ -489,9 +489,29 @@ static void test_where_the_heading_is_in_doubt_a_direction_alone_waits(void **st
     assert_int_equal(see_after(long_us - STEP_US, 0.011, false).outcome, BSLAM_OUTCOME_MATCHED);
 }
 
+/// What has just begun is itself; what comes into view again is what its match says.
+static void test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view(void **state)
+{
+    const bslam_params_t params = svm_params();
+    see_two(6);
+    assert_true(looks.of[0].view_score >= params.again_odds);
+    see_object(0, 6, 0.06);
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
+    assert_true(looks.of[0].view_score >= params.again_odds);
+    drive_on(params.wait_us);
+    see_object(0, 7, 0.06);
+    const bslam_real_t anew = slam.matches[0].score;
+    assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
+    assert_near(looks.of[0].view_score, anew, 1e-6);
+    see_object(0, 8, 0.3);
+    assert_int_equal(slam.accounts[0].has_beacon, false);
+    assert_near(looks.of[0].view_score, anew, 1e-6);  // it was not this one's
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view, setup),
         cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
         cmocka_unit_test_setup(test_where_the_heading_is_in_doubt_a_direction_alone_waits, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
