@@ -14,8 +14,10 @@ fit        the odds that a logistic machine gives a sighting by its score, its d
 and class  the same, told besides what the detector takes it for
 
 The machines know the truth of the drives that they are asked about, so what they get wrong no rule of their
-kind gets right. `--set` changes a parameter. It says nothing of rules that keep more than a sum.
+kind gets right. With `--teach SCENARIO=A:B`, as often as one likes, they are taught with those drives: what
+could be known beforehand. `--set` changes a parameter. It says nothing of rules that keep more than a sum.
 `.venv/bin/python tools/bound_trial.py --scenario lookalikes --seeds 100:104`
+`.venv/bin/python tools/bound_trial.py --seeds 2000:2040 --teach paper_room=1020:1031 --teach pairs=100:106`
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
 from booked_run import BookedRun
+from bslam.commands.arguments import seeds_range
 from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
 from bslam.experiment.ledger import CLUTTER
 from bslam.experiment.runner import run_log
@@ -80,9 +83,9 @@ class Rows(BookedRun):
                 self.of[account.beacon_uid].append(row)
 
 
-def things_of(words: argparse.Namespace, seed: int) -> list[Thing]:
+def things_of(words: argparse.Namespace, world: str, seed: int) -> list[Thing]:
     """All that a drive's map begins."""
-    scenario, rig, store = load_scenario(words.scenario), load_rig(words.rig), CameraStore(words.store)
+    scenario, rig, store = load_scenario(world), load_rig(words.rig), CameraStore(words.store)
     log = camera_log(scenario, seed, words.sigma, "speedometer", rig, store, UNTOLD_THRESHOLD)
     seen = store.drive(scenario, seed, rig).surer_than(UNTOLD_THRESHOLD).seen
     rows = Rows()
@@ -176,10 +179,22 @@ def verdict_row(name: str, rule: Rule, drives: Sequence[Sequence[Thing]], truste
     return f"| {name}, {trusted_sum:g} | {costs} |"
 
 
+def lesson(text: str) -> tuple[str, range]:
+    """SCENARIO=A:B."""
+    world, _, seeds = text.partition("=")
+    return world, seeds_range(seeds)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    add_changes(parser)
+    parser.add_argument("--teach", action="append", default=[], type=lesson, metavar="SCENARIO=A:B")
+
+
 def main() -> None:
-    words = arguments(__doc__, range(1000, 1020), add_changes)
-    drives = [things_of(words, seed) for seed in words.seeds]
+    words = arguments(__doc__, range(1000, 1020), add_options)
+    drives = [things_of(words, words.scenario, seed) for seed in words.seeds]
     things = [one for drive in drives for one in drive]
+    taught = [one for world, seeds in words.teach for seed in seeds for one in things_of(words, world, seed)]
     beacons = sum(one.identity != CLUTTER for one in things)
     print(
         f"{words.scenario}, sigma {words.sigma:g}, {words.seeds}: {beacons} beacons begun, "
@@ -190,8 +205,8 @@ def main() -> None:
     rules = {
         "scores": scores,
         "plain": plain,
-        "fit": fit(things, with_class=False),
-        "and class": fit(things, with_class=True),
+        "fit": fit(taught or things, with_class=False),
+        "and class": fit(taught or things, with_class=True),
     }
     for name, rule in rules.items():
         for trusted_sum in SUMS:

@@ -1,9 +1,11 @@
 """What a rule that sums up sightings costs, and where it is wrong."""
 
+import argparse
+
 import numpy as np
 import pytest
 
-from bound_trial import Thing, fit, missed_in, plain, scores, sightings_before, verdict_row
+from bound_trial import Thing, fit, lesson, missed_in, plain, scores, sightings_before, verdict_row
 from bslam.experiment.ledger import CLUTTER
 
 
@@ -65,3 +67,10 @@ def test_a_machine_is_told_the_class_only_where_it_is_to_be():
         fit(things, with_class=True)(things[0])[0] > 0.5 > -0.5 > fit(things, with_class=True)(things[-1])[0]
     )
     assert fit(things, with_class=False)(things[0]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_what_to_teach_is_a_world_and_its_seeds():
+    assert lesson("pairs=100:106") == ("pairs", range(100, 106))
+    for text in ("pairs", "pairs=3:2"):
+        with pytest.raises((ValueError, argparse.ArgumentTypeError)):
+            lesson(text)
