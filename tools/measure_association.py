@@ -6,7 +6,8 @@ identity on the same drives; diverged runs. Beside each mean its 95 % interval o
 
 Two ablations of `svm` stand beside the methods: `untrained`, machines that are never trained
 (learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0). A camera's sightings from a
-lower score on serve where identity is known; `same` has known identity of those that the others get.
+lower score on serve where identity is known; `same` has known identity of those that the others get, and
+`used` of those that `svm` has fused with some beacon, or begun one from: what it does without costs as much.
 `--photographs`: simulated sightings whose signatures are of ETH-80's photographs, an object a beacon
 (tools/training/eth80.py). `--classes`, of a camera's sightings: as `seen`, `none`, or `usual`, what the
 beacon is called most often on the drive, with the distance that it would have had as that: what evidence over
@@ -28,12 +29,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 from sklearn.svm import LinearSVC
 
+from booked_run import BookedRun
 from bslam.experiment.batch import make_jobs, run_batch
 from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD, Threshold
 from bslam.experiment.options import Number, RunOptions
+from bslam.experiment.runner import run_log
 from bslam.experiment.sources import CameraSource, ScenarioSource
 from bslam.log import Log, Sightings
 from bslam.world.kinds import KINDS
@@ -45,6 +49,7 @@ ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
     "position": (("looks_weight", 0.0),),
 }
 METHODS = ("known", "same", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
+TOLD = ("same", "used")  # known identity of a camera's sightings that other methods get
 VIEWS = (1, 2, 4, 10)
 TEST_VIEWS, FAR_M = 30, 6.5
 
@@ -69,13 +74,44 @@ class ClassedSource(CameraSource):
         return replace(log, sightings=as_usual(log.sightings)) if self.classes == "usual" else log
 
 
-def without_clutter(seen: Sightings) -> Sightings:
-    """Those that show a beacon."""
-    shows = seen.beacon_id >= 0
+class UsedRows(BookedRun):
+    """Which of a log's sightings are fused with a beacon, or begin one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[int] = []
+
+    def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
+        """Notes a frame."""
+        del time_us, true_id
+        self.rows += [
+            row for row, one in enumerate(accounts, self.sightings) if one.result in ("matched", "new")
+        ]
+
+
+@dataclass(frozen=True)
+class UsedSource(ClassedSource):
+    """A camera's drive with the sightings of beacons that `svm` uses of it."""
+
+    def load(self) -> Log:
+        log, used = super().load(), UsedRows()
+        run_log(log, options_of("svm", "camera", self.sigma_mps, self.seed), watcher=used)
+        is_used = np.zeros(len(log.sightings.beacon_id), bool)
+        is_used[used.rows] = True
+        return replace(log, sightings=only(log.sightings, is_used & (log.sightings.beacon_id >= 0)))
+
+
+def only(seen: Sightings, rows: NDArray[np.bool_]) -> Sightings:
+    """Some of them."""
     columns = {one.name: getattr(seen, one.name) for one in fields(seen)}
     return replace(
-        seen, **{name: column[shows] for name, column in columns.items() if isinstance(column, np.ndarray)}
+        seen, **{name: column[rows] for name, column in columns.items() if isinstance(column, np.ndarray)}
     )
+
+
+def without_clutter(seen: Sightings) -> Sightings:
+    """Those that show a beacon."""
+    return only(seen, seen.beacon_id >= 0)
 
 
 def as_usual(seen: Sightings) -> Sightings:
@@ -93,10 +129,10 @@ def as_usual(seen: Sightings) -> Sightings:
 
 
 def options_of(
-    method: str, sensor: str, sigma_mps: float, seed: int, changes: Sequence[tuple[str, Number]] = ()
+    method: str, sensor: str, sigma_mps: float | None, seed: int, changes: Sequence[tuple[str, Number]] = ()
 ) -> RunOptions:
     """One run of a method; an ablation is `svm` with a parameter changed. `changes`: others, of `svm`."""
-    association = "svm" if method in ABLATIONS else "known" if method == "same" else method
+    association = "svm" if method in ABLATIONS else "known" if method in TOLD else method
     return RunOptions(
         association=association,
         sensor=sensor,
@@ -116,9 +152,8 @@ def source_of(
         return PhotographedSource(*drive)
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if method == "known" else Threshold(arguments.score, arguments.score)
-        return ClassedSource(
-            *drive, arguments.rig, arguments.store, threshold, arguments.classes, arguments.clutter
-        )
+        source = UsedSource if method == "used" else ClassedSource
+        return source(*drive, arguments.rig, arguments.store, threshold, arguments.classes, arguments.clutter)
     return ScenarioSource(*drive)
 
 
@@ -221,9 +256,10 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         "--set", dest="changes", action="append", default=[], type=change, metavar="NAME=VALUE"
     )
     arguments = parser.parse_args(argv)
-    unknown = set(arguments.methods) - set(METHODS)
+    allowed = (*METHODS, "used") if arguments.sensor == "camera" else METHODS
+    unknown = set(arguments.methods) - set(allowed)
     if unknown:
-        parser.error(f"methods {', '.join(sorted(unknown))}; allowed: {', '.join(METHODS)}")
+        parser.error(f"methods {', '.join(sorted(unknown))}; allowed: {', '.join(allowed)}")
     return arguments
 
 

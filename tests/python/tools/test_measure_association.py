@@ -1,10 +1,13 @@
 """Which sightings and which options each method gets."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.log import Sightings
-from measure_association import options_of, parse, source_of, without_clutter
+from measure_association import UsedRows, UsedSource, options_of, parse, source_of, without_clutter
 
 
 def source(method, *words):
@@ -16,6 +19,24 @@ def test_same_has_known_identity_of_what_the_others_get():
     assert source("known").threshold == TOLD_THRESHOLD
     assert source("same").threshold == source("svm").threshold == UNTOLD_THRESHOLD
     assert source("same", "--score", "0.5").threshold.whole == 0.5
+
+
+def test_used_has_known_identity_of_what_svm_uses():
+    assert options_of("used", "camera", 0.6, 3, [("again_odds", 2.0)]) == options_of("same", "camera", 0.6, 3)
+    assert isinstance(source("used"), UsedSource) and not isinstance(source("same"), UsedSource)
+    assert source("used").threshold == UNTOLD_THRESHOLD
+    rows = UsedRows()
+    frames = [["new", "deferred"], [], ["matched", "rejected", "matched"]]
+    for results in frames:
+        accounts = [SimpleNamespace(result=result, reason="none", beacon_uid=4) for result in results]
+        rows.frame(0, [7] * len(results), (), accounts)
+    assert rows.rows == [0, 2, 4]
+
+
+def test_only_a_camera_has_what_is_used_of_it():
+    assert parse(["pairs", "--sensor", "camera", "--methods", "used"]).methods == ["used"]
+    with pytest.raises(SystemExit):
+        parse(["pairs", "--methods", "used"])
 
 
 def test_an_ablation_is_svm_with_one_parameter_changed():
