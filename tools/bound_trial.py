@@ -23,16 +23,14 @@ could be known beforehand. `--set` changes a parameter. It says nothing of rules
 from __future__ import annotations
 
 import argparse
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
-from booked_run import BookedRun
 from bslam.commands.arguments import seeds_range
 from bslam.experiment.camera import UNTOLD_THRESHOLD, CameraStore, camera_log
 from bslam.experiment.ledger import CLUTTER
@@ -42,7 +40,7 @@ from bslam.world.kinds import KINDS
 from bslam.world.simulate import load_scenario
 from camera_drives import arguments
 from measure_association import options_of
-from measure_false import add_changes
+from measure_false import Books, add_changes
 
 SUMS = (1.0, 2.0, 3.0, 4.5, 6.5, 10.0)
 NO_TRIAL = (("trust_sum", 0.0), ("trust_first_sum", 0.0))
@@ -68,34 +66,19 @@ class Thing:
 Rule = Callable[[Thing], NDArray[np.float64]]
 
 
-class Rows(BookedRun):
-    """Which of the log's sightings went to which thing."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.of: defaultdict[int, list[int]] = defaultdict(list)
-
-    def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
-        """Notes a frame."""
-        del time_us, true_id
-        for row, account in enumerate(accounts, self.sightings):
-            if account.result in ("matched", "new") or account.reason == "trial":
-                self.of[account.beacon_uid].append(row)
-
-
 def things_of(words: argparse.Namespace, world: str, seed: int) -> list[Thing]:
     """All that a drive's map begins."""
     scenario, rig, store = load_scenario(world), load_rig(words.rig), CameraStore(words.store)
     log = camera_log(scenario, seed, words.sigma, "speedometer", rig, store, UNTOLD_THRESHOLD)
     seen = store.drive(scenario, seed, rig).surer_than(UNTOLD_THRESHOLD).seen
-    rows = Rows()
-    run_log(log, options_of("svm", "camera", words.sigma, seed, (*NO_TRIAL, *words.changes)), watcher=rows)
+    books = Books()
+    run_log(log, options_of("svm", "camera", words.sigma, seed, (*NO_TRIAL, *words.changes)), watcher=books)
     found = []
-    for uid, of in rows.of.items():
-        one = seen[np.array(of)]
+    for uid, rows in books.rows.items():
+        one = seen[np.array(rows)]
         found.append(
             Thing(
-                identity=rows.ledger.identity(uid),
+                identity=books.ledger.identity(uid),
                 score=one["score"].astype(np.float64),
                 has_range=np.isfinite(one["range_m"]),
                 is_cut=one["is_cut"],

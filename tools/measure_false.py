@@ -69,7 +69,8 @@ class Books(BookedRun):
     def __init__(self) -> None:
         super().__init__()
         self.wrong: Counter[str] = Counter()
-        self._rows: defaultdict[int, list[int]] = defaultdict(list)
+        self.rows: defaultdict[int, list[int]] = defaultdict(list)
+        """Of the log's sightings, by the beacon that they went to, in order of time."""
         self._test_ratio: defaultdict[int, list[float]] = defaultdict(list)
 
     def enter(self, time_us: int, true_id: Sequence[int], accounts: Sequence[Any]) -> None:
@@ -77,7 +78,7 @@ class Books(BookedRun):
         del time_us
         for row, (identity, account) in enumerate(zip(true_id, accounts, strict=False), self.sightings):
             if account.result in ("matched", "new") or account.reason == "trial":
-                self._rows[account.beacon_uid].append(row)
+                self.rows[account.beacon_uid].append(row)
             if account.result == "matched":
                 self._test_ratio[account.beacon_uid].append(account.test_ratio)
                 self._judge(identity, self.ledger.identity(account.beacon_uid))
@@ -85,7 +86,7 @@ class Books(BookedRun):
     def things(self) -> list[Thing]:
         """What is in the map."""
         return [
-            Thing(self.ledger.identity(uid), self._rows[uid], self._test_ratio[uid]) for uid in self.uids()
+            Thing(self.ledger.identity(uid), self.rows[uid], self._test_ratio[uid]) for uid in self.uids()
         ]
 
     def _judge(self, identity: int, matched: int) -> None:

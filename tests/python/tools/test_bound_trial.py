@@ -1,11 +1,14 @@
 """What a rule that sums up sightings costs, and where it is wrong."""
 
 import argparse
+import math
 
 import numpy as np
 import pytest
 
 from bound_trial import Thing, fit, lesson, missed_in, plain, scores, sightings_before, verdict_row
+from bslam.core.slam import Slam
+from bslam.experiment.camera import UNTOLD_THRESHOLD
 from bslam.experiment.ledger import CLUTTER
 
 
@@ -74,3 +77,13 @@ def test_what_to_teach_is_a_world_and_its_seeds():
     for text in ("pairs", "pairs=3:2"):
         with pytest.raises((ValueError, argparse.ArgumentTypeError)):
             lesson(text)
+
+
+@pytest.mark.parametrize("ranged", [True, False])
+@pytest.mark.parametrize("score", [0.55, 1.0, 1.9, 2.1, 6.0])
+def test_scores_say_of_a_sighting_what_the_core_adds_for_it(score, ranged):
+    slam = Slam({"association": 3, "trust_score": UNTOLD_THRESHOLD.whole}, looks=True)
+    slam.sightings(1000, [1.0], [4.0], [-1], [True], score=[1.0])  # it measures distances
+    slam.sightings(2000, [-1.0], [4.0 if ranged else math.nan], [-1], [True], score=[score])
+    made = slam._slam.ekf.beacons[1]
+    assert scores(thing(1, [score], ranged)) == pytest.approx([made.score_sum], abs=1e-6)

@@ -100,11 +100,17 @@ static void test_score_is_equation_47_without_looks(void **state)
     assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01), 1e-4);
 }
 
-static void test_score_adds_the_odds_of_being_seen_again(void **state)
+static bslam_params_t again_params(void)
 {
     bslam_params_t params = svm_params();
     params.again_odds = BSLAM_R(4.2);
     params.again_us = 200000;
+    return params;
+}
+
+static void test_score_adds_the_odds_of_being_seen_again(void **state)
+{
+    const bslam_params_t params = again_params();
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     ekf.beacons[0].last_seen_us = 1000000;
@@ -120,9 +126,7 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
 /// That something was in view is no surer than the best that spoke for it.
 static void test_what_was_matched_with_little_is_hardly_held(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.again_odds = BSLAM_R(4.2);
-    params.again_us = 200000;
+    const bslam_params_t params = again_params();
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     const double alone = position_score(&params, 4.1, 0.01);
@@ -142,9 +146,7 @@ static void test_what_was_matched_with_little_is_hardly_held(void **state)
 /// Called something else it is not seen again.
 static void test_another_class_has_no_odds_of_being_seen_again(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.again_odds = BSLAM_R(4.2);
-    params.again_us = 200000;
+    const bslam_params_t params = again_params();
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].beacon_class = 3;
@@ -161,9 +163,7 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
 /// From afar position says little, and a beacon that waits each time is never learned.
 static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.again_odds = BSLAM_R(4.2);
-    params.again_us = 200000;
+    const bslam_params_t params = again_params();
     const double far_away[1][2] = {{20, 0}};
     bslam_ekf_t ekf = unit_map_of(&params, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
@@ -530,10 +530,13 @@ static void test_a_match_that_little_speaks_for_waits_while_another_is_in_view(v
     assert_true(waits_beside(&params, 200000, true));
     assert_false(waits_beside(&params, 200001, true));
     assert_false(waits_beside(&params, 200000, false));
-    bslam_looks_note_wait(&looks, &params, 0, 9000000 - params.wait_us);
-    assert_false(waits_beside(&params, 200000, true));  // it has waited
-    bslam_looks_note_wait(&looks, &params, 0, 9000000 - params.wait_us / 2);
     params.wait_score = real(score - 0.01);
+    assert_false(waits_beside(&params, 200000, true));
+    params.wait_score = real(score + 0.01);
+    bslam_looks_note_wait(&looks, &params, 0, 9000000 - params.wait_us / 2);
+    assert_true(waits_beside(&params, 200000, true));
+    bslam_looks_note_wait(&looks, &params, 0, 9000000 - 1);
+    params.wait_us /= 2;  // it has waited
     assert_false(waits_beside(&params, 200000, true));
 }
 
