@@ -114,7 +114,7 @@
     INTEGER(wait_us, 1000000, 0, 1000000000, \
             "svm: a match that a machine of few samples is against waits so long, 0: not") \
     REAL(wait_score, 3.0, 0.0, 100.0, \
-         "svm: and so does one that scores less, while another beacon is in view") \
+         "svm: so does one that scores less, another in view; or leads by less, no distance, none in view") \
     REAL(looks_weight, 1.0, 0.0, 100.0, "svm: what looks count against position (0: nothing)") \
     REAL(looks_samples, 3.0, 0.0, 1e3, "svm: looks count half when a machine keeps so many samples") \
     REAL(looks_slope, 4.0, 0.0, 1e3, "svm: log odds of a decision value") \

@@ -156,13 +156,16 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     return opens ? params->candidate_d2 : params->gate_d2;
 }
 
-/// Whether a match would turn a doubtful heading to whatever it is taken for: it has no distance that might
-/// contradict it, and nothing that the robot knows has been where it should be for a while.
-static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting)
+/// Whether a match would turn the robot to whatever it is taken for: it has no distance that might contradict
+/// it, nothing that the robot knows has been where it should be for a while, and either the heading is
+/// doubtful or it is nearly as well another beacon, or a new one.
+static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
+                     const bslam_match_t *match)
 {
     const bslam_params_t *params = &slam->params;
     return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
-           bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 &&
+           (bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
+            match->lead < params->wait_score) &&
            !bslam_is_placed(&slam->ekf, params->wait_us, -1, time_us);
 }
 
@@ -174,7 +177,7 @@ static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_po
     const bslam_real_t gate_d2 = gate_of(slam, time_us);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
-        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, &sightings[i])) {
+        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, &sightings[i], match)) {
             match->verdict = BSLAM_VERDICT_DEFER;
             match->reason = BSLAM_REASON_AMBIGUOUS;
         }

@@ -462,9 +462,11 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
 
 /// Two beacons that were seen with distances, out of view for so long, and a heading of so much doubt: what
 /// becomes of the first as it is seen then.
-static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_range)
+static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_range, double wait_score)
 {
-    start(svm_params());
+    bslam_params_t params = svm_params();
+    params.wait_score = real(wait_score);
+    start(params);
     see_two(20);
     drive_on(us);
     const bslam_pose_t pose = bslam_ekf_pose(&slam.ekf);
@@ -481,12 +483,27 @@ static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_r
 static void test_where_the_heading_is_in_doubt_a_direction_alone_waits(void **state)
 {
     const int64_t long_us = svm_params().wait_us;
-    const bslam_account_t account = see_after(long_us, 0.011, false);
+    const double score = (double)svm_params().wait_score;
+    const bslam_account_t account = see_after(long_us, 0.011, false, score);
     assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
     assert_int_equal(account.reason, BSLAM_REASON_AMBIGUOUS);
-    assert_int_equal(see_after(long_us, 0.011, true).outcome, BSLAM_OUTCOME_MATCHED);
-    assert_int_equal(see_after(long_us, 0.009, false).outcome, BSLAM_OUTCOME_MATCHED);
-    assert_int_equal(see_after(long_us - STEP_US, 0.011, false).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(see_after(long_us, 0.011, true, score).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(see_after(long_us, 0.009, false, score).outcome, BSLAM_OUTCOME_MATCHED);
+    assert_int_equal(see_after(long_us - STEP_US, 0.011, false, score).outcome, BSLAM_OUTCOME_MATCHED);
+}
+
+/// And where it is nearly as well another beacon, or a new one, however sure the heading is.
+static void test_where_little_speaks_for_its_beacon_a_direction_alone_waits(void **state)
+{
+    const int64_t long_us = svm_params().wait_us;
+    assert_int_equal(see_after(long_us, 0.009, false, 0).outcome, BSLAM_OUTCOME_MATCHED);
+    const double lead = (double)slam.matches[0].lead;
+    assert_true(lead > 0);
+    assert_int_equal(see_after(long_us, 0.009, false, lead - 0.01).outcome, BSLAM_OUTCOME_MATCHED);
+    const bslam_account_t account = see_after(long_us, 0.009, false, lead + 0.01);
+    assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
+    assert_int_equal(account.reason, BSLAM_REASON_AMBIGUOUS);
+    assert_int_equal(see_after(long_us, 0.009, true, lead + 0.01).outcome, BSLAM_OUTCOME_MATCHED);
 }
 
 /// What has just begun is itself; what comes into view again is what its match says.
@@ -514,6 +531,7 @@ int main(void)
         cmocka_unit_test_setup(test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view, setup),
         cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
         cmocka_unit_test_setup(test_where_the_heading_is_in_doubt_a_direction_alone_waits, setup),
+        cmocka_unit_test_setup(test_where_little_speaks_for_its_beacon_a_direction_alone_waits, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),
