@@ -14,6 +14,9 @@ beacon is called most often on the drive, with the distance that it would have h
 frames could reach at best. `--score`: what the detector is less sure of is left out where identity is not
 told. `--without-clutter`: without a camera's sightings of no beacon, which only the truth tells. `--set`
 changes a parameter of `svm` and its ablations.
+`--draws`: each drive as often, with the noise of its wheels' readings drawn anew while path and sightings
+stay; means are over a drive's draws, then over drives, and of counts all runs count. Beneath the table stands
+the ratio to known identity in each draw: how much of it is luck.
 `--looks` prints how alike simulated signatures are to a camera's instead: top-1 of LinearSVC, C = 10, by
 views a beacon, on the given worlds (the camera's: tools/measure_learner.py).
 `.venv/bin/python tools/measure_association.py pairs lookalikes --sigma 0.6,1.0 --seeds 100:110`
@@ -144,26 +147,27 @@ def options_of(
 
 
 def source_of(
-    arguments: argparse.Namespace, world: str, seed: int, sigma_mps: float, method: str
+    arguments: argparse.Namespace, world: str, seed: int, sigma_mps: float, method: str, draw: int
 ) -> ScenarioSource:
     """Where the sightings come from."""
     drive = (world, seed, sigma_mps, "speedometer")
     if arguments.photographs:
-        return PhotographedSource(*drive)
+        return PhotographedSource(*drive, draw=draw)
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if method == "known" else Threshold(arguments.score, arguments.score)
         source = UsedSource if method == "used" else ClassedSource
-        return source(*drive, arguments.rig, arguments.store, threshold, arguments.classes, arguments.clutter)
-    return ScenarioSource(*drive)
+        rig, store = arguments.rig, arguments.store
+        return source(*drive, rig, store, threshold, arguments.classes, arguments.clutter, draw=draw)
+    return ScenarioSource(*drive, draw=draw)
 
 
-def run_all(arguments: argparse.Namespace) -> dict[tuple[str, float, str], list[Entry]]:
-    """The summaries of every combination, in the order of the seeds."""
+def run_all(arguments: argparse.Namespace, draw: int) -> dict[tuple[str, float, str], list[Entry]]:
+    """The summaries of every combination in one draw, in the order of the seeds."""
     grid = list(itertools.product(arguments.worlds, arguments.sigma, arguments.methods))
     sources: list[ScenarioSource] = []
     options: list[RunOptions] = []
     for (world, sigma_mps, method), seed in itertools.product(grid, arguments.seeds):
-        sources.append(source_of(arguments, world, seed, sigma_mps, method))
+        sources.append(source_of(arguments, world, seed, sigma_mps, method, draw))
         options.append(options_of(method, arguments.sensor, sigma_mps, seed, arguments.changes))
     outcomes = run_batch(make_jobs(sources, options, None, 0), arguments.out, arguments.jobs).outcomes
     entries = [outcome.entry for outcome in outcomes]
@@ -180,29 +184,44 @@ def interval(values: Sequence[float]) -> str:
     return f"{mean:.3g} ± {half:.2g}"
 
 
-def row(name: str, entries: list[Entry], known: list[Entry] | None) -> str:
-    """A line of the table."""
+def ratios(entries: list[Entry], known: list[Entry]) -> list[float]:
+    """How many times as far off as with known identity each run is."""
+    errors_m = ([one["position_error_m"]["mean"] for one in runs] for runs in (entries, known))
+    return [error_m / known_m for error_m, known_m in zip(*errors_m, strict=True)]
+
+
+def row(name: str, draws: list[list[Entry]], known: list[list[Entry]] | None) -> str:
+    """A line of the table: each draw's runs, of the same drives."""
+    entries = list(itertools.chain(*draws))
+
+    def over_drives(values: Sequence[float]) -> str:
+        return interval(np.reshape(values, (len(draws), -1)).mean(axis=0).tolist())
 
     def share(key: str) -> str:
-        return interval([100.0 * one[key] / max(one["sightings"], 1) for one in entries])
+        return over_drives([100.0 * one[key] / max(one["sightings"], 1) for one in entries])
 
     errors_m = [one["position_error_m"]["mean"] for one in entries]
-    ratio = "-"
-    if known is not None:
-        pairs = zip(errors_m, known, strict=True)
-        ratio = interval([error_m / one["position_error_m"]["mean"] for error_m, one in pairs])
+    ratio = "-" if known is None else over_drives(ratios(entries, list(itertools.chain(*known))))
     exact = sum(one["beacons_mapped"] == one["beacons_true"] for one in entries)
     mapped = float(np.mean([one["beacons_mapped"] for one in entries]))
     cells = [
         name,
         *(share(key) for key in ("wrong_associations", "missed", "false_new", "deferred")),
         f"{exact} of {len(entries)} ({mapped:.1f})",
-        interval([100.0 * one["map_rmse_m"] for one in entries]),
-        interval([100.0 * error_m for error_m in errors_m]),
+        over_drives([100.0 * one["map_rmse_m"] for one in entries]),
+        over_drives([100.0 * error_m for error_m in errors_m]),
         ratio,
         str(sum(one["diverged"] for one in entries)),
     ]
     return "| " + " | ".join(cells) + " |"
+
+
+def print_draws(of_method: dict[str, list[list[Entry]]], known: list[list[Entry]]) -> None:
+    """Each method's ratio to known identity in each draw, in the mean over the drives."""
+    print()
+    for method, draws in of_method.items():
+        means = [float(np.mean(ratios(*pair))) for pair in zip(draws, known, strict=True)]
+        print(f"{method}, against known in each draw: " + ", ".join(f"{one:.3g}" for one in means))
 
 
 def print_looks(worlds: Sequence[str], seeds: Sequence[int]) -> None:
@@ -231,6 +250,14 @@ def change(text: str) -> tuple[str, Number]:
     return name, float(value) if "." in value else int(value)
 
 
+def count_of(text: str) -> int:
+    """How many."""
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"{count} is not allowed; allowed: from 1")
+    return count
+
+
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(
@@ -246,6 +273,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--rig", default="three60")
     parser.add_argument("--store", type=Path, default=Path("out") / "camera", metavar="DIR")
     parser.add_argument("--score", type=float, default=UNTOLD_THRESHOLD.whole, help="a camera's, at least")
+    parser.add_argument("--draws", type=count_of, default=1, help="of the wheels' noise, of each drive")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("out") / "association")
     parser.add_argument("--looks", action="store_true")
@@ -268,16 +296,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.looks:
         print_looks(arguments.worlds, arguments.seeds)
         return 0
-    table = run_all(arguments)
+    tables = [run_all(arguments, draw) for draw in range(arguments.draws)]
     for world, sigma_mps in itertools.product(arguments.worlds, arguments.sigma):
         print(f"\n{world}, {arguments.sensor}, sigma {sigma_mps:g}, seeds {arguments.seeds}\n")
         print(
             "| method | wrong % | missed % | false-new % | deferred % | exact count (mean) | map cm ", end=""
         )
         print("| position cm | against known | lost |\n|---|---|---|---|---|---|---|---|---|---|")
-        known = table.get((world, sigma_mps, "known"))
-        for method in arguments.methods:
-            print(row(method, table[world, sigma_mps, method], known))
+        of_method = {name: [one[world, sigma_mps, name] for one in tables] for name in arguments.methods}
+        known = of_method.get("known")
+        for method, runs in of_method.items():
+            print(row(method, runs, known))
+        if known is not None and arguments.draws > 1:
+            print_draws(of_method, known)
     return 0
 
 

@@ -311,8 +311,8 @@ def covering_beacon(outline: tuple[float, float, float, float], identity: NDArra
 
 def _digest(scenario: Scenario, rig: Rig) -> str:
     """Of everything that decides what is seen: the scenario, the rig, and the code that renders and looks."""
-    if scenario.wheels.noise == "speedometer":  # how much a reading errs does not change the path
-        scenario = replace(scenario, wheels=replace(scenario.wheels, sigma_mps=0.0))
+    if scenario.wheels.noise == "speedometer":  # what a reading errs by does not change the path
+        scenario = replace(scenario, wheels=replace(scenario.wheels, sigma_mps=0.0, draw=0))
     words = hashlib.sha256(repr((scenario, rig, SEEN)).encode())
     world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "bslam" / "vision"
     code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.glob("*.[ch]")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Protocol
 
@@ -18,6 +18,7 @@ from bslam.log import SIGNATURES, Log, read_folder
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
+from bslam.world.scenario import Scenario
 from bslam.world.simulate import load_scenario, simulate
 
 
@@ -71,6 +72,7 @@ class ScenarioSource(_Unshared):
     seed: int
     sigma_mps: float | None  # wheel-speed sigma; None: the scenario's
     noise: str | None  # what errs; None: as the scenario says
+    draw: int = field(default=0, kw_only=True)  # of the wheels' noise, as in the scenario's [wheels]
 
     align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "simulated"
@@ -80,8 +82,14 @@ class ScenarioSource(_Unshared):
     def name(self) -> str:
         return Path(self.scenario).stem
 
+    def drawn(self) -> Scenario:
+        """The scenario, with the draw of the wheels' noise if that is not the first."""
+        scenario = load_scenario(self.scenario)
+        wheels = scenario.wheels
+        return scenario if self.draw == 0 else replace(scenario, wheels=replace(wheels, draw=self.draw))
+
     def load(self) -> Log:
-        return simulate(load_scenario(self.scenario), self.seed, self.sigma_mps, self.noise)
+        return simulate(self.drawn(), self.seed, self.sigma_mps, self.noise)
 
     def walls_m(self) -> NDArray[np.float64]:
         scenario = load_scenario(self.scenario)
@@ -101,16 +109,15 @@ class CameraSource(ScenarioSource):
 
     @property
     def shared(self) -> Hashable | None:  # type: ignore[override]
-        sigma_mps = self.sigma_mps if self.noise == "actuation" else None
-        return self.scenario, self.seed, self.rig, self.noise, sigma_mps
+        moved = (self.sigma_mps, self.draw) if self.noise == "actuation" else None
+        return self.scenario, self.seed, self.rig, self.noise, moved
 
     def prepare(self) -> None:
         self.load()
 
     def load(self) -> Log:
-        scenario, rig = load_scenario(self.scenario), load_rig(self.rig)
-        store = CameraStore(self.store)
-        return camera_log(scenario, self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
+        rig, store = load_rig(self.rig), CameraStore(self.store)
+        return camera_log(self.drawn(), self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
 
 
 @dataclass(frozen=True)

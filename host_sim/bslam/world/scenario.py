@@ -164,10 +164,15 @@ class Driving:
 
 @dataclass(frozen=True)
 class Wheels:
-    """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`."""
+    """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`.
+
+    `draw`: above 0 the noise is drawn anew for the same seed, so that with "speedometer" path and sightings
+    stay.
+    """
 
     sigma_mps: float = setting(WHEEL_SPEED_SIGMA_MPS)
     noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
+    draw: int = setting(integer(0, 1_000_000), 0)
 
 
 @dataclass(frozen=True)

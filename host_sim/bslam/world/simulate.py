@@ -29,6 +29,7 @@ from bslam.world.wheels import count_ticks, read_gyro, read_travel
 
 __all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
 
+_REDRAW_STREAM = 77  # of wheels whose noise is drawn anew
 _BIAS_AS_NOISE_S = 2.0  # docs/EXPERIMENTS.md "A gyro"
 
 
@@ -94,7 +95,9 @@ def _random_streams(seed: int) -> list[np.random.Generator]:
 def _wheel_noise_m(scenario: Scenario, seed: int) -> NDArray[np.float64]:
     """Noise of the left and right wheel's travel in each step, (steps, 2)."""
     sigma_m = scenario.wheels.sigma_mps * scenario.step_us * 1e-6
-    return sigma_m * _random_streams(seed)[1].standard_normal((scenario.steps, 2))
+    first, draw = _random_streams(seed)[1], scenario.wheels.draw
+    stream = np.random.default_rng([seed, _REDRAW_STREAM, draw]) if draw > 0 else first
+    return sigma_m * stream.standard_normal((scenario.steps, 2))
 
 
 def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], path: Drive) -> Odometry:

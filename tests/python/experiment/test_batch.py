@@ -12,7 +12,7 @@ from bslam.errors import BslamError
 from bslam.experiment import batch
 from bslam.experiment.batch import Job, make_jobs, run_batch, run_names
 from bslam.experiment.options import RunOptions
-from bslam.experiment.sources import FolderSource, MrclamSource, ScenarioSource
+from bslam.experiment.sources import CameraSource, FolderSource, MrclamSource, ScenarioSource
 from bslam.log import Log, write_folder
 
 
@@ -165,6 +165,14 @@ def test_names_tell_runs_apart_by_what_differs():
     ]
     wrong = replace(plain, wrong_identity_rate=0.05)
     assert run_names([room] * 2, [plain, wrong]) == ["room_seed0_known", "room_seed0_known0.05"]
+
+
+def test_draws_of_wheels_that_only_read_wrong_share_what_cameras_see():
+    def shared(noise, draw):
+        return CameraSource("paper_room", 0, 0.3, noise, "three60", Path("out"), draw=draw).shared
+
+    assert shared("speedometer", 0) == shared("speedometer", 2)
+    assert shared("actuation", 0) != shared("actuation", 2)
 
 
 def test_names_of_logs_are_their_folders_and_stay_apart():

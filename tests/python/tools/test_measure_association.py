@@ -7,11 +7,21 @@ import pytest
 
 from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.log import Sightings
-from measure_association import UsedRows, UsedSource, options_of, parse, source_of, without_clutter
+from measure_association import (
+    UsedRows,
+    UsedSource,
+    options_of,
+    parse,
+    print_draws,
+    ratios,
+    row,
+    source_of,
+    without_clutter,
+)
 
 
-def source(method, *words):
-    return source_of(parse(["pairs", "--sensor", "camera", *words]), "pairs", 3, 0.6, method)
+def source(method, *words, draw=0):
+    return source_of(parse(["pairs", "--sensor", "camera", *words]), "pairs", 3, 0.6, method, draw)
 
 
 def test_same_has_known_identity_of_what_the_others_get():
@@ -37,6 +47,31 @@ def test_only_a_camera_has_what_is_used_of_it():
     assert parse(["pairs", "--sensor", "camera", "--methods", "used"]).methods == ["used"]
     with pytest.raises(SystemExit):
         parse(["pairs", "--methods", "used"])
+
+
+def entry(error_m, mapped=3):
+    counts = dict.fromkeys(("wrong_associations", "missed", "false_new", "deferred"), 0)
+    beacons = {"beacons_mapped": mapped, "beacons_true": 3, "map_rmse_m": error_m, "diverged": False}
+    return counts | beacons | {"sightings": 10, "position_error_m": {"mean": error_m}}
+
+
+def test_each_draw_of_the_wheels_noise_is_a_source_of_its_own():
+    assert [source("svm", draw=draw).draw for draw in (0, 2)] == [0, 2]
+    assert parse(["pairs"]).draws == 1 and parse(["pairs", "--draws", "3"]).draws == 3
+    with pytest.raises(SystemExit):
+        parse(["pairs", "--draws", "0"])
+
+
+def test_a_drive_counts_as_the_mean_of_its_draws(capsys):
+    known = [[entry(0.1), entry(0.2)], [entry(0.2), entry(0.1)]]
+    runs = [[entry(0.2), entry(0.2)], [entry(0.2), entry(0.2, mapped=4)]]
+    assert ratios(runs[0], known[0]) == pytest.approx([2.0, 1.0])
+    cells = [cell.strip() for cell in row("svm", runs, known).split("|")]
+    assert cells[6] == "3 of 4 (3.2)"
+    assert cells[8] == "20 ± 0"
+    assert cells[9] == "1.5 ± 0"  # 2 and 1 in either drive, so their means agree
+    print_draws({"svm": runs}, [known[0], known[0]])
+    assert "in each draw: 1.5, 1.5" in capsys.readouterr().out
 
 
 def test_an_ablation_is_svm_with_one_parameter_changed():

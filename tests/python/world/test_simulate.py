@@ -147,6 +147,24 @@ def test_simulate_with_another_sigma_changes_only_the_odometry(short_room: Scena
     assert (low.robot.wheel_speed_sigma_mps, high.robot.wheel_speed_sigma_mps) == (0.3, 1.0)
 
 
+def test_simulate_another_draw_changes_only_the_odometry(short_room: Scenario) -> None:
+    def drawn(draw: int) -> Log:
+        wheels = replace(short_room.wheels, draw=draw)
+        return simulate(replace(short_room, wheels=wheels), 4, sigma_mps=0.6)
+
+    first, second, third = drawn(0), drawn(1), drawn(2)
+    assert_same_arrays(first.odometry, simulate(short_room, 4, sigma_mps=0.6).odometry)
+    assert_same_arrays(second.odometry, drawn(1).odometry)
+    noises_m = [one.odometry.a - first.odometry.a for one in (second, third)]
+    assert (
+        abs(noises_m[0].std() / (0.024 * math.sqrt(2.0)) - 1.0) < 0.1
+    )  # of two that know nothing of each other
+    assert (noises_m[0] != noises_m[1]).all()
+    for other in (second, third):
+        assert_same_arrays(first.truth, other.truth)
+        assert_same_arrays(first.sightings, other.sightings)
+
+
 def test_simulate_speedometer_noise_is_white_of_the_sigma_asked_for(paper_room: Scenario) -> None:
     drive, log = true_drive(paper_room, 2), simulate(paper_room, 2, sigma_mps=0.6)
     errors_m = np.stack([log.odometry.a - drive.left_m, log.odometry.b - drive.right_m])
