@@ -152,13 +152,13 @@ def source_of(
     """Where the sightings come from."""
     drive = (world, seed, sigma_mps, "speedometer")
     if arguments.photographs:
-        return PhotographedSource(*drive, draw=draw)
+        return PhotographedSource(*drive, noise_draw=draw)
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if method == "known" else Threshold(arguments.score, arguments.score)
         source = UsedSource if method == "used" else ClassedSource
-        rig, store = arguments.rig, arguments.store
-        return source(*drive, rig, store, threshold, arguments.classes, arguments.clutter, draw=draw)
-    return ScenarioSource(*drive, draw=draw)
+        rig, store, classes = arguments.rig, arguments.store, arguments.classes
+        return source(*drive, rig, store, threshold, classes, arguments.clutter, noise_draw=draw)
+    return ScenarioSource(*drive, noise_draw=draw)
 
 
 def run_all(arguments: argparse.Namespace, draw: int) -> dict[tuple[str, float, str], list[Entry]]:
@@ -169,7 +169,8 @@ def run_all(arguments: argparse.Namespace, draw: int) -> dict[tuple[str, float, 
     for (world, sigma_mps, method), seed in itertools.product(grid, arguments.seeds):
         sources.append(source_of(arguments, world, seed, sigma_mps, method, draw))
         options.append(options_of(method, arguments.sensor, sigma_mps, seed, arguments.changes))
-    outcomes = run_batch(make_jobs(sources, options, None, 0), arguments.out, arguments.jobs).outcomes
+    out = arguments.out / f"draw{draw}" if arguments.draws > 1 else arguments.out
+    outcomes = run_batch(make_jobs(sources, options, None, 0), out, arguments.jobs).outcomes
     entries = [outcome.entry for outcome in outcomes]
     seeds = len(arguments.seeds)
     return {key: entries[seeds * i : seeds * (i + 1)] for i, key in enumerate(grid)}
@@ -250,12 +251,11 @@ def change(text: str) -> tuple[str, Number]:
     return name, float(value) if "." in value else int(value)
 
 
-def count_of(text: str) -> int:
-    """How many."""
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError(f"{count} is not allowed; allowed: from 1")
-    return count
+def draw_count(text: str) -> int:
+    """How many, one at least."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed: a whole number from 1")
+    return int(text)
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -273,7 +273,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--rig", default="three60")
     parser.add_argument("--store", type=Path, default=Path("out") / "camera", metavar="DIR")
     parser.add_argument("--score", type=float, default=UNTOLD_THRESHOLD.whole, help="a camera's, at least")
-    parser.add_argument("--draws", type=count_of, default=1, help="of the wheels' noise, of each drive")
+    parser.add_argument("--draws", type=draw_count, default=1, help="of the wheels' noise, of each drive")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("out") / "association")
     parser.add_argument("--looks", action="store_true")

@@ -72,7 +72,7 @@ class ScenarioSource(_Unshared):
     seed: int
     sigma_mps: float | None  # wheel-speed sigma; None: the scenario's
     noise: str | None  # what errs; None: as the scenario says
-    draw: int = field(default=0, kw_only=True)  # of the wheels' noise, as in the scenario's [wheels]
+    noise_draw: int = field(default=0, kw_only=True)  # of [wheels]; 0: the scenario's
 
     align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "simulated"
@@ -82,14 +82,14 @@ class ScenarioSource(_Unshared):
     def name(self) -> str:
         return Path(self.scenario).stem
 
-    def drawn(self) -> Scenario:
-        """The scenario, with the draw of the wheels' noise if that is not the first."""
+    def redrawn(self) -> Scenario:
+        """The scenario, with its wheels' noise drawn as is asked for."""
         scenario = load_scenario(self.scenario)
-        wheels = scenario.wheels
-        return scenario if self.draw == 0 else replace(scenario, wheels=replace(wheels, draw=self.draw))
+        wheels = replace(scenario.wheels, draw=self.noise_draw or scenario.wheels.draw)
+        return replace(scenario, wheels=wheels)
 
     def load(self) -> Log:
-        return simulate(self.drawn(), self.seed, self.sigma_mps, self.noise)
+        return simulate(self.redrawn(), self.seed, self.sigma_mps, self.noise)
 
     def walls_m(self) -> NDArray[np.float64]:
         scenario = load_scenario(self.scenario)
@@ -109,7 +109,7 @@ class CameraSource(ScenarioSource):
 
     @property
     def shared(self) -> Hashable | None:  # type: ignore[override]
-        moved = (self.sigma_mps, self.draw) if self.noise == "actuation" else None
+        moved = (self.sigma_mps, self.noise_draw) if self.noise == "actuation" else None
         return self.scenario, self.seed, self.rig, self.noise, moved
 
     def prepare(self) -> None:
@@ -117,7 +117,7 @@ class CameraSource(ScenarioSource):
 
     def load(self) -> Log:
         rig, store = load_rig(self.rig), CameraStore(self.store)
-        return camera_log(self.drawn(), self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
+        return camera_log(self.redrawn(), self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
 
 
 @dataclass(frozen=True)

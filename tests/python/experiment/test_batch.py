@@ -169,7 +169,7 @@ def test_names_tell_runs_apart_by_what_differs():
 
 def test_draws_of_wheels_that_only_read_wrong_share_what_cameras_see():
     def shared(noise, draw):
-        return CameraSource("paper_room", 0, 0.3, noise, "three60", Path("out"), draw=draw).shared
+        return CameraSource("paper_room", 0, 0.3, noise, "three60", Path("out"), noise_draw=draw).shared
 
     assert shared("speedometer", 0) == shared("speedometer", 2)
     assert shared("actuation", 0) != shared("actuation", 2)

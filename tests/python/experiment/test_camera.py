@@ -147,10 +147,15 @@ def test_camera_log_drives_as_without_a_camera(short, tmp_path):
     assert np.abs(log.beacons.x_m - plain.beacons.x_m).max() < 0.5  # a thick one's face is off the wall
 
 
+def other_draw(scenario):
+    return replace(scenario, wheels=replace(scenario.wheels, draw=1))
+
+
 def test_store_renders_once_for_every_reading_noise_and_anew_for_another_seed(short, tmp_path):
     store = CameraStore(tmp_path)
     first = camera_log(short, 1, 0.3, None, RIG, store)
     again = camera_log(short, 1, 1.0, None, RIG, store)
+    camera_log(other_draw(short), 1, 0.3, None, RIG, store)
     assert len(FakeFrontEnd.calls) == 8
     np.testing.assert_array_equal(first.sightings.bearing_rad, again.sightings.bearing_rad)
     camera_log(short, 2, 0.3, None, RIG, store)
@@ -162,7 +167,8 @@ def test_store_renders_anew_where_the_wheels_themselves_jitter(short, tmp_path):
     store = CameraStore(tmp_path)
     camera_log(short, 1, 0.3, "actuation", RIG, store)
     camera_log(short, 1, 1.0, "actuation", RIG, store)
-    assert len(FakeFrontEnd.calls) == 16
+    camera_log(other_draw(short), 1, 0.3, "actuation", RIG, store)
+    assert len(FakeFrontEnd.calls) == 24
 
 
 def test_camera_log_of_cameras_that_stand_apart_is_refused(short, tmp_path):

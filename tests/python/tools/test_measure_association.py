@@ -56,22 +56,23 @@ def entry(error_m, mapped=3):
 
 
 def test_each_draw_of_the_wheels_noise_is_a_source_of_its_own():
-    assert [source("svm", draw=draw).draw for draw in (0, 2)] == [0, 2]
+    assert [source("svm", draw=draw).noise_draw for draw in (0, 2)] == [0, 2]
     assert parse(["pairs"]).draws == 1 and parse(["pairs", "--draws", "3"]).draws == 3
-    with pytest.raises(SystemExit):
-        parse(["pairs", "--draws", "0"])
+    for wrong in ("0", "-1", "two"):
+        with pytest.raises(SystemExit):
+            parse(["pairs", "--draws", wrong])
 
 
 def test_a_drive_counts_as_the_mean_of_its_draws(capsys):
-    known = [[entry(0.1), entry(0.2)], [entry(0.2), entry(0.1)]]
-    runs = [[entry(0.2), entry(0.2)], [entry(0.2), entry(0.2, mapped=4)]]
-    assert ratios(runs[0], known[0]) == pytest.approx([2.0, 1.0])
+    known = [[entry(0.1)] * 3, [entry(0.2)] * 3]  # of three drives
+    runs = [[entry(0.1), entry(0.2), entry(0.3)], [entry(0.8), entry(0.4), entry(0.2, mapped=4)]]
+    assert ratios(runs[0], known[0]) == pytest.approx([1.0, 2.0, 3.0])
     cells = [cell.strip() for cell in row("svm", runs, known).split("|")]
-    assert cells[6] == "3 of 4 (3.2)"
-    assert cells[8] == "20 ± 0"
-    assert cells[9] == "1.5 ± 0"  # 2 and 1 in either drive, so their means agree
-    print_draws({"svm": runs}, [known[0], known[0]])
-    assert "in each draw: 1.5, 1.5" in capsys.readouterr().out
+    assert cells[6] == "5 of 6 (3.2)"
+    assert cells[8] == "33.3 ± 26"  # of 45, 30 and 25 cm; Student's t of two degrees of freedom is 4.30
+    assert cells[9] == "2.17 ± 0.72"  # of 2.5, 2 and 2
+    print_draws({"known": known, "svm": [runs[0], runs[0]]}, known)
+    assert "svm, against known in each draw: 2, 1\n" in capsys.readouterr().out
 
 
 def test_an_ablation_is_svm_with_one_parameter_changed():
