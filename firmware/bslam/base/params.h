@@ -156,7 +156,9 @@
     REAL(trust_sum, 6.5, 0.0, 1e6, \
          "svm: until those of a beacon come to this, it is not confirmed, nor its sightings used") \
     REAL(trust_first_sum, 3.0, 0.0, 1e6, "svm: which they are from this on") \
-    INTEGER(trust_beacons, 4, 0, 250, "svm: while fewer than so many are confirmed")
+    INTEGER(trust_beacons, 4, 0, 250, "svm: while fewer than so many are confirmed") \
+    INTEGER(settled_us, 30000000, 0, 1000000000, \
+            "recovery, svm: no beacon new for so long: one alone may contradict the pose (0: always)")
 // clang-format on
 
 /// Values of `filter`.

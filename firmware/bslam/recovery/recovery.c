@@ -33,6 +33,8 @@ enum {
     CLUE_AGE_US = 5000000,       ///< odometry carries a clue so long,
     DIRECTION_AGE_US = 3000000,  ///< or this, for three directions give a pose as if taken from here
     FIX_AGE_US = 1000000,
+    ELSEWHERE_BEACONS = 4,  ///< beacons that another pose has more than the present one, in a map that grows,
+    ELSEWHERE_FRAMES = 3,   ///< in as many frames: the robot is there
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
     CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
 };
@@ -147,6 +149,16 @@ static int add_clues(const bslam_slam_t *slam, const bslam_memory_t *memory, bsl
         }
     }
     return count + added;
+}
+
+/// All that is remembered as clues. Returns how many.
+static int recall(const bslam_recovery_t *recovery, const bslam_slam_t *slam, bslam_clue_t *clues)
+{
+    int count = 0;
+    for (int m = 0; m < recovery->memory_count; m++) {
+        count = add_clues(slam, &recovery->memories[m], clues, count);
+    }
+    return count;
 }
 
 // ---- noticing ---------------------------------------------------------------------------------------------
@@ -390,9 +402,9 @@ static bool is_clear(const bslam_fix_t *fix)
            fix->heading_sd_rad <= DOUBT_HEADING_MAX_RAD;
 }
 
-/// Counts frames with the same fix. True when it is confirmed.
-static bool confirm(bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_fix_t *fix,
-                    int64_t time_us)
+/// Counts frames with the same fix.
+static int32_t confirm(bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_fix_t *fix,
+                       int64_t time_us)
 {
     const bslam_pose_t robot = bslam_ekf_pose(&slam->ekf);
     recovery->confirmed = is_same(recovery, &robot, fix, time_us) ? recovery->confirmed + 1 : 1;
@@ -400,7 +412,7 @@ static bool confirm(bslam_recovery_t *recovery, const bslam_slam_t *slam, const 
     recovery->last_fix = bslam_pose_compose(&fix->pose, &back);
     recovery->has_fix = true;
     recovery->fix_us = time_us;
-    return recovery->confirmed >= (is_verified(fix) ? CONFIRMED_BY_THIRD : CONFIRMED_BY_TIME);
+    return recovery->confirmed;
 }
 
 static bslam_real_t doubt(bslam_real_t sd, bslam_real_t least, bslam_real_t most)
@@ -418,11 +430,10 @@ static bool seek(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t t
         return false;
     }
     bslam_clue_t clues[BSLAM_CLUES_MAX];
-    int clue_count = 0;
-    for (int m = 0; m < recovery->memory_count; m++) {
-        clue_count = add_clues(slam, &recovery->memories[m], clues, clue_count);
-    }
-    return bslam_relocate(clues, clue_count, fix) && is_clear(fix) && confirm(recovery, slam, fix, time_us);
+    const int clue_count = recall(recovery, slam, clues);
+    return bslam_relocate(clues, clue_count, fix) && is_clear(fix) &&
+           confirm(recovery, slam, fix, time_us) >=
+               (is_verified(fix) ? CONFIRMED_BY_THIRD : CONFIRMED_BY_TIME);
 }
 
 static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam_fix_t *fix)
@@ -435,7 +446,89 @@ static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam
     }
 }
 
+// ---- a map that grows -------------------------------------------------------------------------------------
+
+/// Whether a beacon has come within `settled_us`, so that more may come, and look like one of the map. Those
+/// of a kept map were there from the start.
+static bool is_growing(const bslam_slam_t *slam, int64_t time_us)
+{
+    if (slam->params.association == BSLAM_ASSOCIATION_KNOWN || slam->is_frozen) {
+        return false;
+    }
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
+        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
+        if (beacon->confirmed && beacon->first_seen_us > 0 &&
+            time_us - beacon->first_seen_us < slam->params.settled_us) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Whether there is a pose that has many more of the recognised beacons where they were seen than the present
+/// one has, frame after frame.
+static bool is_elsewhere(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
+                         bslam_fix_t *fix)
+{
+    bslam_clue_t clues[BSLAM_CLUES_MAX];
+    const int count = recall(recovery, slam, clues);
+    const bslam_pose_t here = bslam_ekf_pose(&slam->ekf);
+    return bslam_relocate(clues, count, fix) && is_clear(fix) &&
+           fix->beacons >= ELSEWHERE_BEACONS + bslam_relocate_agreeing(clues, count, &here) &&
+           confirm(recovery, slam, fix, time_us) >= ELSEWHERE_FRAMES;
+}
+
+/// A frame of a robot in a map that grows. True if it shows that the robot is elsewhere: at *fix.
+static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
+                        const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count,
+                        const int *who, const verdict_t *verdict, bslam_fix_t *fix)
+{
+    (void)remember(recovery, slam, time_us, mount, sightings, count, who);
+    if (verdict->contradicting == 0) {
+        return false;
+    }
+    recovery->counters.contradicting += (uint32_t)verdict->contradicting;
+    if (!recovery->has_contradicted || time_us - recovery->contradicted_us > CLUE_AGE_US) {
+        recovery->doubted_us = time_us;
+    }
+    recovery->has_contradicted = true;
+    recovery->contradicted_us = time_us;
+    return is_elsewhere(recovery, slam, time_us, fix);
+}
+
 // ---- a frame ----------------------------------------------------------------------------------------------
+
+/// A frame of a robot that is not lost. True if it may be used; *is_found: not, for it shows that the robot
+/// is at *fix.
+static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                   const bslam_sighting_t *sightings, int count, const int *who, bool *is_found,
+                   bslam_fix_t *fix)
+{
+    verdict_t verdict = weigh(recovery, slam, mount, sightings, count, who);
+    if (recovery->evidence == 0 && is_growing(slam, time_us)) {
+        *is_found = look_around(recovery, slam, time_us, mount, sightings, count, who, &verdict, fix);
+        if (*is_found) {
+            get_lost(recovery, slam);
+            forget_all(recovery);
+        }
+        return !*is_found;
+    }
+    if (recovery->evidence == 0) {
+        forget_all(recovery);  // what was remembered while the map grew
+    }
+    // A pose that gave way to the first beacon seen agrees with that one.
+    if (verdict.contradicting > 0 && verdict.contradicting == verdict.agreeing &&
+        fits_elsewhere(slam, mount, sightings, count, who)) {
+        verdict.agreeing = 0;
+    }
+    if (notice(recovery, slam, time_us, &verdict)) {
+        forget_all(recovery);  // the pose is no longer odometry's alone
+        return true;
+    }
+    // Where it is by then is not believed before it is lost.
+    (void)seek(recovery, slam, time_us, mount, sightings, count, who, fix);
+    return false;
+}
 
 bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us,
                                         const bslam_sighting_t *sightings, int count)
@@ -459,19 +552,7 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
     } else if (!bslam_is_findable(slam)) {
         use = true;
     } else {
-        verdict_t verdict = weigh(recovery, slam, &mount, sightings, count, who);
-        // A pose that gave way to the first beacon seen agrees with that one.
-        if (verdict.contradicting > 0 && verdict.contradicting == verdict.agreeing &&
-            fits_elsewhere(slam, &mount, sightings, count, who)) {
-            verdict.agreeing = 0;
-        }
-        use = notice(recovery, slam, time_us, &verdict);
-        if (use) {
-            forget_all(recovery);  // the pose is no longer odometry's alone
-        } else {
-            // Where it is by then is not believed before it is lost.
-            (void)seek(recovery, slam, time_us, &mount, sightings, count, who, &fix);
-        }
+        use = follow(recovery, slam, time_us, &mount, sightings, count, who, &is_found, &fix);
     }
     recovery->counters.withheld += use ? 0u : 1u;
     bslam_slam_close_frame(slam, time_us, sightings, count, &mount, use);

@@ -11,6 +11,10 @@
 /// jumps silently: state and counters say what happened, and the pose's covariance is 30 m and 3.2 rad
 /// meanwhile.
 ///
+/// In a map that still grows, identities by looks are less sure: what is new there may look like a beacon of
+/// the map. Until no beacon has come for `settled_us`, every frame is used, and only another pose, by which
+/// much more of what is recognised is where it is seen, says that the robot is elsewhere; it is set there.
+///
 /// Without labels and without looks nothing can contradict: association alone decides.
 #ifndef BSLAM_RECOVERY_RECOVERY_H
 #define BSLAM_RECOVERY_RECOVERY_H
@@ -46,11 +50,13 @@ typedef struct bslam_memory {
 typedef struct bslam_recovery {
     bslam_recovery_counters_t counters;
     int32_t evidence;
-    int64_t doubted_us;    ///< the first frame that contradicted, of this doubt,
-    uint32_t doubted_uid;  ///< and the beacon that it showed
-    bool several;          ///< others have contradicted, too
-    int32_t undecided;     ///< frames since then that said neither
-    int32_t silent;        ///< frames since one contradicted in which nothing was recognised
+    int64_t doubted_us;       ///< the first frame that contradicted, of this doubt,
+    uint32_t doubted_uid;     ///< and the beacon that it showed
+    bool several;             ///< others have contradicted, too
+    int32_t undecided;        ///< frames since then that said neither
+    int32_t silent;           ///< frames since one contradicted in which nothing was recognised
+    bool has_contradicted;    ///< one did while the map grew,
+    int64_t contradicted_us;  ///< the last one
     bslam_memory_t memories[BSLAM_CLUES_MAX];
     int32_t memory_count;
     bslam_pose_t last_fix;

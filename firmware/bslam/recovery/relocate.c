@@ -370,3 +370,8 @@ bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
     *fix = found;
     return true;
 }
+
+int32_t bslam_relocate_agreeing(const bslam_clue_t *clues, int count, const bslam_pose_t *pose)
+{
+    return vote_on(clues, count, pose).beacons;
+}

@@ -41,4 +41,7 @@ typedef struct bslam_fix {
 /// a sighting for another beacon. O(count³), or O(count⁴) without distances.
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix);
 
+/// How many beacons of the clues, at most BSLAM_CLUES_MAX of them, are where this pose has them. O(count²).
+int32_t bslam_relocate_agreeing(const bslam_clue_t *clues, int count, const bslam_pose_t *pose);
+
 #endif

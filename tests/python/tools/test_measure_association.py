@@ -1,5 +1,6 @@
 """Which sightings and which options each method gets."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,6 +42,14 @@ def test_used_has_known_identity_of_what_svm_uses():
         accounts = [SimpleNamespace(result=result, reason="none", beacon_uid=4) for result in results]
         rows.frame(0, [7] * len(results), (), accounts)
     assert rows.rows == [0, 2, 4]
+
+
+def test_recovers_is_svm_that_notices_when_it_is_lost():
+    changes = [("settled_us", 0)]
+    svm = options_of("svm", "simulated", 0.6, 3, changes)
+    assert options_of("recovers", "simulated", 0.6, 3, changes) == replace(svm, recovery=True)
+    assert not svm.recovery and svm.parameters == tuple(changes)
+    assert parse(["pairs", "--methods", "recovers"]).methods == ["recovers"]
 
 
 def test_only_a_camera_has_what_is_used_of_it():

@@ -371,6 +371,121 @@ static void test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_p
     assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
 }
 
+// ---- a map that grows -------------------------------------------------------------------------------------
+
+/// From here on looks tell who is seen: beacon b by feature b.
+static void go_by_own_looks(void)
+{
+    look_on(50, 0, 0, 0, BEACONS);
+    assert_int_equal(bslam_looks_init(&looks, NULL, 0), BSLAM_OK);
+    slam.params.association = BSLAM_ASSOCIATION_SVM;
+    slam.params.looks_samples = 3;
+    slam.params.learn_budget = 0;
+    bslam_slam_attach_looks(&slam, &looks);
+    for (int b = 0; b < BEACONS; b++) {
+        float weights[BSLAM_SAMPLE_SIZE] = {0};
+        weights[b] = BSLAM_SAMPLE_UNIT;
+        unit_give_machine(&looks, b, 0, 16);
+        bslam_weights_round(weights, &looks.learner.machines[looks.of[b].machine].weights);
+    }
+}
+
+/// A frame of a robot that has not moved by its wheels, and sees the first `count` beacons, by their looks,
+/// as from (x, y, theta).
+static void look_alike_from(double x, double y, double theta, int count)
+{
+    float signatures[BEACONS][BSLAM_SAMPLE_FEATURES] = {{0}};
+    bslam_sighting_t seen[BEACONS];
+    for (int i = 0; i < count; i++) {
+        signatures[i][i] = 1;
+        seen[i] = seen_from(x, y, theta, i);
+        seen[i].label = BSLAM_LABEL_NONE;
+        seen[i].signature = signatures[i];
+    }
+    now_us += STEP_US;
+    const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us};
+    assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
+    assert_int_equal(bslam_recovery_sightings(&recovery, &slam, now_us, seen, count), BSLAM_OK);
+}
+
+static void test_recovery_in_a_map_that_grows_sets_the_robot_where_four_beacons_fit(void **state)
+{
+    go_by_own_looks();
+    const bslam_ekf_t before = slam.ekf;
+    for (int k = 0; k < 2; k++) {
+        look_alike_from(1, 2, 2.5, BEACONS);
+        assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    }
+    assert_int_equal(recovery.counters.lost, 0);
+    assert_int_equal(recovery.counters.withheld, 0);
+    assert_true(bslam_slam_beacon_count(&slam) > BEACONS);  // taken for new ones meanwhile
+    look_alike_from(1, 2, 2.5, BEACONS);
+    assert_int_equal(recovery.counters.lost, 1);
+    assert_int_equal(recovery.counters.found, 1);
+    assert_int_equal(recovery.counters.withheld, 1);
+    assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
+    assert_at(1, 2, 2.5);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+    for (int b = 0; b < BEACONS; b++) {
+        const int at = before.beacons[b].at;
+        assert_near(slam.ekf.mean[at], before.mean[at], 1e-3);
+        assert_near(slam.ekf.mean[at + 1], before.mean[at + 1], 1e-3);
+    }
+}
+
+/// What is new may look like a beacon of the map, so that a few that fit elsewhere prove nothing.
+static void test_recovery_in_a_map_that_grows_is_not_lost_by_three_beacons(void **state)
+{
+    go_by_own_looks();
+    for (int k = 0; k < 40; k++) {
+        look_alike_from(1, 2, 2.5, 3);
+    }
+    assert_int_equal(recovery.counters.lost, 0);
+    assert_int_equal(recovery.counters.withheld, 0);
+    assert_at(0, 0, 0);
+}
+
+static void test_recovery_in_a_map_that_grows_counts_what_fits_where_the_robot_is_held_to_be(void **state)
+{
+    go_by_own_looks();
+    cut = 0;
+    look_alike_from(0, 0, 0, 1);
+    cut = -1;
+    for (int k = 0; k < 10; k++) {
+        look_alike_from(1, 2, 2.5, BEACONS);
+    }
+    assert_int_equal(recovery.counters.lost, 0);
+    assert_true(recovery.counters.contradicting > 0);
+}
+
+static void test_recovery_in_a_map_that_has_settled_one_beacon_is_enough(void **state)
+{
+    go_by_own_looks();
+    slam.params.settled_us = 0;
+    for (int k = 0; k < 25; k++) {
+        assert_int_equal(recovery.counters.lost, 0);
+        look_alike_from(1, 2, 2.5, 1);
+    }
+    assert_int_equal(recovery.counters.lost, 1);
+    assert_int_equal(recovery.counters.withheld, 25);
+}
+
+/// A kept map does not grow by what it was loaded with, nor a frozen one by anything.
+static void test_recovery_takes_a_kept_map_for_settled(void **state)
+{
+    for (int frozen = 0; frozen < 2; frozen++) {
+        setup(NULL);
+        go_by_own_looks();
+        slam.is_frozen = frozen != 0;
+        for (int b = 0; b < BEACONS && !slam.is_frozen; b++) {
+            slam.ekf.beacons[b].first_seen_us = 0;
+        }
+        look_alike_from(1, 2, 2.5, 1);
+        assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
+        assert_int_equal(recovery.counters.withheld, 1);
+    }
+}
+
 // ---- what is refused --------------------------------------------------------------------------------------
 
 static void test_recovery_refuses_as_the_pipeline_does(void **state)
@@ -411,6 +526,13 @@ int main(void)
         cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_either_may_be_seen, setup),
         cmocka_unit_test_setup(test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_passed_over,
                                setup),
+        cmocka_unit_test_setup(test_recovery_in_a_map_that_grows_sets_the_robot_where_four_beacons_fit,
+                               setup),
+        cmocka_unit_test_setup(test_recovery_in_a_map_that_grows_is_not_lost_by_three_beacons, setup),
+        cmocka_unit_test_setup(
+            test_recovery_in_a_map_that_grows_counts_what_fits_where_the_robot_is_held_to_be, setup),
+        cmocka_unit_test_setup(test_recovery_in_a_map_that_has_settled_one_beacon_is_enough, setup),
+        cmocka_unit_test_setup(test_recovery_takes_a_kept_map_for_settled, setup),
         cmocka_unit_test_setup(test_recovery_refuses_as_the_pipeline_does, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
