@@ -158,7 +158,7 @@
     REAL(trust_first_sum, 3.0, 0.0, 1e6, "svm: which they are from this on") \
     INTEGER(trust_beacons, 4, 0, 250, "svm: while fewer than so many are confirmed") \
     INTEGER(settled_us, 30000000, 0, 1000000000, \
-            "recovery, svm: no beacon new for so long: one alone may contradict the pose (0: always)")
+            "recovery, svm: nothing new for so long: one beacon may contradict the pose (0: always)")
 // clang-format on
 
 /// Values of `filter`.

@@ -448,21 +448,17 @@ static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam
 
 // ---- a map that grows -------------------------------------------------------------------------------------
 
-/// Whether a beacon has come within `settled_us`, so that more may come, and look like one of the map. Those
-/// of a kept map were there from the start.
-static bool is_growing(const bslam_slam_t *slam, int64_t time_us)
+/// Whether something has begun in the map within `settled_us`, so that more may, and look like a beacon of
+/// it. What a kept map was loaded with has not.
+static bool is_growing(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
 {
-    if (slam->params.association == BSLAM_ASSOCIATION_KNOWN || slam->is_frozen) {
-        return false;
+    if (recovery->next_uid != slam->ekf.next_uid) {
+        recovery->next_uid = slam->ekf.next_uid;
+        recovery->has_grown = slam->counters.added > 0;
+        recovery->grew_us = time_us;
     }
-    for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (beacon->confirmed && beacon->first_seen_us > 0 &&
-            time_us - beacon->first_seen_us < slam->params.settled_us) {
-            return true;
-        }
-    }
-    return false;
+    return slam->params.association != BSLAM_ASSOCIATION_KNOWN && !slam->is_frozen && recovery->has_grown &&
+           time_us - recovery->grew_us < slam->params.settled_us;
 }
 
 /// Whether there is a pose that has many more of the recognised beacons where they were seen than the present
@@ -505,7 +501,7 @@ static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_
                    bslam_fix_t *fix)
 {
     verdict_t verdict = weigh(recovery, slam, mount, sightings, count, who);
-    if (recovery->evidence == 0 && is_growing(slam, time_us)) {
+    if (recovery->evidence == 0 && is_growing(recovery, slam, time_us)) {
         *is_found = look_around(recovery, slam, time_us, mount, sightings, count, who, &verdict, fix);
         if (*is_found) {
             get_lost(recovery, slam);

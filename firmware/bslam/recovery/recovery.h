@@ -12,7 +12,7 @@
 /// meanwhile.
 ///
 /// In a map that still grows, identities by looks are less sure: what is new there may look like a beacon of
-/// the map. Until no beacon has come for `settled_us`, every frame is used, and only another pose, by which
+/// the map. Until nothing has begun for `settled_us`, every frame is used, and only another pose, by which
 /// much more of what is recognised is where it is seen, says that the robot is elsewhere; it is set there.
 ///
 /// Without labels and without looks nothing can contradict: association alone decides.
@@ -55,6 +55,9 @@ typedef struct bslam_recovery {
     bool several;             ///< others have contradicted, too
     int32_t undecided;        ///< frames since then that said neither
     int32_t silent;           ///< frames since one contradicted in which nothing was recognised
+    uint32_t next_uid;        ///< of the map, as of the last frame
+    bool has_grown;           ///< something has begun in it,
+    int64_t grew_us;          ///< the last time then
     bool has_contradicted;    ///< one did while the map grew,
     int64_t contradicted_us;  ///< the last one
     bslam_memory_t memories[BSLAM_CLUES_MAX];

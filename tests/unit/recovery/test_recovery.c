@@ -477,8 +477,9 @@ static void test_recovery_takes_a_kept_map_for_settled(void **state)
         setup(NULL);
         go_by_own_looks();
         slam.is_frozen = frozen != 0;
-        for (int b = 0; b < BEACONS && !slam.is_frozen; b++) {
-            slam.ekf.beacons[b].first_seen_us = 0;
+        if (!slam.is_frozen) {
+            bslam_recovery_init(&recovery);
+            slam.counters.added = 0;
         }
         look_alike_from(1, 2, 2.5, 1);
         assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
