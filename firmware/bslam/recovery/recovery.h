@@ -73,7 +73,7 @@ void bslam_recovery_init(bslam_recovery_t *recovery);
 
 /// bslam_slam_sightings with a look at whether the robot is where the filter has it. Sightings of a frame
 /// that is not used have the account "deferred", reason "lost". The same statuses; of what is refused nothing
-/// changes. O(count machines) more, and while lost O(clues³).
+/// changes. O(count machines) more, and while lost or contradicted O(clues³).
 BSLAM_MUST_CHECK bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam,
                                                          int64_t time_us, const bslam_sighting_t *sightings,
                                                          int count);
