@@ -52,6 +52,15 @@ bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, co
     return recovery->evidence > 0 ? BSLAM_RECOVERY_DOUBTING : BSLAM_RECOVERY_FOLLOWING;
 }
 
+/// A frame, and which beacon each of its sightings is recognised as.
+typedef struct view {
+    int64_t time_us;
+    bslam_pose_t mount;
+    const bslam_sighting_t *sightings;
+    int count;
+    int who[BSLAM_SIGHTINGS_MAX];
+} view_t;
+
 // ---- clues ------------------------------------------------------------------------------------------------
 
 static bslam_real_t heading_var(const bslam_ekf_t *ekf)
@@ -59,13 +68,13 @@ static bslam_real_t heading_var(const bslam_ekf_t *ekf)
     return bslam_symmat_get(ekf->covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA);
 }
 
-static bslam_memory_t memorise(const bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                               const bslam_sighting_t *sighting, uint32_t uid)
+/// Sighting `i` of a frame, to be remembered.
+static bslam_memory_t memorise(const bslam_slam_t *slam, const view_t *view, int i)
 {
-    bslam_memory_t memory = {.uid = uid,
-                             .time_us = time_us,
-                             .sighting = *sighting,
-                             .mount = *mount,
+    bslam_memory_t memory = {.uid = slam->ekf.beacons[view->who[i]].uid,
+                             .time_us = view->time_us,
+                             .sighting = view->sightings[i],
+                             .mount = view->mount,
                              .robot = bslam_ekf_pose(&slam->ekf),
                              .heading_var_rad2 = heading_var(&slam->ekf)};
     memory.sighting.signature = NULL;
@@ -212,36 +221,35 @@ static bool fits_any(const bslam_slam_t *slam, const bslam_pose_t *mount, const 
 /// What was recognised agrees or contradicts. What stands where some beacon is agrees, too, and does not
 /// contradict: it may be that one, and look like another from here. But not in doubt: then the pose is
 /// odometry's alone and grows vague, by which anything stands somewhere, so that identities alone count.
-static verdict_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const bslam_pose_t *mount,
-                       const bslam_sighting_t *sightings, int count, const int *who)
+static verdict_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view)
 {
     const bool in_doubt = recovery->evidence > 0;
     verdict_t verdict = {0, 0, 0, 0};
-    for (int i = 0; i < count; i++) {
-        const bslam_real_t distance2 = who[i] >= 0 ? nearest2_of(slam, mount, &sightings[i], who[i]) : -1;
-        verdict.recognised += who[i] >= 0 ? 1 : 0;
+    for (int i = 0; i < view->count; i++) {
+        const bslam_sighting_t *sighting = &view->sightings[i];
+        const int who = view->who[i];
+        const bslam_real_t distance2 = who >= 0 ? nearest2_of(slam, &view->mount, sighting, who) : -1;
+        verdict.recognised += who >= 0 ? 1 : 0;
         if (bslam_in_range(distance2, 0, FIT_D2)) {
             verdict.agreeing++;
-        } else if (who[i] < 0) {
-            verdict.agreeing += !in_doubt && fits_any(slam, mount, &sightings[i]) ? 1 : 0;
-        } else if (distance2 > CONTRADICT_D2 && (in_doubt || !fits_any(slam, mount, &sightings[i]))) {
+        } else if (who < 0) {
+            verdict.agreeing += !in_doubt && fits_any(slam, &view->mount, sighting) ? 1 : 0;
+        } else if (distance2 > CONTRADICT_D2 && (in_doubt || !fits_any(slam, &view->mount, sighting))) {
             verdict.contradicting++;
-            verdict.uid = slam->ekf.beacons[who[i]].uid;
+            verdict.uid = slam->ekf.beacons[who].uid;
         }
     }
     return verdict;
 }
 
 /// Whether there is a pose by which all that was recognised in a frame is where it is seen.
-static bool fits_elsewhere(const bslam_slam_t *slam, const bslam_pose_t *mount,
-                           const bslam_sighting_t *sightings, int count, const int *who)
+static bool fits_elsewhere(const bslam_slam_t *slam, const view_t *view)
 {
     bslam_clue_t clues[BSLAM_CLUES_MAX];
     int clue_count = 0;
-    for (int i = 0; i < count; i++) {
-        if (who[i] >= 0) {
-            const bslam_memory_t memory =
-                memorise(slam, 0, mount, &sightings[i], slam->ekf.beacons[who[i]].uid);
+    for (int i = 0; i < view->count; i++) {
+        if (view->who[i] >= 0) {
+            const bslam_memory_t memory = memorise(slam, view, i);
             clue_count = add_clues(slam, &memory, clues, clue_count);
         }
     }
@@ -355,18 +363,17 @@ static void forget_all(bslam_recovery_t *recovery)
     recovery->memory_count = 0;
     recovery->confirmed = 0;
     recovery->has_fix = false;
+    recovery->has_contradicted = false;
 }
 
 /// Keeps the newest sightings of each recognised beacon. True if there is one.
-static bool remember(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
-                     const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count, const int *who)
+static bool remember(bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view)
 {
     bool any = false;
-    for (int i = 0; i < count; i++) {
-        if (who[i] >= 0) {
-            const uint32_t uid = slam->ekf.beacons[who[i]].uid;
-            *memory_for(recovery, uid, sightings[i].has_range) =
-                memorise(slam, time_us, mount, &sightings[i], uid);
+    for (int i = 0; i < view->count; i++) {
+        if (view->who[i] >= 0) {
+            const bslam_memory_t memory = memorise(slam, view, i);
+            *memory_for(recovery, memory.uid, memory.sighting.has_range) = memory;
             any = true;
         }
     }
@@ -422,17 +429,15 @@ static bslam_real_t doubt(bslam_real_t sd, bslam_real_t least, bslam_real_t most
 }
 
 /// Remembers who is seen in a frame that is not used. True if that confirms where the robot is: *fix.
-static bool seek(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
-                 const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count, const int *who,
-                 bslam_fix_t *fix)
+static bool seek(bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view, bslam_fix_t *fix)
 {
-    if (!remember(recovery, slam, time_us, mount, sightings, count, who)) {
+    if (!remember(recovery, slam, view)) {
         return false;
     }
     bslam_clue_t clues[BSLAM_CLUES_MAX];
-    const int clue_count = recall(recovery, slam, clues);
-    return bslam_relocate(clues, clue_count, fix) && is_clear(fix) &&
-           confirm(recovery, slam, fix, time_us) >=
+    const int count = recall(recovery, slam, clues);
+    return bslam_relocate(clues, count, fix) && is_clear(fix) &&
+           confirm(recovery, slam, fix, view->time_us) >=
                (is_verified(fix) ? CONFIRMED_BY_THIRD : CONFIRMED_BY_TIME);
 }
 
@@ -448,15 +453,19 @@ static void be_found(bslam_recovery_t *recovery, bslam_slam_t *slam, const bslam
 
 // ---- a map that grows -------------------------------------------------------------------------------------
 
-/// Whether something has begun in the map within `settled_us`, so that more may, and look like a beacon of
-/// it. What a kept map was loaded with has not.
-static bool is_growing(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
+/// Notes when something began in the map. What a kept map was loaded with did not.
+static void note_growth(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
 {
     if (recovery->next_uid != slam->ekf.next_uid) {
         recovery->next_uid = slam->ekf.next_uid;
         recovery->has_grown = slam->counters.added > 0;
         recovery->grew_us = time_us;
     }
+}
+
+/// Whether something began within `settled_us`, so that more may, and look like a beacon of the map.
+static bool is_growing(const bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
+{
     return slam->params.association != BSLAM_ASSOCIATION_KNOWN && !slam->is_frozen && recovery->has_grown &&
            time_us - recovery->grew_us < slam->params.settled_us;
 }
@@ -475,67 +484,71 @@ static bool is_elsewhere(bslam_recovery_t *recovery, const bslam_slam_t *slam, i
 }
 
 /// A frame of a robot in a map that grows. True if it shows that the robot is elsewhere: at *fix.
-static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us,
-                        const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count,
-                        const int *who, const verdict_t *verdict, bslam_fix_t *fix)
+static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view,
+                        const verdict_t *verdict, bslam_fix_t *fix)
 {
-    (void)remember(recovery, slam, time_us, mount, sightings, count, who);
+    (void)remember(recovery, slam, view);
     if (verdict->contradicting == 0) {
         return false;
     }
     recovery->counters.contradicting += (uint32_t)verdict->contradicting;
-    if (!recovery->has_contradicted || time_us - recovery->contradicted_us > CLUE_AGE_US) {
-        recovery->doubted_us = time_us;
+    if (!recovery->has_contradicted || view->time_us - recovery->contradicted_us > CLUE_AGE_US) {
+        recovery->doubted_us = view->time_us;
     }
     recovery->has_contradicted = true;
-    recovery->contradicted_us = time_us;
-    return is_elsewhere(recovery, slam, time_us, fix);
+    recovery->contradicted_us = view->time_us;
+    return is_elsewhere(recovery, slam, view->time_us, fix);
+}
+
+/// A frame of a robot in a map that has settled, or in doubt. True if it may be used.
+static bool look_again(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t *view, verdict_t *verdict)
+{
+    if (recovery->evidence == 0) {
+        forget_all(recovery);  // what was remembered while the map grew
+    }
+    // A pose that gave way to the first beacon seen agrees with that one.
+    if (verdict->contradicting > 0 && verdict->contradicting == verdict->agreeing &&
+        fits_elsewhere(slam, view)) {
+        verdict->agreeing = 0;
+    }
+    if (notice(recovery, slam, view->time_us, verdict)) {
+        forget_all(recovery);  // the pose is no longer odometry's alone
+        return true;
+    }
+    bslam_fix_t unused;  // where it is by then is not believed before it is lost
+    (void)seek(recovery, slam, view, &unused);
+    return false;
 }
 
 // ---- a frame ----------------------------------------------------------------------------------------------
 
 /// A frame of a robot that is not lost. True if it may be used; *is_found: not, for it shows that the robot
 /// is at *fix.
-static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                   const bslam_sighting_t *sightings, int count, const int *who, bool *is_found,
+static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t *view, bool *is_found,
                    bslam_fix_t *fix)
 {
-    verdict_t verdict = weigh(recovery, slam, mount, sightings, count, who);
-    if (recovery->evidence == 0 && is_growing(recovery, slam, time_us)) {
-        *is_found = look_around(recovery, slam, time_us, mount, sightings, count, who, &verdict, fix);
-        if (*is_found) {
-            get_lost(recovery, slam);
-            forget_all(recovery);
-        }
-        return !*is_found;
+    note_growth(recovery, slam, view->time_us);
+    verdict_t verdict = weigh(recovery, slam, view);
+    if (recovery->evidence > 0 || !is_growing(recovery, slam, view->time_us)) {
+        return look_again(recovery, slam, view, &verdict);
     }
-    if (recovery->evidence == 0) {
-        forget_all(recovery);  // what was remembered while the map grew
+    *is_found = look_around(recovery, slam, view, &verdict, fix);
+    if (*is_found) {
+        get_lost(recovery, slam);
+        forget_all(recovery);
     }
-    // A pose that gave way to the first beacon seen agrees with that one.
-    if (verdict.contradicting > 0 && verdict.contradicting == verdict.agreeing &&
-        fits_elsewhere(slam, mount, sightings, count, who)) {
-        verdict.agreeing = 0;
-    }
-    if (notice(recovery, slam, time_us, &verdict)) {
-        forget_all(recovery);  // the pose is no longer odometry's alone
-        return true;
-    }
-    // Where it is by then is not believed before it is lost.
-    (void)seek(recovery, slam, time_us, mount, sightings, count, who, fix);
-    return false;
+    return !*is_found;
 }
 
 bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us,
                                         const bslam_sighting_t *sightings, int count)
 {
-    bslam_pose_t mount;
-    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &mount);
+    view_t view = {.time_us = time_us, .sightings = sightings, .count = count};
+    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &view.mount);
     if (status != BSLAM_OK) {
         return status;
     }
-    int who[BSLAM_SIGHTINGS_MAX];
-    bslam_identify(slam, sightings, count, who);
+    bslam_identify(slam, sightings, count, view.who);
     forget_old(recovery, slam, time_us);
     bslam_fix_t fix;
     bool use = false;
@@ -544,14 +557,14 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
         if (recovery->memory_count == 0) {
             bslam_slam_lose_pose(slam);  // odometry's doubt begins anew with the first clue
         }
-        is_found = seek(recovery, slam, time_us, &mount, sightings, count, who, &fix);
+        is_found = seek(recovery, slam, &view, &fix);
     } else if (!bslam_is_findable(slam)) {
         use = true;
     } else {
-        use = follow(recovery, slam, time_us, &mount, sightings, count, who, &is_found, &fix);
+        use = follow(recovery, slam, &view, &is_found, &fix);
     }
     recovery->counters.withheld += use ? 0u : 1u;
-    bslam_slam_close_frame(slam, time_us, sightings, count, &mount, use);
+    bslam_slam_close_frame(slam, time_us, sightings, count, &view.mount, use);
     if (is_found) {  // behind it: of a lost robot's frame the map stays as it is
         be_found(recovery, slam, &fix);
     }

@@ -58,7 +58,7 @@ typedef struct bslam_recovery {
     uint32_t next_uid;        ///< of the map, as of the last frame
     bool has_grown;           ///< something has begun in it,
     int64_t grew_us;          ///< the last time then
-    bool has_contradicted;    ///< one did while the map grew,
+    bool has_contradicted;    ///< one did while the map grew, of this doubt,
     int64_t contradicted_us;  ///< the last one
     bslam_memory_t memories[BSLAM_CLUES_MAX];
     int32_t memory_count;

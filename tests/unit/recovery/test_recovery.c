@@ -458,6 +458,26 @@ static void test_recovery_in_a_map_that_grows_counts_what_fits_where_the_robot_i
     assert_true(recovery.counters.contradicting > 0);
 }
 
+/// What began once the robot was found again was there before the next doubt.
+static void test_recovery_in_a_map_that_grows_a_doubt_ends_where_the_robot_is_found(void **state)
+{
+    go_by_own_looks();
+    for (int k = 0; k < 3; k++) {
+        look_alike_from(1, 2, 2.5, BEACONS);
+    }
+    const float none[BSLAM_SAMPLE_FEATURES] = {0};
+    bslam_sighting_t seen = unit_polar(0, 2, -1);
+    seen.signature = none;
+    show(&seen, 1);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS + 1);
+    for (int k = 0; k < 3; k++) {
+        look_alike_from(0, 0, 0, BEACONS);
+    }
+    assert_int_equal(recovery.counters.found, 2);
+    assert_at(0, 0, 0);
+    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS + 1);
+}
+
 static void test_recovery_in_a_map_that_has_settled_one_beacon_is_enough(void **state)
 {
     go_by_own_looks();
@@ -532,6 +552,8 @@ int main(void)
         cmocka_unit_test_setup(test_recovery_in_a_map_that_grows_is_not_lost_by_three_beacons, setup),
         cmocka_unit_test_setup(
             test_recovery_in_a_map_that_grows_counts_what_fits_where_the_robot_is_held_to_be, setup),
+        cmocka_unit_test_setup(test_recovery_in_a_map_that_grows_a_doubt_ends_where_the_robot_is_found,
+                               setup),
         cmocka_unit_test_setup(test_recovery_in_a_map_that_has_settled_one_beacon_is_enough, setup),
         cmocka_unit_test_setup(test_recovery_takes_a_kept_map_for_settled, setup),
         cmocka_unit_test_setup(test_recovery_refuses_as_the_pipeline_does, setup),
