@@ -265,18 +265,20 @@ def run_names(sources: Sequence[Source], options: Sequence[RunOptions]) -> list[
             "motion",
             "noise",
             "velocity_states",
+            "recovery",
         )
     }
     seeds_vary = len({one.seed for one in options}) > 1
     parameters = [dict(one.parameters) for one in options]
-    keys = [key for key in parameters[0] if len({one.get(key) for one in parameters}) > 1] if options else []
+    known = dict.fromkeys(itertools.chain.from_iterable(parameters))
+    keys = [key for key in known if len({one.get(key) for one in parameters}) > 1]
     names: dict[str, None] = {}
     for source, one, values in zip(sources, options, parameters, strict=True):
         name = source.name
         if seeds_vary or isinstance(source, ScenarioSource):
             name += f"_seed{one.seed}"
         name += "".join(_name_part(word, getattr(one, word)) for word, varies in varying.items() if varies)
-        name += "".join(f"_{key}{values.get(key):g}" for key in keys)
+        name += "".join(f"_{key}{values[key]:g}" for key in keys if key in values)
         names[_unique(name, names)] = None
     return list(names)
 
@@ -286,6 +288,8 @@ def _name_part(word: str, value: Any) -> str:
         return f"_sigma{value:g}" if value is not None else ""
     if word == "velocity_states":
         return "_velocity" if value else "_novelocity"
+    if word == "recovery":
+        return "_recovery" if value else ""
     return f"_{str(value).replace(':', '')}"
 
 
