@@ -8,7 +8,7 @@ Two ablations of `svm` stand beside the methods: `untrained`, machines that are 
 (learn_budget = 0), and `position`, the SVM step switched off (looks_weight = 0). A camera's sightings from a
 lower score on serve where identity is known; `same` has known identity of those that the others get, and
 `used` of those that `svm` has fused with some beacon, or begun one from: what it does without costs as much.
-`recovers` is `svm` with recovery: it notices when it is lost.
+`alone` is `svm` without recovery: it does not notice when it is lost.
 `--photographs`: simulated sightings whose signatures are of ETH-80's photographs, an object a beacon
 (tools/training/eth80.py). `--classes`, of a camera's sightings: as `seen`, `none`, or `usual`, what the
 beacon is called most often on the drive, with the distance that it would have had as that: what evidence over
@@ -53,7 +53,7 @@ ABLATIONS: dict[str, tuple[tuple[str, Number], ...]] = {
     "position": (("looks_weight", 0.0),),
 }
 METHODS = ("known", "same", "nearest", "mahalanobis", "joint", "svm", *ABLATIONS)
-RECOVERS = "recovers"
+ALONE = "alone"
 TOLD = ("same", "used")  # known identity of a camera's sightings that other methods get
 VIEWS = (1, 2, 4, 10)
 TEST_VIEWS, FAR_M = 30, 6.5
@@ -137,7 +137,7 @@ def options_of(
     method: str, sensor: str, sigma_mps: float | None, seed: int, changes: Sequence[tuple[str, Number]] = ()
 ) -> RunOptions:
     """One run of a method; an ablation is `svm` with a parameter changed. `changes`: others, of `svm`."""
-    is_svm = method in ABLATIONS or method == RECOVERS
+    is_svm = method in ABLATIONS or method == ALONE
     association = "svm" if is_svm else "known" if method in TOLD else method
     return RunOptions(
         association=association,
@@ -146,7 +146,7 @@ def options_of(
         noise="speedometer",
         seed=seed,
         parameters=(*ABLATIONS.get(method, ()), *(changes if association == "svm" else ())),
-        recovery=method == RECOVERS,
+        recovery=None if method == "svm" else "off",
     )
 
 
@@ -288,7 +288,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         "--set", dest="changes", action="append", default=[], type=change, metavar="NAME=VALUE"
     )
     arguments = parser.parse_args(argv)
-    allowed = (*METHODS, RECOVERS, *(("used",) if arguments.sensor == "camera" else ()))
+    allowed = (*METHODS, ALONE, *(("used",) if arguments.sensor == "camera" else ()))
     unknown = set(arguments.methods) - set(allowed)
     if unknown:
         parser.error(f"methods {', '.join(sorted(unknown))}; allowed: {', '.join(allowed)}")

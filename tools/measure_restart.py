@@ -231,7 +231,7 @@ Counts = dict[tuple[str, bool], Counter[str]]
 def count_drive(args: argparse.Namespace, seed: int) -> tuple[Counts, list[str]]:
     """The outcomes of one drive's robots, and a line about each that is not near."""
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery=True)
+    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery="carried")
     log = camera_log(scenario, seed, args.sigma, None, rig, store)
     counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
     lines = []

@@ -20,6 +20,7 @@ from bslam.experiment.options import (
     MOTIONS,
     OBSERVATIONS,
     REALS,
+    RECOVERIES,
     SENSORS,
     Number,
     RunOptions,
@@ -118,8 +119,10 @@ def _add_map_options(group: Any) -> None:
     group.add_argument("--frozen", action="store_true", help="--map: nothing changes a beacon, none is added")
     group.add_argument(
         "--recovery",
-        action="store_true",
-        help="notice when it is lost, and find itself again; on with --map",
+        choices=RECOVERIES,
+        help="notice when it is lost, and find itself again. growing: when several beacons of the map it "
+        "makes fit a pose elsewhere; carried: when one does, too, if nothing new was seen for a while "
+        "(default: growing by looks, carried with --map, else off)",
     )
 
 
@@ -244,7 +247,7 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "known_map": arguments.known_map,
         "kept_map": None if arguments.map is None else str(arguments.map),
         "frozen": arguments.frozen,
-        "recovery": arguments.recovery or arguments.map is not None,
+        "recovery": arguments.recovery,
         "parameters": tuple(core_parameters(arguments).items()),
     }
     values |= changes

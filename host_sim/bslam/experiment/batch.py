@@ -289,7 +289,7 @@ def _name_part(word: str, value: Any) -> str:
     if word == "velocity_states":
         return "_velocity" if value else "_novelocity"
     if word == "recovery":
-        return "_recovery" if value else ""
+        return f"_recovery{value}" if value else ""
     return f"_{str(value).replace(':', '')}"
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bslam.experiment.align import Rigid, fit_rigid, fit_scale
 from bslam.experiment.bound import has_bound, mean_bound_m
 from bslam.experiment.consistency import POSE_95, nees
-from bslam.experiment.options import RunOptions, uses_velocity_states, wheel_noise
+from bslam.experiment.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
 from bslam.experiment.trace import SightingCounts, Trace
 from bslam.experiment.truth import dead_reckoning, is_dense, odometry_increments, truth_at
 from bslam.log import Log
@@ -122,7 +122,7 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "known_map": options.known_map,
         "kept_map": options.kept_map,
         "frozen": options.frozen or None,
-        "recovery": options.recovery or None,
+        "recovery": recovery_of(options),
     }
     return {word: value for word, value in words.items() if value is not None}
 

@@ -15,6 +15,9 @@ FILTERS = ("standard", "invariant", "smoother", "similarity")
 MOTIONS = ("euler", "arc")
 SENSORS = ("simulated", "camera")
 REALS = ("float", "double")
+# What shows a run that it is lost: nothing; several beacons that fit a pose elsewhere; or also, in a map that
+# has settled, one that contradicts the pose.
+RECOVERIES = ("off", "growing", "carried")
 
 # A measurement without any noise would leave the filter to divide by what rounding leaves of the
 # uncertainty: a noise-free sensor is told to err by this much. The core's own lowest for directions; over the
@@ -45,7 +48,7 @@ class RunOptions:
     known_map: bool = False  # the log's true beacons are given to the filter, which only localises
     kept_map: str | None = None  # file of a map to start in, at a place that nobody knows
     frozen: bool = False  # that map stays as it is
-    recovery: bool = False  # the filter notices when it is lost; it always does in a kept map
+    recovery: str | None = None  # one of RECOVERIES; None: the usual one, see `recovery_of`
     sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
     odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: by kind of log
@@ -93,6 +96,19 @@ def uses_velocity_states(options: RunOptions, log: Log) -> bool:
     return log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
 
 
+def recovery_of(options: RunOptions) -> str:
+    """One of RECOVERIES: asked for, else by what can go wrong.
+
+    In a kept map the robot stands at a place that nobody knows. By looks it may take one beacon for another;
+    "carried" is for those who do carry it, and has false alarms where something new looks like a beacon.
+    """
+    if options.recovery is not None:
+        return options.recovery
+    if options.kept_map is not None:
+        return "carried"
+    return "growing" if options.association == "svm" else "off"
+
+
 def odometry_lead_us(options: RunOptions, log: Log) -> int:
     """How far odometry runs ahead of the true motion: asked for, else what is known of its data set."""
     if options.odometry_lead_us is not None:
@@ -127,6 +143,8 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
             params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
     if log.collection == "dlr":
         params |= defaults.DLR
+    if recovery_of(options) == "growing":
+        params |= defaults.NEVER_SETTLED
     return params | dict(options.parameters)
 
 

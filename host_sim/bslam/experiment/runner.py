@@ -22,7 +22,7 @@ from bslam.errors import BslamError
 from bslam.experiment.kept import read_blob
 from bslam.experiment.ledger import Ledger, corrupt_identities
 from bslam.experiment.local_map import LocalMap
-from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us
+from bslam.experiment.options import Number, RunOptions, core_params, odometry_lead_us, recovery_of
 from bslam.experiment.trace import MapBeacon, Trace
 from bslam.experiment.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
@@ -98,7 +98,7 @@ def run_log(
             fingerprints=record is not None,
             looks=looks,
             seeds=log.seeds,
-            recovery=options.recovery,
+            recovery=recovers(options),
         ) as slam:
             return _run(slam, log, options, frames, watcher, record, slam.target_description)
     factory = slam_factory or partial(_make_slam, options, log)
@@ -119,7 +119,7 @@ def _run(
         return _Run(slam, log, options, frames, watcher).finish(target and target())
     params = slam.params if target is None else slam.host_params
     start = start_of(log, params, beacons_to_hold(log, options), uses_looks(options), options.real)
-    start = replace(start, recovery=options.recovery, frozen=options.frozen, kept_map=_kept_text(options))
+    start = replace(start, recovery=recovers(options), frozen=options.frozen, kept_map=_kept_text(options))
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
@@ -135,7 +135,7 @@ def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beac
         real=options.real,
         looks=looks,
         seeds=log.seeds,
-        recovery=options.recovery,
+        recovery=recovers(options),
     )
     if options.kept_map is not None:
         slam.load_map(read_blob(Path(options.kept_map)), frozen=options.frozen)
@@ -150,6 +150,10 @@ def _kept_text(options: RunOptions) -> str | None:
 
 def uses_looks(options: RunOptions) -> bool:
     return options.association == "svm"
+
+
+def recovers(options: RunOptions) -> bool:
+    return recovery_of(options) != "off"
 
 
 def beacons_to_hold(log: Log, options: RunOptions) -> int:

@@ -54,6 +54,14 @@ def test_true_identities_change_no_bit(pairs: Log) -> None:
     assert one.counts == other.counts  # the true identities are consistent in both
 
 
+def test_a_run_by_looks_notices_when_it_is_lost_and_nothing_else(pairs: Log) -> None:
+    trace, alone = run_log(pairs, SVM), run_log(pairs, replace(SVM, recovery="off"))
+    assert (trace.counters["lost"], trace.counters["withheld"]) == (0, 0)
+    assert "lost" not in alone.counters
+    np.testing.assert_array_equal(trace.pose, alone.pose)
+    np.testing.assert_array_equal(trace.covariance, alone.covariance)
+
+
 def test_pairs_are_told_apart(pairs: Log) -> None:
     trace, known = run_log(pairs, SVM), run_log(pairs, RunOptions())
     assert trace.counts.wrong_associations < 0.001 * trace.counts.sightings

@@ -16,6 +16,7 @@ from bslam.experiment.options import (
     core_params,
     odometry_lead_us,
     parse_association,
+    recovery_of,
 )
 from bslam.experiment.runner import run_log
 from bslam.log import Odometry, Robot
@@ -128,6 +129,26 @@ def test_what_is_set_for_directions_alone_is_not_where_distances_are_seen(made, 
 )
 def test_velocity_states_belong_to_speedometer_noise(made, options, expected):
     assert core_params(options, made.circle_log(steps=1))["velocity_states"] == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (RunOptions(), "off"),
+        (RunOptions(association="svm"), "growing"),
+        (RunOptions(association="svm", kept_map="room.bslam"), "carried"),
+        (RunOptions(kept_map="room.bslam"), "carried"),
+        (RunOptions(association="svm", recovery="off"), "off"),
+        (RunOptions(association="svm", recovery="carried"), "carried"),
+    ],
+)
+def test_what_a_run_notices_of_being_lost(made, options, expected):
+    assert recovery_of(options) == expected
+    never = (
+        core_params(options, made.circle_log(steps=1)).get("settled_us")
+        == defaults.NEVER_SETTLED["settled_us"]
+    )
+    assert never == (expected == "growing")
 
 
 def test_real_logs_have_their_own_set(made):

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
+from bslam.experiment.options import recovery_of
 from bslam.log import Sightings
 from measure_association import (
+    ABLATIONS,
     UsedRows,
     UsedSource,
     options_of,
@@ -44,12 +46,17 @@ def test_used_has_known_identity_of_what_svm_uses():
     assert rows.rows == [0, 2, 4]
 
 
-def test_recovers_is_svm_that_notices_when_it_is_lost():
+def test_alone_is_svm_that_does_not_notice_when_it_is_lost():
     changes = [("settled_us", 0)]
     svm = options_of("svm", "simulated", 0.6, 3, changes)
-    assert options_of("recovers", "simulated", 0.6, 3, changes) == replace(svm, recovery=True)
-    assert not svm.recovery and svm.parameters == tuple(changes)
-    assert parse(["pairs", "--methods", "recovers"]).methods == ["recovers"]
+    assert options_of("alone", "simulated", 0.6, 3, changes) == replace(svm, recovery="off")
+    assert recovery_of(svm) == "growing" and svm.parameters == tuple(changes)
+    assert parse(["pairs", "--methods", "alone"]).methods == ["alone"]
+
+
+def test_no_ablation_finds_itself_by_looks():
+    for method in ABLATIONS:
+        assert recovery_of(options_of(method, "simulated", 0.6, 3)) == "off"
 
 
 def test_only_a_camera_has_what_is_used_of_it():

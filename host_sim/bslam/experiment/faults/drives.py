@@ -37,7 +37,9 @@ class Follower:
     def __init__(
         self, log: Log, *, recovery: bool, map_blob: bytes | None = None, direction_only: bool = False
     ) -> None:
-        options = RunOptions(association="svm", sigma_mps=SIGMA_MPS)
+        options = RunOptions(
+            association="svm", sigma_mps=SIGMA_MPS, recovery="carried" if recovery else "off"
+        )
         params = core_params(options, log)
         self.slam = Slam(params, beacons_max=BEACONS_ROOM, looks=True, seeds=log.seeds, recovery=recovery)
         if map_blob is not None:
