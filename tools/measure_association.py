@@ -166,7 +166,10 @@ def source_of(
 
 
 def run_all(arguments: argparse.Namespace, draw: int) -> dict[tuple[str, float, str], list[Entry]]:
-    """The summaries of every combination in one draw, in the order of the seeds."""
+    """The summaries of every combination in one draw, in the order of the seeds.
+
+    Ends the program with what went wrong if a run failed, or was interrupted.
+    """
     grid = list(itertools.product(arguments.worlds, arguments.sigma, arguments.methods))
     sources: list[ScenarioSource] = []
     options: list[RunOptions] = []
@@ -174,8 +177,11 @@ def run_all(arguments: argparse.Namespace, draw: int) -> dict[tuple[str, float, 
         sources.append(source_of(arguments, world, seed, sigma_mps, method, draw))
         options.append(options_of(method, arguments.sensor, sigma_mps, seed, arguments.changes))
     out = arguments.out / f"draw{draw}" if arguments.draws > 1 else arguments.out
-    outcomes = run_batch(make_jobs(sources, options, None, 0), out, arguments.jobs).outcomes
-    entries = [outcome.entry for outcome in outcomes]
+    result = run_batch(make_jobs(sources, options, None, 0), out, arguments.jobs)
+    failed = [f"{one.name}: {one.entry['error']}" for one in result.outcomes if one.failed]
+    if failed or result.interrupted:
+        sys.exit("\n".join(failed) or "interrupted")
+    entries = [outcome.entry for outcome in result.outcomes]
     seeds = len(arguments.seeds)
     return {key: entries[seeds * i : seeds * (i + 1)] for i, key in enumerate(grid)}
 

@@ -228,6 +228,10 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
     """
     if arguments.frozen and arguments.map is None:
         raise BslamError("--frozen: no map; allowed: --map FILE --frozen")
+    if arguments.recovery == "off" and arguments.map is not None:
+        raise BslamError(
+            "--recovery off with --map: the robot would never find itself; allowed: growing, carried"
+        )
     if arguments.known_map and arguments.map is not None:
         raise BslamError("--known-map with --map: allowed is one of them")
     association = changes.pop("association", arguments.association)

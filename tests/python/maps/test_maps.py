@@ -193,4 +193,5 @@ def test_a_run_leaves_its_map_and_another_starts_in_it_and_replays(tmp_path, cap
     assert main(["replay", f"{second}/figure3_seed0.mcap", "--pictures", "0", "--out", third]) == 0
     assert "to the bit" in capsys.readouterr().out
     assert main([*words, "--frozen", "--out", second]) == 2
+    assert main([*words, "--map", kept, "--recovery", "off", "--out", second]) == 2
     assert main([*words, "--map", "none.bslam", "--out", second]) == 2

@@ -18,6 +18,7 @@ from measure_association import (
     print_draws,
     ratios,
     row,
+    run_all,
     source_of,
     without_clutter,
 )
@@ -52,6 +53,14 @@ def test_alone_is_svm_that_does_not_notice_when_it_is_lost():
     assert options_of("alone", "simulated", 0.6, 3, changes) == replace(svm, recovery="off")
     assert recovery_of(svm) == "growing" and svm.parameters == tuple(changes)
     assert parse(["pairs", "--methods", "alone"]).methods == ["alone"]
+
+
+def test_a_run_that_fails_ends_the_table_with_its_error(monkeypatch):
+    failed = SimpleNamespace(name="pairs_seed3", failed=True, entry={"error": "photographs: not at hand"})
+    result = SimpleNamespace(outcomes=[failed], interrupted=False)
+    monkeypatch.setattr("measure_association.run_batch", lambda *_: result)
+    with pytest.raises(SystemExit, match="pairs_seed3: photographs: not at hand"):
+        run_all(parse(["pairs", "--methods", "svm", "--seeds", "3:4"]), 0)
 
 
 def test_no_ablation_finds_itself_by_looks():
