@@ -221,11 +221,8 @@ def add_batch_options(
     )
 
 
-def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **changes: Any) -> RunOptions:
-    """Options of one run; `changes` win, and are needed where the command takes lists.
-
-    has_looks: the sightings have signatures, as all simulated ones do.
-    """
+def _check_map(arguments: argparse.Namespace) -> None:
+    """Raises BslamError for what cannot be with a map, or without one."""
     if arguments.frozen and arguments.map is None:
         raise BslamError("--frozen: no map; allowed: --map FILE --frozen")
     if arguments.recovery == "off" and arguments.map is not None:
@@ -234,6 +231,14 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         )
     if arguments.known_map and arguments.map is not None:
         raise BslamError("--known-map with --map: allowed is one of them")
+
+
+def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **changes: Any) -> RunOptions:
+    """Options of one run; `changes` win, and are needed where the command takes lists.
+
+    has_looks: the sightings have signatures, as all simulated ones do.
+    """
+    _check_map(arguments)
     association = changes.pop("association", arguments.association)
     by_sight = has_looks and not arguments.known_map
     name, rate = association or ("svm" if by_sight else "known", 0.0)
