@@ -40,7 +40,7 @@ def main() -> int:
     """Measures and prints."""
     args = arguments(__doc__, range(1000, 1020))
     scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association="known", sigma_mps=args.sigma, recovery="carried")
+    options = RunOptions(association="known", sigma_mps=args.sigma)
     errors_m: list[list[float]] = []
     for count, seed in enumerate(args.seeds, 1):
         log = camera_log(scenario, seed, args.sigma, None, rig, store)

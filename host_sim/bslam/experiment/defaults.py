@@ -34,9 +34,9 @@ CAMERA_UNKNOWN_IDENTITY: Final[dict[str, int | float]] = {
     "double_sd_m": 0.3,
 }
 
-# The map always counts as one that grows: the robot is lost when several beacons fit a pose elsewhere, not by
-# one that looks like another.
-NEVER_SETTLED: Final[dict[str, int | float]] = {"settled_us": 1_000_000_000}
+# The map counts as one that grows until nothing has begun for 1000 s, the core's longest: the robot is lost
+# when several beacons fit a pose elsewhere, not by one that looks like another.
+GROWING: Final[dict[str, int | float]] = {"settled_us": 1_000_000_000}
 
 # A prior on the forward speed in m/s would tell the scale, which directions do not; one on the turning rate
 # is free of it.

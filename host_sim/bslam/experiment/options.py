@@ -144,7 +144,7 @@ def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
     if log.collection == "dlr":
         params |= defaults.DLR
     if recovery_of(options) == "growing":
-        params |= defaults.NEVER_SETTLED
+        params |= defaults.GROWING
     return params | dict(options.parameters)
 
 
