@@ -8,9 +8,14 @@ static const bslam_look_t BLANK = {.machine = BSLAM_NO_MACHINE, .twin = BSLAM_NO
 static const uint32_t MICROMETRES_PER_M = 1000000;
 
 const bslam_looks_answers_t bslam_looks_answers = {bslam_looks_ask, bslam_looks_class_odds,
-                                                   bslam_looks_has_waited};
+                                                   bslam_looks_side_odds, bslam_looks_has_waited};
 
 enum { SEEN_AS_MAX = 32 };
+enum { SECTORS = BSLAM_LOOKS_SECTORS };
+// Turned by one sector a beacon looks and stands as before; by four, a right angle, a wall's is out of sight.
+enum { NEAR_SECTORS = 1, FAR_SECTORS = 4 };
+// A beacon that was seen from one sector alone was seen in passing: whoever stands beside it was not noticed.
+enum { KNOWN_SECTORS = 2 };
 
 bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bslam_sample_t *seeds, int32_t seed_count)
 {
@@ -138,6 +143,36 @@ static void note_class(bslam_look_t *look, uint8_t beacon_class)
         }
     }
     look->seen_as[beacon_class - 1]++;
+}
+
+// ---- sides ------------------------------------------------------------------------------------------------
+
+/// How many sectors lie from one to the other, the shorter way round.
+static int sectors_between(int one, int other)
+{
+    const int apart = one > other ? one - other : other - one;
+    return apart < SECTORS - apart ? apart : SECTORS - apart;
+}
+
+bslam_real_t bslam_looks_side_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                   int sector)
+{
+    int known = 0, nearest = SECTORS;
+    for (int k = 0; k < SECTORS; k++) {
+        if (looks->of[index].seen_from[k] > 0) {
+            const int apart = sectors_between(k, sector);
+            known++;
+            nearest = apart < nearest ? apart : nearest;
+        }
+    }
+    if (known == 0 || (nearest > 0 && nearest <= NEAR_SECTORS)) {
+        return 0;
+    }
+    if (nearest == 0) {
+        return known >= KNOWN_SECTORS ? params->side_high : 0;
+    }
+    const int far = nearest < FAR_SECTORS ? nearest : FAR_SECTORS;
+    return -params->side_low * (bslam_real_t)(far - NEAR_SECTORS) / (FAR_SECTORS - NEAR_SECTORS);
 }
 
 // ---- views ------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@
 #define BSLAM_NO_MACHINE (-1)
 /// Classes 1 to this many are evidence; what a detector calls higher ones is none.
 #define BSLAM_LOOKS_CLASSES 8
-/// Directions from which a beacon may be seen.
+/// Sectors around a beacon from which it may be seen; outlook.h says which is which.
 #define BSLAM_LOOKS_SECTORS 16
 
 /// What happened since init. Never decreases.
@@ -70,6 +70,8 @@ typedef struct bslam_looks_answers {
                            const bslam_sample_t *sample);
     bslam_real_t (*class_odds)(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                uint8_t beacon_class);
+    bslam_real_t (*side_odds)(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                              int sector);
     bool (*has_waited)(const bslam_looks_t *looks, const bslam_params_t *params, int index, int64_t time_us);
 } bslam_looks_answers_t;
 
@@ -90,6 +92,11 @@ bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t
 /// class that is no evidence.
 bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                     uint8_t beacon_class);
+
+/// Log odds that beacon `index` is seen from this sector, against one that is not in the map: by those from
+/// which it was seen so far. 0 if none is known. MATH equation (47). O(sectors).
+bslam_real_t bslam_looks_side_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
+                                   int sector);
 
 /// The class that beacon `index` was surely seen as most often; BSLAM_CLASS_NONE: it never was.
 uint8_t bslam_looks_class(const bslam_looks_t *looks, int index);

@@ -2,6 +2,7 @@
 #include "bslam/association/association.h"
 #include "bslam/association/given.h"
 #include "bslam/association/internal.h"
+#include "bslam/association/outlook.h"
 #include "bslam/math/logarithm.h"
 #include "bslam/model/noise.h"
 
@@ -50,6 +51,17 @@ static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_
     return frame->looks == NULL
                ? 0
                : frame->answers->class_odds(frame->looks, frame->params, beacon, sighting->beacon_class);
+}
+
+/// What the side from which the robot sees a beacon adds to the score, where it is known.
+static bslam_real_t side_odds(const bslam_sighting_frame_t *frame, int beacon)
+{
+    if (frame->looks == NULL || !bslam_has_outlook(&frame->ekf->beacons[beacon])) {
+        return 0;
+    }
+    const bslam_outlook_t outlook = bslam_outlook_of(frame->ekf, beacon);
+    return outlook.is_sure ? frame->answers->side_odds(frame->looks, frame->params, beacon, outlook.sector)
+                           : 0;
 }
 
 static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
@@ -119,6 +131,9 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
+    if (weight.distance2 <= frame->params->candidate_d2) {
+        found->score += side_odds(frame, beacon);
+    }
     found->view_score = view_score(frame, beacon, found->score);
     found->score += again_odds(frame, sighting, beacon);
     return true;

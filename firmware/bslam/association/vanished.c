@@ -1,7 +1,7 @@
 #include "bslam/association/vanished.h"
 
+#include "bslam/association/outlook.h"
 #include "bslam/math/symmat.h"
-#include "bslam/math/trig.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t STEPS_PER_M = BSLAM_R(10.0);  // of a kept distance
@@ -14,30 +14,8 @@ static const bslam_real_t HEADING_VAR_MAX_RAD2 = BSLAM_R(0.01);
 // Missed all along so much way it is missed from there: longer than a few frames without a hit, or than what
 // walks past hides it.
 static const bslam_real_t MISSED_M = BSLAM_R(0.3);
-static const bslam_real_t POSITION_SD_MAX = BSLAM_R(0.125);  // of the distance
 
 enum { STEPS_MAX = UINT8_MAX };
-
-/// How a beacon and the robot stand to each other.
-typedef struct bslam_outlook {
-    bslam_real_t range_m;
-    bslam_real_t bearing_rad;  ///< of the beacon from the robot
-    int sector;                ///< of the robot from the beacon
-} bslam_outlook_t;
-
-static bslam_outlook_t outlook_of(const bslam_ekf_t *ekf, const bslam_pose_t *robot, int index)
-{
-    const int at = ekf->beacons[index].at;
-    const bslam_real_t dx_m = ekf->mean[at] - robot->x_m;
-    const bslam_real_t dy_m = ekf->mean[at + 1] - robot->y_m;
-    const bslam_real_t direction_rad = bslam_atan2(dy_m, dx_m);
-    const bslam_real_t turns = (direction_rad + BSLAM_PI) / (2 * BSLAM_PI);
-    bslam_outlook_t outlook;
-    outlook.range_m = bslam_sqrt(dx_m * dx_m + dy_m * dy_m);
-    outlook.bearing_rad = bslam_angle_wrap(direction_rad - robot->theta_rad);
-    outlook.sector = (int)(turns * BSLAM_LOOKS_SECTORS) % BSLAM_LOOKS_SECTORS;
-    return outlook;
-}
 
 static void note_seen(bslam_looks_t *looks, int index, const bslam_outlook_t *outlook)
 {
@@ -55,26 +33,22 @@ static bool is_expected(const bslam_looks_t *looks, const bslam_ekf_t *ekf, int 
 {
     const bslam_real_t seen_m = (bslam_real_t)looks->of[index].seen_from[outlook->sector] / STEPS_PER_M;
     const bslam_real_t off_m = bslam_abs(outlook->range_m - seen_m);
-    const bslam_real_t *p = ekf->covariance;
-    const bslam_real_t sd_m = POSITION_SD_MAX * outlook->range_m;
     return off_m <= SAME_PLACE * seen_m && outlook->bearing_rad < INSIDE * looks->left_rad &&
            outlook->bearing_rad > INSIDE * looks->right_rad &&
-           bslam_symmat_get(p, 2, 2) <= HEADING_VAR_MAX_RAD2 &&
-           bslam_symmat_get(p, 0, 0) + bslam_symmat_get(p, 1, 1) <= sd_m * sd_m;
+           bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && outlook->is_sure;
 }
 
 int bslam_vanished_find(bslam_looks_t *looks, const bslam_ekf_t *ekf, const bslam_params_t *params,
                         int64_t time_us, uint32_t way_um, bool judges)
 {
-    const bslam_pose_t robot = bslam_ekf_pose(ekf);
     const uint32_t least_um = (uint32_t)(MISSED_M * MICROMETRES_PER_M);
     int vanished = BSLAM_NO_VANISHED;
     for (int b = 0; b < ekf->beacon_count && params->vanish_views > 0; b++) {
         bslam_look_t *look = &looks->of[b];
-        if (ekf->beacons[b].kind != BSLAM_BEACON_POINT && ekf->beacons[b].kind != BSLAM_BEACON_SIZED) {
+        if (!bslam_has_outlook(&ekf->beacons[b])) {
             continue;
         }
-        const bslam_outlook_t outlook = outlook_of(ekf, &robot, b);
+        const bslam_outlook_t outlook = bslam_outlook_of(ekf, b);
         const bool is_seen = ekf->beacons[b].last_seen_us == time_us;
         if (is_seen) {
             note_seen(looks, b, &outlook);

@@ -121,6 +121,9 @@
     REAL(looks_offset, -0.5, -100.0, 100.0, "svm: log odds of the decision value 0") \
     REAL(looks_low, 8.0, 0.0, 100.0, "svm: looks speak against a match by this much at most") \
     REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
+    REAL(side_low, 3.0, 0.0, 100.0, \
+         "svm: log odds against a beacon seen from a right angle or more beside where it was seen from") \
+    REAL(side_high, 1.0, 0.0, 100.0, "svm: and for one seen from where it was, if from two sides at least") \
     REAL(class_doubt, 0.1, 1e-3, 1e3, \
          "svm: a beacon counts as seen so often as each class before it is seen at all") \
     REAL(new_range_sd_m, 0.7, 1e-3, 1e6, \

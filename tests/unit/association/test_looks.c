@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "bslam/association/looks.h"
+#include "bslam/association/outlook.h"
 
 static bslam_looks_t looks;
 static bslam_params_t params;
@@ -253,6 +253,58 @@ static void test_a_class_seen_for_long_is_unlearned_again(void **state)
     assert_true(bslam_looks_class_odds(&looks, &params, 0, 5) > 1);
 }
 
+static const double TURN_RAD = 6.283185307179586;
+
+static int sector_at(double turns)
+{
+    return bslam_outlook_sector((bslam_real_t)(turns * TURN_RAD));
+}
+
+static void test_sectors_are_equal_parts_of_a_turn(void **state)
+{
+    for (int k = -40; k < 40; k++) {
+        const int sector = sector_at((k + 0.5) / BSLAM_LOOKS_SECTORS);
+        assert_int_equal(sector_at((k + 0.02) / BSLAM_LOOKS_SECTORS), sector);
+        assert_int_equal(sector_at((k + 0.98) / BSLAM_LOOKS_SECTORS), sector);
+        const int next = sector_at((k + 1.5) / BSLAM_LOOKS_SECTORS);
+        assert_int_equal(next, (sector + 1) % BSLAM_LOOKS_SECTORS);
+    }
+    assert_in_range(sector_at(0.5), 0, BSLAM_LOOKS_SECTORS - 1);
+    assert_in_range(sector_at(-0.5), 0, BSLAM_LOOKS_SECTORS - 1);
+}
+
+static double side_odds(int sectors_on)
+{
+    return (double)bslam_looks_side_odds(&looks, &params, 0,
+                                         sector_at((7.5 + sectors_on) / BSLAM_LOOKS_SECTORS));
+}
+
+/// A wall's beacon has a back; one that stands free is seen from all sides in time.
+static void test_side_odds_fall_with_the_angle_to_where_it_was_seen_from(void **state)
+{
+    params.side_low = 3;
+    params.side_high = 1;
+    for (int k = -8; k <= 8; k++) {
+        assert_near(side_odds(k), 0, 0);  // from nowhere yet
+    }
+    const int here = sector_at(7.5 / BSLAM_LOOKS_SECTORS);  // the last, beside the first
+    looks.of[0].seen_from[here] = 40;
+    const double passing[] = {0, 0, -1, -2, -3, -3, -3, -3, -3};
+    for (int k = -8; k <= 8; k++) {
+        assert_near(side_odds(k), passing[abs(k)], 1e-6);
+    }
+    looks.of[0].seen_from[(here + 1) % BSLAM_LOOKS_SECTORS] = 1;
+    const double two_sides[] = {-3, -3, -2, -1, 0, 1, 1, 0, -1, -2, -3};
+    for (int k = -5; k <= 5; k++) {
+        assert_near(side_odds(k), two_sides[k + 5], 1e-6);
+    }
+    memset(looks.of[0].seen_from, 1, sizeof looks.of[0].seen_from);
+    for (int k = -8; k <= 8; k++) {
+        assert_near(side_odds(k), 1, 0);
+    }
+    assert_near(bslam_looks_side_odds(&looks, &params, 1, 0), 0, 0);  // each beacon has its own
+}
+
 static void test_all_beacons_alike_end_with_one_machine(void **state)
 {
     for (int view = 0; view < 40; view++) {
@@ -335,6 +387,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_class_odds_are_of_counts_with_a_little_doubt, setup),
         cmocka_unit_test_setup(test_a_class_seen_for_long_is_unlearned_again, setup),
+        cmocka_unit_test_setup(test_sectors_are_equal_parts_of_a_turn, setup),
+        cmocka_unit_test_setup(test_side_odds_fall_with_the_angle_to_where_it_was_seen_from, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
         cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_machine, setup),
         cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),

@@ -5,6 +5,7 @@
 
 #include "bslam/association/association.h"
 #include "bslam/association/given.h"
+#include "bslam/association/outlook.h"
 #include "bslam/model/noise.h"
 
 static const bslam_pose_t on_axle = {0, 0, 0};
@@ -308,6 +309,72 @@ static void test_a_class_counts_as_its_log_odds_say(void **state)
     seen.beacon_class = 4;
     const decision_t d = decide(&ekf, &params, &seen, 1);
     assert_near(d.matches[0].score, position_score(&params, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
+}
+
+/// What the side adds to the score of a beacon at (4, 0) that was seen from the origin and a little aside.
+static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bearing_rad)
+{
+    bslam_params_t params = svm_params();
+    params.candidate_d2 = 1000;
+    params.side_low = 3;
+    params.side_high = 1;
+    const int ahead_of_origin = bslam_outlook_sector(0);
+    looks.of[0].seen_from[ahead_of_origin] = 40;
+    looks.of[0].seen_from[ahead_of_origin - 1] = 40;
+    const bslam_sighting_t seen = unit_polar(bearing_rad, 4, -1);
+    bslam_looks_t *const known[] = {NULL, &looks};
+    double scores[2];
+    for (int i = 0; i < 2; i++) {
+        const bslam_sighting_frame_t frame = {ekf,   &params, known[i], &bslam_looks_answers,
+                                              mount, &seen,   1,        0};
+        bslam_match_t match;
+        bslam_associate_svm(&frame, &match);
+        scores[i] = (double)match.score;
+    }
+    return scores[1] - scores[0];
+}
+
+/// The side from which a beacon is seen is one of the map, however the robot and its sensor are turned.
+static void test_score_adds_the_odds_of_the_side(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_pose_t poses[] = {{0, 0, 0}, {0, 0, 1.5}, {8, 0, 3}};
+    const bslam_pose_t mounts[] = {{0, 0, 0}, {0, 0, -1}};
+    const double odds[] = {1, 1, -3};
+    for (int k = 0; k < 6; k++) {
+        const bslam_pose_t *pose = &poses[k / 2], *mount = &mounts[k % 2];
+        bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+        bslam_ekf_set_pose(&ekf, pose, BSLAM_R(1e-6), BSLAM_R(1e-6));
+        const double direction = pose->x_m > 4 ? 3.14159265 : 0;
+        const double bearing = direction - (double)pose->theta_rad - (double)mount->theta_rad;
+        assert_near(side_score(&ekf, mount, bearing), odds[k / 2], 1e-3);
+    }
+}
+
+/// A robot whose wheels have spun takes its place for another, and doubts it: by half a metre at four.
+static void test_in_doubt_of_its_place_a_robot_knows_no_side(void **state)
+{
+    const bslam_params_t params = svm_params();
+    const bslam_pose_t behind = {8, 0, BSLAM_R(3.14159265)};
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_ekf_set_pose(&ekf, &behind, BSLAM_R(0.12), BSLAM_R(1e-6));
+    assert_near(side_score(&ekf, &on_axle, 0), -3, 1e-3);
+    bslam_ekf_set_pose(&ekf, &behind, BSLAM_R(0.13), BSLAM_R(1e-6));
+    assert_near(side_score(&ekf, &on_axle, 0), 0, 1e-3);
+}
+
+static void test_only_what_has_a_place_in_the_map_has_sides(void **state)
+{
+    const bslam_params_t params = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    assert_near(side_score(&ekf, &on_axle, 0), 1, 1e-3);
+    assert_true(bslam_has_outlook(&ekf.beacons[0]));
+    ekf.beacons[0].kind = BSLAM_BEACON_RAY;
+    assert_false(bslam_has_outlook(&ekf.beacons[0]));
+    ekf.beacons[0].kind = BSLAM_BEACON_KNOWN;
+    assert_false(bslam_has_outlook(&ekf.beacons[0]));
+    ekf.beacons[0].kind = BSLAM_BEACON_SIZED;
+    assert_true(bslam_has_outlook(&ekf.beacons[0]));
 }
 
 /// How much too long a beacon's distances are goes with its class: taken for another, a sighting has but a
@@ -739,6 +806,9 @@ int main(void)
         cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),
         cmocka_unit_test_setup(test_two_sightings_that_want_a_beacon_alike_both_wait, setup),
         cmocka_unit_test_setup(test_looks_decide_between_two_in_the_gate, setup),
+        cmocka_unit_test_setup(test_score_adds_the_odds_of_the_side, setup),
+        cmocka_unit_test_setup(test_in_doubt_of_its_place_a_robot_knows_no_side, setup),
+        cmocka_unit_test_setup(test_only_what_has_a_place_in_the_map_has_sides, setup),
         cmocka_unit_test_setup(test_sure_enough_to_learn_from, setup),
         cmocka_unit_test_setup(test_directions_alone_have_their_own_density_of_new, setup),
         cmocka_unit_test_setup(test_an_unmappable_sighting_is_rejected, setup),
