@@ -131,7 +131,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
                    looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
-    if (weight.distance2 <= frame->params->candidate_d2) {
+    if (weight.distance2 <= frame->params->candidate_d2) {  // beyond, nobody asks the score
         found->score += side_odds(frame, beacon);
     }
     found->view_score = view_score(frame, beacon, found->score);

@@ -363,18 +363,21 @@ static void test_in_doubt_of_its_place_a_robot_knows_no_side(void **state)
     assert_near(side_score(&ekf, &on_axle, 0), 0, 1e-3);
 }
 
+/// A beacon that was given stands in no state, and a ray in another one than a point.
 static void test_only_what_has_a_place_in_the_map_has_sides(void **state)
 {
     const bslam_params_t params = svm_params();
     bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_beacon_t *beacon = &ekf.beacons[0];
     assert_near(side_score(&ekf, &on_axle, 0), 1, 1e-3);
-    assert_true(bslam_has_outlook(&ekf.beacons[0]));
-    ekf.beacons[0].kind = BSLAM_BEACON_RAY;
-    assert_false(bslam_has_outlook(&ekf.beacons[0]));
-    ekf.beacons[0].kind = BSLAM_BEACON_KNOWN;
-    assert_false(bslam_has_outlook(&ekf.beacons[0]));
-    ekf.beacons[0].kind = BSLAM_BEACON_SIZED;
-    assert_true(bslam_has_outlook(&ekf.beacons[0]));
+    beacon->kind = BSLAM_BEACON_KNOWN;
+    beacon->known_x_m = 4;
+    beacon->known_y_m = 0;
+    assert_near(side_score(&ekf, &on_axle, 0), 0, 0);
+    beacon->kind = BSLAM_BEACON_RAY;
+    assert_false(bslam_has_outlook(beacon));
+    beacon->kind = BSLAM_BEACON_SIZED;
+    assert_true(bslam_has_outlook(beacon));
 }
 
 /// How much too long a beacon's distances are goes with its class: taken for another, a sighting has but a
