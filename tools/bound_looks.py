@@ -41,7 +41,7 @@ from measure_association import draw_count, interval, options_of, without_clutte
 METHODS = ("known", "svm", "alike", "told")
 UNTRIED = ("untried", "unspoilt")  # of a camera, besides
 NO_TRIALS = (("trust_sum", 0.0), ("trust_first_sum", 0.0))
-SURE = 1.2  # a decision value by which looks say all that they may
+SURE = 1.2  # a decision value: looks say all that they may for a match, and more against one
 NO_LOOK = -1
 
 
@@ -90,7 +90,7 @@ class SureSlam(Slam):
         """What looks say: all, where truth knows the look of both."""
         key = bytes(self._ffi.buffer(sample, self._ffi.sizeof("bslam_sample_t")))
         seen = self._look_of_sample.get(key, NO_LOOK)
-        mapped = self._looks_now[index] if index < len(self._looks_now) else NO_LOOK
+        mapped = self._looks_now[index]
         if NO_LOOK in (seen, mapped):
             return self._ask_machines(looks, params, index, sample)
         value = SURE if seen == mapped else -SURE
