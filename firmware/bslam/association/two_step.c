@@ -40,8 +40,10 @@ static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting
 static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinion_t *opinion)
 {
     const bslam_real_t odds = params->looks_slope * (bslam_real_t)opinion->value + params->looks_offset;
-    return params->looks_weight * (bslam_real_t)opinion->weight *
-           clip(odds, -params->looks_low, params->looks_high);
+    const bslam_real_t unlike = (bslam_real_t)opinion->apart - params->unlike_distance;
+    const bslam_real_t weight = (bslam_real_t)opinion->weight;
+    return params->looks_weight * (weight * clip(odds, -params->looks_low, params->looks_high) -
+                                   (1 - weight) * clip(params->unlike_slope * unlike, 0, params->looks_low));
 }
 
 /// What the detector's class adds to the score.
@@ -125,7 +127,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
         return false;
     }
     found->distance2 = weight.distance2;
-    found->opinion = (bslam_opinion_t){0.0f, 0.0f};
+    found->opinion = (bslam_opinion_t){0.0f, 0.0f, 0.0f};
     if (sample != NULL) {
         found->opinion = frame->answers->ask(frame->looks, frame->params, beacon, sample);
     }

@@ -121,6 +121,10 @@
     REAL(looks_offset, -0.5, -100.0, 100.0, "svm: log odds of the decision value 0") \
     REAL(looks_low, 8.0, 0.0, 100.0, "svm: looks speak against a match by this much at most") \
     REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
+    REAL(unlike_distance, 0.8, 0.0, 100.0, \
+         "svm: signatures farther apart than this are unlike, to a machine that does not count half yet") \
+    REAL(unlike_slope, 7.4, 0.0, 1e3, \
+         "svm: log odds against a match, by how much farther its signature is from all such a machine keeps") \
     REAL(side_low, 3.0, 0.0, 100.0, \
          "svm: log odds against a beacon seen from a right angle or more beside where it was seen from") \
     REAL(side_high, 1.0, 0.0, 100.0, "svm: and for one seen from where it was, if from two sides at least") \

@@ -17,7 +17,8 @@ _IMAGE_DELAY_US: Final = 30_000
 # Its distances are so doubtful that position alone fits too much: looks count twice, and new beacons are
 # expected less. Tried on paper_room, seeds 90:92.
 # Its cameras tell how it turns, so that it is seldom in doubt, and by the side from which a beacon is seen
-# nothing is gained (EXPERIMENTS, "From which side").
+# nothing is gained (EXPERIMENTS, "From which side"). Nor by what is unlike all that a young machine keeps
+# ("What is unlike").
 CAMERA: Final[dict[str, int | float]] = {
     "huber_d": 1.0,
     "gate_d2": 9.0,
@@ -25,6 +26,7 @@ CAMERA: Final[dict[str, int | float]] = {
     "new_per_m2": 0.003,
     "side_low": 0.0,
     "side_high": 0.0,
+    "unlike_slope": 0.0,
 }
 
 # With identity unknown, besides: the detector believes in things that are no beacon, mostly for a few metres
