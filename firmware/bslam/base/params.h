@@ -124,7 +124,7 @@
     REAL(unlike_distance, 0.8, 0.0, 100.0, \
          "svm: signatures farther apart than this are unlike, to a machine that does not count half yet") \
     REAL(unlike_slope, 7.4, 0.0, 1e3, \
-         "svm: log odds against a match, by how much farther its signature is from all such a machine keeps") \
+         "svm: log odds against a match, by how much farther it is from all that such a machine keeps") \
     REAL(side_low, 3.0, 0.0, 100.0, \
          "svm: log odds against a beacon seen from a right angle or more beside where it was seen from") \
     REAL(side_high, 1.0, 0.0, 100.0, "svm: and for one seen from where it was, if from two sides at least") \
