@@ -35,21 +35,21 @@ class SureSlam(Slam):
         super().__init__(looks=True, seeds=log.seeds, **options)
         assert log.sightings.signature is not None
         self._look_of = look_of
-        self._identity_of = {
-            one.tobytes(): int(identity)
-            for one, identity in zip(log.sightings.signature, log.sightings.beacon_id, strict=True)
-        }
+        self._signatures = np.ascontiguousarray(log.sightings.signature, np.float32)
+        self._identities: list[int] = log.sightings.beacon_id.tolist()
+        self._row_of = {one.tobytes(): i for i, one in enumerate(self._signatures)}
+        samples = encode(self._raw, self._signatures)
+        self._row_of_sample = {self._key(samples + i): i for i in range(len(self._identities))}
         self._shown: defaultdict[int, Counter[int]] = defaultdict(Counter)
         self._looks_now: list[int] = []  # of the beacons, in the order of the map
-        self._look_of_sample = self._looks_of_samples(log)
+        self._look_of_sample = self._looks_of_samples(samples)
         self._ask_machines = self._slam.learning.answers.ask
         self._attach_sure()
 
-    def _looks_of_samples(self, log: Log) -> dict[bytes, int]:
+    def _looks_of_samples(self, samples: Any) -> dict[bytes, int]:
         """By what the core makes of a signature; NO_LOOK where two looks have the same."""
-        samples = encode(self._raw, np.ascontiguousarray(log.sightings.signature, np.float32))
         look_of: dict[bytes, int] = {}
-        for i, identity in enumerate(log.sightings.beacon_id.tolist()):
+        for i, identity in enumerate(self._identities):
             key = self._key(samples + i)
             look = self._look_of.get(identity, NO_LOOK)
             look_of[key] = look if look_of.get(key, look) == look else NO_LOOK
@@ -88,12 +88,17 @@ class SureSlam(Slam):
         ekf = self._slam.ekf
         self._looks_now = [self.look_of_beacon(ekf.beacons[b].uid) for b in range(ekf.beacon_count)]
         accounts = super().sightings(time_us, *columns, **named)
-        signature = named.get("signature", columns[7] if len(columns) > 7 else None)
-        for one, account in zip([] if signature is None else signature, accounts, strict=True):
+        for row, account in zip(self._rows_in(columns, named), accounts, strict=True):
             if account.beacon_uid is not None and account.result in ("matched", "new"):
-                identity = self._identity_of[np.ascontiguousarray(one, np.float32).tobytes()]
-                self._shown[account.beacon_uid][identity] += 1
+                self._shown[account.beacon_uid][self._identities[row]] += 1
         return accounts
+
+    def _rows_in(self, columns: tuple[Any, ...], named: Mapping[str, Any]) -> list[int]:
+        """Which sightings of the log these are, by their signatures."""
+        signature = named.get("signature", columns[7] if len(columns) > 7 else None)
+        if signature is None:
+            return []
+        return [self._row_of[one.tobytes()] for one in np.ascontiguousarray(signature, np.float32)]
 
 
 @dataclass(frozen=True)
@@ -116,12 +121,7 @@ class TaughtSlam(SureSlam):
 
     def __init__(self, look_of: Mapping[int, int], log: Log, **options: Any) -> None:
         super().__init__(look_of, log, **options)
-        assert log.sightings.signature is not None
-        self._signatures = np.ascontiguousarray(log.sightings.signature, np.float32)
         self._generic = log.seeds
-        samples = encode(self._raw, self._signatures)
-        self._row_of_sample = {self._key(samples + i): i for i in range(len(self._signatures))}
-        self._row_of = {one.tobytes(): i for i, one in enumerate(self._signatures)}
         self._seen: defaultdict[int, list[int]] = defaultdict(list)  # rows of each look's sightings so far
         self._machines: dict[int, _Machine] = {}
         self._samples_most = len(self._slam.looks.learner.machines[0].own_alpha)
@@ -140,12 +140,10 @@ class TaughtSlam(SureSlam):
     def sightings(self, time_us: int, *columns: Any, **named: Any) -> list[Account]:
         """As Slam has it."""
         accounts = super().sightings(time_us, *columns, **named)
-        signature = named.get("signature", columns[7] if len(columns) > 7 else None)
-        for one in [] if signature is None else signature:
-            key = np.ascontiguousarray(one, np.float32).tobytes()
-            look = self._look_of.get(self._identity_of[key], NO_LOOK)
+        for row in self._rows_in(columns, named):
+            look = self._look_of.get(self._identities[row], NO_LOOK)
             if look != NO_LOOK:
-                self._seen[look].append(self._row_of[key])
+                self._seen[look].append(row)
         for look in self._seen:
             if self._wants_training(look, time_us):
                 self._train(look, time_us)

@@ -39,6 +39,14 @@ def mean_error_m(log: Log, trace: Trace) -> float:
     return float(np.hypot(*off.T).mean())
 
 
+def with_sightings(log: Log, rows: Any) -> Log:
+    """The drive with some of its sightings."""
+    left: dict[str, Any] = {
+        name: None if values is None else values[rows] for name, values in vars(log.sightings).items()
+    }
+    return replace(log, sightings=Sightings(**left))
+
+
 def relabelled(log: Log) -> Log:
     """Every beacon with another's identity."""
     beacon_id = log.sightings.beacon_id
@@ -75,6 +83,16 @@ def test_pairs_are_not_told_apart_without_machines(harder_pairs: Log, off: tuple
     assert trace.counts.wrong_associations > 0.03 * trace.counts.sightings
 
 
+def test_a_neighbour_is_not_taken_for_a_beacon_that_was_seen_once() -> None:
+    """Drive 2017 comes back after 43 s to a beacon of one sample, and meets first what stands beside it."""
+    log = simulate(load_scenario("pairs"), 2017, 1.0, "speedometer")
+    log = with_sightings(log, log.sightings.time_us < 50_000_000)
+    trace = run_log(log, SVM)
+    without = run_log(log, replace(SVM, parameters=(("unlike_slope", 0.0),)))
+    assert trace.counts.wrong_associations == 0
+    assert without.counts.wrong_associations > 10
+
+
 def test_without_signatures_position_alone_decides(harder_pairs: Log) -> None:
     log = replace(harder_pairs, sightings=replace(harder_pairs.sightings, signature=None))
     blind = run_log(log, SVM)
@@ -89,10 +107,7 @@ def test_a_beacon_that_vanishes_leaves_the_map_and_no_other_does() -> None:
     log = simulate(load_scenario("paper_room"), 1, 0.6, "speedometer")
     seen = log.sightings
     rows = (seen.beacon_id != 1) | (seen.time_us < log.odometry.time_us[-1] // 2)
-    left: dict[str, Any] = {
-        name: None if values is None else values[rows] for name, values in vars(seen).items()
-    }
-    gone = replace(log, sightings=Sightings(**left))
+    gone = with_sightings(log, rows)
     confirmed = [sum(one.confirmed for one in run_log(drive, SVM).beacons) for drive in (log, gone)]
     assert confirmed == [6, 5]
 
