@@ -33,7 +33,6 @@ _ITERATIONS_MAX: Final = 500  # Gauss-Newton is slow where a map of another size
 _SETTLED: Final = 1e-7  # m, rad: the largest change of an iteration that changes nothing
 _SETTLED_COST: Final = 1e-10  # nor does one that lessens the cost by so small a share
 _SHORTEST: Final = 1e-6  # share of a step that is still tried
-_LITTLE_COST: Final = 1e-3  # of a logarithm of a probability
 _POSE: Final = 3  # unknowns of a pose
 _BEACON: Final = 2
 
@@ -141,17 +140,6 @@ class Smoother:
             self._priors.append((beacon, *place, _FIRST_RANGE_SD_M))
         self._new_beacons.append(place)
 
-    def set_out_from(self, poses: Array, beacons: Array | None = None) -> None:
-        """Where `solve` begins, in place of what odometry leads to and of the beacons' guesses.
-
-        poses: (steps + 1, 3), the first is 0, 0, 0. beacons: (beacons, 2); None: where they are.
-        """
-        assert poses.shape == self.poses.shape
-        self._poses = poses.copy()
-        if beacons is not None:
-            assert beacons.shape == self.beacons.shape
-            self._beacons = beacons.copy()
-
     def solve(self) -> int:
         """Iterate until nothing changes; the number of iterations. ArithmeticError if that never is."""
         problem = self._problem()
@@ -166,35 +154,6 @@ class Smoother:
                 self._poses, self._beacons = poses, beacons
                 return iteration
         raise ArithmeticError(f"{self.steps} poses have not settled in {_ITERATIONS_MAX} iterations")
-
-    def first_eyes(self) -> Array:
-        """Where the sensor was when it first saw each beacon, (beacons, 2) m."""
-        first = {beacon: pose for pose, beacon, *_ in reversed(self._seen)}
-        at = self.poses[[first[beacon] for beacon in range(len(self.beacons))]].reshape(-1, _POSE)
-        return at[:, :2] + self._mount(at[:, 2])
-
-    def map_information(self) -> Array:
-        """Inverse covariance of the beacons' x_m, y_m about where they are, (2 beacons, 2 beacons)."""
-        problem = self._problem()
-        weights = problem.weights(self.poses, self.beacons)
-        return problem.linearise(self.poses, self.beacons, weights)[1].reduced()
-
-    def poses_in(self, beacons: Array) -> tuple[Array, float]:
-        """The poses that fit best if the beacons stand there, and the logarithm of how well all of them fit.
-
-        The latter is the integral over the poses, by Laplace, but for a constant. What `solve` found is where
-        it sets out from, and stays.
-        """
-        problem, poses = self._problem(), self.poses
-        for _ in range(_ITERATIONS_MAX):
-            weights = problem.weights(poses, beacons)
-            cost, normal = problem.linearise(poses, beacons, weights)
-            change, half_log_determinant = normal.solve_poses()
-            poses, _ = problem.lower(poses, beacons, change, np.zeros_like(beacons), weights, cost)
-            lowered = problem.cost(poses, beacons, weights)
-            if cost - lowered < _LITTLE_COST:
-                return poses, -lowered - half_log_determinant
-        raise ArithmeticError(f"{self.steps} poses among known beacons have not settled")
 
     def _problem(self) -> _Problem:
         return _Problem(self._p, self._steps, self._seen, self._priors, self._guesses)
@@ -232,17 +191,6 @@ class _Normal:
             beacon_change = -solve(corner, beacon_gradient, assume_a="pos", check_finite=False)
             change[_POSE:] -= solved @ beacon_change
         return change.reshape(-1, _POSE), beacon_change.reshape(-1, _BEACON)
-
-    def reduced(self) -> Array:
-        """What is left of the normal equations for the beacons, (2 beacons, 2 beacons)."""
-        return self._eliminate()[2]
-
-    def solve_poses(self) -> tuple[Array, float]:
-        """Change (poses, 3) if the beacons stay, and half the logarithm of the poses' determinant."""
-        factor = cholesky_banded(self.band[:, _POSE:], lower=True, check_finite=False)
-        gradient = self.pose_gradient.reshape(-1)[_POSE:]
-        change = np.concatenate([np.zeros(_POSE), -cho_solve_banded((factor, True), gradient)])
-        return change.reshape(-1, _POSE), float(np.log(factor[0]).sum())
 
     def _eliminate(self) -> tuple[Array, Array, Array, Array]:
         """Without the poses: their change if beacons stay, what they change by beacons; what is left."""

@@ -117,14 +117,10 @@ def test_optimum_is_that_of_gtsam_on_the_same_graph(velocity_states, has_range, 
     assert np.abs(smoother.beacons - beacons).max() < 2e-5
 
 
-def test_known_beacons_stay_and_a_start_at_the_optimum_is_kept():
-    p = parameters()
-    smoother, other = (drive(p, 60, sds=(0.05, 0.3)) for _ in range(2))
+def test_known_beacons_stay():
+    smoother = drive(parameters(), 60, sds=(0.05, 0.3))
     assert smoother.solve() > 2
     assert np.abs(smoother.beacons[:2] - PLACES[:2]).max() < 1e-3
-    other.set_out_from(smoother.poses)
-    other.solve()
-    assert np.abs(other.poses - smoother.poses).max() < 1e-5
 
 
 def beside(solved):
