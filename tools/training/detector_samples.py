@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, Proposals, feature_counts
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm, weights_in_row
-from training.additive import KNOTS
-from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
-from training.truth import NOTHING, areas, owners, teaches
+from tools.training.additive import KNOTS
+from tools.training.render_set import CELL_PX, KINDS, World, camera_of, read_world
+from tools.training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
     BeaconClass(

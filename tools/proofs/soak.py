@@ -1,8 +1,8 @@
 """Runs the filter for simulated hours in float and in double, and compares: consistency, repairs, errors.
 
 Examples:
-    tools/soak.py                                        6 hours, seeds 1000 to 1019
-    tools/soak.py --minutes 30 --seeds 4 --nees 1.1 5.8
+    python -m tools.proofs.soak                                        6 hours, seeds 1000 to 1019
+    python -m tools.proofs.soak --minutes 30 --seeds 4 --nees 1.1 5.8
 
 `make soak` builds what this runs (tests/soak/soak.c). NEES is the squared error of the pose in standard
 deviations: 3 on average for a consistent filter. The bounds that it is held to are for 20 seeds; those of
@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-PROGRAMS = Path(__file__).resolve().parent.parent / "build/soak"
+PROGRAMS = Path(__file__).resolve().parents[2] / "build/soak"
 MOST_APART = 0.1
 FIRST_SEED = 1000  # what was looked at while this was written lies below
 

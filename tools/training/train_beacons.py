@@ -1,6 +1,6 @@
 """Trains the front end to recognise your own objects, from a folder of pictures with labels.csv.
 
-    .venv/bin/python tools/train_beacons.py FOLDER --out firmware/models/my_beacons.h
+    .venv/bin/python -m tools.training.train_beacons FOLDER --out firmware/models/my_beacons.h
 
 Writes the C header, the same as a model file for `bslam look --model` (.json), and the confusion matrix as a
 picture (.png); prints it too. The figures are of pictures that a machine was not trained on, by
@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 from bslam.modelfile import Recogniser, write_recogniser
 from bslam.rig import load_rig
-from training import export, fit
-from training.compiled import TOLERANCE, CompiledSvm, worst_difference
-from training.folder import Folder, read_folder
-from training.samples import NONE, Samples, collect, folder_sha256
+from tools.training import export, fit
+from tools.training.compiled import TOLERANCE, CompiledSvm, worst_difference
+from tools.training.folder import Folder, read_folder
+from tools.training.samples import NONE, Samples, collect, folder_sha256
 
 NO_RIG = """no --rig: taken for pictures of a camera 60 degrees wide that looks straight ahead. One that does
 not has its horizon elsewhere, takes other colours for the wall's, and will recognise less."""

@@ -6,7 +6,7 @@ drives and signatures, as far as they are installed. Unlike time, counts are the
 are compared within rounds in which every program runs once. Instructions are not cycles.
 
     make bench                                                 # all, into out/bench/BENCHMARKS.md
-    .venv/bin/python tools/bench.py --step-only                # the core's own counts, 10 s
+    .venv/bin/python -m tools.bench.bench --step-only                # the core's own counts, 10 s
     make bench-doc                                             # all, into docs/BENCHMARKS.md
 """
 
@@ -20,9 +20,9 @@ from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
-from markdown import Row, table
-from peers import filters, machines
-from peers.programs import PEERS, ROOT
+from tools.bench.peers import filters, machines
+from tools.bench.peers.programs import PEERS, ROOT
+from tools.checks.markdown import Row, table
 
 BUILD = ROOT / "build" / "bench"
 

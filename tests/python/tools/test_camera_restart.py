@@ -8,7 +8,7 @@ import pytest
 from bslam.experiment.truth import step_times_us
 from bslam.log import Sightings
 from bslam.world.simulate import load_scenario, simulate
-from measure_restart import DRIVEN_US, Restart, in_view_us, part
+from tools.proofs.camera_restart import DRIVEN_US, Restart, in_view_us, part
 
 STEP_US = 40_000
 

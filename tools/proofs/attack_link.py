@@ -6,8 +6,8 @@ other versions. Whatever comes through must be applied once: after every reading
 of all states, covariance and machines included, is the host's to the bit, and so are the counters of what
 was applied. What was refused is in the robot's own counters.
 
-    .venv/bin/python tools/attack_link.py                       a process of this computer, ten minutes
-    .venv/bin/python tools/attack_link.py qemu:mps2_an386 --timeout 1       an emulated board, which is slow
+    python -m tools.proofs.attack_link                       a process of this computer, ten minutes
+    python -m tools.proofs.attack_link qemu:mps2_an386 --timeout 1       an emulated board, which is slow
 
 Exit status 0: all drives are the host's, and each kind of damage was counted. 1: not so.
 """
@@ -34,7 +34,7 @@ from bslam.target.client import Client
 from bslam.target.lines import Line, open_line
 from bslam.target.remote import RemoteSlam
 from bslam.world.simulate import load_scenario, simulate
-from same_bits import Noting, first_difference
+from tools.proofs.same_bits import Noting, first_difference
 
 FLOOD_BYTES = 3000
 """Longer than any frame that an image takes."""

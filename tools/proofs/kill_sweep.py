@@ -1,6 +1,6 @@
 """A sweep that is killed in the middle: is anything lost, is anything counted twice?
 
-    .venv/bin/python tools/kill_sweep.py --runs 1000 --kills 3
+    .venv/bin/python -m tools.proofs.kill_sweep --runs 1000 --kills 3
 
 Starts `bslam sweep` on short drives, kills it with all its processes (SIGKILL), starts it again, and compares
 what comes out with the same sweep in one go. Exit status 0: every run once, with the same figures.

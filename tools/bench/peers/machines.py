@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
-from peers.programs import BUILD, INCLUDE, OPTIMISED, ROOT, SOURCES
-from training import export, fit
-from training.looks import Views, rendered
+from tools.bench.peers.programs import BUILD, INCLUDE, OPTIMISED, ROOT, SOURCES
+from tools.training import export, fit
+from tools.training.looks import Views, rendered
 
 SCENARIO, WORLD, FRAMES = "building20", 11, 1500
 OWN, RIVALS = 16, 96  # samples of a set: as many as a training on the robot takes

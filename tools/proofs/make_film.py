@@ -1,6 +1,6 @@
 """Writes a film for an emulated board: its robot turns on the spot in a room, and its camera takes pictures.
 
-    .venv/bin/python tools/make_film.py paper_room out/turn.film
+    .venv/bin/python -m tools.proofs.make_film paper_room out/turn.film
     bslam console qemu:stm32f405:out/turn.film --reset --record drive.mcap --seconds 20
     bslam replay drive.mcap
 

@@ -1,5 +1,5 @@
 // A plugin for QEMU's translator: how often each block of the guest's instructions ran. Writes a line a block
-// at the end: address, instructions executed in it. tools/profile_image.py builds and reads it.
+// at the end: address, instructions executed in it. tools/bench/profile_image.py builds and reads it.
 //
 // Debian has no header for plugins; what is used of QEMU's API version 1 is declared here.
 #include <stddef.h>

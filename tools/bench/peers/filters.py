@@ -13,9 +13,9 @@ from tqdm import tqdm
 from bslam.experiment.options import RunOptions
 from bslam.experiment.rival import run_algorithm
 from bslam.log import Log
-from markdown import Row, table
-from peers.drives import circle, simulated, text
-from peers.programs import CORE, PEERS, Program, instructions, run
+from tools.bench.peers.drives import circle, simulated, text
+from tools.bench.peers.programs import CORE, PEERS, Program, instructions, run
+from tools.checks.markdown import Row, table
 
 STEPS = {6: 3000, 20: 1500, 50: 400, 100: 120, 200: 45}
 """Measured, by beacons: so many that a run takes some ms at least and some s at most."""

@@ -14,10 +14,10 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from bslam.core.vision import BeaconModel, DetectorModel
-from training.built_in import built_in_detector
-from training.closer import choose_fusion_threshold, fit_close, fit_verdict, gather_close
-from training.detector_export import beacons_header
-from training.detector_fit import (
+from tools.training.built_in import built_in_detector
+from tools.training.closer import choose_fusion_threshold, fit_close, fit_verdict, gather_close
+from tools.training.detector_export import beacons_header
+from tools.training.detector_fit import (
     choose_thresholds,
     fit_cells,
     fit_fusion,
@@ -28,12 +28,12 @@ from training.detector_fit import (
     shares,
     summary,
 )
-from training.detector_samples import CLASSES, blank_detector, gather_boxes, gather_cells
-from training.detector_score import look_at_worlds, score
-from training.export import write_header
-from training.render_set import FRAMES_A_WORLD, RIGS, render_set
+from tools.training.detector_samples import CLASSES, blank_detector, gather_boxes, gather_cells
+from tools.training.detector_score import look_at_worlds, score
+from tools.training.export import write_header
+from tools.training.render_set import FRAMES_A_WORLD, RIGS, render_set
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 HEADER = ROOT / "firmware" / "models" / "beacons.h"
 VALIDATION_FROM = 5000
 PRECISION = 0.95

@@ -1,8 +1,8 @@
 """Measures the modified condition/decision coverage (MC/DC) of firmware/bslam by the C tests.
 
 Examples:
-    tools/mcdc.py                          a table by file, and the total against the goal
-    tools/mcdc.py --list vision/lens.c     which conditions of a file no test has shown to matter
+    python -m tools.proofs.mcdc                          a table by file, and the total against the goal
+    python -m tools.proofs.mcdc --list vision/lens.c     conditions that no test has shown to matter
 
 `make mcdc` builds what this runs: the C unit tests, and the inputs that fuzzing kept, whose core has smaller
 sizes. A condition is covered if two runs of its decision with the same core differ in it alone, of what was
@@ -23,7 +23,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/mcdc"
 CORE = ROOT / "firmware/bslam"
 CORPUS = ROOT / "tests/fuzz/corpus"

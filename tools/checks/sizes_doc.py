@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, QEMU, ROOT, emulator_of, qemu_machines
-from check_image import CallGraph, output_of, read_frames, read_functions
-from markdown import Row, table
-from run_image import run_image
-from sizes import instance_bytes
-from training.render_set import RIGS, camera_of, render_world
+from tools.checks.check_image import CallGraph, output_of, read_frames, read_functions
+from tools.checks.markdown import Row, table
+from tools.checks.sizes import instance_bytes
+from tools.proofs.run_image import run_image
+from tools.training.render_set import RIGS, camera_of, render_world
 
 FILE = ROOT / "docs" / "SIZES.md"
 TOLERANCE = 0.02
@@ -254,7 +254,7 @@ stm32f405 learns looks, stm32f405_seeing has the front end for one QVGA camera, 
 ## Stack
 
 The longest path from a call on, bytes, from the linked image: the compiler's frames along the call graph \
-(tools/check_image.py).
+(tools/checks/check_image.py).
 
 {table(code_heads(STEP_FUNCTIONS), stack_rows("cost", STEP_FUNCTIONS))}
 {table(code_heads(VISION_FUNCTIONS), stack_rows("cost_vision", VISION_FUNCTIONS))}
@@ -274,9 +274,8 @@ frame of 6 beacons, 5 of 20; firmware/app/cost_smoother.c.
 {table(("", "beacons", "instructions", f"of {CORE_HZ // 1_000_000} million a second"), smoother_rows())}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
 world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
-`.venv/bin/python tools/profile_image.py cost_vision`. A frame costs as much as it shows: of other worlds \
-`--worlds 7000:7020 --frames 8` tells (EXPERIMENTS.md).
-
+`.venv/bin/python -m tools.bench.profile_image cost_vision`. A frame costs as much as it shows: of other \
+worlds `--worlds 7000:7020 --frames 8` tells.
 
 {table(("lens", *COST_BOARDS), vision_rows(seeing))}
 ## A second on a Cortex-M4F

@@ -14,14 +14,10 @@ stand within a metre of the true ones are laid on these first, as a robot that g
 frame. A frame is that of one camera. What is not near in the map's frame, five seconds after two beacons, is
 told with what there was to go by.
 
-References say what the restart itself loses. With --association known whoever is seen is told, in the first
-drive and after power-on; with --kept-after N the first drive is shorter. With --start told the robot is told
-at power-on exactly where it stands in the map's frame, with --start running it never was switched off:
-whoever has to find itself knows less than either. Takes drives as `bslam tables --sensor camera` keeps
-them (out/camera; rendered if they are not there, a minute each), --jobs drives at a time:
+Takes drives as `bslam tables --sensor camera` keeps them (out/camera; rendered if they are not there, a
+minute each), --jobs drives at a time:
 
-    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --jobs 2
-    .venv/bin/python tools/measure_restart.py --seeds 1000:1020 --association known --start told
+    python -m tools.proofs.camera_restart --seeds 1000:1020 --jobs 2
 """
 
 from __future__ import annotations
@@ -29,39 +25,36 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.builds import SIZE_CLASSES
-from bslam.core.slam import Slam
+from bslam.commands.arguments import CAMERA_STORE, seeds_range
 from bslam.experiment.align import Rigid, fit_rigid
 from bslam.experiment.camera import CameraStore, camera_log
 from bslam.experiment.metrics import map_pairs
-from bslam.experiment.options import Number, RunOptions
-from bslam.experiment.runner import SlamFactory, run_log, uses_looks
+from bslam.experiment.options import RunOptions
+from bslam.experiment.runner import run_log
 from bslam.experiment.trace import Trace
 from bslam.experiment.truth import truth_at
 from bslam.log import Log, Sightings
 from bslam.maps.blob import SUFFIX
 from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
-from camera_drives import arguments
 
+SCENARIO, RIG, SIGMA_MPS = "paper_room", "three60", 0.6
+KEPT_AFTER = 3000  # steps
 SWITCHED_ON_AT = (3200, 3800, 4400)  # steps
 DRIVEN_US = 5_000_000
 NEAR_M, ELSEWHERE_M = 0.2, 1.0
 NEEDED = 2  # beacons of the map in one frame
 OUTCOMES = ("near", "off", "elsewhere", "lost")
 SINCE = ("power-on", "two beacons in view")
-STARTS = ("lost", "told", "running")
-TOLD_SD_M, TOLD_SD_RAD = 0.01, 0.01
 
 
 @dataclass(frozen=True)
@@ -148,9 +141,9 @@ class Kept:
     text: str
 
 
-def keep(log: Log, options: RunOptions, kept_after: int, folder: Path) -> Kept:
+def keep(log: Log, options: RunOptions, folder: Path) -> Kept:
     """Keeps a map of the first steps of a drive."""
-    start = part(log, 0, kept_after)
+    start = part(log, 0, KEPT_AFTER)
     kept = run_log(start, options)
     assert kept.kept_map is not None
     path = folder / f"kept{SUFFIX}"
@@ -163,35 +156,14 @@ def keep(log: Log, options: RunOptions, kept_after: int, folder: Path) -> Kept:
     return Kept(path, fit_rigid(mapped_m[right], true_m[right]), mapped, text)
 
 
-def restarts(log: Log, options: RunOptions, kept: Kept, start: str) -> list[Restart]:
-    """Each robot that is switched on in a kept map. start: one of STARTS."""
-    if start == "running":
-        losses = _Losses()
-        trace = run_log(log, options, watcher=losses)
-        return [_restart(part(log, first, None), trace, losses, kept) for first in SWITCHED_ON_AT]
+def restarts(log: Log, options: RunOptions, kept: Kept) -> list[Restart]:
+    """Each robot that is switched on in a kept map."""
     options = replace(options, kept_map=str(kept.path))
     robots = []
     for first in SWITCHED_ON_AT:
         rest, losses = part(log, first, None), _Losses()
-        make = _told(rest, options, kept) if start == "told" else None
-        robots.append(_restart(rest, run_log(rest, options, make, losses), losses, kept))
+        robots.append(_restart(rest, run_log(rest, options, watcher=losses), losses, kept))
     return robots
-
-
-def _told(log: Log, options: RunOptions, kept: Kept) -> SlamFactory:
-    """Makes a robot that is told where it is switched on in the kept map."""
-    assert log.truth is not None
-    truth = truth_at(log.truth, log.odometry.time_us[:1])[0]
-    x_m, y_m, theta_rad = kept.to_truth.inverse().poses(truth)[0].tolist()
-
-    def make(params: Mapping[str, Number], beacons: int) -> Slam:
-        most = min(beacons, SIZE_CLASSES[-1])
-        slam = Slam(params, beacons_max=most, looks=uses_looks(options), seeds=log.seeds, recovery=True)
-        slam.load_map(kept.path.read_bytes())
-        slam.set_pose(x_m, y_m, theta_rad, TOLD_SD_M, TOLD_SD_RAD)
-        return slam
-
-    return make
 
 
 def _restart(log: Log, trace: Trace, losses: _Losses, kept: Kept) -> Restart:
@@ -211,33 +183,29 @@ def _restart(log: Log, trace: Trace, losses: _Losses, kept: Kept) -> Restart:
     return Restart(time_us, lost, error_m, aligned_m, power_us, view_us, views, kept.text)
 
 
-def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--association", choices=("svm", "known"), default="svm", help="default: svm")
-    parser.add_argument("--start", choices=STARTS, default="lost", help="default: lost")
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument(
-        "--kept-after",
-        type=int,
-        choices=range(1, SWITCHED_ON_AT[0]),
-        default=3000,
-        metavar="STEPS",
-        help=f"when the map is kept, before {SWITCHED_ON_AT[0]} (default: 3000)",
+        "--seeds", type=seeds_range, default=range(1000, 1020), metavar="A:B", help="default: 1000:1020"
     )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="drives at a time (default: 1)")
+    return parser.parse_args()
 
 
 Counts = dict[tuple[str, bool], Counter[str]]
 
 
-def count_drive(args: argparse.Namespace, seed: int) -> tuple[Counts, list[str]]:
+def count_drive(seed: int) -> tuple[Counts, list[str]]:
     """The outcomes of one drive's robots, and a line about each that is not near."""
-    scenario, rig, store = load_scenario(args.scenario), load_rig(args.rig), CameraStore(args.store)
-    options = RunOptions(association=args.association, sigma_mps=args.sigma, recovery="carried")
-    log = camera_log(scenario, seed, args.sigma, None, rig, store)
+    options = RunOptions(association="svm", sigma_mps=SIGMA_MPS, recovery="carried")
+    log = camera_log(load_scenario(SCENARIO), seed, SIGMA_MPS, None, load_rig(RIG), CameraStore(CAMERA_STORE))
     counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
     lines = []
     with tempfile.TemporaryDirectory() as folder:
-        kept = keep(log, options, args.kept_after, Path(folder))
-        robots = restarts(log, options, kept, args.start)
+        kept = keep(log, options, Path(folder))
+        robots = restarts(log, options, kept)
     for first, robot in zip(SWITCHED_ON_AT, robots, strict=True):
         for since, since_us in zip(SINCE, (robot.power_us, robot.view_us), strict=True):
             for aligned in (False, True):
@@ -250,17 +218,15 @@ def count_drive(args: argparse.Namespace, seed: int) -> tuple[Counts, list[str]]
 
 def main() -> int:
     """Measures and prints."""
-    args = arguments(__doc__, range(1000, 1020), _add_arguments)
+    args = _arguments()
     counts: Counts = {(since, aligned): Counter() for since in SINCE for aligned in (False, True)}
     with ProcessPoolExecutor(args.jobs) as pool:
-        drives = pool.map(partial(count_drive, args), args.seeds)
+        drives = pool.map(count_drive, args.seeds)
         for number, (of_drive, lines) in enumerate(drives, 1):
             for key, count in of_drive.items():
                 counts[key] += count
             print(*lines, f"{number} of {len(args.seeds)} drives", sep="\n", flush=True)
-    rig = load_rig(args.rig)
-    seeds = f"seeds {args.seeds.start}:{args.seeds.stop}"
-    print(f"{args.scenario}, {rig.name}, {seeds}, sigma {args.sigma}, {args.association}, {args.start}")
+    print(f"{SCENARIO}, {RIG}, seeds {args.seeds.start}:{args.seeds.stop}, sigma {SIGMA_MPS}")
     for (since, aligned), count in counts.items():
         figures = ", ".join(f"{count[one]} {one}" for one in OUTCOMES)
         frame = "in the map's frame" if aligned else "against the truth"

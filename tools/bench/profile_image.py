@@ -1,9 +1,9 @@
 """Prints which functions of a firmware program execute how many instructions on an emulated board.
 
 Examples:
-    tools/profile_image.py cost
-    tools/profile_image.py cost_vision --lens wide
-    tools/profile_image.py cost_vision --worlds 7000:7020 --frames 8
+    python -m tools.bench.profile_image cost
+    python -m tools.bench.profile_image cost_vision --lens wide
+    python -m tools.bench.profile_image cost_vision --worlds 7000:7020 --frames 8
 
 A program of firmware/app that ends by itself: cost, cost_vision, selftest. cost_vision is given a walk
 through each of some rendered worlds, and what its frames cost by its own count is printed besides: the
@@ -22,10 +22,10 @@ from pathlib import Path
 
 from bslam.commands.arguments import seeds_range
 from bslam.target.lines import BUILD_DIR, ROOT
-from check_image import output_of
-from run_image import run_image
-from sizes_doc import FRAMES, INSTRUCTIONS_A_TICK, PIXELS, WORLD_SEED, picture_loader
-from training.render_set import RIGS
+from tools.checks.check_image import output_of
+from tools.checks.sizes_doc import FRAMES, INSTRUCTIONS_A_TICK, PIXELS, WORLD_SEED, picture_loader
+from tools.proofs.run_image import run_image
+from tools.training.render_set import RIGS
 
 PLUGIN = BUILD_DIR / "qemu_profile.so"
 FRAMES_MAX = 12

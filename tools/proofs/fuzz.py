@@ -1,13 +1,13 @@
 """Runs the fuzz targets in slices, keeps a ledger of what ran, prints it against the goals.
 
 Examples:
-    tools/fuzz.py                          until every goal is met, in slices of five minutes at most
-    tools/fuzz.py --jobs 2                 two slices at a time
-    tools/fuzz.py --seconds 120 --targets map api
-    tools/fuzz.py --each 60                a minute of each target, whatever ran before, then as above
-    tools/fuzz.py --table                  what ran so far
-    tools/fuzz.py --keep                   writes the smallest inputs that reach what all reach to
-                                           tests/fuzz/corpus
+    python -m tools.proofs.fuzz                  until every goal is met, in slices of five minutes at most
+    python -m tools.proofs.fuzz --jobs 2         two slices at a time
+    python -m tools.proofs.fuzz --seconds 120 --targets map api
+    python -m tools.proofs.fuzz --each 60        a minute of each target, whatever ran before, then as above
+    python -m tools.proofs.fuzz --table          what ran so far
+    python -m tools.proofs.fuzz --keep           writes the smallest inputs that reach what all reach
+                                                 to tests/fuzz/corpus
 
 `make fuzz` builds the programs and calls this. The ledger (tests/fuzz/ledger.csv) has a line a slice: when,
 of which commit and sources, target, libFuzzer's seed, executions, seconds, crashes. It is kept with the
@@ -30,7 +30,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build/fuzz"
 BUILT_OF = PROGRAMS / "sources"
 CORPUS = ROOT / "tests/fuzz/corpus"

@@ -1,10 +1,10 @@
 """Runs the long proofs and prints what each reached beside its goal.
 
 Examples:
-    tools/prove.py                        all of them: an hour and a half
-    tools/prove.py --list                 what there is, how long each takes, what is proved already
-    tools/prove.py --only soak mcdc       some
-    tools/prove.py --quick                a little of each in half an hour: whether all of it runs here
+    python -m tools.proofs.prove                    all of them: an hour and a half
+    python -m tools.proofs.prove --list             what there is, how long each takes, what is proved already
+    python -m tools.proofs.prove --only soak mcdc   some
+    python -m tools.proofs.prove --quick            a little of each in half an hour: whether all of it runs
 
 What a proof prints is in out/proof/NAME.txt, what came of it in out/proof/NAME.json: a proof that ended on
 the sources as they are is not run again (--again does), so that one that was stopped goes on where it was.
@@ -31,14 +31,14 @@ from typing import NamedTuple
 
 from bslam.experiment.output import write_atomically
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out/proof"
 PYTHON = str(ROOT / ".venv/bin/python")
 BSLAM = str(ROOT / ".venv/bin/bslam")
 THOROUGH = MappingProxyType({"BSLAM_THOROUGH": "1"})
 LAST_LINE = r"([^\n]+)\n?\Z"
 SOURCES = ("firmware", "host_sim", "tests", "tools", "mk")
-SUFFIXES = frozenset((".c", ".h", ".py", ".mk", ".toml", ".sh", ".bin", ".npz"))
+SUFFIXES = frozenset((".c", ".h", ".py", ".mk", ".toml", ".sh", ".bin", ".npy", ".npz"))
 SAY_EVERY_S = 60.0
 CORES = 2
 UNMEASURED = "not measured"
@@ -70,6 +70,11 @@ class Result(NamedTuple):
 # --- What is proved -----------------------------------------------------------------------------------------
 
 
+def tool(name: str) -> list[str]:
+    """The command of a script beside this one."""
+    return [PYTHON, "-m", f"tools.proofs.{name}"]
+
+
 def own_proofs(quick: bool) -> list[Proof]:
     """Of the core alone."""
     slots, guard = "build/unit/float/bin/store/test_slots", "build/unit/float/bin/store/test_guard"
@@ -83,12 +88,12 @@ def own_proofs(quick: bool) -> list[Proof]:
     less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []
     # The ledger tells of executions elsewhere, too: of each target some are made here.
     how_long = ["--seconds", "60"] if quick else ["--each", "30"]
-    fuzzing = [PYTHON, "tools/fuzz.py", "--jobs", str(CORES), *how_long]
+    fuzzing = [*tool("fuzz"), "--jobs", str(CORES), *how_long]
     return [
         Proof("cuts", *cuts, [slots], 1, (slots,), depth),
         Proof("flips", *flips, [guard], 0.1, (guard,), depth),
-        Proof("soak", *soak, [PYTHON, "tools/soak.py", *less_soak], 0.2 if quick else 4, soaks),
-        Proof("mcdc", *mcdc, [PYTHON, "tools/mcdc.py"], 2, ("mcdc-programs",)),
+        Proof("soak", *soak, [*tool("soak"), *less_soak], 0.2 if quick else 4, soaks),
+        Proof("mcdc", *mcdc, tool("mcdc"), 2, ("mcdc-programs",)),
         Proof("fuzz", *fuzz, fuzzing, 1 if quick else 12, ("fuzz-programs",), alone=True),
     ]
 
@@ -105,7 +110,7 @@ def fault_proofs(seeds: int) -> list[Proof]:
     rows = ("fault rows as promised", "all", r"(\d+ of \d+) as promised")
     found, near = "2 s, 0.3 m 5 s later, all", "0.2 m after 5 s, all"
     third = max(1, seeds // 3)
-    cameras = [PYTHON, "tools/measure_restart.py", "--seeds", f"1000:{1000 + third}", "--jobs", str(CORES)]
+    cameras = [*tool("camera_restart"), "--seeds", f"1000:{1000 + third}", "--jobs", str(CORES)]
     in_frame = r"5 s after (two.*in the map's frame.*)"
     camera_row = (f"the same, camera in, {3 * third} restarts", "0.2 m, 59 of 60", in_frame)
     return [
@@ -120,12 +125,12 @@ def fault_proofs(seeds: int) -> list[Proof]:
 def other_proofs(quick: bool) -> list[Proof]:
     """Of the whole project."""
     steps, runs = (200, 30) if quick else (5000, 1000)
-    bits = [PYTHON, "tools/same_bits.py", "--steps", str(steps), "--jobs", str(CORES)]
+    bits = [*tool("same_bits"), "--steps", str(steps), "--jobs", str(CORES)]
     wide = [*bits, "--rig", "wide180"]
     smoothed = [*bits, "--association", "known", "--observation", "direction", "--filter", "smoother"]
-    sweep = [PYTHON, "tools/kill_sweep.py", "--runs", str(runs)]
+    sweep = [*tool("kill_sweep"), "--runs", str(runs)]
     minutes = 1 if quick else 10
-    attack = [PYTHON, "tools/attack_link.py", "--minutes", str(minutes)]
+    attack = [*tool("attack_link"), "--minutes", str(minutes)]
     cores = ["make", f"--jobs={CORES}", "firmware-all"]
     rows = (
         ("test", "make test", "passes", r"make test: (.*)", ["make", "test"], 10),

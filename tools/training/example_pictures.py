@@ -1,8 +1,8 @@
-"""Takes pictures of a rendered room and labels them: to try tools/train_beacons.py without a camera.
+"""Takes pictures of a rendered room and labels them: to try tools/training/train_beacons.py without a camera.
 
 Writes --count pictures and labels.csv into FOLDER. Every beacon that is whole and well seen has a box and a
 name of its own, unless it is in one picture only. Another --seed takes other pictures of that room.
-`.venv/bin/python tools/example_pictures.py FOLDER [--world 1] [--count 20] [--seed 0]`
+`.venv/bin/python -m tools.training.example_pictures FOLDER [--world 1] [--count 20] [--seed 0]`
 """
 
 import argparse
@@ -16,7 +16,7 @@ from PIL import Image
 
 from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, free_pose, make_world
-from training.folder import COLUMNS
+from tools.training.folder import COLUMNS
 
 BETWEEN_S = 10.0  # light and white balance change from picture to picture
 SLANT_RAD_MAX = math.radians(75.0)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from check_symbols import UNWANTED_CALLS
+from tools.checks.check_symbols import UNWANTED_CALLS
 
 CALLED_BY_POINTER = (
     (r"session_", r"(apply|answer)_"),
@@ -140,9 +140,7 @@ class CallGraph:
             if re.match(callers, caller):
                 return {address for address, one in self._functions.items() if re.match(callees, one.name)}
         if not caller.startswith("__"):
-            self.faults.append(
-                f"{caller} calls through a pointer: whom? tools/check_image.py, CALLED_BY_POINTER"
-            )
+            self.faults.append(f"{caller} calls through a pointer: whom? check_image.py, CALLED_BY_POINTER")
         return set()
 
     def frame(self, name: str) -> int:

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from training.render_set import RIGS, camera_of, render_world
+from tools.training.render_set import RIGS, camera_of, render_world
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "bench"
 WIDTHS = (320, 160)
 PER_PIXEL_MAX = 32
