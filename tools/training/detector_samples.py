@@ -30,7 +30,7 @@ CLASSES = (
     BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02, 0.0, 0.0, 0.8, 1.0, 0.03),
 )
 """In the order of KINDS: whole heights, middling depths, where their upper sides are, how wide they are, and
-what their looks make of a distance in training worlds (tools/measure_outline.py --style train). A radiator's
+what their looks make of a distance in training worlds. A radiator's
 height and a sign's are what is outlined in the mean: the lower side of the one is often found at the skirting
 or the floor, and a pale rim of the other is taken for the wall. The last:
 by how much the distances of one thing are off together over a drive (paper_room, drives 0:8): cabinets are
