@@ -60,7 +60,7 @@ CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(cal
 
 .PHONY: library-$(1)
 library-$(1): build/$(1)/libbslam.a
-	@$$(PYTHON) tools/check_symbols.py --nm $(call TOOLS_FOR,$(1))nm $$<
+	@$$(PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$<
 	@$(call TOOLS_FOR,$(1))size --totals $$< | \
 	    awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
 
@@ -82,6 +82,6 @@ firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the imag
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons
-	@$(PYTHON) tools/sizes.py --beacons 6 20 50 --learner 6 32 64 \
+	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 --learner 6 32 64 \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm
