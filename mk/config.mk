@@ -1,7 +1,14 @@
-# The C core: its files, and the flags every build of it shares.
+# The C libraries, their files, and the flags every build of them shares. base is what both stand on; bslam is
+# the estimator, vision the way from images to sightings: neither needs the other. link is the serial protocol.
 
-CORE_SOURCES := $(sort $(wildcard firmware/bslam/*.c firmware/bslam/*/*.c))
-CORE_HEADERS := $(sort $(wildcard firmware/bslam/*.h firmware/bslam/*/*.h))
+library_files = $(sort $(foreach folder,$(1),$(wildcard firmware/$(folder)/*.$(2) firmware/$(folder)/*/*.$(2))))
+BASE_SOURCES := $(call library_files,base,c)
+LIBRARIES := bslam vision link
+LIBRARY_SOURCES_bslam := $(BASE_SOURCES) $(call library_files,bslam,c)
+LIBRARY_SOURCES_vision := $(BASE_SOURCES) $(call library_files,vision,c)
+LIBRARY_SOURCES_link := $(BASE_SOURCES) $(call library_files,link,c)
+CORE_SOURCES := $(sort $(foreach library,$(LIBRARIES),$(LIBRARY_SOURCES_$(library))))
+CORE_HEADERS := $(call library_files,base bslam vision link,h)
 
 # Contraction (fused multiply-add) would change the last bit from one machine to the next.
 C_STANDARD := -std=c11 -ffp-contract=off

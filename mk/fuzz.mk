@@ -1,11 +1,11 @@
-# Fuzzing: tests/fuzz/<target>.c, one program each, linked with the core and the application in small sizes
+# Fuzzing: tests/fuzz/<target>.c, one program each, linked with the core and the robot in small sizes
 # (tests/fuzz/sizes.h). clang's libFuzzer makes inputs up (`make fuzz`); `make test` replays those that are
 # kept in tests/fuzz/corpus/<target>.bin, compiled with the compiler of the other tests.
 
 FUZZ_TARGETS := link map model image api drive session
 FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c
-FUZZ_APP := $(APP_SOURCES)
-FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_APP) $(FUZZ_HELPERS)
+FUZZ_ROBOT := $(ROBOT_SOURCES)
+FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_ROBOT) $(FUZZ_HELPERS)
 FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"sizes.h"' -DSESSION_VISION=1 -DSESSION_TURNS=1 \
     -DSESSION_MAP_BYTES=4096
 FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) $(FUZZ_DEFINES) $(SANITIZE) -g -MMD -MP

@@ -14,8 +14,8 @@ HOST_SIZES := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSIO
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records carried stored seeing \
-    turning text watch)
+ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,session messages own_sensors records map_transfer param_store \
+    camera_input gyro_wait health) firmware/bench/text.c
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -35,7 +35,9 @@ define board_rules
 BOARD_CC_$(1) := $(call TOOLS_FOR,$(BOARD_CORE_$(1)))gcc $(call FLAGS_FOR,$(BOARD_CORE_$(1)))
 BOARD_COMPILE_$(1) := $$(BOARD_CC_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT)
-BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(CORE_SOURCES) $(APP_SOURCES) $(BOARD_SOURCES_$(1)))
+BOARD_LIBRARIES_$(1) := bslam link $(if $(findstring SESSION_VISION=1,$(BOARD_FLAGS_$(1))),vision)
+BOARD_OBJECTS_$(1) := $$(patsubst %.c,build/$(1)/%.o,$(ROBOT_SOURCES) $(BOARD_SOURCES_$(1)) \
+    $$(sort $$(foreach library,$$(BOARD_LIBRARIES_$(1)),$$(LIBRARY_SOURCES_$$(library)))))
 BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
 BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
 
@@ -43,7 +45,9 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@mkdir -p $$(@D)
 	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
-build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
+build/$(1)/robot.elf: build/$(1)/firmware/robot/main.o
+$$(filter-out build/$(1)/robot.elf,$$(BOARD_ALL_$(1):%=build/$(1)/%.elf)): build/$(1)/%.elf: build/$(1)/firmware/bench/%.o
+$$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
     firmware/port/sections.ld tools/checks/check_image.py
 	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
 	    -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
@@ -52,20 +56,20 @@ build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/po
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 
--include $$(BOARD_OBJECTS_$(1):.o=.d) $$(BOARD_ALL_$(1):%=build/$(1)/firmware/app/%.d)
+-include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
 # An image whose stack is too small, for `bslam faults`: tools/checks/check_image.py refuses it.
 build/microbit/shallow.elf: build/microbit/robot.elf
 	@$(BOARD_CC_microbit) $(IMAGE_LINK) $(call LIBC_FOR,m0plus) -Wl,--defsym=STACK=512 \
-	    -T firmware/port/microbit/memory.ld build/microbit/firmware/app/robot.o $(BOARD_OBJECTS_microbit) \
+	    -T firmware/port/microbit/memory.ld build/microbit/firmware/robot/main.o $(BOARD_OBJECTS_microbit) \
 	    -lm -o $@
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
 HOST_ROBOT_FLAGS := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536
-HOST_ROBOT_SOURCES := $(APP_SOURCES) firmware/app/robot.c \
+HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
 

@@ -1,12 +1,12 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
-C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch] \
+C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/unit/*/*/*.[ch] tests/bench/*.[ch] \
     tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] tests/soak/*.c)
-APP_FILES := $(wildcard firmware/app/*.[ch] firmware/port/*.h firmware/port/*/*.[ch])
+ROBOT_FILES := $(wildcard firmware/robot/*.[ch] firmware/bench/*.[ch] firmware/port/*.h firmware/port/*/*.[ch])
 CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
 CAMERA_HEADERS := $(wildcard host_sim/bslam/world/camera/*.h)
 C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES) $(CAMERA_SOURCES) $(CAMERA_HEADERS) \
-    $(APP_FILES))
+    $(ROBOT_FILES))
 PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
 
 LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \
@@ -43,7 +43,7 @@ lint-layers:
 	@$(PYTHON) -m tools.checks.check_layers
 
 lint-complexity:
-	@$(PYTHON) -m tools.checks.check_complexity $(CORE_SOURCES) $(CORE_HEADERS) $(APP_FILES) $(PYTHON_DIRS)
+	@$(PYTHON) -m tools.checks.check_complexity $(CORE_SOURCES) $(CORE_HEADERS) $(ROBOT_FILES) $(PYTHON_DIRS)
 
 lint-version:
 	@$(PYTHON) -m tools.checks.check_version

@@ -38,13 +38,13 @@ MCDC_FOLDER_unit := unit
 MCDC_FOLDER_replay := fuzz
 $(foreach account,unit replay,$(eval $(call mcdc_rules,$(account))))
 
-build/mcdc/replay/library.a: $(patsubst %.c,build/mcdc/replay/%.o,$(FUZZ_APP) $(FUZZ_HELPERS))
+build/mcdc/replay/library.a: $(patsubst %.c,build/mcdc/replay/%.o,$(FUZZ_ROBOT) $(FUZZ_HELPERS))
 	@rm -f $@ && ar rcs $@ $^
 
 -include $(MCDC_HELPERS_unit:.o=.d) $(UNIT_SOURCES:%.c=build/mcdc/unit/%.d)
--include $(patsubst %.c,build/mcdc/replay/%.d,$(FUZZ_APP) $(FUZZ_HELPERS) $(FUZZ_TARGETS:%=tests/fuzz/%.c))
+-include $(patsubst %.c,build/mcdc/replay/%.d,$(FUZZ_ROBOT) $(FUZZ_HELPERS) $(FUZZ_TARGETS:%=tests/fuzz/%.c))
 
-# What is listed: MCDC="--list vision/lens.c".
+# What is listed: MCDC="--list vision/camera/lens.c".
 MCDC :=
 
 .PHONY: mcdc-programs mcdc

@@ -6,7 +6,7 @@ RTOS_DIR := build/$(RTOS_BOARD)/rtos
 RTOS_PORT := $(FREERTOS_KERNEL)/portable/GCC/ARM_CM4F
 RTOS_KERNEL := $(addprefix $(FREERTOS_KERNEL)/,tasks.c queue.c list.c) $(RTOS_PORT)/port.c
 RTOS_OBJECTS := $(patsubst %.c,$(RTOS_DIR)/%.o,$(notdir $(RTOS_KERNEL))) $(RTOS_DIR)/robot_rtos.o
-RTOS_INCLUDES := -Ifirmware/app/rtos -isystem $(FREERTOS_KERNEL)/include -isystem $(RTOS_PORT)
+RTOS_INCLUDES := -Ifirmware/robot/rtos -isystem $(FREERTOS_KERNEL)/include -isystem $(RTOS_PORT)
 RTOS_IMAGE := build/$(RTOS_BOARD)/robot_rtos.elf
 
 .PHONY: rtos
@@ -22,7 +22,7 @@ else
 rtos: $(RTOS_IMAGE)
 endif
 
-$(RTOS_DIR)/robot_rtos.o: firmware/app/rtos/robot_rtos.c
+$(RTOS_DIR)/robot_rtos.o: firmware/robot/rtos/robot_rtos.c
 	@mkdir -p $(@D)
 	@$(BOARD_COMPILE_$(RTOS_BOARD)) $(RTOS_INCLUDES) -MMD -MP -c $< -o $@
 

@@ -1,7 +1,11 @@
-# C unit tests: tests/unit/<layer>/test_<module>.c mirrors firmware/bslam/<layer>/<module>.c. Each is a CMocka
-# program linked with the whole core, built under sanitizers twice: float (the target), double (the twin).
+# C unit tests: tests/unit/<path>/test_<module>.c mirrors firmware/<path>/<module>.c. Each is a CMocka program
+# linked with its own library and no other, built under sanitizers twice: float (the target), double (the twin).
 
-UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c))
+UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
+# The library of a test, by its first folder; what a test of all of them links.
+UNIT_LIBRARY_base := bslam
+UNIT_LIBRARY_port := bslam
+unit_library = $(or $(UNIT_LIBRARY_$(1)),$(1))
 
 # Helpers that several tests share (tests/unit/*.c); linked to every test.
 UNIT_HELPERS := $(sort $(wildcard tests/unit/*.c))
@@ -27,7 +31,7 @@ UNIT_DIR_$(1) := build/unit/$(1)
 UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(SANITIZE) -MMD -MP
 
 UNIT_CORE_$(1) := $$(CORE_SOURCES:%.c=build/unit/$(1)/%.o)
-UNIT_HELPERS_$(1) := $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.o)
+UNIT_ARCHIVES_$(1) := $$(LIBRARIES:%=build/unit/$(1)/lib%.a)
 UNIT_PROGRAMS_$(1) := $$(UNIT_SOURCES:tests/unit/%.c=build/unit/$(1)/bin/%)
 
 .PHONY: unit-$(1)
@@ -41,10 +45,18 @@ build/unit/$(1)/tests/%.o: tests/%.c mk/config.mk mk/unit.mk
 	@mkdir -p $$(@D)
 	@$$(UNIT_COMPILE_$(1)) $$(UNIT_WARNINGS) -Itests/unit $$(CMOCKA_CFLAGS) -c $$< -o $$@
 
-$$(UNIT_PROGRAMS_$(1)): build/unit/$(1)/bin/%: build/unit/$(1)/tests/unit/%.o \
-    $$(UNIT_HELPERS_$(1)) $$(UNIT_CORE_$(1))
+# Flat archives: of two files of one name in a library one would be missing, and nothing would link.
+build/unit/$(1)/helpers.a: $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.o)
+	@rm -f $$@ && ar rcs $$@ $$^
+
+$$(UNIT_ARCHIVES_$(1)): build/unit/$(1)/lib%.a: $$(UNIT_CORE_$(1))
+	@rm -f $$@ && ar rcs $$@ $$(LIBRARY_SOURCES_$$*:%.c=build/unit/$(1)/%.o)
+
+$$(UNIT_PROGRAMS_$(1)): build/unit/$(1)/bin/%: build/unit/$(1)/tests/unit/%.o build/unit/$(1)/helpers.a \
+    $$(UNIT_ARCHIVES_$(1))
 	@mkdir -p $$(@D)
-	@$$(CC) $$(SANITIZE) $$^ $$(CMOCKA_LIBS) -lm -o $$@
+	@$$(CC) $$(SANITIZE) $$< build/unit/$(1)/helpers.a \
+	    build/unit/$(1)/lib$$(call unit_library,$$(firstword $$(subst /, ,$$*))).a $$(CMOCKA_LIBS) -lm -o $$@
 
 # One line for a program that passes, everything it wrote for one that fails.
 .PHONY: $$(UNIT_PROGRAMS_$(1):%=%.run)
@@ -52,7 +64,7 @@ $$(UNIT_PROGRAMS_$(1):%=%.run): %.run: %
 	@if $$< >$$<.log 2>&1; then sed -n 's|^\[  PASSED  \]|unit $(1) $$(notdir $$<):|p' $$<.log; \
 	 else cat $$<.log >&2; echo "unit $(1) $$(notdir $$<): FAILED" >&2; exit 1; fi
 
--include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_HELPERS_$(1):.o=.d)
+-include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.d)
 -include $$(UNIT_SOURCES:%.c=build/unit/$(1)/%.d)
 endef
 $(foreach real,$(UNIT_REALS),$(eval $(call unit_rules,$(real))))

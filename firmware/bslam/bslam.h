@@ -1,6 +1,6 @@
 /// bslam: simultaneous localisation and mapping with beacons, in fixed memory.
 ///
-/// Start at slam/slam.h. Sizes: base/config.h. Parameters: base/params.h. The vision front end, which a robot
+/// Start at slam/slam.h. Sizes: config.h. Parameters: params.h. The vision front end, which a robot
 /// with a detector of its own does without, is apart: vision/vision.h.
 #ifndef BSLAM_H
 #define BSLAM_H
@@ -9,11 +9,11 @@
 #define BSLAM_VERSION_MINOR 1
 #define BSLAM_VERSION_PATCH 0
 
-#include "bslam/link/parser.h"
+#include "link/parser.h"
 #include "bslam/recovery/recovery.h"
 #include "bslam/slam/fingerprint.h"
 #include "bslam/store/guard.h"
 #include "bslam/store/slots.h"
-#include "bslam/svm/learner.h"
+#include "bslam/appearance/learner.h"
 
 #endif

@@ -1,6 +1,6 @@
 """What a run says at one moment, for whoever watches it.
 
-Data only, like a log: experiment makes moments while it feeds the filter, view shows them. Everything is in
+Data only, like a log: runs make moments while it feeds the filter, view shows them. Everything is in
 the frame of the map, whose origin is the start pose: x forward, y left, m, rad.
 """
 

@@ -5,13 +5,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bslam/svm/learner.h"
+#include "bslam/appearance/learner.h"
 
 // The last sightings are worked off piece by piece.
 #define PIECEWISE 5
 
 typedef struct record {
-    int32_t machine;
+    int32_t classifier;
     float signature[BSLAM_SAMPLE_FEATURES];
 } record_t;
 
@@ -30,7 +30,7 @@ static void fail(const char *what)
 
 __attribute__((noinline)) void measured_show(const record_t *record)
 {
-    if (bslam_learner_show(&learner, record->machine, record->signature) != BSLAM_OK) {
+    if (bslam_learner_show(&learner, record->classifier, record->signature) != BSLAM_OK) {
         fail("a signature was refused");
     }
 }
@@ -59,8 +59,8 @@ static bool next(record_t *record)
 static void begin(record_t *record)
 {
     int32_t seed_count = 0;
-    int32_t machine;
-    while (next(record) && record->machine < 0 && seed_count < BSLAM_SEEDS_MAX) {
+    int32_t classifier;
+    while (next(record) && record->classifier < 0 && seed_count < BSLAM_SEEDS_MAX) {
         if (bslam_sample_encode(record->signature, &seeds[seed_count]) != BSLAM_OK) {
             fail("a seed was refused");
         }
@@ -70,7 +70,7 @@ static void begin(record_t *record)
         fail("the seeds were refused");
     }
     for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
-        if (bslam_learner_add(&learner, &machine) != BSLAM_OK) {
+        if (bslam_learner_add(&learner, &classifier) != BSLAM_OK) {
             fail("no room for a machine");
         }
     }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "bslam/bslam.h"
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 #define STEP_US 40000
 #define MEASURED_STEPS 60

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bslam/vision/vision.h"
+#include "vision/vision.h"
 #include "models/beacons.h"
 
 #define WIDTH_PX 320

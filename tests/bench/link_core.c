@@ -7,7 +7,7 @@ int main(void);
 static bslam_slam_t slam;
 static bslam_params_t params;
 #if WITH_LOOKS
-static bslam_looks_t looks;
+static bslam_appearance_t appearance;
 #endif
 static bslam_odometry_reading_t reading;
 static bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
@@ -41,9 +41,9 @@ int main(void)
     bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);
 #if WITH_LOOKS
     if (status == BSLAM_OK) {
-        status = bslam_looks_init(&looks, NULL, 0);
+        status = bslam_appearance_init(&appearance, NULL, 0);
     }
-    bslam_slam_attach_looks(&slam, &looks);
+    bslam_slam_attach_appearance(&slam, &appearance);
 #endif
     while (status == BSLAM_OK) {
         status = robot_step();

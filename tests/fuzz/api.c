@@ -12,7 +12,7 @@ enum { CALLS_MAX = 40, BLOB_MAX = 4096 };
 
 typedef struct robot {
     bslam_slam_t slam;
-    bslam_looks_t looks;
+    bslam_appearance_t appearance;
     bslam_recovery_t recovery;
 } robot_t;
 
@@ -140,7 +140,7 @@ static bslam_status_t call_init(fuzz_input_t *input)
     int bad_id;
     const bslam_status_t status = bslam_slam_init(&robot.slam, &params, &bad_id);
     if (status == BSLAM_OK) {
-        bslam_slam_attach_looks(&robot.slam, (fuzz_u8(input) & 1u) != 0 ? &robot.looks : NULL);
+        bslam_slam_attach_appearance(&robot.slam, (fuzz_u8(input) & 1u) != 0 ? &robot.appearance : NULL);
     }
     return status;
 }
@@ -208,7 +208,7 @@ static void start(fuzz_input_t *input)
         bslam_params_default(&params);
         params.learn_budget = 50;
         fuzz_require(bslam_slam_init(&fresh.slam, &params, &bad_id) == BSLAM_OK);
-        fuzz_require(bslam_looks_init(&fresh.looks, NULL, 0) == BSLAM_OK);
+        fuzz_require(bslam_appearance_init(&fresh.appearance, NULL, 0) == BSLAM_OK);
         bslam_recovery_init(&fresh.recovery);
         is_made = true;
     }
@@ -216,7 +216,7 @@ static void start(fuzz_input_t *input)
     memcpy(&robot, &fresh, sizeof robot);
     robot.slam.params.association = (int32_t)(choice % 5);
     robot.slam.params.filter = (int32_t)(choice / 5 % 2);
-    bslam_slam_attach_looks(&robot.slam, choice >= 128 ? &robot.looks : NULL);
+    bslam_slam_attach_appearance(&robot.slam, choice >= 128 ? &robot.appearance : NULL);
     blob_size = 0;
 }
 

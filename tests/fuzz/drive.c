@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 #include "bslam/recovery/recovery.h"
 
 enum { BEACONS = 5, FRAMES_MAX = 48, STEP_US = 40000 };
@@ -17,7 +17,7 @@ static const double places[BEACONS][2] = {{3, 1}, {4, -2}, {-2, 2}, {-3, -3}, {1
 /// What the pipeline lives in.
 typedef struct robot {
     bslam_slam_t slam;
-    bslam_looks_t looks;
+    bslam_appearance_t appearance;
     bslam_smoother_t smoother;
     bslam_recovery_t recovery;
 } robot_t;
@@ -132,9 +132,9 @@ static void drive(world_t *world, int frames, double v_mps, double omega_radps)
 {
     for (; frames > 0 && world->frames < FRAMES_MAX; frames--) {
         const double turn_rad = omega_radps * STEP_US * 1e-6;
-        const double way_m = v_mps * STEP_US * 1e-6;
-        world->x_m += way_m * cos(world->theta_rad + turn_rad / 2);
-        world->y_m += way_m * sin(world->theta_rad + turn_rad / 2);
+        const double travelled_m = v_mps * STEP_US * 1e-6;
+        world->x_m += travelled_m * cos(world->theta_rad + turn_rad / 2);
+        world->y_m += travelled_m * sin(world->theta_rad + turn_rad / 2);
         world->theta_rad += turn_rad;
         world->now_us += STEP_US;
         world->frames++;
@@ -207,12 +207,12 @@ static void prepare(robot_t *start, world_t *world, unsigned how)
         bslam_params_default(&params);
         params.association = (how & 1u) != 0 ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_KNOWN;
         params.filter = (how & 4u) != 0 ? BSLAM_FILTER_SMOOTHER : BSLAM_FILTER_INVARIANT;
-        params.learn_way_m = 0;
+        params.learn_travel_m = 0;
         params.learn_budget = 50;
-        params.confirm_way_m = 0;
+        params.confirm_travel_m = 0;
         fuzz_require(bslam_slam_init(&robot.slam, &params, &bad_id) == BSLAM_OK);
-        fuzz_require(bslam_looks_init(&robot.looks, NULL, 0) == BSLAM_OK);
-        bslam_slam_attach_looks(&robot.slam, (how & 1u) != 0 ? &robot.looks : NULL);
+        fuzz_require(bslam_appearance_init(&robot.appearance, NULL, 0) == BSLAM_OK);
+        bslam_slam_attach_appearance(&robot.slam, (how & 1u) != 0 ? &robot.appearance : NULL);
         bslam_slam_attach_smoother(&robot.slam, (how & 4u) != 0 ? &robot.smoother : NULL);
         bslam_recovery_init(&robot.recovery);
         *world = (world_t){.stretch = 1, .has_range = (how & 2u) == 0, .by_looks = (how & 1u) != 0};

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 /// The covariance is rounded: a number of it may be wrong by so much of the largest variance that the input
 /// has made so far, from which it came down. Below the other its square is 0 in float.
@@ -110,19 +110,19 @@ void fuzz_clear_unused(bslam_slam_t *slam)
 
 // ---- a map ------------------------------------------------------------------------------------------------
 
-void fuzz_make_map(bslam_slam_t *slam, bslam_looks_t *looks)
+void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
     bslam_params_t params;
     int bad_id;
     bslam_params_default(&params);
     params.association = BSLAM_ASSOCIATION_SVM;
-    params.learn_way_m = 0;
+    params.learn_travel_m = 0;
     params.left_speed_sd_mps = BSLAM_R(1e-3);
     params.right_speed_sd_mps = BSLAM_R(1e-3);
     fuzz_require(bslam_slam_init(slam, &params, &bad_id) == BSLAM_OK);
-    if (looks != NULL) {
-        fuzz_require(bslam_looks_init(looks, NULL, 0) == BSLAM_OK);
-        bslam_slam_attach_looks(slam, looks);
+    if (appearance != NULL) {
+        fuzz_require(bslam_appearance_init(appearance, NULL, 0) == BSLAM_OK);
+        bslam_slam_attach_appearance(slam, appearance);
     }
     for (int view = 1; view <= 8; view++) {
         const int64_t now_us = view * INT64_C(40000);

@@ -61,6 +61,6 @@ void fuzz_clear_unused(bslam_slam_t *slam);
 
 /// A pipeline that has a map of three beacons, one of them in direction only, and, where looks are given,
 /// machines that know them. Always the same.
-void fuzz_make_map(bslam_slam_t *slam, bslam_looks_t *looks);
+void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance);
 
 #endif

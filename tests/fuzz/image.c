@@ -2,8 +2,8 @@
 // no picture makes a candidate that is not finite.
 #include <string.h>
 
-#include "bslam/math/trig.h"
-#include "bslam/vision/turn.h"
+#include "base/trig.h"
+#include "vision/gyro/frame_rotation.h"
 
 #include "models/beacons.h"
 #include "picture.h"

@@ -4,8 +4,8 @@
 
 #include <string.h>
 
-#include "bslam/link/crc16.h"
-#include "bslam/link/parser.h"
+#include "link/crc16.h"
+#include "link/parser.h"
 
 enum { STREAM_MAX = 4096, PIECE_MAX = 200 };
 

@@ -12,7 +12,7 @@ enum { BLOB_MAX = 4096, LENGTH_AT = 8 };
 
 typedef struct robot {
     bslam_slam_t slam;
-    bslam_looks_t looks;
+    bslam_appearance_t appearance;
 } robot_t;
 
 static robot_t start;  ///< what each input begins with
@@ -33,7 +33,7 @@ static void prepare(void)
 {
     fuzz_make_map(&start.slam, NULL);
     good_size[0] = write_map(&start.slam, good[0]);
-    fuzz_make_map(&start.slam, &start.looks);
+    fuzz_make_map(&start.slam, &start.appearance);
     fuzz_clear_unused(&start.slam);  // as a load leaves it
     good_size[1] = write_map(&start.slam, good[1]);
 }
@@ -92,7 +92,7 @@ static void write_again(const bslam_slam_t *slam)
     fuzz_require(bslam_map_check(&source) == BSLAM_MAP_FINE);
     bslam_map_fault_t fault;
     memcpy(&other.slam, slam, sizeof other.slam);
-    other.slam.looks = NULL;
+    other.slam.appearance = NULL;
     fuzz_require(bslam_map_load(&other.slam, &source, BSLAM_MAP_LIVING, &fault) == BSLAM_OK);
 }
 
@@ -101,7 +101,7 @@ static void load(const uint8_t *blob, uint32_t size, bslam_map_mode_t mode, bool
     static robot_t robot;
     const bslam_map_source_t source = bslam_map_from_memory(blob, size);
     memcpy(&robot, &start, sizeof robot);
-    robot.slam.looks = with_looks ? &robot.looks : NULL;
+    robot.slam.appearance = with_looks ? &robot.appearance : NULL;
     const bslam_slam_t *before = &start.slam;
     bslam_map_fault_t fault;
     const bslam_map_fault_t expected = bslam_map_check(&source);
@@ -112,7 +112,7 @@ static void load(const uint8_t *blob, uint32_t size, bslam_map_mode_t mode, bool
                  (expected == BSLAM_MAP_COVARIANCE && fault != BSLAM_MAP_FINE));
     fuzz_require((status == BSLAM_OK) == (fault == BSLAM_MAP_FINE));
     if (status != BSLAM_OK) {
-        robot.slam.looks = before->looks;
+        robot.slam.appearance = before->appearance;
         fuzz_require(memcmp(&robot, &start, sizeof robot) == 0);
         return;
     }

@@ -3,7 +3,7 @@
 // picture.
 #include <string.h>
 
-#include "bslam/vision/recogniser.h"
+#include "vision/classifiers/recogniser.h"
 
 #include "models/beacons.h"
 #include "picture.h"
@@ -136,32 +136,32 @@ static void change_svm(fuzz_input_t *input, bslam_svm_t *svm)
     }
 }
 
-static void change_additive(fuzz_input_t *input, bslam_additive_t *machine)
+static void change_additive(fuzz_input_t *input, bslam_additive_t *classifier)
 {
     switch (fuzz_u8(input) % 9) {
     case 0:
-        machine->rows = (int32_t)fuzz_u8(input) - 1;
+        classifier->rows = (int32_t)fuzz_u8(input) - 1;
         break;
     case 1:
-        machine->features = (int32_t)fuzz_u8(input);
+        classifier->features = (int32_t)fuzz_u8(input);
         break;
     case 2:
-        machine->crossed_count = (int32_t)fuzz_u8(input) - 1;
+        classifier->crossed_count = (int32_t)fuzz_u8(input) - 1;
         break;
     case 3:
-        machine->knots = NULL;
+        classifier->knots = NULL;
         break;
     case 4:
-        machine->bytes = NULL;
+        classifier->bytes = NULL;
         break;
     case 5:
-        machine->byte_scale = NULL;
+        classifier->byte_scale = NULL;
         break;
     case 6:
-        machine->bias = NULL;
+        classifier->bias = NULL;
         break;
     case 7:
-        machine->crossed = NULL;
+        classifier->crossed = NULL;
         break;
     default:
         made.crossed[fuzz_u8(input) % BSLAM_CROSSED_MAX] = fuzz_u8(input);
@@ -169,26 +169,26 @@ static void change_additive(fuzz_input_t *input, bslam_additive_t *machine)
     }
 }
 
-static void change_hinged(fuzz_input_t *input, bslam_hinged_t *machine)
+static void change_hinged(fuzz_input_t *input, bslam_hinged_t *classifier)
 {
     switch (fuzz_u8(input) % 7) {
     case 0:
-        machine->rows = (int32_t)fuzz_u8(input) - 1;
+        classifier->rows = (int32_t)fuzz_u8(input) - 1;
         break;
     case 1:
-        machine->features = (int32_t)fuzz_u16(input);
+        classifier->features = (int32_t)fuzz_u16(input);
         break;
     case 2:
-        machine->knots = NULL;
+        classifier->knots = NULL;
         break;
     case 3:
-        machine->bytes = NULL;
+        classifier->bytes = NULL;
         break;
     case 4:
-        machine->byte_scale = NULL;
+        classifier->byte_scale = NULL;
         break;
     case 5:
-        machine->bias = NULL;
+        classifier->bias = NULL;
         break;
     default:
         made.close_knots[fuzz_u16(input) % BSLAM_CLOSE_FEATURES] = fuzz_u8(input);

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 bslam_camera_t fuzz_camera(bslam_lens_kind_t lens)
 {

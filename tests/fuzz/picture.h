@@ -2,7 +2,7 @@
 #ifndef FUZZ_PICTURE_H
 #define FUZZ_PICTURE_H
 
-#include "bslam/vision/vision.h"
+#include "vision/vision.h"
 #include "fuzz.h"
 
 /// A row of RGB888 or RGB565, as many bytes as the format takes.

@@ -1,7 +1,7 @@
 // The whole application behind its serial line: any bytes, or messages that the input makes up in good
 // frames. Whatever comes, the pipeline stays sound, every answer is a good frame, and no message is answered
 // twice.
-#include "app/session.h"
+#include "robot/session.h"
 
 #include <string.h>
 

@@ -7,7 +7,7 @@ static const bslam_beacon_class_t classes[UNIT_MODEL_CLASSES] = {
     {.name = "small", .height_m = 0.3f},
 };
 
-static bslam_svm_t machine(int32_t rows, int32_t features, bool quadratic, const float *weights,
+static bslam_svm_t classifier(int32_t rows, int32_t features, bool quadratic, const float *weights,
                            const float *bias)
 {
     const bslam_svm_t svm = {
@@ -27,12 +27,12 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
     }
     d->verdict_weights[0] = 1;
     const bslam_detector_model_t views = {
-        .cell = machine(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
-        .glance = machine(1, BSLAM_GLANCE_FEATURES, false, d->glance_weights, &d->glance_bias),
+        .cell = classifier(1, BSLAM_CELL_FEATURES, false, d->cell_weights, &d->cell_bias),
+        .glance = classifier(1, BSLAM_GLANCE_FEATURES, false, d->glance_weights, &d->glance_bias),
         .glance_threshold = -1e6f,
         .blob_offset = d->blob_offset,
         .blob_scale = d->blob_scale,
-        .screen = machine(1, BSLAM_BLOB_FEATURES, false, d->screen_weights, &d->screen_bias),
+        .screen = classifier(1, BSLAM_BLOB_FEATURES, false, d->screen_weights, &d->screen_bias),
         .screen_threshold = -1e6f,
         .any_threshold = -1e6f,
         .kinds = {.rows = UNIT_MODEL_CLASSES + 2,
@@ -41,7 +41,7 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
                   .bytes = d->kind_weights,
                   .byte_scale = d->kind_scale,
                   .bias = d->kind_bias},
-        .fusion = machine(1, UNIT_MODEL_CLASSES + 3, false, d->fusion_weights, &d->fusion_bias),
+        .fusion = classifier(1, UNIT_MODEL_CLASSES + 3, false, d->fusion_weights, &d->fusion_bias),
         .fusion_threshold = -1e6f,
         .close = {.rows = UNIT_MODEL_CLASSES + 2,
                   .features = BSLAM_CLOSE_FEATURES,
@@ -49,7 +49,7 @@ bslam_beacon_model_t unit_blank_model(unit_detector_t *detector)
                   .bytes = d->close_weights,
                   .byte_scale = d->close_scale,
                   .bias = d->close_bias},
-        .verdict = machine(1, UNIT_MODEL_CLASSES + 4, false, d->verdict_weights, &d->verdict_bias),
+        .verdict = classifier(1, UNIT_MODEL_CLASSES + 4, false, d->verdict_weights, &d->verdict_bias),
         .threshold = 0,
     };
     const bslam_beacon_model_t model = {

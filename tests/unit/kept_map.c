@@ -8,7 +8,7 @@ bslam_params_t kept_params(void)
     params.association = 3;
     params.left_speed_sd_mps = BSLAM_R(1e-3);
     params.right_speed_sd_mps = BSLAM_R(1e-3);
-    params.learn_way_m = 0;
+    params.learn_travel_m = 0;
     params.learn_budget = 2000;
     return params;
 }
@@ -24,22 +24,22 @@ const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_F
     return signature;
 }
 
-void kept_empty(bslam_slam_t *slam, bslam_looks_t *looks)
+void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
     const bslam_params_t params = kept_params();
     int bad_id;
     memset(slam, 0, sizeof *slam);
     assert_int_equal(bslam_slam_init(slam, &params, &bad_id), BSLAM_OK);
-    if (looks != NULL) {
-        memset(looks, 0, sizeof *looks);
-        assert_int_equal(bslam_looks_init(looks, NULL, 0), BSLAM_OK);
-        bslam_slam_attach_looks(slam, looks);
+    if (appearance != NULL) {
+        memset(appearance, 0, sizeof *appearance);
+        assert_int_equal(bslam_appearance_init(appearance, NULL, 0), BSLAM_OK);
+        bslam_slam_attach_appearance(slam, appearance);
     }
 }
 
-void kept_make(bslam_slam_t *slam, bslam_looks_t *looks, int objects)
+void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects)
 {
-    kept_empty(slam, looks);
+    kept_empty(slam, appearance);
     for (int view = 1; view <= 12; view++) {
         const int64_t now_us = (int64_t)view * STEP_US;
         const bslam_odometry_reading_t reading = {

@@ -15,10 +15,10 @@ const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_F
 
 /// A pipeline that has seen `objects` <= 6 beacons often enough to know their places and looks, and one in
 /// direction only. `looks` stays attached; NULL: none.
-void kept_make(bslam_slam_t *slam, bslam_looks_t *looks, int objects);
+void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects);
 
 /// The same parameters and looks, and no map yet.
-void kept_empty(bslam_slam_t *slam, bslam_looks_t *looks);
+void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance);
 
 /// Behind the rows in use the covariance's memory holds nothing; zeros here, as a load leaves them.
 void kept_clear_unused(bslam_slam_t *slam);

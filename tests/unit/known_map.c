@@ -23,14 +23,14 @@ bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2],
     return ekf;
 }
 
-void unit_give_machine(bslam_looks_t *looks, int index, double value, int samples)
+void unit_give_machine(bslam_appearance_t *appearance, int index, double value, int samples)
 {
-    int32_t machine;
-    assert_int_equal(bslam_learner_add(&looks->learner, &machine), BSLAM_OK);
-    looks->of[index].machine = (int16_t)machine;
-    bslam_machine_t *made = &looks->learner.machines[machine];
+    int32_t classifier;
+    assert_int_equal(bslam_learner_add(&appearance->learner, &classifier), BSLAM_OK);
+    appearance->of[index].classifier = (int16_t)classifier;
+    bslam_classifier_t *made = &appearance->learner.classifiers[classifier];
     made->trained = true;
-    made->rivals = 1;
+    made->negatives = 1;
     made->samples = (uint8_t)samples;
     float weights[BSLAM_SAMPLE_SIZE] = {0};
     weights[0] = (float)value * BSLAM_SAMPLE_UNIT;

@@ -9,7 +9,7 @@ bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2],
 
 /// A machine for beacon `index` that has learned from `samples` (16 at most), and answers value * first
 /// feature.
-void unit_give_machine(bslam_looks_t *looks, int index, double value, int samples);
+void unit_give_machine(bslam_appearance_t *appearance, int index, double value, int samples);
 
 void unit_assert_decided(const bslam_match_t *match, bslam_verdict_t verdict, bslam_reason_t reason,
                          int beacon);

@@ -2,7 +2,7 @@
 #ifndef UNIT_MADE_VIEW_H
 #define UNIT_MADE_VIEW_H
 
-#include "bslam/vision/features.h"
+#include "vision/detection/features.h"
 
 enum {
     MADE_COLUMNS = 80,

@@ -3,8 +3,8 @@
 #ifndef UNIT_PICTURE_H
 #define UNIT_PICTURE_H
 
-#include "bslam/vision/frame.h"
-#include "bslam/vision/lens.h"
+#include "vision/frame.h"
+#include "vision/camera/lens.h"
 
 #define UNIT_PICTURE_WIDTH 320
 #define UNIT_PICTURE_HEIGHT 240

@@ -134,10 +134,10 @@ bslam_params_t unit_params(void)
     p.new_d2 = 40;
     p.confirm_sightings = 4;
     p.confirm_window_us = 0;
-    p.trust_score = BSLAM_R(0.5);
-    p.trust_sum = BSLAM_R(6.5);
-    p.trust_first_sum = 3;
-    p.trust_beacons = 4;
+    p.existence_score = BSLAM_R(0.5);
+    p.existence_sum = BSLAM_R(6.5);
+    p.existence_first_sum = 3;
+    p.existence_beacons = 4;
     return p;
 }
 

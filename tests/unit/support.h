@@ -13,8 +13,8 @@
 
 #include <cmocka.h>
 
-#include "bslam/base/params.h"
-#include "bslam/base/types.h"
+#include "bslam/params.h"
+#include "base/types.h"
 
 /// Half the distance from 1 to the next number of bslam_real_t: the relative error of one rounding.
 #define UNIT_ROUNDING (BSLAM_REAL_DOUBLE ? 1.12e-16 : 5.97e-8)

@@ -112,7 +112,7 @@ def machine_table(rounds: int) -> str:
     rows = [_machine_row(one, machines.measure(one, task, rounds)) for one in entrants]
     head = ["", "training, us", "instructions", "decision, ns", "instructions", "flash, M4F", "right"]
     tests = f"{len(task.tests[0])} tests"
-    sizes = f"{len(task.sets)} objects; {machines.OWN} views of each against {machines.RIVALS}; {tests}"
+    sizes = f"{len(task.sets)} objects; {machines.OWN} views of each against {machines.NEGATIVES}; {tests}"
     return f"{sizes}\n\n{table(head, rows)}"
 
 

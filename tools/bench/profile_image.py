@@ -29,7 +29,7 @@ from tools.training.render_set import RIGS
 
 PLUGIN = BUILD_DIR / "qemu_profile.so"
 FRAMES_MAX = 12
-"""What the 2 MB hold that firmware/app/cost_vision.c reads from."""
+"""What the 2 MB hold that firmware/bench/cost_vision.c reads from."""
 
 
 def build_plugin() -> None:

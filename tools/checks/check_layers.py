@@ -14,26 +14,38 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-BASE = frozenset({"base"})
-MATH = BASE | {"math"}
-BELOW_SLAM = MATH | {"odometry", "model", "svm", "ekf", "smoother", "vision", "association"}
+# Folders of the firmware, from the lowest up: "base", "bslam/ekf". What stands in a library's own folder, its
+# public header and what implements it, is the folder itself: "bslam".
+SETTINGS = frozenset({"base", "bslam"})
+MODEL = SETTINGS | {"bslam/linalg", "bslam/model"}
+EKF = MODEL | {"bslam/ekf"}
+ASSOCIATION = EKF | {"bslam/appearance", "bslam/association"}
+SLAM = ASSOCIATION | {"bslam/smoother", "bslam/slam"}
+VISION = frozenset({"base", "vision"})
+PIXELS = VISION | {"vision/pixels", "vision/camera", "vision/classifiers"}
+DETECTION = PIXELS | {"vision/detection", "vision/measurement"}
 C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "base": frozenset(),
-    "math": BASE,
-    "odometry": MATH,
-    "model": MATH,
-    "svm": MATH,
-    "link": MATH,
-    "ekf": MATH | {"model"},
-    "smoother": MATH | {"model", "ekf"},
-    "vision": MATH | {"model", "svm"},
-    "association": MATH | {"model", "svm", "ekf"},
-    "slam": BELOW_SLAM,
-    "store": BELOW_SLAM | {"link", "slam"},
-    "recovery": BELOW_SLAM | {"slam"},
-    # bslam.h itself, the umbrella: for users of the library, so nothing inside may include it.
-    "umbrella": BELOW_SLAM | {"link", "slam", "store", "recovery"},
+    "bslam": SLAM | {"bslam/recovery", "bslam/store"},
+    "bslam/linalg": SETTINGS,
+    "bslam/model": MODEL,
+    "bslam/appearance": MODEL,
+    "bslam/ekf": MODEL,
+    "bslam/smoother": EKF,
+    "bslam/association": ASSOCIATION,
+    "bslam/slam": SLAM,
+    "bslam/store": SLAM,
+    "bslam/recovery": SLAM,
+    "vision": DETECTION | {"vision/gyro"},
+    "vision/pixels": PIXELS,
+    "vision/camera": VISION,
+    "vision/classifiers": PIXELS,
+    "vision/detection": DETECTION,
+    "vision/measurement": DETECTION,
+    "vision/gyro": DETECTION,
+    "link": frozenset({"base"}),
 }
+C_LIBRARIES = ("base", "bslam", "vision", "link")
 LIBC_HEADERS = frozenset(
     {"assert.h", "float.h", "limits.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
     # Of the compiler: instructions of cores as functions, where there are any (math/bytes.h).

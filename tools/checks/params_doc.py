@@ -16,7 +16,7 @@ END = "<!-- parameters: end -->"
 
 
 def table() -> str:
-    """Every parameter as a row of a Markdown table, in the order of firmware/bslam/base/params.h."""
+    """Every parameter as a row of a Markdown table, in the order of firmware/bslam/params.h."""
     lines = ["| parameter | type | default | from | to | meaning |", "|---|---|---:|---:|---:|---|"]
     return "\n".join([*lines, *map(row, Slam.parameters())]) + "\n"
 

@@ -28,7 +28,7 @@ TICKS_HZ = 25_000_000
 INSTRUCTIONS_A_TICK = 1e9 / TICKS_HZ / NS_PER_INSTRUCTION
 WORLD_SEED, FRAMES = 7000, 3
 PICTURES_AT = 0x20200000
-"""As in firmware/app/cost_vision.c: the upper half of the boards' 4 MB, which no image uses."""
+"""As in firmware/bench/cost_vision.c: the upper half of the boards' 4 MB, which no image uses."""
 PIXELS = 320 * 240
 STEPS_A_SECOND, CORE_HZ = 25, 168_000_000
 COST_BOARDS = {"Cortex-M0+": "mps2_an385", "Cortex-M4F": "mps2_an386", "Cortex-M7": "mps2_an500"}
@@ -38,10 +38,10 @@ COMPILER = f"arm-none-eabi-gcc -std=c11 -ffp-contract=off -I{ROOT / 'firmware'} 
 SLAM_LAYERS = ("base", "math", "odometry", "model", "ekf", "association", "slam", "svm", "link")
 STRUCTS = {
     "bslam_slam_t": "bslam/bslam.h",
-    "bslam_looks_t": "bslam/bslam.h",
-    "bslam_vision_t": "bslam/vision/vision.h",
+    "bslam_appearance_t": "bslam/bslam.h",
+    "bslam_vision_t": "vision/vision.h",
 }
-LOOKING_STRUCTS = ("bslam_slam_t", "bslam_looks_t")
+LOOKING_STRUCTS = ("bslam_slam_t", "bslam_appearance_t")
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
@@ -176,7 +176,7 @@ def ram_rows() -> Iterator[Row]:
         sum(instance_bytes(without_rays, "arm-none-eabi-nm", n, one) for one in LOOKING_STRUCTS)
         for n in BEACONS
     ]
-    yield ("`bslam_slam_t` and `bslam_looks_t`, `BSLAM_RAYS_MAX` = 0", *both)
+    yield ("`bslam_slam_t` and `bslam_appearance_t`, `BSLAM_RAYS_MAX` = 0", *both)
 
 
 def image_rows() -> Iterator[Row]:
@@ -240,7 +240,7 @@ Learning is linked where looks are attached, names of parameters where they are 
 {table(("linked", "bytes"), linked_rows())}
 ## RAM
 
-Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_looks_t` is \
+Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_appearance_t` is \
 for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam, \
 `bslam_smoother_t` for `filter` = 2, which has no use for rays.
 
@@ -264,16 +264,16 @@ With the smoother linked:
 ## Instructions
 
 Counted by QEMU (`-icount`), the same at every run; instructions are not cycles. `-O2`, invariant filter, \
-`firmware/app/cost.c`. No board of QEMU has a Cortex-M0+: its image runs on a Cortex-M3.
+`firmware/bench/cost.c`. No board of QEMU has a Cortex-M0+: its image runs on a Cortex-M3.
 
 {table(("part", "beacons", *COST_BOARDS), cost_rows(measured))}
 {parts}
 A step in direction only with the smoother (`filter` = 2) on a Cortex-M4F, its window full: 3 sightings a \
-frame of 6 beacons, 5 of 20; firmware/app/cost_smoother.c.
+frame of 6 beacons, 5 of 20; firmware/bench/cost_smoother.c.
 
 {table(("", "beacons", "instructions", f"of {CORE_HZ // 1_000_000} million a second"), smoother_rows())}
 The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
-world (seed {WORLD_SEED}; firmware/app/cost_vision.c). In which functions: \
+world (seed {WORLD_SEED}; firmware/bench/cost_vision.c). In which functions: \
 `.venv/bin/python -m tools.bench.profile_image cost_vision`. A frame costs as much as it shows: of other \
 worlds `--worlds 7000:7020 --frames 8` tells.
 

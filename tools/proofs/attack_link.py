@@ -23,8 +23,8 @@ from cobs import cobs
 
 from bslam.core.raw import library
 from bslam.core.slam import Slam
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.link import messages
 from bslam.link.frames import crc16
 from bslam.link.messages import Message

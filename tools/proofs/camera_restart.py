@@ -35,13 +35,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.commands.arguments import CAMERA_STORE, seeds_range
-from bslam.experiment.align import Rigid, fit_rigid
-from bslam.experiment.camera import CameraStore, camera_log
-from bslam.experiment.metrics import map_pairs
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
-from bslam.experiment.trace import Trace
-from bslam.experiment.truth import truth_at
+from bslam.evaluation.align import Rigid, fit_rigid
+from bslam.runs.camera import CameraStore, camera_log
+from bslam.evaluation.metrics import map_pairs
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
+from bslam.evaluation.trace import Trace
+from bslam.evaluation.truth import truth_at
 from bslam.log import Log, Sightings
 from bslam.maps.blob import SUFFIX
 from bslam.rig import load_rig

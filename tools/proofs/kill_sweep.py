@@ -22,7 +22,7 @@ from typing import Any
 
 import bslam
 from bslam import cli
-from bslam.experiment.sweep import STORE
+from bslam.runs.sweep import STORE
 
 TIMES = ("step_us_median",)  # differs from run to run
 SCENARIO = Path(bslam.__file__).parent / "scenarios/paper_room.toml"

@@ -29,7 +29,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from bslam.experiment.output import write_atomically
+from bslam.runs.output import write_atomically
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out/proof"

@@ -24,9 +24,9 @@ from typing import Any
 from bslam.commands.arguments import CAMERA_STORE
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.experiment.camera import CameraStore, camera_log
-from bslam.experiment.options import FILTERS, RunOptions
-from bslam.experiment.runner import run_log
+from bslam.runs.camera import CameraStore, camera_log
+from bslam.options import FILTERS, RunOptions
+from bslam.runs.runner import run_log
 from bslam.log import Log, first_steps, read_folder
 from bslam.recording.recorder import FINGERPRINT_START
 from bslam.rig import load_rig

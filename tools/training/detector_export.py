@@ -10,7 +10,7 @@ from tools.training.export import Header, c_float, initialiser
 
 def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:
     """The header that holds `static const bslam_beacon_model_t bslam_beacons_model`."""
-    header = Header("BSLAM_MODELS_BEACONS_H", ["bslam/vision/beacon_model.h"], notes)
+    header = Header("BSLAM_MODELS_BEACONS_H", ["vision/classifiers/beacon_model.h"], notes)
     fields = {
         "class_count": str(len(model.classes)),
         "classes": header.classes("bslam_beacons_classes", model.classes),

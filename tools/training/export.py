@@ -147,7 +147,7 @@ def recogniser_header(recogniser: Recogniser, name: str) -> str:
     if not NAME.fullmatch(name):
         allowed = "small letters, digits and _, a letter first: it becomes a name in C"
         raise BslamError(f"header {name}.h: the name is not allowed; allowed: {allowed}")
-    header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["bslam/vision/beacon_model.h"], recogniser.notes)
+    header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/classifiers/beacon_model.h"], recogniser.notes)
     svm = header.svm(name, recogniser.svm)
     objects = header.classes(f"{name}_objects", recogniser.objects)
     fields = {"svm": svm, "objects": objects, "reject_margin": c_float(recogniser.reject_margin)}

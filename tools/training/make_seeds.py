@@ -1,6 +1,6 @@
 """Writes host_sim/bslam/core/seeds.npy: signatures of rendered beacons of training worlds, one a world.
 
-None of them is a user's: the learner (firmware/bslam/svm/learner.h) sets a new beacon against them. They are
+None of them is a user's: the learner (firmware/bslam/appearance/learner.h) sets a new beacon against them. They are
 to be made anew when signatures change; the same call writes the same bytes:
 
     .venv/bin/python -m tools.training.make_seeds [--count 64] [--first-world 5000]

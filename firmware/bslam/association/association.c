@@ -1,7 +1,7 @@
 #include "bslam/association/association.h"
 
-#include "bslam/association/internal.h"
-#include "bslam/math/trig.h"
+#include "bslam/association/association_internal.h"
+#include "base/trig.h"
 
 /// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
 typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
@@ -18,7 +18,7 @@ bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
     match->view_score = 0;
     match->lead = 0;
     match->sure = false;
-    match->waits_for = -1;
+    match->delayed_for = -1;
     return mappable;
 }
 
@@ -98,7 +98,7 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
 static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                         bslam_match_t *match)
 {
-    int rivals = 0;
+    int negatives = 0;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &frame->ekf->beacons[b];
         if (beacon->label != sighting->label) {
@@ -110,16 +110,16 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
             return;
         }
         const bslam_real_t d2 = mahalanobis2(frame, sighting, b);
-        if (rivals == 0 || (d2 >= 0 && d2 < match->distance2)) {
+        if (negatives == 0 || (d2 >= 0 && d2 < match->distance2)) {
             match->beacon = b;
             match->distance2 = d2;
         }
-        rivals++;
+        negatives++;
     }
     const bslam_real_t gate_d2 = frame->params->gate_d2;
     const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
-    const bool may_rival = is_out && sighting->has_range && rivals < RIVALS_MAX;
-    if (rivals == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
+    const bool may_rival = is_out && sighting->has_range && negatives < RIVALS_MAX;
+    if (negatives == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
         match->verdict = BSLAM_VERDICT_NEW;
         match->beacon = -1;
     }

@@ -3,7 +3,7 @@
 #ifndef BSLAM_ASSOCIATION_ASSOCIATION_H
 #define BSLAM_ASSOCIATION_ASSOCIATION_H
 
-#include "bslam/association/looks.h"
+#include "bslam/appearance/appearance.h"
 #include "bslam/ekf/ekf.h"
 
 /// Values of the parameter `association`.
@@ -22,13 +22,13 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or waits
-    BSLAM_REASON_LOOKS,        ///< too far from any beacon to match, but it looks like one that may be here
+    BSLAM_REASON_APPEARANCE,        ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
     BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
     BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
-    BSLAM_REASON_TRIAL,        ///< it shows a beacon that may be none, as far as the detector's scores tell
+    BSLAM_REASON_TENTATIVE,        ///< it shows a beacon that may be none, as far as the detector's scores tell
     BSLAM_REASON_COUNT
 } bslam_reason_t;
 
@@ -38,7 +38,7 @@ typedef enum bslam_verdict {
     BSLAM_VERDICT_MATCH,
     BSLAM_VERDICT_NEW,
     BSLAM_VERDICT_DEFER,  ///< undecided: used for nothing
-    BSLAM_VERDICT_TRIAL   ///< no method's: a match or a new one that says whether there is a beacon, no more
+    BSLAM_VERDICT_TENTATIVE   ///< no method's: a match or a new one that says whether there is a beacon, no more
 } bslam_verdict_t;
 
 typedef struct bslam_match {
@@ -51,15 +51,15 @@ typedef struct bslam_match {
     bslam_real_t lead;        ///< svm: by how much the score leads that of any other beacon, and of a new one
     bool sure;                ///< svm: sure enough to learn from; else false
     bool range_used;  ///< within a frame: the distance has said where on a ray the beacon is, or does not fit
-    int32_t waits_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
+    int32_t delayed_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
 } bslam_match_t;
 
 /// All a method may look at.
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
     const bslam_params_t *params;
-    const bslam_looks_t *looks;            ///< what the beacons look like; NULL: nobody knows
-    const bslam_looks_answers_t *answers;  ///< how looks are asked
+    const bslam_appearance_t *appearance;            ///< what the beacons look like; NULL: nobody knows
+    const bslam_appearance_answers_t *answers;  ///< how looks are asked
     const bslam_pose_t *mount;             ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;

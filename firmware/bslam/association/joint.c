@@ -3,12 +3,12 @@
 #include <string.h>
 
 #include "bslam/association/association.h"
-#include "bslam/association/given.h"
-#include "bslam/association/internal.h"
+#include "bslam/association/conditional.h"
+#include "bslam/association/association_internal.h"
 
 /// A search through the pairings of up to BSLAM_GIVEN_MAX sightings: level i chooses for the i-th of them.
 typedef struct search {
-    bslam_given_t given;
+    bslam_conditional_t conditional;
     int32_t sightings[BSLAM_GIVEN_MAX];
     int32_t next[BSLAM_GIVEN_MAX];    ///< what a level tries next: a beacon, or none at all
     int32_t choice[BSLAM_GIVEN_MAX];  ///< a beacon, or -1
@@ -56,10 +56,10 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
         bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_ekf_distance2(frame->ekf, &innovation, &distance2) != BSLAM_OK ||
-        distance2 > frame->params->match_d2 || !bslam_given_add(frame->ekf, &search->given, &innovation)) {
+        distance2 > frame->params->match_d2 || !bslam_conditional_add(frame->ekf, &search->conditional, &innovation)) {
         return false;
     }
-    return bslam_given_distance2(&search->given) <= joint_limit(frame->params, search->given.count);
+    return bslam_conditional_distance2(&search->conditional) <= joint_limit(frame->params, search->conditional.count);
 }
 
 /// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better: one of
@@ -67,7 +67,7 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
 static void keep_if_better(search_t *search)
 {
     const int32_t pairs = search->pairs[search->count];
-    const bslam_real_t distance2 = bslam_given_distance2(&search->given);
+    const bslam_real_t distance2 = bslam_conditional_distance2(&search->conditional);
     if (pairs > search->best_pairs || distance2 < search->best_distance2) {
         search->best_pairs = pairs;
         search->best_distance2 = distance2;
@@ -81,7 +81,7 @@ static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *m
 {
     const int32_t beacon = search->next[level]++;
     const int32_t left = search->count - level - 1;
-    search->given.count = search->scalars[level];
+    search->conditional.count = search->scalars[level];
     if (beacon == frame->ekf->beacon_count) {
         search->choice[level] = -1;
         search->pairs[level + 1] = search->pairs[level];
@@ -92,7 +92,7 @@ static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *m
         search->choice[level] = beacon;
         search->pairs[level + 1] = search->pairs[level] + 1;
     }
-    search->scalars[level + 1] = search->given.count;
+    search->scalars[level + 1] = search->conditional.count;
     return search->pairs[level + 1] + left >= search->best_pairs;
 }
 
@@ -137,7 +137,7 @@ static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_ma
 /// Searches for the sightings that were gathered, and writes down what was found.
 static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_match_t *matches)
 {
-    bslam_given_nothing(&search->given);
+    bslam_conditional_init(&search->conditional);
     search->scalars[0] = 0;
     search->pairs[0] = 0;
     search->best_pairs = 0;

@@ -10,11 +10,11 @@
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
-#include "bslam/base/params.h"
-#include "bslam/base/status.h"
-#include "bslam/base/types.h"
-#include "bslam/math/smallmat.h"
-#include "bslam/math/symmat.h"
+#include "bslam/params.h"
+#include "base/status.h"
+#include "base/types.h"
+#include "bslam/linalg/smallmat.h"
+#include "bslam/linalg/symmat.h"
 #include "bslam/model/observation.h"
 
 /// The robot's own values: pose, and v, omega or their scale factors.
@@ -67,12 +67,12 @@ typedef struct bslam_beacon {
     int64_t last_seen_us;
     uint32_t sightings;  ///< that were matched with it, the one that started it included
     uint32_t gated;      ///< sightings taken for it that its gate rejected
-    uint32_t way_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
+    uint32_t travelled_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
     uint32_t view_um;    ///< the same when it was last counted in views
     uint16_t views;      ///< sightings far apart that count towards its confirmation, less those against
     bool confirmed;
     uint8_t beacon_class;
-    uint8_t class_lead;        ///< by how many votes it leads, slam/scale.c
+    uint8_t class_lead;        ///< by how many votes it leads, slam/beacon_scale.c
     uint8_t distance_lead;     ///< by how many more its distances fitted than did not
     bool has_scores;           ///< of its sightings
     bslam_real_t score_sum;    ///< what these say for its being a beacon at all

@@ -3,8 +3,8 @@
 #include <string.h>
 
 #include "bslam/ekf/ekf.h"
-#include "bslam/ekf/internal.h"
-#include "bslam/math/trig.h"
+#include "bslam/ekf/ekf_internal.h"
+#include "base/trig.h"
 #include "bslam/model/motion.h"
 #include "bslam/model/pose.h"
 

@@ -1,6 +1,6 @@
 #include "bslam/model/motion.h"
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 /// sin(h)/h and its derivative.
 static void sinc(bslam_real_t h, bslam_real_t *value, bslam_real_t *slope)

@@ -3,7 +3,7 @@
 #ifndef BSLAM_MODEL_MOTION_H
 #define BSLAM_MODEL_MOTION_H
 
-#include "bslam/base/types.h"
+#include "base/types.h"
 
 typedef enum bslam_motion_kind {
     BSLAM_MOTION_EULER = 0,  ///< the whole way in the old heading: equation (2) as printed

@@ -2,8 +2,8 @@
 #ifndef BSLAM_MODEL_NOISE_H
 #define BSLAM_MODEL_NOISE_H
 
-#include "bslam/base/params.h"
-#include "bslam/base/types.h"
+#include "bslam/params.h"
+#include "base/types.h"
 
 /// Variance of a measured distance to a beacon predicted at range_m: floor² + (fraction r)² + (per_m r²)².
 /// The detector's own is in proportion to the distance: what is measured too short must not count as more
@@ -50,15 +50,15 @@ static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_params_t *par
 }
 
 /// By how much a sighting's variances grow because its error is much like that of the sighting of the same
-/// beacon before it, since when the robot went way_m; at most 100. MATH "Errors that stay alike".
-static inline bslam_real_t bslam_correlation_factor(const bslam_params_t *params, bslam_real_t way_m)
+/// beacon before it, since when the robot went travelled_m; at most 100. MATH "Errors that stay alike".
+static inline bslam_real_t bslam_correlation_factor(const bslam_params_t *params, bslam_real_t travelled_m)
 {
     const bslam_real_t length_m = params->correlation_m;
     if (!(length_m > 0)) {
         return 1;
     }
     const bslam_real_t least_m = length_m / 50;
-    const bslam_real_t ratio = 2 * length_m / (way_m > least_m ? way_m : least_m);
+    const bslam_real_t ratio = 2 * length_m / (travelled_m > least_m ? travelled_m : least_m);
     return bslam_sqrt(1 + ratio * ratio);
 }
 

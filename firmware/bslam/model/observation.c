@@ -1,6 +1,6 @@
 #include "bslam/model/observation.h"
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 static const bslam_real_t DISTANCE_MIN_M = BSLAM_R(1e-3);
 

@@ -3,8 +3,8 @@
 #ifndef BSLAM_MODEL_OBSERVATION_H
 #define BSLAM_MODEL_OBSERVATION_H
 
-#include "bslam/base/status.h"
-#include "bslam/base/types.h"
+#include "base/status.h"
+#include "base/types.h"
 
 /// State values of a beacon: a point is (x, y); a sized one (x, y, scale), its distances all being measured
 /// scale times as long as they are; a ray is (anchor x, anchor y, direction, inverse distance).

@@ -1,6 +1,6 @@
 #include "bslam/model/pose.h"
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 
 bslam_pose_t bslam_pose_compose(const bslam_pose_t *a, const bslam_pose_t *b)
 {

@@ -2,7 +2,7 @@
 #ifndef BSLAM_MODEL_POSE_H
 #define BSLAM_MODEL_POSE_H
 
-#include "bslam/base/types.h"
+#include "base/types.h"
 
 /// a then b: the pose in a's reference of something whose pose in a's frame is b.
 bslam_pose_t bslam_pose_compose(const bslam_pose_t *a, const bslam_pose_t *b);

@@ -19,7 +19,7 @@ static int find_label(const bslam_ekf_t *ekf, int32_t label)
 
 static bool looks_alike(const bslam_slam_t *slam, int a, int b)
 {
-    return slam->looks->of[a].machine == slam->looks->of[b].machine;
+    return slam->appearance->of[a].classifier == slam->appearance->of[b].classifier;
 }
 
 /// The first beacon of the machine that takes a sample for its own, if no other one comes near.
@@ -29,7 +29,7 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
     float best_value = RECOGNISE_VALUE;
     float next_value = RECOGNISE_VALUE - RECOGNISE_LEAD;
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_opinion_t opinion = bslam_looks_ask(slam->looks, &slam->params, b, sample);
+        const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, &slam->params, b, sample);
         if (opinion.weight < RECOGNISE_WEIGHT || (best >= 0 && looks_alike(slam, b, best))) {
             continue;
         }
@@ -47,7 +47,7 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
 static int find_looks(const bslam_slam_t *slam, const float *signature)
 {
     bslam_sample_t sample;
-    if (slam->looks == NULL || signature == NULL || bslam_sample_encode(signature, &sample) != BSLAM_OK) {
+    if (slam->appearance == NULL || signature == NULL || bslam_sample_encode(signature, &sample) != BSLAM_OK) {
         return BSLAM_NOBODY;
     }
     const int best = find_machine(slam, &sample);
@@ -91,7 +91,7 @@ void bslam_identify(const bslam_slam_t *slam, const bslam_sighting_t *sightings,
 
 bool bslam_may_be(const bslam_slam_t *slam, int who, int beacon)
 {
-    const bool by_looks = slam->params.association != BSLAM_ASSOCIATION_KNOWN && slam->looks != NULL;
+    const bool by_looks = slam->params.association != BSLAM_ASSOCIATION_KNOWN && slam->appearance != NULL;
     return beacon == who ||
            (by_looks && slam->ekf.beacons[beacon].confirmed && looks_alike(slam, beacon, who));
 }
@@ -100,8 +100,8 @@ static bool is_known(const bslam_slam_t *slam, int beacon)
 {
     static const bslam_sample_t ANY = {{0}};
     return slam->params.association == BSLAM_ASSOCIATION_KNOWN ||
-           (slam->looks != NULL &&
-            bslam_looks_ask(slam->looks, &slam->params, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
+           (slam->appearance != NULL &&
+            bslam_appearance_ask(slam->appearance, &slam->params, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
 }
 
 bool bslam_is_findable(const bslam_slam_t *slam)

@@ -1,11 +1,11 @@
 #include "bslam/recovery/recovery.h"
 
-#include "bslam/math/symmat.h"
-#include "bslam/math/trig.h"
+#include "bslam/linalg/symmat.h"
+#include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "bslam/recovery/identity.h"
-#include "bslam/slam/internal.h"
+#include "bslam/slam/slam_internal.h"
 
 // A sighting of a recognised beacon contradicts the pose beyond this squared distance. Rightly recognised
 // ones are there once in 10^6.

@@ -19,7 +19,7 @@
 #ifndef BSLAM_RECOVERY_RECOVERY_H
 #define BSLAM_RECOVERY_RECOVERY_H
 
-#include "bslam/recovery/relocate.h"
+#include "bslam/recovery/resection.h"
 #include "bslam/slam/slam.h"
 
 typedef enum bslam_recovery_state {

@@ -35,10 +35,10 @@ static uint64_t add_state(uint64_t hash, const bslam_ekf_t *ekf)
 static uint64_t add_machines(uint64_t hash, const bslam_learner_t *learner)
 {
     for (uint32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
-        const bslam_machine_t *machine = &learner->machines[m];
-        if (machine->used && machine->trained) {
+        const bslam_classifier_t *classifier = &learner->classifiers[m];
+        if (classifier->used && classifier->trained) {
             hash = add_word(hash, m);
-            hash = add_words(hash, &machine->weights, sizeof machine->weights);
+            hash = add_words(hash, &classifier->weights, sizeof classifier->weights);
         }
     }
     return hash;
@@ -71,5 +71,5 @@ uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
     if (slam->smoother != NULL) {
         hash = add_smoother(hash, slam->smoother);
     }
-    return slam->looks != NULL ? add_machines(hash, &slam->looks->learner) : hash;
+    return slam->appearance != NULL ? add_machines(hash, &slam->appearance->learner) : hash;
 }

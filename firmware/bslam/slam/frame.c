@@ -1,9 +1,9 @@
-#include "bslam/association/doubles.h"
-#include "bslam/association/vanished.h"
-#include "bslam/math/symmat.h"
+#include "bslam/association/duplicates.h"
+#include "bslam/association/missed_beacons.h"
+#include "bslam/linalg/symmat.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
-#include "bslam/slam/internal.h"
+#include "bslam/slam/slam_internal.h"
 
 // Six degrees: at the distance of a wall, as much as two beacons are apart.
 static const bslam_real_t DOUBTFUL_HEADING_RAD2 = BSLAM_R(0.01);
@@ -57,7 +57,7 @@ static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
 {
     beacon->sightings++;
     beacon->last_seen_us = time_us;
-    bslam_slam_trust_match(slam, beacon, sighting, distance2);
+    bslam_slam_confirm_match(slam, beacon, sighting, distance2);
 }
 
 /// A sighting of what may be no beacon moves nothing, but says whether it is one.
@@ -71,7 +71,7 @@ static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_
         account->test_ratio = test_ratio(slam->params.gate_d2, match->distance2);
         return;
     }
-    fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TRIAL, beacon);
+    fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
     if (beacon != NULL) {
         note_match(slam, time_us, sighting, beacon, match->distance2);
     }
@@ -81,8 +81,8 @@ static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_
 static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
                        bslam_beacon_t *beacon, bslam_innovation_t *innovation, bslam_account_t *account)
 {
-    const bslam_real_t way_m = (bslam_real_t)(slam->way_um - beacon->way_um) / MICROMETRES_PER_M;
-    const bslam_real_t factor = bslam_correlation_factor(&slam->params, way_m);
+    const bslam_real_t travelled_m = (bslam_real_t)(slam->travelled_um - beacon->travelled_um) / MICROMETRES_PER_M;
+    const bslam_real_t factor = bslam_correlation_factor(&slam->params, travelled_m);
     innovation->range_var_m2 *= factor;
     innovation->bearing_var_rad2 *= factor;
     bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
@@ -101,7 +101,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
         const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, sighting);
         slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
-    beacon->way_um = slam->way_um;
+    beacon->travelled_um = slam->travelled_um;
     note_match(slam, time_us, sighting, beacon, fusion.distance2);
 }
 
@@ -111,9 +111,9 @@ static void note_rivals(bslam_slam_t *slam, int index)
 {
     bslam_beacon_t *beacons = slam->ekf.beacons;
     for (int b = 0; b < index && slam->params.association == BSLAM_ASSOCIATION_KNOWN; b++) {
-        const uint32_t rivals = beacons[b].label == beacons[index].label ? 1 : 0;
-        beacons[b].gated += rivals;
-        beacons[index].gated += rivals;
+        const uint32_t negatives = beacons[b].label == beacons[index].label ? 1 : 0;
+        beacons[b].gated += negatives;
+        beacons[index].gated += negatives;
     }
 }
 
@@ -135,8 +135,8 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->first_seen_us = time_us;
     beacon->last_seen_us = time_us;
     beacon->sightings = 1;
-    beacon->way_um = slam->way_um;
-    bslam_slam_trust_new(slam, beacon, sighting);
+    beacon->travelled_um = slam->travelled_um;
+    bslam_slam_confirm_new(slam, beacon, sighting);
     note_rivals(slam, index);
     if (slam->smoother != NULL) {
         slam->smoothing->see(slam->smoother, sighting, index);
@@ -152,7 +152,7 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     const bslam_params_t *params = &slam->params;
     const bool opens = params->association == BSLAM_ASSOCIATION_SVM && params->gate_d2 > 0 &&
                        params->gate_d2 < params->candidate_d2 &&
-                       !bslam_is_placed(&slam->ekf, params->wait_us, -1, time_us);
+                       !bslam_is_placed(&slam->ekf, params->decision_delay_us, -1, time_us);
     return opens ? params->candidate_d2 : params->gate_d2;
 }
 
@@ -165,8 +165,8 @@ static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sigh
     const bslam_params_t *params = &slam->params;
     return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
            (bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
-            match->lead < params->wait_score) &&
-           !bslam_is_placed(&slam->ekf, params->wait_us, -1, time_us);
+            match->lead < params->decision_delay_score) &&
+           !bslam_is_placed(&slam->ekf, params->decision_delay_us, -1, time_us);
 }
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
@@ -206,7 +206,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                                                   const bslam_pose_t *mount,
                                                   const bslam_sighting_t *sightings, int count)
 {
-    bslam_slam_try(slam, sightings, count);
+    bslam_slam_mark_tentative(slam, sightings, count);
     for (int i = 0; i < count; i++) {
         bslam_match_t *match = &slam->matches[i];
         match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&
@@ -216,7 +216,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
     take_innovations(slam, time_us, mount, sightings, count);
     for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->matches[i];
-        if (match->verdict == BSLAM_VERDICT_TRIAL) {
+        if (match->verdict == BSLAM_VERDICT_TENTATIVE) {
             try_match(slam, time_us, &sightings[i], match, &slam->accounts[i]);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
             fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[match->beacon], &slam->innovations[i],
@@ -246,7 +246,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 
 static bool was_tried(const bslam_account_t *account)
 {
-    return account->reason == BSLAM_REASON_TRIAL && account->has_beacon;
+    return account->reason == BSLAM_REASON_TENTATIVE && account->has_beacon;
 }
 
 /// Which matches wait, and how well those fit that were made. What has just begun is itself for sure.
@@ -255,18 +255,18 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = &slam->accounts[i];
         const bslam_match_t *match = &slam->matches[i];
-        if (match->waits_for >= 0) {
-            bslam_looks_note_wait(slam->looks, &slam->params, match->waits_for, time_us);
+        if (match->delayed_for >= 0) {
+            bslam_appearance_note_delay(slam->appearance, &slam->params, match->delayed_for, time_us);
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
-            bslam_looks_note_view(slam->looks, bslam_slam_find_beacon(slam, account->beacon_uid),
+            bslam_appearance_note_view(slam->appearance, bslam_slam_find_beacon(slam, account->beacon_uid),
                                   slam->params.again_odds);
         } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account)) {
-            bslam_looks_note_view(slam->looks, match->beacon, match->view_score);
+            bslam_appearance_note_view(slam->appearance, match->beacon, match->view_score);
         }
     }
 }
 
-void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
     note_matches(slam, time_us, count);
     if (slam->is_frozen) {
@@ -283,22 +283,22 @@ void bslam_slam_learn_looks(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         }
         const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
         if (is_new || slam->matches[i].sure) {
-            bslam_looks_teach(slam->looks, &slam->params, index, slam->ekf.beacon_count, slam->way_um,
+            bslam_appearance_train(slam->appearance, &slam->params, index, slam->ekf.beacon_count, slam->travelled_um,
                               &sightings[i]);
         } else {
-            slam->looks->counters.unsure++;
+            slam->appearance->counters.unsure++;
         }
     }
-    const int leaves = bslam_doubles_settle(slam->looks, &slam->ekf, &slam->params, time_us);
-    if (leaves != BSLAM_NO_DOUBLE) {
+    const int leaves = bslam_duplicates_settle(slam->appearance, &slam->ekf, &slam->params, time_us);
+    if (leaves != BSLAM_NO_DUPLICATE) {
         bslam_slam_drop_beacon(slam, leaves);
     }
     const int vanished =
-        bslam_vanished_find(slam->looks, &slam->ekf, &slam->params, time_us, slam->way_um, all_matched);
-    if (vanished != BSLAM_NO_VANISHED) {
+        bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->params, time_us, slam->travelled_um, all_matched);
+    if (vanished != BSLAM_NO_MISSED_BEACON) {
         bslam_slam_drop_beacon(slam, vanished);
     }
-    (void)bslam_learner_work(&slam->looks->learner, slam->params.learn_budget);
+    (void)bslam_learner_work(&slam->appearance->learner, slam->params.learn_budget);
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------
@@ -399,13 +399,13 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
                             const bslam_pose_t *mount, bool use)
 {
     if (use && !slam->is_lost) {
-        const bslam_looks_answers_t *answers = slam->looks != NULL ? slam->learning->answers : NULL;
-        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->looks, answers,
+        const bslam_appearance_answers_t *answers = slam->appearance != NULL ? slam->learning->answers : NULL;
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->appearance, answers,
                                               mount,      sightings,     count,       time_us};
         const bslam_associate_fn associate = bslam_associate_method(&slam->params);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        if (slam->looks != NULL && slam->params.association == BSLAM_ASSOCIATION_SVM) {
+        if (slam->appearance != NULL && slam->params.association == BSLAM_ASSOCIATION_SVM) {
             slam->learning->learn(slam, time_us, sightings, count);
         }
     } else {

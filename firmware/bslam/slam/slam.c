@@ -1,8 +1,8 @@
 #include "bslam/slam/slam.h"
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 #include "bslam/model/pose.h"
-#include "bslam/slam/internal.h"
+#include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
@@ -88,14 +88,14 @@ void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
     bslam_slam_restart_smoother(slam);
 }
 
-void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks)
+void bslam_slam_attach_appearance(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    static const bslam_learning_t learning = {bslam_looks_clear, bslam_looks_forget, bslam_slam_learn_looks,
-                                              &bslam_looks_answers};
-    slam->looks = looks;
+    static const bslam_learning_t learning = {bslam_appearance_clear, bslam_appearance_forget, bslam_slam_learn_appearance,
+                                              &bslam_appearance_answers};
+    slam->appearance = appearance;
     slam->learning = &learning;
-    if (looks != NULL) {
-        bslam_looks_clear(looks);
+    if (appearance != NULL) {
+        bslam_appearance_clear(appearance);
     }
 }
 
@@ -113,8 +113,8 @@ int bslam_slam_find_beacon(const bslam_slam_t *slam, uint32_t uid)
 
 void bslam_slam_drop_beacon(bslam_slam_t *slam, int index)
 {
-    if (slam->looks != NULL) {
-        slam->learning->forget(slam->looks, index, slam->ekf.beacon_count);
+    if (slam->appearance != NULL) {
+        slam->learning->forget(slam->appearance, index, slam->ekf.beacon_count);
     }
     if (slam->smoother != NULL) {
         slam->smoothing->remove(slam->smoother, index);
@@ -147,8 +147,8 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
 
 void bslam_slam_forget_map(bslam_slam_t *slam)
 {
-    if (slam->looks != NULL) {
-        slam->learning->clear(slam->looks);
+    if (slam->appearance != NULL) {
+        slam->learning->clear(slam->appearance);
     }
     bslam_ekf_forget_map(&slam->ekf);
     bslam_slam_restart_smoother(slam);

@@ -18,8 +18,8 @@
 #define BSLAM_SLAM_SLAM_H
 
 #include "bslam/association/association.h"
-#include "bslam/odometry/odometry.h"
-#include "bslam/slam/history.h"
+#include "bslam/model/odometry.h"
+#include "bslam/model/odometry_history.h"
 #include "bslam/smoother/smoother.h"
 
 /// Never-decreasing counts of what happened.
@@ -82,10 +82,10 @@ typedef struct bslam_smoothing {
 /// out where no looks are attached.
 struct bslam_slam;
 typedef struct bslam_learning {
-    void (*clear)(bslam_looks_t *looks);
-    void (*forget)(bslam_looks_t *looks, int beacon, int count);
+    void (*clear)(bslam_appearance_t *appearance);
+    void (*forget)(bslam_appearance_t *appearance, int beacon, int count);
     void (*learn)(struct bslam_slam *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
-    const bslam_looks_answers_t *answers;
+    const bslam_appearance_answers_t *answers;
 } bslam_learning_t;
 
 /// All members are the pipeline's own; read them through the functions below.
@@ -94,14 +94,14 @@ typedef struct bslam_slam {
     bslam_ekf_t ekf;
     bslam_odometry_t odometry;
     bslam_history_t history;
-    uint32_t way_um;  ///< that the filter has gone, modulo 4.3 km
+    uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
     bool confirmed_now;                  ///< within a frame: it has confirmed a beacon
     bool measures_distance;              ///< some sighting had one
     bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
     bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
-    bslam_looks_t *looks;                ///< the caller's; NULL: none attached
+    bslam_appearance_t *appearance;                ///< the caller's; NULL: none attached
     const bslam_learning_t *learning;    ///< theirs
     bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
     const bslam_smoothing_t *smoothing;  ///< theirs
@@ -120,9 +120,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_
                                                 int *bad_id);
 
 /// From now on the pipeline learns what beacons look like, and association 3 decides by it. *looks has been
-/// through bslam_looks_init and stays the caller's; it serves one pipeline, and forgets what it knew of
+/// through bslam_appearance_init and stays the caller's; it serves one pipeline, and forgets what it knew of
 /// another map. NULL: looks are not used any more. bslam_slam_init detaches.
-void bslam_slam_attach_looks(bslam_slam_t *slam, bslam_looks_t *looks);
+void bslam_slam_attach_appearance(bslam_slam_t *slam, bslam_appearance_t *appearance);
 
 /// From now on the filter is led through the last drive again and again (smoother/smoother.h), if the
 /// parameter `filter` says so; without a smoother it is the invariant one. *smoother stays the caller's and

@@ -2,9 +2,9 @@
 
 #include <string.h>
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 #include "bslam/model/noise.h"
-#include "bslam/smoother/internal.h"
+#include "bslam/smoother/smoother_internal.h"
 
 /// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
 /// last moment before nothing is in view.

@@ -1,10 +1,10 @@
 // What lies farther back is kept with fewer nodes: two neighbours become one. MATH "The smoother".
 #include <string.h>
 
-#include "bslam/math/trig.h"
+#include "base/trig.h"
 #include "bslam/model/motion.h"
 #include "bslam/model/observation.h"
-#include "bslam/smoother/internal.h"
+#include "bslam/smoother/smoother_internal.h"
 
 /// No way is bent by more: beyond that it has no direction to speak of.
 static const bslam_real_t TURNED_MAX_RAD = BSLAM_R(1.0);

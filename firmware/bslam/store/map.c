@@ -3,8 +3,8 @@
 #include <string.h>
 
 #include "bslam/store/crc32.h"
-#include "bslam/store/machines.h"
-#include "bslam/store/passage.h"
+#include "bslam/store/classifiers.h"
+#include "bslam/store/codec.h"
 
 #define MAGIC 0x4d4c5342u  // "BSLM"
 #define ORDER 0x0102u
@@ -67,33 +67,33 @@ typedef struct header {
     uint32_t length;
     uint32_t beacons;
     uint32_t values;
-    uint32_t machines;
+    uint32_t classifiers;
     uint32_t next_uid;
 } header_t;
 
-static void move_header(bslam_passage_t *passage, header_t *header)
+static void move_header(bslam_codec_t *codec, header_t *header)
 {
-    const uint32_t magic = bslam_passage_whole(passage, MAGIC, 4);
-    bslam_passage_require(passage, magic == MAGIC, BSLAM_MAP_NO_MAP);
-    const uint32_t order = bslam_passage_whole(passage, ORDER, 2);
-    bslam_passage_require(passage, order != ORDER_SWAPPED, BSLAM_MAP_BYTE_ORDER);
-    bslam_passage_require(passage, order == ORDER, BSLAM_MAP_NO_MAP);
-    passage->version = bslam_passage_whole(passage, BSLAM_MAP_VERSION, 2);
-    bslam_passage_require(passage, passage->version >= 1 && passage->version <= BSLAM_MAP_VERSION,
+    const uint32_t magic = bslam_codec_whole(codec, MAGIC, 4);
+    bslam_codec_require(codec, magic == MAGIC, BSLAM_MAP_NO_MAP);
+    const uint32_t order = bslam_codec_whole(codec, ORDER, 2);
+    bslam_codec_require(codec, order != ORDER_SWAPPED, BSLAM_MAP_BYTE_ORDER);
+    bslam_codec_require(codec, order == ORDER, BSLAM_MAP_NO_MAP);
+    codec->version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
+    bslam_codec_require(codec, codec->version >= 1 && codec->version <= BSLAM_MAP_VERSION,
                           BSLAM_MAP_OTHER_VERSION);
-    header->length = bslam_passage_whole(passage, header->length, 4);
-    header->beacons = bslam_passage_whole(passage, header->beacons, 2);
-    header->values = bslam_passage_whole(passage, header->values, 2);
-    header->machines = bslam_passage_whole(passage, header->machines, 2);
-    const uint32_t features = bslam_passage_whole(passage, BSLAM_SAMPLE_FEATURES, 2);
-    header->next_uid = bslam_passage_whole(passage, header->next_uid, 4);
-    const uint32_t reserved = bslam_passage_whole(passage, 0, 4);
-    bslam_passage_require(passage, header->beacons <= BSLAM_BEACONS_MAX, BSLAM_MAP_BEACONS);
-    bslam_passage_require(passage, header->values <= BSLAM_STATE_MAX - BSLAM_ROBOT_DIM_MAX,
+    header->length = bslam_codec_whole(codec, header->length, 4);
+    header->beacons = bslam_codec_whole(codec, header->beacons, 2);
+    header->values = bslam_codec_whole(codec, header->values, 2);
+    header->classifiers = bslam_codec_whole(codec, header->classifiers, 2);
+    const uint32_t features = bslam_codec_whole(codec, BSLAM_SAMPLE_FEATURES, 2);
+    header->next_uid = bslam_codec_whole(codec, header->next_uid, 4);
+    const uint32_t reserved = bslam_codec_whole(codec, 0, 4);
+    bslam_codec_require(codec, header->beacons <= BSLAM_BEACONS_MAX, BSLAM_MAP_BEACONS);
+    bslam_codec_require(codec, header->values <= BSLAM_STATE_MAX - BSLAM_ROBOT_DIM_MAX,
                           BSLAM_MAP_BEACONS);
-    bslam_passage_require(passage, header->machines <= BSLAM_LEARNER_SLOTS, BSLAM_MAP_MACHINES);
-    bslam_passage_require(passage, features == BSLAM_SAMPLE_FEATURES, BSLAM_MAP_MACHINES);
-    bslam_passage_require(passage, reserved == 0, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, header->classifiers <= BSLAM_LEARNER_SLOTS, BSLAM_MAP_CLASSIFIERS);
+    bslam_codec_require(codec, features == BSLAM_SAMPLE_FEATURES, BSLAM_MAP_CLASSIFIERS);
+    bslam_codec_require(codec, reserved == 0, BSLAM_MAP_CONTENT);
 }
 
 // ---- beacons ----------------------------------------------------------------------------------------------
@@ -102,33 +102,33 @@ static void move_header(bslam_passage_t *passage, header_t *header)
 /// count.
 typedef struct record {
     bslam_beacon_t beacon;
-    uint32_t machine;
+    uint32_t classifier;
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m;
     bslam_real_t y_m;
-    uint8_t seen_as[BSLAM_LOOKS_CLASSES];
+    uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } record_t;
 
-static void move_record(bslam_passage_t *passage, record_t *record)
+static void move_record(bslam_codec_t *codec, record_t *record)
 {
     bslam_beacon_t *beacon = &record->beacon;
-    beacon->uid = bslam_passage_whole(passage, beacon->uid, 4);
-    const uint32_t label = bslam_passage_whole(passage, (uint32_t)beacon->label, 4);
-    const uint32_t kind = bslam_passage_whole(passage, (uint32_t)beacon->kind, 1);
-    beacon->beacon_class = (uint8_t)bslam_passage_whole(passage, beacon->beacon_class, 1);
-    record->machine = bslam_passage_whole(passage, record->machine, 2);
-    beacon->sightings = bslam_passage_whole(passage, beacon->sightings, 4);
-    record->scale = bslam_passage_real(passage, record->scale);
-    bslam_passage_require(passage, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
-    record->x_m = bslam_passage_real(passage, record->x_m);
-    record->y_m = bslam_passage_real(passage, record->y_m);
-    if (passage->version >= 2) {
-        bslam_passage_bytes(passage, record->seen_as, sizeof record->seen_as);
+    beacon->uid = bslam_codec_whole(codec, beacon->uid, 4);
+    const uint32_t label = bslam_codec_whole(codec, (uint32_t)beacon->label, 4);
+    const uint32_t kind = bslam_codec_whole(codec, (uint32_t)beacon->kind, 1);
+    beacon->beacon_class = (uint8_t)bslam_codec_whole(codec, beacon->beacon_class, 1);
+    record->classifier = bslam_codec_whole(codec, record->classifier, 2);
+    beacon->sightings = bslam_codec_whole(codec, beacon->sightings, 4);
+    record->scale = bslam_codec_real(codec, record->scale);
+    bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
+    record->x_m = bslam_codec_real(codec, record->x_m);
+    record->y_m = bslam_codec_real(codec, record->y_m);
+    if (codec->version >= 2) {
+        bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     } else {  // version 1 knew neither
-        bslam_passage_require(passage, record->scale == 0, BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec, record->scale == 0, BSLAM_MAP_CONTENT);
     }
-    bslam_passage_require(passage, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
-    bslam_passage_require(passage, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
     beacon->kind = kind <= BSLAM_BEACON_SIZED ? (bslam_beacon_kind_t)kind : BSLAM_BEACON_POINT;
 }
@@ -170,7 +170,7 @@ static void take_record(const target_t *target, const record_t *record)
     beacon->distance_lead = BSLAM_LEAD_MAX;
     beacon->known_x_m = record->x_m;
     beacon->known_y_m = record->y_m;
-    beacon->way_um = target->slam->way_um - LONG_WAY_UM;
+    beacon->travelled_um = target->slam->travelled_um - LONG_WAY_UM;
     if (target->mode == BSLAM_MAP_FROZEN) {
         beacon->kind = BSLAM_BEACON_KNOWN;
     }
@@ -179,83 +179,83 @@ static void take_record(const target_t *target, const record_t *record)
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
     ekf->dim += bslam_beacon_dim(beacon->kind);
-    if (target->slam->looks != NULL) {
-        bslam_look_t *look = &target->slam->looks->of[index];
-        look->machine = record->machine != BSLAM_MAP_NO_MACHINE ? (int16_t)record->machine : look->machine;
+    if (target->slam->appearance != NULL) {
+        bslam_beacon_look_t *look = &target->slam->appearance->of[index];
+        look->classifier = record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
         memcpy(look->seen_as, record->seen_as, sizeof look->seen_as);
     }
 }
 
-static void read_beacons(bslam_passage_t *passage, const header_t *header, const target_t *target)
+static void read_beacons(bslam_codec_t *codec, const header_t *header, const target_t *target)
 {
     uint32_t values = 0;
     uint32_t further = 0;  // beyond two a beacon
     uint32_t least_uid = 0;
-    for (uint32_t b = 0; b < header->beacons && passage->fault == BSLAM_MAP_FINE; b++) {
-        record_t record = {.machine = BSLAM_MAP_NO_MACHINE};
-        move_record(passage, &record);
+    for (uint32_t b = 0; b < header->beacons && codec->fault == BSLAM_MAP_FINE; b++) {
+        record_t record = {.classifier = BSLAM_MAP_NO_CLASSIFIER};
+        move_record(codec, &record);
         values += (uint32_t)bslam_beacon_dim(record.beacon.kind);
         further += record.beacon.kind == BSLAM_BEACON_RAY     ? 2u
                    : record.beacon.kind == BSLAM_BEACON_SIZED ? 1u
                                                               : 0u;
         const uint32_t uid = record.beacon.uid;
-        bslam_passage_require(passage, uid >= least_uid && uid < header->next_uid, BSLAM_MAP_CONTENT);
-        bslam_passage_require(passage,
-                              record.machine == BSLAM_MAP_NO_MACHINE || record.machine < header->machines,
+        bslam_codec_require(codec, uid >= least_uid && uid < header->next_uid, BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec,
+                              record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
                               BSLAM_MAP_CONTENT);
         least_uid = uid + 1;
         if (is_taken(target, &record.beacon)) {
             take_record(target, &record);
         }
     }
-    bslam_passage_require(passage, values == header->values, BSLAM_MAP_CONTENT);
-    bslam_passage_require(passage, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
+    bslam_codec_require(codec, values == header->values, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
 }
 
 // ---- mean and covariance ----------------------------------------------------------------------------------
 
 /// A value of the covariance, read out of turn: the diagonal.
-static bslam_real_t variance_at(bslam_passage_t *passage, uint32_t covariance_at, uint32_t i)
+static bslam_real_t variance_at(bslam_codec_t *codec, uint32_t covariance_at, uint32_t i)
 {
     uint8_t bytes[4] = {0};
     const uint32_t at = covariance_at + REAL_BYTES * (i * (i + 1) / 2 + i);
-    if (passage->source->size < at + REAL_BYTES) {
+    if (codec->source->size < at + REAL_BYTES) {
         return 0;
     }
-    bslam_passage_require(passage, passage->source->read(passage->source->context, at, bytes, REAL_BYTES),
+    bslam_codec_require(codec, codec->source->read(codec->source->context, at, bytes, REAL_BYTES),
                           BSLAM_MAP_UNREADABLE);
-    return (bslam_real_t)bslam_passage_float_of((uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 |
+    return (bslam_real_t)bslam_codec_float_of((uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 |
                                                 (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
 }
 
 /// Without room for more: no variance is negative, no two values are correlated beyond 1.
-static void check_pairs(bslam_passage_t *passage, uint32_t values)
+static void check_pairs(bslam_codec_t *codec, uint32_t values)
 {
-    const uint32_t covariance_at = passage->at;
-    for (uint32_t i = 0; i < values && passage->fault == BSLAM_MAP_FINE; i++) {
-        const bslam_real_t own = variance_at(passage, covariance_at, i);
+    const uint32_t covariance_at = codec->at;
+    for (uint32_t i = 0; i < values && codec->fault == BSLAM_MAP_FINE; i++) {
+        const bslam_real_t own = variance_at(codec, covariance_at, i);
         for (uint32_t j = 0; j <= i; j++) {
-            const bslam_real_t value = bslam_passage_real(passage, 0);
-            const bslam_real_t other = j == i ? 1 : variance_at(passage, covariance_at, j);
+            const bslam_real_t value = bslam_codec_real(codec, 0);
+            const bslam_real_t other = j == i ? 1 : variance_at(codec, covariance_at, j);
             const bool fits = j == i ? value >= 0 : value * value <= CORRELATION2_MAX * own * other;
-            bslam_passage_require(passage, fits, BSLAM_MAP_COVARIANCE);
+            bslam_codec_require(codec, fits, BSLAM_MAP_COVARIANCE);
         }
     }
 }
 
 /// All values together: that the covariance is positive semidefinite.
-static void check_whole(bslam_passage_t *passage, uint32_t values, const room_t *room)
+static void check_whole(bslam_codec_t *codec, uint32_t values, const room_t *room)
 {
-    for (int i = 0; i < (int)values && passage->fault == BSLAM_MAP_FINE; i++) {
+    for (int i = 0; i < (int)values && codec->fault == BSLAM_MAP_FINE; i++) {
         for (int j = 0; j <= i; j++) {
-            bslam_symmat_set(room->factor, i, j, bslam_passage_real(passage, 0));
+            bslam_symmat_set(room->factor, i, j, bslam_codec_real(codec, 0));
         }
-        bslam_passage_require(passage, bslam_symmat_factor_row(room->factor, i, room->raise),
+        bslam_codec_require(codec, bslam_symmat_factor_row(room->factor, i, room->raise),
                               BSLAM_MAP_COVARIANCE);
     }
 }
 
-static void take_covariance(bslam_passage_t *passage, uint32_t values, const target_t *target)
+static void take_covariance(bslam_codec_t *codec, uint32_t values, const target_t *target)
 {
     bslam_ekf_t *ekf = &target->slam->ekf;
     const int base = ekf->base_dim;
@@ -264,29 +264,29 @@ static void take_covariance(bslam_passage_t *passage, uint32_t values, const tar
             bslam_symmat_set(ekf->covariance, i, k, 0);
         }
         for (int j = base; j <= i; j++) {
-            const bslam_real_t value = bslam_passage_real(passage, 0);
+            const bslam_real_t value = bslam_codec_real(codec, 0);
             bslam_symmat_set(ekf->covariance, i, j, j == i ? value + target->raise * value : value);
         }
     }
 }
 
 /// The state values of the beacons, and the lower triangle of their covariance, row by row.
-static void read_values(bslam_passage_t *passage, const header_t *header, const target_t *target,
+static void read_values(bslam_codec_t *codec, const header_t *header, const target_t *target,
                         const room_t *room)
 {
     const bool is_taken = target != NULL && target->mode == BSLAM_MAP_LIVING;
     for (uint32_t i = 0; i < header->values; i++) {
-        const bslam_real_t value = bslam_passage_real(passage, 0);
+        const bslam_real_t value = bslam_codec_real(codec, 0);
         if (is_taken) {
             target->slam->ekf.mean[target->slam->ekf.base_dim + (int)i] = value;
         }
     }
     if (is_taken) {
-        take_covariance(passage, header->values, target);
+        take_covariance(codec, header->values, target);
     } else if (room != NULL && has_room(room, header->values)) {
-        check_whole(passage, header->values, room);
+        check_whole(codec, header->values, room);
     } else {
-        check_pairs(passage, header->values);
+        check_pairs(codec, header->values);
     }
 }
 
@@ -314,16 +314,16 @@ static int state_at(const bslam_ekf_t *ekf, const place_t *place)
     return ekf->beacons[place->beacon].at + place->value;
 }
 
-static void write_values(bslam_passage_t *passage, const bslam_ekf_t *ekf)
+static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf)
 {
     for (place_t i = {0, -1}; next_value(ekf, &i);) {
-        (void)bslam_passage_real(passage, ekf->mean[state_at(ekf, &i)]);
+        (void)bslam_codec_real(codec, ekf->mean[state_at(ekf, &i)]);
     }
     for (place_t i = {0, -1}; next_value(ekf, &i);) {
         place_t j = {0, -1};
         do {
             (void)next_value(ekf, &j);
-            (void)bslam_passage_real(passage,
+            (void)bslam_codec_real(codec,
                                      bslam_symmat_get(ekf->covariance, state_at(ekf, &i), state_at(ekf, &j)));
         } while (i.beacon != j.beacon || i.value != j.value);
     }
@@ -339,7 +339,7 @@ static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beaco
 
 // ---- the whole --------------------------------------------------------------------------------------------
 
-static void write_all(bslam_passage_t *passage, const bslam_slam_t *slam, uint32_t length)
+static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t length)
 {
     const bslam_ekf_t *ekf = &slam->ekf;
     header_t header = {.length = length, .next_uid = ekf->next_uid};
@@ -349,91 +349,91 @@ static void write_all(bslam_passage_t *passage, const bslam_slam_t *slam, uint32
             header.values += (uint32_t)bslam_beacon_dim(ekf->beacons[b].kind);
         }
     }
-    for (int32_t slot = 0; slam->looks != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
-        header.machines += bslam_map_owns(slam, slot) ? 1u : 0u;
+    for (int32_t slot = 0; slam->appearance != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
+        header.classifiers += bslam_map_owns(slam, slot) ? 1u : 0u;
     }
-    move_header(passage, &header);
+    move_header(codec, &header);
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (bslam_map_saves(ekf, b)) {
-            record_t record = {.beacon = ekf->beacons[b], .machine = BSLAM_MAP_NO_MACHINE};
+            record_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
             record.scale = scale_of(ekf, &ekf->beacons[b]);
-            if (slam->looks != NULL) {
-                const bslam_look_t *look = &slam->looks->of[b];
-                record.machine = bslam_map_machine_number(slam, look->machine);
+            if (slam->appearance != NULL) {
+                const bslam_beacon_look_t *look = &slam->appearance->of[b];
+                record.classifier = bslam_map_classifier_number(slam, look->classifier);
                 memcpy(record.seen_as, look->seen_as, sizeof record.seen_as);
             }
             bslam_ekf_beacon_position(ekf, b, &record.x_m, &record.y_m);
-            move_record(passage, &record);
+            move_record(codec, &record);
         }
     }
-    write_values(passage, ekf);
-    for (int32_t slot = 0; slam->looks != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
+    write_values(codec, ekf);
+    for (int32_t slot = 0; slam->appearance != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
         if (bslam_map_owns(slam, slot)) {
-            bslam_map_write_machine(passage, slam, slot);
+            bslam_map_write_classifier(codec, slam, slot);
         }
     }
-    (void)bslam_passage_whole(passage, ~passage->crc, CRC_BYTES);
+    (void)bslam_codec_whole(codec, ~codec->crc, CRC_BYTES);
 }
 
 uint32_t bslam_map_size(const bslam_slam_t *slam)
 {
-    bslam_passage_t passage = {.crc = BSLAM_CRC32_START};
-    write_all(&passage, slam, 0);
-    return passage.at;
+    bslam_codec_t codec = {.crc = BSLAM_CRC32_START};
+    write_all(&codec, slam, 0);
+    return codec.at;
 }
 
 bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t *sink,
                                bslam_map_fault_t *fault)
 {
-    bslam_passage_t passage = {.sink = sink, .crc = BSLAM_CRC32_START};
-    write_all(&passage, slam, bslam_map_size(slam));
-    *fault = passage.fault;
-    return passage.fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
+    bslam_codec_t codec = {.sink = sink, .crc = BSLAM_CRC32_START};
+    write_all(&codec, slam, bslam_map_size(slam));
+    *fault = codec.fault;
+    return codec.fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
 }
 
-static void read_all(bslam_passage_t *passage, const target_t *target, const room_t *room)
+static void read_all(bslam_codec_t *codec, const target_t *target, const room_t *room)
 {
     header_t header = {0};
-    move_header(passage, &header);
+    move_header(codec, &header);
     if (target != NULL) {
         target->slam->ekf.next_uid = header.next_uid;
     }
-    read_beacons(passage, &header, target);
-    read_values(passage, &header, target, room);
-    const bool learns = target != NULL && target->slam->looks != NULL;
-    bslam_map_read_machines(passage, header.machines, learns ? &target->slam->looks->learner : NULL);
-    const uint32_t body = passage->at;
-    (void)bslam_passage_whole(passage, 0, CRC_BYTES);
-    bslam_passage_require(passage, body + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
-    bslam_passage_require(passage, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
+    read_beacons(codec, &header, target);
+    read_values(codec, &header, target, room);
+    const bool learns = target != NULL && target->slam->appearance != NULL;
+    bslam_map_read_classifiers(codec, header.classifiers, learns ? &target->slam->appearance->learner : NULL);
+    const uint32_t body = codec->at;
+    (void)bslam_codec_whole(codec, 0, CRC_BYTES);
+    bslam_codec_require(codec, body + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
 }
 
 /// The frame of a blob: it begins as a map, is as long as it says, and its CRC is right. All else is looked
 /// at only then, so that damage is called damage.
 static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
 {
-    bslam_passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
+    bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
     header_t header = {0};
     if (source->size < HEADER_BYTES + CRC_BYTES) {
         return BSLAM_MAP_TRUNCATED;
     }
-    move_header(&passage, &header);
-    const bool is_map = passage.fault == BSLAM_MAP_FINE || passage.fault >= BSLAM_MAP_BEACONS;
-    if (!is_map || passage.fault == BSLAM_MAP_UNREADABLE) {
-        return passage.fault;
+    move_header(&codec, &header);
+    const bool is_map = codec.fault == BSLAM_MAP_FINE || codec.fault >= BSLAM_MAP_BEACONS;
+    if (!is_map || codec.fault == BSLAM_MAP_UNREADABLE) {
+        return codec.fault;
     }
     if (header.length != source->size) {
         return source->size < header.length ? BSLAM_MAP_TRUNCATED : BSLAM_MAP_TOO_LONG;
     }
-    passage = (bslam_passage_t){.source = source, .crc = BSLAM_CRC32_START};
-    while (passage.at < header.length - CRC_BYTES && passage.fault == BSLAM_MAP_FINE) {
+    codec = (bslam_codec_t){.source = source, .crc = BSLAM_CRC32_START};
+    while (codec.at < header.length - CRC_BYTES && codec.fault == BSLAM_MAP_FINE) {
         uint8_t bytes[32];
-        const uint32_t left = header.length - CRC_BYTES - passage.at;
-        bslam_passage_bytes(&passage, bytes, left < sizeof bytes ? left : sizeof bytes);
+        const uint32_t left = header.length - CRC_BYTES - codec.at;
+        bslam_codec_bytes(&codec, bytes, left < sizeof bytes ? left : sizeof bytes);
     }
-    const uint32_t crc = ~passage.crc;
-    bslam_passage_require(&passage, bslam_passage_whole(&passage, 0, CRC_BYTES) == crc, BSLAM_MAP_BAD_CRC);
-    return passage.fault;
+    const uint32_t crc = ~codec.crc;
+    bslam_codec_require(&codec, bslam_codec_whole(&codec, 0, CRC_BYTES) == crc, BSLAM_MAP_BAD_CRC);
+    return codec.fault;
 }
 
 static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room)
@@ -442,9 +442,9 @@ static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *r
     if (fault != BSLAM_MAP_FINE) {
         return fault;
     }
-    bslam_passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&passage, NULL, room);
-    return passage.fault;
+    bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
+    read_all(&codec, NULL, room);
+    return codec.fault;
 }
 
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
@@ -470,9 +470,9 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     bslam_slam_forget_map(slam);
     slam->is_frozen = mode == BSLAM_MAP_FROZEN;
     const target_t target = {slam, mode, room.raise};
-    bslam_passage_t passage = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&passage, &target, NULL);
-    *fault = passage.fault;
+    bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
+    read_all(&codec, &target, NULL);
+    *fault = codec.fault;
     if (*fault != BSLAM_MAP_FINE) {
         bslam_slam_forget_map(slam);
     }

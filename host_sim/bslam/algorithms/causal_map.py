@@ -46,10 +46,10 @@ class CausalMap:
         """See `Algorithm`."""
         p, gyro = self._parameters, self._gyro
         dt_s = (time_us - self._times_us[-1]) * 1e-6
-        way_m, turn_rad = measured_motion(p, dt_s, left_m, right_m, *gyro)[0].tolist()
+        travelled_m, turn_rad = measured_motion(p, dt_s, left_m, right_m, *gyro)[0].tolist()
         half_turn_m = 0.5 * turn_rad * p["wheelbase_m"]
         pose = move_on_arc(
-            self._smoother.last_pose, way_m - half_turn_m, way_m + half_turn_m, p["wheelbase_m"]
+            self._smoother.last_pose, travelled_m - half_turn_m, travelled_m + half_turn_m, p["wheelbase_m"]
         )
         self._smoother.add_step(dt_s, left_m, right_m, pose, *gyro)
         self._times_us.append(time_us)

@@ -63,9 +63,9 @@ class Isam2:
         """See `Algorithm`."""
         p = self._p
         dt_s = (time_us - self._times_us[-1]) * 1e-6
-        (way_m, turn_rad), spread = measured_motion(p, dt_s, left_m, right_m, *self._gyro)
+        (travelled_m, turn_rad), spread = measured_motion(p, dt_s, left_m, right_m, *self._gyro)
         self._gyro = NO_GYRO
-        twist = np.array([way_m, 0.0, turn_rad])
+        twist = np.array([travelled_m, 0.0, turn_rad])
         covariance = np.zeros((3, 3))
         covariance[np.ix_([0, 2], [0, 2])] = spread
         covariance[1, 1] = _SIDEWAYS_SD_M**2

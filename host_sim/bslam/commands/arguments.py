@@ -13,8 +13,8 @@ import joblib
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.experiment.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
-from bslam.experiment.options import (
+from bslam.runs.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
+from bslam.options import (
     ASSOCIATIONS,
     FILTERS,
     MOTIONS,
@@ -26,7 +26,7 @@ from bslam.experiment.options import (
     RunOptions,
     parse_association,
 )
-from bslam.experiment.sources import CameraSource, ScenarioSource
+from bslam.runs.sources import CameraSource, ScenarioSource
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 from bslam.maps.blob import SUFFIX
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines

@@ -12,12 +12,12 @@ from bslam.commands.drawing import draw
 from bslam.commands.replay import log_sources
 from bslam.commands.report import finish, table_of
 from bslam.errors import BslamError
-from bslam.experiment.batch import Job, run_batch
-from bslam.experiment.calibrate import Calibration, as_toml, calibrate
-from bslam.experiment.mrclam import ROBOTS
-from bslam.experiment.options import RunOptions
-from bslam.experiment.output import write_atomically
-from bslam.experiment.sources import Source
+from bslam.runs.batch import Job, run_batch
+from bslam.calibration.calibrate import Calibration, as_toml, calibrate
+from bslam.datasets.mrclam import ROBOTS
+from bslam.options import RunOptions
+from bslam.runs.output import write_atomically
+from bslam.runs.sources import Source
 
 SUMMARY = "odometry's scale and noise from a log with truth; a camera's lens and mounting from pictures"
 EXAMPLES = """examples:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from bslam.commands.report import table_of
 from bslam.errors import BslamError
-from bslam.experiment.calibrate import Estimate
-from bslam.experiment.calibrate_camera import (
+from bslam.calibration.calibrate import Estimate
+from bslam.calibration.calibrate_camera import (
     Board,
     LensCalibration,
     Mounting,
@@ -19,9 +19,9 @@ from bslam.experiment.calibrate_camera import (
     find_boards,
     find_mounting,
 )
-from bslam.experiment.camera_pitch import find_pitch, load_drive
-from bslam.experiment.output import write_atomically
-from bslam.experiment.sensor_yaw import find_yaw
+from bslam.calibration.camera_pitch import find_pitch, load_drive
+from bslam.runs.output import write_atomically
+from bslam.calibration.sensor_yaw import find_yaw
 from bslam.log import read_folder
 from bslam.rig import LENS_KINDS, Camera
 

@@ -16,9 +16,9 @@ from bslam.commands.arguments import add_filter_options, run_options
 from bslam.commands.report import table_of
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
-from bslam.experiment.kept import read_blob
-from bslam.experiment.options import ASSOCIATIONS
-from bslam.experiment.runner import run_log
+from bslam.runs.kept import read_blob
+from bslam.options import ASSOCIATIONS
+from bslam.runs.runner import run_log
 from bslam.link.messages import Health, PoseReport
 from bslam.log import Log, read_folder
 from bslam.recording import RecordingWriter

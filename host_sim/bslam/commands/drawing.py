@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bslam.experiment.consistency import nees_band_95
-from bslam.experiment.metrics import WINDOW_S, Evaluation
-from bslam.experiment.output import write_atomically
-from bslam.experiment.sources import Source
-from bslam.experiment.trace import MapBeacon, Trace
+from bslam.evaluation.consistency import nees_band_95
+from bslam.evaluation.metrics import WINDOW_S, Evaluation
+from bslam.runs.output import write_atomically
+from bslam.runs.sources import Source
+from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.log import Log
 from bslam.view.room import Mapped, Room, draw_room
 from bslam.view.series import Series, draw_run

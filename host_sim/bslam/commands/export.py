@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.experiment.options import RunOptions
-from bslam.experiment.output import tum, write_atomically
-from bslam.experiment.runner import run_log
+from bslam.options import RunOptions
+from bslam.runs.output import tum, write_atomically
+from bslam.runs.runner import run_log
 from bslam.log import Log, read_folder, write_folder
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log

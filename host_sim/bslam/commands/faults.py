@@ -9,15 +9,15 @@ from tqdm import tqdm
 
 from bslam.commands.arguments import positive_count
 from bslam.errors import BslamError
-from bslam.experiment.faults.device import device_faults
-from bslam.experiment.faults.drives import drive_faults
-from bslam.experiment.faults.images import image_faults
-from bslam.experiment.faults.inputs import input_faults
-from bslam.experiment.faults.memory import memory_faults
-from bslam.experiment.faults.model import missing_parts
-from bslam.experiment.faults.places import place_faults
-from bslam.experiment.faults.promise import Fault, Measured
-from bslam.experiment.output import write_json
+from bslam.faults.device import device_faults
+from bslam.faults.drives import drive_faults
+from bslam.faults.images import image_faults
+from bslam.faults.inputs import input_faults
+from bslam.faults.memory import memory_faults
+from bslam.faults.model import missing_parts
+from bslam.faults.places import place_faults
+from bslam.faults.promise import Fault, Measured
+from bslam.runs.output import write_json
 
 SUMMARY = "inject every fault, and compare what happens with what is promised (docs/FAULTS.md)"
 EXAMPLES = """examples:

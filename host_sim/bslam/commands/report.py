@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bslam.errors import BslamError
-from bslam.experiment.batch import BatchResult
+from bslam.runs.batch import BatchResult
 from bslam.maps.blob import SUFFIX
 
 # Heading, and how to get the text of an entry.

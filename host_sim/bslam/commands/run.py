@@ -13,7 +13,7 @@ from bslam.commands.arguments import (
 )
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
-from bslam.experiment.batch import Job, make_jobs, run_batch
+from bslam.runs.batch import Job, make_jobs, run_batch
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "simulate a scenario and run the filter on it"

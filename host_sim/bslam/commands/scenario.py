@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.experiment.output import write_atomically
+from bslam.runs.output import write_atomically
 from bslam.log import Beacons
 from bslam.view.style import png
 from bslam.view.world import World, draw_world

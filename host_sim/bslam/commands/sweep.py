@@ -22,15 +22,15 @@ from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
 from bslam.commands.report import HEADINGS, mean_row, table_of
 from bslam.errors import BslamError
-from bslam.experiment.batch import Job, make_jobs
-from bslam.experiment.cluster import cluster
-from bslam.experiment.consistency import half_interval_95
-from bslam.experiment.contest import Guest, guest_jobs
-from bslam.experiment.methods import method_digest, own_method
-from bslam.experiment.options import RunOptions
-from bslam.experiment.output import write_atomically, write_summary
-from bslam.experiment.sources import Source
-from bslam.experiment.sweep import (
+from bslam.runs.batch import Job, make_jobs
+from bslam.runs.cluster import cluster
+from bslam.evaluation.consistency import half_interval_95
+from bslam.runs.contest import Guest, guest_jobs
+from bslam.runs.methods import method_digest, own_method
+from bslam.options import RunOptions
+from bslam.runs.output import write_atomically, write_summary
+from bslam.runs.sources import Source
+from bslam.runs.sweep import (
     PARQUET,
     STORE,
     Store,

@@ -12,12 +12,12 @@ import numpy as np
 from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
 from bslam.commands.grid import Filters, grid_jobs
 from bslam.commands.report import finish, table_of
-from bslam.experiment.batch import Job, Outcome, run_batch
-from bslam.experiment.consistency import nees_band_95
-from bslam.experiment.metrics import WINDOW_S
-from bslam.experiment.options import OBSERVATIONS
-from bslam.experiment.output import write_atomically, write_json
-from bslam.experiment.tables import (
+from bslam.runs.batch import Job, Outcome, run_batch
+from bslam.evaluation.consistency import nees_band_95
+from bslam.evaluation.metrics import WINDOW_S
+from bslam.options import OBSERVATIONS
+from bslam.runs.output import write_atomically, write_json
+from bslam.runs.tables import (
     NAMES,
     OBSERVATION_TITLES,
     SIGMAS_MPS,

@@ -20,7 +20,8 @@ from cffi import FFI
 from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 
 CORE_DIR = Path(__file__).resolve().parent
-LIBRARY_DIR = FIRMWARE_DIR / "bslam"
+SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision")}
+"""Folders of the firmware that make each library."""
 BEACONS_HEADER = FIRMWARE_DIR / "models" / "beacons.h"
 
 LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limits.h", "float.h")
@@ -64,13 +65,13 @@ def _drop_inline_functions(text: str) -> str:
 
 
 def declarations(macros: Macros, header: str) -> str:
-    """A public header of the library, "bslam.h" say, with all it includes, as cffi reads it."""
+    """A header of the firmware, "bslam/bslam.h" say, with all it includes, as cffi reads it."""
     with tempfile.TemporaryDirectory() as empty:
         for libc_header in LIBC_HEADERS:
             Path(empty, libc_header).touch()
         defines = [f"-D{name}={value}" for name, value in macros]
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
-        command += [*defines, "-D__attribute__(x)=", str(LIBRARY_DIR / header)]
+        command += [*defines, "-D__attribute__(x)=", str(FIRMWARE_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return _drop_inline_functions(text)
 
@@ -79,13 +80,13 @@ def build(real: str, beacons_max: int) -> Path:
     """Builds the filter for a scalar type and size class; returns where."""
     macros = _macros(real, beacons_max)
     name = extension_name(real, beacons_max)
-    return _compile(name, declarations(macros, "bslam.h"), '#include "bslam/bslam.h"', macros)
+    return _compile(name, declarations(macros, "bslam/bslam.h"), '#include "bslam/bslam.h"', macros, "bslam")
 
 
 def build_vision() -> Path:
     """Builds the vision front end, in float as on the target, with its model where there is one yet."""
-    header = "vision/visual_gyro.h"  # it includes all the others
-    includes = f'#include "bslam/{header}"\n'
+    header = "vision/gyro/visual_gyro.h"  # it includes all the others
+    includes = f'#include "{header}"\n'
     text = declarations(VISION_MACROS, header)
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
     if BEACONS_HEADER.is_file():
@@ -94,10 +95,10 @@ def build_vision() -> Path:
     else:
         model = "NULL"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    return _compile(VISION_EXTENSION, text, includes + function, VISION_MACROS)
+    return _compile(VISION_EXTENSION, text, includes + function, VISION_MACROS, "vision")
 
 
-def _compile(name: str, declared: str, source: str, macros: Macros) -> Path:
+def _compile(name: str, declared: str, source: str, macros: Macros, library: str) -> Path:
     """Compiles one extension and puts it beside this file; returns where."""
     ffi = FFI()
     ffi.cdef(declared)
@@ -105,7 +106,7 @@ def _compile(name: str, declared: str, source: str, macros: Macros) -> Path:
         ffi.set_source(
             name,
             source,
-            sources=sorted(str(path) for path in LIBRARY_DIR.rglob("*.c")),
+            sources=sorted(str(path) for folder in SOURCES[library] for path in (FIRMWARE_DIR / folder).rglob("*.c")),
             include_dirs=[str(FIRMWARE_DIR)],
             define_macros=list(macros),
             extra_compile_args=[

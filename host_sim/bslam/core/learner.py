@@ -17,7 +17,7 @@ SIGNATURE_SIZE = 71
 """Values of a signature."""
 
 _SEEDS = Path(__file__).with_name("seeds.npy")  # tools/training/make_seeds.py writes it
-_SEED_STEPS = 127  # of 1, as firmware/bslam/svm/sample.h stores them
+_SEED_STEPS = 127  # of 1, as firmware/bslam/appearance/sample.h stores them
 
 
 class Learner:

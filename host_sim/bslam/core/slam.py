@@ -109,11 +109,11 @@ class Slam:
             self._attach_looks(np.empty((0, SIGNATURE_SIZE), np.float32) if seeds is None else seeds)
 
     def _attach_looks(self, seeds: NDArray[np.float32]) -> None:
-        self._looks = self._ffi.new("bslam_looks_t *")
+        self._looks = self._ffi.new("bslam_appearance_t *")
         self._seeds = encode(self._raw, seeds)
-        status = self._lib.bslam_looks_init(self._looks, self._seeds, len(seeds))
+        status = self._lib.bslam_appearance_init(self._looks, self._seeds, len(seeds))
         self._raw.ensure(status, f"{len(seeds)} seeds")
-        self._lib.bslam_slam_attach_looks(self._slam, self._looks)
+        self._lib.bslam_slam_attach_appearance(self._slam, self._looks)
 
     def _init(self, params: Mapping[str, float]) -> None:
         table = {p.name: p for p in self.parameters(self._raw.real)}
@@ -371,7 +371,7 @@ class Slam:
         """Never-decreasing counts by the names of bslam_counters_t; with looks, theirs and the learner's."""
         counts = self._raw.fields(self._slam.counters, "bslam_counters_t")
         if self._looks is not None:
-            counts |= self._raw.fields(self._looks.counters, "bslam_looks_counters_t")
+            counts |= self._raw.fields(self._looks.counters, "bslam_appearance_counters_t")
             counts |= self._raw.fields(self._looks.learner.counters, "bslam_learner_counters_t")
         if self._recovery is not None:
             counts |= self._raw.fields(self._recovery.counters, "bslam_recovery_counters_t")

@@ -260,7 +260,7 @@ class FrontEnd:
         glances = np.empty((found.count, self._library.lib.BSLAM_GLANCE_FEATURES), dtype=np.float32)
         for i in range(found.count):
             self._library.lib.bslam_vision_blob_features(self._vision, i, self._library.floats(features[i]))
-            self._library.lib.bslam_vision_glance(self._vision, i, self._library.floats(glances[i]))
+            self._library.lib.bslam_vision_prefilter(self._vision, i, self._library.floats(glances[i]))
         return Proposals(
             boxes=np.array([[getattr(box, side) for side in sides] for box in boxes], np.float32).reshape(
                 -1, 4

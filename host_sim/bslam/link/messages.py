@@ -1,4 +1,4 @@
-"""Messages of the link: payloads to values and back. `firmware/app/session.h` is the other side."""
+"""Messages of the link: payloads to values and back. `firmware/robot/session.h` is the other side."""
 
 from __future__ import annotations
 

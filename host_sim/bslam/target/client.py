@@ -15,7 +15,7 @@ ANSWER_TIMEOUT_S = 2.0
 _MEANING = {
     "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
-    "LOOKS": ": the image learns no looks (SESSION_LOOKS=0)",
+    "LOOKS": ": the image learns no looks (SESSION_APPEARANCE=0)",
     "SMOOTHER": ": the image has no smoother (SESSION_SMOOTHER=0)",
 }
 

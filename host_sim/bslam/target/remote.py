@@ -253,7 +253,7 @@ class RemoteSlam:
 
     def counters(self) -> dict[str, int]:
         """As `Slam.counters`."""
-        types = ["bslam_counters_t", "bslam_looks_counters_t", "bslam_learner_counters_t"]
+        types = ["bslam_counters_t", "bslam_appearance_counters_t", "bslam_learner_counters_t"]
         values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
         counts = [{name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types]
         found = counts[0] | counts[1] | counts[2] if self._looks else counts[0]

@@ -95,12 +95,12 @@ class _Walk:
         self.place = self._place(self._at_m)
 
     def _place(self, at_m: float) -> Point:
-        way_m = math.fmod(at_m, self._round_m)
-        if way_m > self._length_m + self._pause_m:
-            way_m = self._round_m - self._pause_m - way_m
-        way_m = min(max(way_m, 0.0), self._length_m)
+        travelled_m = math.fmod(at_m, self._round_m)
+        if travelled_m > self._length_m + self._pause_m:
+            travelled_m = self._round_m - self._pause_m - travelled_m
+        travelled_m = min(max(travelled_m, 0.0), self._length_m)
         x_m, y_m = (
-            float(np.interp(way_m, self._ends_m, [point[axis] for point in self.mover.path]))
+            float(np.interp(travelled_m, self._ends_m, [point[axis] for point in self.mover.path]))
             for axis in (0, 1)
         )
         return x_m, y_m

@@ -238,7 +238,7 @@ def _follow(scenario: Scenario, random: np.random.Generator) -> Drive:
     turn_rad = np.diff(theta_rad)
     course_rad = theta_rad[:-1] + 0.5 * turn_rad
     chord_m = np.cos(course_rad) * np.diff(x_m) + np.sin(course_rad) * np.diff(y_m)
-    way_m = chord_m / np.sinc(turn_rad / (2.0 * np.pi))  # numpy's sinc(x) is sin(pi x) / (pi x)
+    travelled_m = chord_m / np.sinc(turn_rad / (2.0 * np.pi))  # numpy's sinc(x) is sin(pi x) / (pi x)
     half_m = 0.5 * scenario.body.wheelbase_m * turn_rad
     crowd = Crowd(
         scenario.movers, scenario.step_us * 1e-6, scenario.body.diameter_m / 2.0, random.spawn(1)[0]
@@ -249,4 +249,4 @@ def _follow(scenario: Scenario, random: np.random.Generator) -> Drive:
         others.append(crowd.discs())
     others_m = np.array(others, dtype=np.float64).reshape(len(x_m), -1, 3)[:, :, :2]
     stalled = np.zeros(scenario.steps, dtype=np.bool_)
-    return Drive(x_m, y_m, theta_rad, way_m - half_m, way_m + half_m, stalled, others_m)
+    return Drive(x_m, y_m, theta_rad, travelled_m - half_m, travelled_m + half_m, stalled, others_m)

@@ -31,21 +31,21 @@ Eigen::Matrix2f noise(float range_m)
 
 void predict(float left_m, float right_m)
 {
-    const float way_m = 0.5F * (left_m + right_m);
+    const float travelled_m = 0.5F * (left_m + right_m);
     const float turn_rad = (right_m - left_m) / static_cast<float>(model.wheelbase_m);
     const float course_rad = mean(2) + 0.5F * turn_rad;
     Matrix g = Matrix::Identity(mean.size(), mean.size());
-    g(0, 2) = -way_m * std::sin(course_rad);
-    g(1, 2) = way_m * std::cos(course_rad);
+    g(0, 2) = -travelled_m * std::sin(course_rad);
+    g(1, 2) = travelled_m * std::cos(course_rad);
     Matrix v = Matrix::Zero(mean.size(), 2);  // by the way and the turn
-    v.topRows<3>() << std::cos(course_rad), -0.5F * way_m * std::sin(course_rad), std::sin(course_rad),
-        0.5F * way_m * std::cos(course_rad), 0.0F, 1.0F;
+    v.topRows<3>() << std::cos(course_rad), -0.5F * travelled_m * std::sin(course_rad), std::sin(course_rad),
+        0.5F * travelled_m * std::cos(course_rad), 0.0F, 1.0F;
     const auto wheel = static_cast<float>(model.wheel_sd_m * model.wheel_sd_m);
     Eigen::Matrix2f m = Eigen::Matrix2f::Zero();
     m(0, 0) = 0.5F * wheel;
     m(1, 1) = 2.0F * wheel / static_cast<float>(model.wheelbase_m * model.wheelbase_m);
-    mean(0) += way_m * std::cos(course_rad);
-    mean(1) += way_m * std::sin(course_rad);
+    mean(0) += travelled_m * std::cos(course_rad);
+    mean(1) += travelled_m * std::sin(course_rad);
     mean(2) = wrapped(mean(2) + turn_rad);
     covariance = g * covariance * g.transpose() + v * m * v.transpose();
 }

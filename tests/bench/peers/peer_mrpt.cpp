@@ -28,14 +28,14 @@ std::vector<CSensoryFrame::Ptr> frames;
 // An arc, with the covariance that the wheels' noise gives its end in the frame of its start.
 CActionCollection::Ptr action_of(const bench_model_t &model, const bench_step_t &step)
 {
-    const double way_m = 0.5 * (step.left_m + step.right_m);
+    const double travelled_m = 0.5 * (step.left_m + step.right_m);
     const double turn_rad = (step.right_m - step.left_m) / model.wheelbase_m;
     const double course_rad = 0.5 * turn_rad;
     mrpt::poses::CPosePDFGaussian move;
-    move.mean = {way_m * std::cos(course_rad), way_m * std::sin(course_rad), turn_rad};
+    move.mean = {travelled_m * std::cos(course_rad), travelled_m * std::sin(course_rad), turn_rad};
     mrpt::math::CMatrixDouble by_wheels(3, 2);
     const double along[2] = {std::cos(course_rad), std::sin(course_rad)};
-    const double across[2] = {-0.5 * way_m * along[1], 0.5 * way_m * along[0]};
+    const double across[2] = {-0.5 * travelled_m * along[1], 0.5 * travelled_m * along[0]};
     for (int wheel = 0; wheel < 2; wheel++) {
         const double turned = (wheel == 0 ? -1.0 : 1.0) / model.wheelbase_m;
         by_wheels(0, wheel) = 0.5 * along[0] + turned * across[0];

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bslam/svm/solver.h"
+#include "bslam/appearance/solver.h"
 
 enum { MACHINES_MAX = 64 };
 
@@ -14,14 +14,14 @@ static bslam_samples_t samples[MACHINES_MAX];
 static bslam_weights_t weights[MACHINES_MAX];
 static const svm_set_t *sets_given;
 static const svm_set_t *tests_given;
-static int machines;
+static int classifiers;
 static float cost_given;
 
 void svm_begin(const svm_set_t *sets, int count, double cost, const svm_set_t *tests)
 {
     sets_given = sets;
     tests_given = tests;
-    machines = count;
+    classifiers = count;
     cost_given = (float)cost;
     for (int m = 0; m < count; m++) {
         bslam_sample_t *stored = calloc((size_t)sets[m].count, sizeof *stored);
@@ -52,7 +52,7 @@ void svm_decide(int test, double *values)
     if (bslam_sample_encode(tests_given->samples[test].x, &sample) != BSLAM_OK) {
         exit(1);
     }
-    for (int m = 0; m < machines; m++) {
+    for (int m = 0; m < classifiers; m++) {
         values[m] = (double)bslam_sample_decide(&weights[m], &sample);
     }
 }

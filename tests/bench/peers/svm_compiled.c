@@ -30,8 +30,8 @@ void svm_decide(int test, double *values)
     score(wide, values);
 #else
     float narrow[BSLAM_SVM_ROWS_MAX];
-    bslam_svm_decide(&machine, x, narrow);
-    for (int m = 0; m < machine.rows; m++) {
+    bslam_svm_decide(&classifier, x, narrow);
+    for (int m = 0; m < classifier.rows; m++) {
         values[m] = (double)narrow[m];
     }
 #endif

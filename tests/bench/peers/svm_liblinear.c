@@ -10,7 +10,7 @@ static struct problem problems[MACHINES_MAX];
 static struct model *models[MACHINES_MAX];
 static struct parameter parameter;
 static struct feature_node **tests_given;
-static int machines;
+static int classifiers;
 
 static void silent(const char *text)
 {
@@ -38,7 +38,7 @@ void svm_begin(const svm_set_t *sets, int count, double cost, const svm_set_t *t
 {
     set_print_string_function(silent);
     parameter = (struct parameter){.solver_type = L2R_L2LOSS_SVC_DUAL, .eps = 0.1, .C = cost};
-    machines = count;
+    classifiers = count;
     tests_given = nodes_of(tests);
     for (int m = 0; m < count; m++) {
         double *y = calloc((size_t)sets[m].count, sizeof *y);
@@ -57,7 +57,7 @@ void svm_train(int m)
 
 void svm_decide(int test, double *values)
 {
-    for (int m = 0; m < machines; m++) {
+    for (int m = 0; m < classifiers; m++) {
         (void)predict_values(models[m], tests_given[test], &values[m]);
         values[m] *= models[m]->label[0];  // the class that a positive value stands for
     }

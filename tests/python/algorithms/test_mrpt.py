@@ -8,10 +8,10 @@ import pytest
 
 from bslam.algorithms import Sighting
 from bslam.errors import BslamError
-from bslam.experiment import methods
-from bslam.experiment.metrics import evaluate
-from bslam.experiment.options import RunOptions
-from bslam.experiment.rival import run_algorithm, setup_for
+from bslam.runs import methods
+from bslam.evaluation.metrics import evaluate
+from bslam.options import RunOptions
+from bslam.runs.rival import run_algorithm, setup_for
 from bslam.log import first_steps
 from bslam.world.simulate import load_scenario, simulate
 

@@ -16,10 +16,10 @@ from playwright.sync_api import Page, expect
 
 import bslam
 from bslam.cli import main
-from bslam.experiment.options import RunOptions
-from bslam.experiment.output import tum
-from bslam.experiment.runner import run_log
-from bslam.experiment.sources import CameraSource
+from bslam.options import RunOptions
+from bslam.runs.output import tum
+from bslam.runs.runner import run_log
+from bslam.runs.sources import CameraSource
 
 STATUS = re.compile(r"(running|paused|finished|failed) · step (\d+) of (\d+)")
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from bslam.cli import main
 from bslam.commands import compare
-from bslam.experiment.contest import ContestResult
+from bslam.runs.contest import ContestResult
 from tools.proofs import kill_sweep
 
 BOUND = [

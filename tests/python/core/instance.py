@@ -10,7 +10,7 @@ from bslam.core import Slam
 
 @cache
 def _places(dim: int) -> NDArray[np.int64]:
-    """(dim, dim) places of the elements in the packed triangle: bslam/math/symmat.h."""
+    """(dim, dim) places of the elements in the packed triangle: bslam/linalg/symmat.h."""
     row, column = (
         np.maximum.outer(np.arange(dim), np.arange(dim)),
         np.minimum.outer(np.arange(dim), np.arange(dim)),

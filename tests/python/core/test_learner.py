@@ -11,7 +11,7 @@ from bslam.errors import BslamError
 
 REALS = pytest.mark.parametrize("real", ["float", "double"])
 COST = 10.0
-OWN, RIVALS = 16, 96
+OWN, NEGATIVES = 16, 96
 
 
 def signatures(random: np.random.Generator, count: int, objects: int) -> NDArray[np.float32]:
@@ -24,7 +24,7 @@ def signatures(random: np.random.Generator, count: int, objects: int) -> NDArray
 def a_set(seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """One machine's own samples, and those of 12 others."""
     random = np.random.default_rng(seed)
-    return signatures(random, 13 * OWN, 13)[: OWN + RIVALS], np.arange(OWN + RIVALS) % 13 == 0
+    return signatures(random, 13 * OWN, 13)[: OWN + NEGATIVES], np.arange(OWN + NEGATIVES) % 13 == 0
 
 
 @REALS
@@ -106,7 +106,7 @@ def test_too_many_seeds_are_refused() -> None:
 
 
 def test_solver_more_samples_than_it_holds_are_refused() -> None:
-    samples = np.zeros((OWN + RIVALS + 1, SIGNATURE_SIZE), np.float32)
+    samples = np.zeros((OWN + NEGATIVES + 1, SIGNATURE_SIZE), np.float32)
     with pytest.raises(BslamError, match=r"113 signatures.*allowed: up to 112"):
         Solution(samples, np.zeros(len(samples), np.bool_), cost=COST, tolerance=0.1)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bslam.cli import main
-from bslam.experiment.methods import shipped_methods
+from bslam.runs.methods import shipped_methods
 
 ROOT = Path(__file__).resolve().parents[3]
 PLUGIN = (ROOT / "docs" / "PLUGIN.md").read_text(encoding="utf-8")

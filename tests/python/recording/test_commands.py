@@ -7,7 +7,7 @@ import pytest
 
 import bslam
 from bslam.cli import main
-from bslam.experiment import sources
+from bslam.runs import sources
 from bslam.log import first_steps, write_folder
 from bslam.recording import load
 from bslam.recording.entries import State

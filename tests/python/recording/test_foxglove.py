@@ -8,8 +8,8 @@ from google.protobuf.descriptor import FieldDescriptor as Field
 from google.protobuf.json_format import ParseDict
 from mcap.reader import make_reader
 
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.log import first_steps
 from bslam.recording.schemas import SCHEMAS
 from bslam.world.simulate import load_scenario, simulate

@@ -12,9 +12,9 @@ from mcap.reader import make_reader
 
 from bslam.core.slam import Account, Beacon, Slam
 from bslam.errors import BslamError
-from bslam.experiment.options import RunOptions
-from bslam.experiment.rerun import options_of, rerun
-from bslam.experiment.runner import run_log
+from bslam.options import RunOptions
+from bslam.runs.rerun import options_of, rerun
+from bslam.runs.runner import run_log
 from bslam.log import first_steps, read_folder, write_folder
 from bslam.recording import Recorder, Recording, RecordingWriter, load
 from bslam.recording.aslog import as_log

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bslam.core.slam import Slam
-from bslam.experiment.faults.promise import PARAMS, Course
+from bslam.faults.promise import PARAMS, Course
 from bslam.link.frames import crc16
 from bslam.target.lines import QemuLine, TargetError
 from bslam.target.remote import RemoteSlam
@@ -35,7 +35,7 @@ def test_a_board_s_parameters_outlast_its_resets():
 
 
 def kept(values, sequence):
-    """A slot of flash with parameters in it: firmware/app/stored.c in firmware/port/kept.c."""
+    """A slot of flash with parameters in it: firmware/robot/param_store.c in firmware/port/kept.c."""
     names = b"".join(p.name.encode() + b"\0" for p in Slam.parameters())
     content = np.array(list(values.values()), "<f4").tobytes() + struct.pack("<H", crc16(names))
     content += struct.pack("<H", crc16(content))

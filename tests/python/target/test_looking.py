@@ -212,7 +212,7 @@ def wheel_speeds(told, params):
     least_mps, speeds = 0.01, [(0.0, 0.01)]
     for before, one in pairwise(told):
         dt_s = (one.time_us - before.time_us) * 1e-6
-        way_m = [
+        travelled_m = [
             (getattr(one.report, f"{side}_ticks") - getattr(before.report, f"{side}_ticks"))
             / params["ticks_per_revolution"]
             * 2
@@ -222,10 +222,10 @@ def wheel_speeds(told, params):
         ]
         sds_mps = params["left_speed_sd_mps"], params["right_speed_sd_mps"]
         variance_m2 = sum((sd_mps * dt_s) ** 2 for sd_mps in sds_mps) / 4
-        variance_m2 += params["travel_sd_per_sqrt_m"] ** 2 * sum(map(abs, way_m)) / 4
+        variance_m2 += params["travel_sd_per_sqrt_m"] ** 2 * sum(map(abs, travelled_m)) / 4
         variance_m2 += params["forward_sd_per_sqrt_s"] ** 2 * dt_s
-        variance_m2 += params["forward_sd_per_sqrt_m"] ** 2 * abs(sum(way_m) / 2)
-        speeds.append((sum(way_m) / 2 / dt_s, max(math.sqrt(variance_m2) / dt_s, least_mps)))
+        variance_m2 += params["forward_sd_per_sqrt_m"] ** 2 * abs(sum(travelled_m) / 2)
+        speeds.append((sum(travelled_m) / 2 / dt_s, max(math.sqrt(variance_m2) / dt_s, least_mps)))
     return speeds
 
 

@@ -11,8 +11,8 @@ from bslam.cli import main
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.link import messages
 from bslam.link.frames import Frame, encode
 from bslam.link.messages import Message
@@ -109,7 +109,7 @@ def test_a_map_goes_to_the_host_and_to_another_robot_which_finds_itself_in_it(ro
 
 def test_a_score_that_is_sent_puts_a_beacon_on_trial_as_on_the_host(robot_line):
     told = []
-    with RemoteSlam(robot_line(), {"association": 3, "trust_beacons": 0}, 20) as robot:
+    with RemoteSlam(robot_line(), {"association": 3, "existence_beacons": 0}, 20) as robot:
         for slam in (robot, Slam(robot.host_params, beacons_max=20)):
             told.append([])
             for step in range(8):

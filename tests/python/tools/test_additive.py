@@ -74,7 +74,7 @@ def test_c_decides_as_python(machine: AdditiveSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: AdditiveSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["bslam/svm/additive.h"], {})
+    header = Header("MACHINE_H", ["vision/classifiers/additive.h"], {})
     header.constant("bslam_additive_t", "machine", header.additive("kinds", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(

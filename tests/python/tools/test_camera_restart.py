@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bslam.experiment.truth import step_times_us
+from bslam.evaluation.truth import step_times_us
 from bslam.log import Sightings
 from bslam.world.simulate import load_scenario, simulate
 from tools.proofs.camera_restart import DRIVEN_US, Restart, in_view_us, part

@@ -22,7 +22,7 @@ def tree(tmp_path: Path) -> Path:
     write(tmp_path, "firmware/bslam/ekf/ekf.c", '#include "bslam/ekf/ekf.h"\n#include "bslam/math/math.h"\n')
     write(tmp_path, "host_sim/bslam/core/raw.py", "from bslam.core import _core_float\n")
     write(tmp_path, "host_sim/bslam/core/slam.py", "from bslam.core import raw\nfrom . import errors\n")
-    write(tmp_path, "host_sim/bslam/experiment/runner.py", "import numpy\nfrom bslam.world import arena\n")
+    write(tmp_path, "host_sim/bslam/runs/runner.py", "import numpy\nfrom bslam.world import arena\n")
     return tree_is_clean(tmp_path)
 
 
@@ -64,7 +64,7 @@ def test_main_bad_include_is_reported(
         ("world/arena.py", "from bslam import core", "world may not import core"),
         ("view/plots.py", "from bslam.core import slam", "view may not import core"),
         ("core/slam.py", "from bslam.core import _core_double", "touch cffi"),
-        ("experiment/runner.py", "from cffi import FFI", "touch cffi"),
+        ("runs/runner.py", "from cffi import FFI", "touch cffi"),
         ("unheard_of/a.py", "", "no part is called unheard_of"),
     ],
 )

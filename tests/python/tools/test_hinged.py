@@ -65,7 +65,7 @@ def test_c_decides_as_python(machine: HingedSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["bslam/svm/hinged.h"], {})
+    header = Header("MACHINE_H", ["vision/classifiers/hinged.h"], {})
     header.constant("bslam_hinged_t", "machine", header.hinged("close", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bslam.experiment.metrics import evaluate
-from bslam.experiment.options import RunOptions
-from bslam.experiment.runner import run_log
+from bslam.evaluation.metrics import evaluate
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.log import first_steps
 from tools.bench import bench
 from tools.bench.peers.drives import circle, simulated, text

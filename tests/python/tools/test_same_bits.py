@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from bslam.errors import BslamError
-from bslam.experiment.options import RunOptions
+from bslam.options import RunOptions
 from bslam.log import Log
 from bslam.target.lines import TargetError
 from tools.proofs import same_bits

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from bslam.core.vision import FrontEnd
-from bslam.experiment.pictures import camera_for, load_picture
+from bslam.datasets.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools.blind import blind_model
 from tools.training import example_pictures, samples, train_beacons
@@ -72,7 +72,7 @@ class Compiled:
     def __init__(self, header: Path, folder: Path) -> None:
         source = folder / "recognise.c"
         source.write_text(
-            f'#include "bslam/vision/recogniser.h"\n#include "{header}"\n'
+            f'#include "vision/classifiers/recogniser.h"\n#include "{header}"\n'
             "int check(void);\nint recognise(const float *s, float *margin);\nconst char *name(int i);\n"
             "int check(void) { return (int)bslam_recogniser_check(&bslam_my_beacons); }\n"
             "int recognise(const float *s, float *margin)\n"

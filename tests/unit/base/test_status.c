@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include "bslam/base/status.h"
+#include "base/status.h"
 
 static void test_status_name_every_code_is_its_own_name(void **state)
 {

@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include "bslam/link/crc16.h"
+#include "link/crc16.h"
 
 static uint16_t crc_of(const char *text)
 {

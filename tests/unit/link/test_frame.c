@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include "bslam/link/frame.h"
+#include "link/frame.h"
 
 /// Made by the Python packages cobs and binascii, which share nothing with this code.
 static void test_link_end_a_frame_with_zeros_is_the_golden_bytes(void **state)

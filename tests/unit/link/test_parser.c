@@ -1,7 +1,7 @@
 #include "support.h"
 
-#include "bslam/link/crc16.h"
-#include "bslam/link/parser.h"
+#include "link/crc16.h"
+#include "link/parser.h"
 
 static bslam_link_parser_t parser;
 static uint8_t bytes[BSLAM_LINK_FRAME_MAX];

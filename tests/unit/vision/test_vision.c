@@ -4,8 +4,8 @@
 
 #include "blank_model.h"
 
-#include "bslam/math/trig.h"
-#include "bslam/vision/vision.h"
+#include "base/trig.h"
+#include "vision/vision.h"
 
 #define WIDTH 320
 #define HEIGHT 240

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.experiment.sources import ScenarioSource
-from bslam.experiment.truth import step_times_us, truth_at, wheel_travel
+from bslam.runs.sources import ScenarioSource
+from bslam.evaluation.truth import step_times_us, truth_at, wheel_travel
 from bslam.log import Log, Odometry, Robot, Sightings, Truth
 
 SPEED_MPS, RADIUS_M = 0.4, 3.0  # of the circle that the drive for timing is

@@ -20,7 +20,7 @@ from tools.training import export, fit
 from tools.training.looks import Views, rendered
 
 SCENARIO, WORLD, FRAMES = "building20", 11, 1500
-OWN, RIVALS = 16, 96  # samples of a set: as many as a training on the robot takes
+OWN, NEGATIVES = 16, 96  # samples of a set: as many as a training on the robot takes
 COST = 10.0
 M4F = ["-mthumb", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
 
@@ -65,14 +65,14 @@ class Entrant:
 
 
 def make_task() -> Task:
-    """Rendered beacons: OWN views of each against RIVALS of all others; what is left are the tests."""
+    """Rendered beacons: OWN views of each against NEGATIVES of all others; what is left are the tests."""
     views = rendered(SCENARIO, WORLD, FRAMES, least=2 * OWN)
     random = np.random.default_rng(0)
     own = [random.permutation(np.flatnonzero(views.objects == one)) for one in range(views.object_count)]
     train = [rows[:OWN] for rows in own]
     sets = []
     for one, rows in enumerate(train):
-        others = random.permutation(np.concatenate([*train[:one], *train[one + 1 :]]))[:RIVALS]
+        others = random.permutation(np.concatenate([*train[:one], *train[one + 1 :]]))[:NEGATIVES]
         labels = np.concatenate([np.ones(len(rows), np.int64), -np.ones(len(others), np.int64)])
         order = random.permutation(len(labels))
         sets.append((labels[order], views.signatures[np.concatenate([rows, others])[order]]))
@@ -150,9 +150,9 @@ def _liblinear(_task: Task) -> list[str]:
 def _header(task: Task, *, small: bool) -> list[str]:
     x, labels = _all(task)
     svm = fit.fit(x, fit.one_vs_rest(labels, len(task.sets)), COST).svm
-    header = export.Header("MACHINE_H", ["bslam/svm/svm.h"], {})
+    header = export.Header("MACHINE_H", ["vision/classifiers/svm.h"], {})
     header.constant("bslam_svm_t", "machine", header.svm("table", fit.quantised(svm) if small else svm))
-    core = str(ROOT / "firmware/bslam/svm/svm.c")
+    core = str(ROOT / "firmware/vision/classifiers/svm.c")
     return [*_compiled_in(header.text()), core, f"-I{ROOT / 'firmware'}"]
 
 

@@ -1,0 +1,85 @@
+#include "bslam/appearance/sample.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "base/real.h"
+
+#if BSLAM_SAMPLE_FLOAT
+typedef float sum_t;
+#else
+typedef int32_t sum_t;  // 72 * 127 * 32767 fits
+#endif
+
+static bool is_number(float x)
+{
+    return x >= -1e12f && x <= 1e12f;
+}
+
+static bslam_stored_t store(float x)
+{
+    const float limited = x < -1.0f ? -1.0f : x > 1.0f ? 1.0f : x;
+#if BSLAM_SAMPLE_FLOAT
+    return limited;
+#else
+    return (int8_t)(limited * 127.0f + (x < 0.0f ? -0.5f : 0.5f));
+#endif
+}
+
+bslam_status_t bslam_sample_encode(const float features[BSLAM_SAMPLE_FEATURES], bslam_sample_t *sample)
+{
+    for (int32_t i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
+        if (!is_number(features[i])) {
+            return BSLAM_E_NOT_FINITE;
+        }
+    }
+    for (int32_t i = 0; i < BSLAM_SAMPLE_FEATURES; i++) {
+        sample->q[i] = store(features[i]);
+    }
+    sample->q[BSLAM_SAMPLE_FEATURES] = store(1.0f);
+    return BSLAM_OK;
+}
+
+float bslam_sample_distance2(const bslam_sample_t *a, const bslam_sample_t *b)
+{
+    sum_t sum = 0;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        const sum_t difference = (sum_t)a->q[i] - (sum_t)b->q[i];
+        sum += difference * difference;
+    }
+    return (float)sum;
+}
+
+float bslam_sample_decide(const bslam_weights_t *weights, const bslam_sample_t *sample)
+{
+    sum_t sum = 0;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        sum += (sum_t)weights->w[i] * (sum_t)sample->q[i];
+    }
+    return weights->unit * (float)sum;
+}
+
+#if BSLAM_SAMPLE_FLOAT
+void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded)
+{
+    rounded->unit = 1.0f;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        rounded->w[i] = weights[i];
+    }
+}
+#else
+void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded)
+{
+    float largest = 0.0f;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        const float size = weights[i] < 0.0f ? -weights[i] : weights[i];
+        largest = size > largest ? size : largest;
+    }
+    const float per_unit = largest > 0.0f ? 32767.0f / largest : 0.0f;
+    rounded->unit = largest / 32767.0f;
+    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
+        const float w = weights[i] * per_unit;
+        rounded->w[i] = (int16_t)(w + (w < 0.0f ? -0.5f : 0.5f));
+    }
+}
+#endif

@@ -1,0 +1,382 @@
+// Position selects candidates, looks decide: paper Section IV. MATH "Position and looks".
+#include "bslam/association/association.h"
+#include "bslam/association/conditional.h"
+#include "bslam/association/association_internal.h"
+#include "bslam/association/viewpoint.h"
+#include "base/logarithm.h"
+#include "bslam/model/noise.h"
+
+static const bslam_real_t LN_NINE = BSLAM_R(2.197224577);
+// Sightings of one view err together, but not in all: the best of them says so many times what it scores.
+static const bslam_real_t VIEW_WORTH = 2;
+
+/// A sighting against a beacon.
+typedef struct candidate {
+    bslam_real_t score;  ///< log odds of this beacon against a new one
+    bslam_real_t view_score;
+    bslam_real_t distance2;
+    bslam_opinion_t opinion;
+} candidate_t;
+
+static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/// Log density of beacons that are not in the map, in the units of a sighting: 1/(m rad), or 1/rad.
+static bslam_real_t log_new(const bslam_params_t *params, const bslam_sighting_t *sighting)
+{
+    return bslam_ln(sighting->has_range ? params->new_per_m2 * sighting->range_m : params->new_per_rad);
+}
+
+/// Log density, in 1/m, of a distance that says nothing because the thing is taken for another kind: between
+/// a third and three times of what it is.
+static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting_t *sighting)
+{
+    return sighting->has_range && !taken->has_range ? -bslam_ln(LN_NINE * sighting->range_m) : 0;
+}
+
+/// What looks add to the score.
+static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinion_t *opinion)
+{
+    const bslam_real_t odds = params->appearance_slope * (bslam_real_t)opinion->value + params->appearance_offset;
+    return params->appearance_weight * (bslam_real_t)opinion->weight *
+           clip(odds, -params->appearance_low, params->appearance_high);
+}
+
+/// What the detector's class adds to the score.
+static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
+{
+    return frame->appearance == NULL
+               ? 0
+               : frame->answers->class_odds(frame->appearance, frame->params, beacon, sighting->beacon_class);
+}
+
+/// What the side from which the robot sees a beacon adds to the score, where it is known.
+static bslam_real_t viewpoint_odds(const bslam_sighting_frame_t *frame, int beacon)
+{
+    if (frame->appearance == NULL || !bslam_has_viewpoint(&frame->ekf->beacons[beacon])) {
+        return 0;
+    }
+    const bslam_viewpoint_t outlook = bslam_viewpoint_of(frame->ekf, beacon);
+    return outlook.is_sure ? frame->answers->viewpoint_odds(frame->appearance, frame->params, beacon, outlook.sector)
+                           : 0;
+}
+
+static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
+{
+    return frame->time_us - frame->ekf->beacons[beacon].last_seen_us;
+}
+
+/// Whether a beacon does not count, and was not seen for a while.
+static bool is_old(const bslam_sighting_frame_t *frame, int beacon)
+{
+    return !frame->ekf->beacons[beacon].confirmed && seen_ago_us(frame, beacon) > frame->params->decision_delay_us;
+}
+
+/// The best score without again_odds that a beacon has had since it came into view, where its next one is
+/// this.
+static bslam_real_t view_score(const bslam_sighting_frame_t *frame, int beacon, bslam_real_t score)
+{
+    const bool is_in_view = frame->appearance != NULL && seen_ago_us(frame, beacon) <= frame->params->decision_delay_us;
+    return is_in_view && frame->appearance->of[beacon].view_score > score ? frame->appearance->of[beacon].view_score
+                                                                     : score;
+}
+
+/// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
+/// its sighting is this one or was missed. As something else it was missed; and whether it was in view at all
+/// is no surer than the best that spoke for it.
+static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                               int beacon)
+{
+    const int64_t ago_us = seen_ago_us(frame, beacon);
+    const bool is_just = ago_us > 0 && ago_us <= frame->params->again_us;
+    if (!is_just || bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting)) {
+        return 0;
+    }
+    const bslam_real_t odds = frame->params->again_odds;
+    return frame->appearance == NULL ? odds : clip(VIEW_WORTH * frame->appearance->of[beacon].view_score, 0, odds);
+}
+
+/// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
+/// not count the map hardly knows where it stands, and its machine knows little, so that most things may be
+/// it: what has a place of its own and is called something else is another.
+static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
+{
+    const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
+    return bslam_ekf_classes_differ(other, sighting) &&
+           (frame->appearance == NULL || (sighting->has_range && is_old(frame, beacon)));
+}
+
+/// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
+static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i, int beacon,
+                  const bslam_sample_t *sample, candidate_t *found)
+{
+    const bslam_sighting_t *sighting = &frame->sightings[i];
+    const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
+    const bslam_sighting_t taken = bslam_ekf_taken_as(other, sighting);
+    bslam_innovation_t innovation;
+    bslam_weight_t weight;
+    if (is_another_kind(frame, sighting, beacon) ||
+        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, beacon, &innovation) !=
+            BSLAM_OK ||
+        bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) != BSLAM_OK) {
+        return false;
+    }
+    found->distance2 = weight.distance2;
+    found->opinion = (bslam_opinion_t){0.0f, 0.0f};
+    if (sample != NULL) {
+        found->opinion = frame->answers->ask(frame->appearance, frame->params, beacon, sample);
+    }
+    found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
+                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
+    if (weight.distance2 <= frame->params->candidate_d2) {  // beyond, nobody asks the score
+        found->score += viewpoint_odds(frame, beacon);
+    }
+    found->view_score = view_score(frame, beacon, found->score);
+    found->score += again_odds(frame, sighting, beacon);
+    return true;
+}
+
+static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, int beacon)
+{
+    for (int i = 0; i < frame->count; i++) {
+        if (matches[i].verdict == BSLAM_VERDICT_MATCH && matches[i].beacon == beacon) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// The sample of a sighting, where there are looks to compare it with; else NULL.
+static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int i, bslam_sample_t *sample)
+{
+    const float *signature = frame->sightings[i].signature;
+    if (frame->appearance == NULL || signature == NULL || bslam_sample_encode(signature, sample) != BSLAM_OK) {
+        return NULL;
+    }
+    return sample;
+}
+
+/// Whether a machine may learn from a match: it is near, no other beacon comes close, and it looks like it,
+/// if that is known.
+static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam_real_t lead)
+{
+    const bool looks_right =
+        best->opinion.weight < 0.5f || (bslam_real_t)best->opinion.value >= params->learn_margin;
+    return best->distance2 <= params->learn_d2 && lead >= params->learn_lead && looks_right;
+}
+
+/// Whether a machine of few samples is against a match. It may be another beacon that stands near, and the
+/// two are told apart once both are in view; or else the machine has not seen that side of its beacon yet.
+static bool is_doubted(const bslam_sighting_frame_t *frame, const candidate_t *best)
+{
+    return best->opinion.weight < 0.5f && best->score < frame->params->learn_lead &&
+           looks_score(frame->params, &best->opinion) < 0;
+}
+
+/// Whether a match that little speaks for can wait: another beacon in view holds the robot in its place.
+static bool can_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+{
+    return frame->appearance != NULL && best->score < frame->params->decision_delay_score &&
+           bslam_is_placed(frame->ekf, frame->params->again_us, beacon, frame->time_us);
+}
+
+/// Whether a match has to wait. Not one with a beacon in view: that it was seen just now says more.
+static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+{
+    return best->score > 0 && seen_ago_us(frame, beacon) > frame->params->decision_delay_us &&
+           (is_doubted(frame, best) || can_wait(frame, beacon, best)) &&
+           !frame->answers->has_waited(frame->appearance, frame->params, beacon, frame->time_us);
+}
+
+/// Finds the best beacon of a sighting among those that are not taken.
+static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                      bslam_match_t *matches)
+{
+    bslam_match_t *match = &matches[i];
+    bslam_sample_t buffer;
+    const bslam_sample_t *sample = sample_of(frame, i, &buffer);
+    candidate_t best = {.distance2 = -1};
+    bslam_real_t second = 0;
+    bool has_second = false;
+    match->beacon = -1;
+    for (int b = 0; b < frame->ekf->beacon_count; b++) {
+        candidate_t one;
+        if (!weigh(frame, conditional, i, b, sample, &one) || one.distance2 > frame->params->candidate_d2) {
+            continue;
+        }
+        if (is_taken(frame, matches, b)) {
+            match->reason = one.score > 0 ? BSLAM_REASON_DUPLICATE : match->reason;
+        } else if (match->beacon < 0 || one.score > best.score) {
+            second = best.score;
+            has_second = match->beacon >= 0;
+            best = one;
+            match->beacon = b;
+        } else if (!has_second || one.score > second) {
+            second = one.score;
+            has_second = true;
+        }
+    }
+    match->distance2 = best.distance2;
+    match->score = best.score;
+    match->view_score = best.view_score;
+    // Another beacon, or a new one, whose score is 0.
+    match->lead = best.score - (has_second && second > 0 ? second : 0);
+    match->sure = match->beacon >= 0 && is_sure(frame->params, &best, match->lead);
+    match->delayed_for = match->beacon >= 0 && has_to_wait(frame, match->beacon, &best) ? match->beacon : -1;
+}
+
+static bool is_open(const bslam_match_t *match)
+{
+    return match->verdict == BSLAM_VERDICT_DEFER && match->reason != BSLAM_REASON_AMBIGUOUS;
+}
+
+/// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0, or
+/// it waits.
+static int next_to_settle(const bslam_match_t *matches, int count)
+{
+    int next = -1;
+    for (int i = 0; i < count; i++) {
+        const bool fits = is_open(&matches[i]) && matches[i].score > 0 && matches[i].delayed_for < 0;
+        if (fits && (next < 0 || matches[i].lead > matches[next].lead)) {
+            next = i;
+        }
+    }
+    return next;
+}
+
+/// Takes a match into what is given for the others.
+static void give(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i, const bslam_match_t *match)
+{
+    const bslam_sighting_t taken =
+        bslam_ekf_taken_as(&frame->ekf->beacons[match->beacon], &frame->sightings[i]);
+    bslam_innovation_t innovation;
+    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, match->beacon, &innovation) ==
+        BSLAM_OK) {
+        (void)bslam_conditional_add(frame->ekf, conditional, &innovation);
+    }
+}
+
+static void leave_open(bslam_match_t *match)
+{
+    match->reason = BSLAM_REASON_AMBIGUOUS;
+    match->beacon = -1;
+    match->sure = false;
+}
+
+/// Where another sighting wants the same beacon, and about as much, neither gets it. True if so.
+static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *matches, int next)
+{
+    bool contested = false;
+    for (int i = 0; i < frame->count; i++) {
+        if (i != next && is_open(&matches[i]) && matches[i].beacon == matches[next].beacon &&
+            matches[i].score > matches[next].score - frame->params->competitor_lead) {
+            leave_open(&matches[i]);
+            contested = true;
+        }
+    }
+    if (contested) {
+        leave_open(&matches[next]);
+    }
+    return contested;
+}
+
+/// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
+/// made anew, given the matches so far.
+static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, bslam_match_t *matches)
+{
+    for (int next = next_to_settle(matches, frame->count); next >= 0;
+         next = next_to_settle(matches, frame->count)) {
+        if (is_contested(frame, matches, next)) {
+            continue;
+        }
+        matches[next].verdict = BSLAM_VERDICT_MATCH;
+        give(frame, conditional, next, &matches[next]);
+        for (int i = 0; i < frame->count; i++) {
+            const bool is_clear = matches[i].lead >= frame->params->learn_lead;
+            if (is_open(&matches[i]) && (!is_clear || matches[i].beacon == matches[next].beacon)) {
+                find_best(frame, conditional, i, matches);
+            }
+        }
+    }
+}
+
+/// A beacon that a sighting clearly looks like, that is not seen in this frame and that could be here, though
+/// it is no candidate: the map has it in the wrong place, rather than that there is a new one; -1: there is
+/// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
+/// it will never be found.
+static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                              const bslam_match_t *matches)
+{
+    bslam_sample_t buffer;
+    const bslam_sample_t *sample = sample_of(frame, i, &buffer);
+    for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
+        candidate_t one;
+        if (!is_taken(frame, matches, b) && weigh(frame, conditional, i, b, sample, &one) &&
+            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
+            class_odds(frame, &frame->sightings[i], b) >= 0 &&
+            looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->appearance_high &&
+            !(bslam_is_placed(frame->ekf, frame->params->decision_delay_us, b, frame->time_us) &&
+              frame->answers->has_waited(frame->appearance, frame->params, b, frame->time_us))) {
+            return b;
+        }
+    }
+    return -1;
+}
+
+/// Whether a sighting is too near to the beacon that fits it best to be new. Of one that was seen a few times
+/// long ago the map hardly knows where it stands, so that much is nearly it: what has a distance, and so a
+/// place, is new there if that is likelier.
+static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
+                    const bslam_match_t *match)
+{
+    if (match->beacon < 0) {
+        return false;
+    }
+    const bool may_be_new = sighting->has_range && is_old(frame, match->beacon);
+    return match->score > (may_be_new ? 0 : -frame->params->defer_score);
+}
+
+/// What becomes of a sighting that matches no beacon.
+static void decide_rest(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                        bslam_match_t *matches)
+{
+    bslam_match_t *match = &matches[i];
+    const bool is_duplicate = match->reason == BSLAM_REASON_DUPLICATE;
+    const bool waits = is_near(frame, &frame->sightings[i], match);
+    leave_open(match);
+    if (is_duplicate) {
+        match->verdict = BSLAM_VERDICT_REJECT;
+        match->reason = BSLAM_REASON_DUPLICATE;
+    } else if (!waits) {
+        match->delayed_for = looks_like_another(frame, conditional, i, matches);
+        match->verdict = match->delayed_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;
+        match->reason = match->delayed_for < 0 ? BSLAM_REASON_NONE : BSLAM_REASON_APPEARANCE;
+    }
+}
+
+void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+{
+    bslam_conditional_t conditional;
+    bslam_conditional_init(&conditional);
+    for (int i = 0; i < frame->count; i++) {
+        if (bslam_is_mappable(&frame->sightings[i], &matches[i])) {
+            matches[i].verdict = BSLAM_VERDICT_DEFER;
+        }
+    }
+    for (int i = 0; i < frame->count; i++) {
+        if (is_open(&matches[i])) {
+            find_best(frame, &conditional, i, matches);
+        }
+    }
+    settle(frame, &conditional, matches);
+    for (int i = 0; i < frame->count; i++) {
+        if (is_open(&matches[i])) {
+            decide_rest(frame, &conditional, i, matches);
+        } else if (matches[i].verdict == BSLAM_VERDICT_MATCH) {
+            matches[i].reason = BSLAM_REASON_NONE;
+        }
+    }
+}

@@ -1,0 +1,10 @@
+/// What the methods share. Not for users of the library.
+#ifndef BSLAM_ASSOCIATION_ASSOCIATION_INTERNAL_H
+#define BSLAM_ASSOCIATION_ASSOCIATION_INTERNAL_H
+
+#include "bslam/association/association.h"
+
+/// Fills in a match that says nothing yet. False if the sighting is of no beacon at all.
+bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match);
+
+#endif

@@ -1,0 +1,17 @@
+/// Two beacons of the map in one place, of which one is a mistake, or no longer there; and two in one
+/// direction from the robot, of which one was hardly ever seen. MATH "Position and looks".
+#ifndef BSLAM_ASSOCIATION_DUPLICATES_H
+#define BSLAM_ASSOCIATION_DUPLICATES_H
+
+#include "bslam/appearance/appearance.h"
+#include "bslam/ekf/ekf.h"
+
+#define BSLAM_NO_DUPLICATE (-1)
+
+/// Goes through the beacons that the frame of time_us showed. Answers which beacon is to leave, because it
+/// has been in another's place, or direction, for long enough without being seen beside it; BSLAM_NO_DUPLICATE:
+/// none. O(beacons seen * beacons).
+int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                         int64_t time_us);
+
+#endif

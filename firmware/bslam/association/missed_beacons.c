@@ -1,0 +1,67 @@
+#include "bslam/association/missed_beacons.h"
+
+#include "bslam/association/viewpoint.h"
+#include "bslam/linalg/symmat.h"
+
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+static const bslam_real_t STEPS_PER_M = BSLAM_R(10.0);  // of a kept distance
+// A view is from the same place if its distance differs by no more than this share: with the sector's 22
+// degrees, the line of sight passes the same corners.
+static const bslam_real_t SAME_PLACE = BSLAM_R(0.25);
+// Of what was seen to either side: what is nearer to the edge may be cut off.
+static const bslam_real_t INSIDE = BSLAM_R(0.8);
+static const bslam_real_t HEADING_VAR_MAX_RAD2 = BSLAM_R(0.01);
+// Missed all along so much way it is missed from there: longer than a few frames without a hit, or than what
+// walks past hides it.
+static const bslam_real_t MISSED_M = BSLAM_R(0.3);
+
+enum { STEPS_MAX = UINT8_MAX };
+
+static void note_seen(bslam_appearance_t *appearance, int index, const bslam_viewpoint_t *outlook)
+{
+    bslam_beacon_look_t *look = &appearance->of[index];
+    const bslam_real_t steps = outlook->range_m * STEPS_PER_M + 1;
+    look->seen_from[outlook->sector] = (uint8_t)(steps < STEPS_MAX ? steps : STEPS_MAX);
+    look->missed = 0;
+    appearance->left_rad = outlook->bearing_rad > appearance->left_rad ? outlook->bearing_rad : appearance->left_rad;
+    appearance->right_rad = outlook->bearing_rad < appearance->right_rad ? outlook->bearing_rad : appearance->right_rad;
+}
+
+/// Whether a beacon that stands where the map has it would be seen.
+static bool is_expected(const bslam_appearance_t *appearance, const bslam_ekf_t *ekf, int index,
+                        const bslam_viewpoint_t *outlook)
+{
+    const bslam_real_t seen_m = (bslam_real_t)appearance->of[index].seen_from[outlook->sector] / STEPS_PER_M;
+    const bslam_real_t off_m = bslam_abs(outlook->range_m - seen_m);
+    return off_m <= SAME_PLACE * seen_m && outlook->bearing_rad < INSIDE * appearance->left_rad &&
+           outlook->bearing_rad > INSIDE * appearance->right_rad &&
+           bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && outlook->is_sure;
+}
+
+int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
+                        int64_t time_us, uint32_t travelled_um, bool judges)
+{
+    const uint32_t least_um = (uint32_t)(MISSED_M * MICROMETRES_PER_M);
+    int vanished = BSLAM_NO_MISSED_BEACON;
+    for (int b = 0; b < ekf->beacon_count && params->missed_views > 0; b++) {
+        bslam_beacon_look_t *look = &appearance->of[b];
+        if (!bslam_has_viewpoint(&ekf->beacons[b])) {
+            continue;
+        }
+        const bslam_viewpoint_t outlook = bslam_viewpoint_of(ekf, b);
+        const bool is_seen = ekf->beacons[b].last_seen_us == time_us;
+        if (is_seen) {
+            note_seen(appearance, b, &outlook);
+        }
+        if (is_seen || !is_expected(appearance, ekf, b, &outlook)) {
+            look->missed_um = travelled_um;
+        } else if (judges && travelled_um - look->missed_um >= least_um) {
+            look->missed_um = travelled_um;
+            look->seen_from[outlook.sector] = 0;
+            look->missed++;
+            vanished = look->missed >= params->missed_views ? b : vanished;
+        }
+    }
+    appearance->counters.vanished += vanished != BSLAM_NO_MISSED_BEACON ? 1u : 0u;
+    return vanished;
+}

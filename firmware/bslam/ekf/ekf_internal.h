@@ -1,0 +1,48 @@
+/// What the files of the filter share. Not for users.
+#ifndef BSLAM_EKF_EKF_INTERNAL_H
+#define BSLAM_EKF_EKF_INTERNAL_H
+
+#include "bslam/ekf/ekf.h"
+
+#define POSE_DIM 3
+
+/// A ray is taken for a point no farther off than this, 1 km.
+#define BSLAM_FAR_INVERSE_PER_M BSLAM_R(1e-3)
+
+/// y[0..n) += factor x. Four at once, which the compiler takes together: up to the next multiple of four,
+/// what stands behind n is written, too.
+static inline void bslam_ekf_add_scaled(bslam_real_t *restrict y, bslam_real_t factor,
+                                        const bslam_real_t *restrict x, int n)
+{
+    for (int i = 0; i < n; i += 4) {
+        y[i] += factor * x[i];
+        y[i + 1] += factor * x[i + 1];
+        y[i + 2] += factor * x[i + 2];
+        y[i + 3] += factor * x[i + 3];
+    }
+}
+
+/// x[0..n) = 0, and what stands behind n up to the next multiple of four. A loop of its own: the memset of
+/// small C libraries goes byte by byte.
+static inline void bslam_ekf_clear(bslam_real_t *x, int n)
+{
+    for (int i = 0; i < n; i += 4) {
+        x[i] = 0;
+        x[i + 1] = 0;
+        x[i + 2] = 0;
+        x[i + 3] = 0;
+    }
+}
+
+/// out[0..dim) = P rowᵀ, the covariance with all pending down-dates; the tail up to the padding is 0.
+/// Returns by how much less row P rowᵀ is for the pending ones.
+bslam_real_t bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out);
+
+/// row · vector.
+bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);
+
+/// Fuses one scalar measurement whose innovation, at the mean before the frame, and variance are given.
+void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
+                            bslam_real_t variance);
+
+#endif

@@ -1,0 +1,93 @@
+// The state as it begins, and what is read of it.
+#include "bslam/ekf/ekf.h"
+#include "bslam/ekf/ekf_internal.h"
+
+void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
+{
+    *ekf = (bslam_ekf_t){0};
+    ekf->dim = 3;
+    if (params->velocity_states != 0) {
+        ekf->dim = 5;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] =
+            params->velocity_sd_mps * params->velocity_sd_mps;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] =
+            params->turn_rate_sd_radps * params->turn_rate_sd_radps;
+    } else if (params->scale_states != 0) {
+        ekf->dim = 5;
+        const bslam_real_t variance = params->scale_sd * params->scale_sd;
+        ekf->mean[BSLAM_STATE_FORWARD] = params->forward_scale;
+        ekf->mean[BSLAM_STATE_TURN] = params->turn_scale;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] = variance;
+        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] = variance;
+    }
+    ekf->base_dim = ekf->dim;
+}
+
+bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
+{
+    const bslam_pose_t pose = {ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y],
+                               ekf->mean[BSLAM_STATE_THETA]};
+    return pose;
+}
+
+/// A ray's values with an inverse distance that has a point.
+static bslam_ray_point_t ray_point(const bslam_ekf_t *ekf, int at)
+{
+    const bslam_real_t inverse = ekf->mean[at + 3];
+    const bslam_real_t ray[BSLAM_RAY_DIM] = {ekf->mean[at], ekf->mean[at + 1], ekf->mean[at + 2],
+                                             inverse > BSLAM_FAR_INVERSE_PER_M ? inverse : BSLAM_FAR_INVERSE_PER_M};
+    return bslam_ray_to_point(ray);
+}
+
+void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *x_m, bslam_real_t *y_m)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    if (beacon->kind == BSLAM_BEACON_KNOWN) {
+        *x_m = beacon->known_x_m;
+        *y_m = beacon->known_y_m;
+    } else if (beacon->kind == BSLAM_BEACON_RAY) {
+        const bslam_ray_point_t point = ray_point(ekf, beacon->at);
+        *x_m = point.x_m;
+        *y_m = point.y_m;
+    } else {
+        *x_m = ekf->mean[beacon->at];
+        *y_m = ekf->mean[beacon->at + 1];
+    }
+}
+
+bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const int at = beacon->at;
+    bslam_sym2_t result = {0, 0, 0};
+    if (beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_SIZED) {
+        result.xx = bslam_symmat_get(ekf->covariance, at, at);
+        result.xy = bslam_symmat_get(ekf->covariance, at + 1, at);
+        result.yy = bslam_symmat_get(ekf->covariance, at + 1, at + 1);
+    } else if (beacon->kind == BSLAM_BEACON_RAY) {
+        const bslam_ray_point_t point = ray_point(ekf, at);
+        for (int i = 0; i < BSLAM_RAY_DIM; i++) {
+            for (int j = 0; j < BSLAM_RAY_DIM; j++) {
+                const bslam_real_t p = bslam_symmat_get(ekf->covariance, at + i, at + j);
+                result.xx += point.x_by_ray[i] * p * point.x_by_ray[j];
+                result.xy += point.x_by_ray[i] * p * point.y_by_ray[j];
+                result.yy += point.y_by_ray[i] * p * point.y_by_ray[j];
+            }
+        }
+    }
+    return result;
+}
+
+bool bslam_ekf_is_sane(const bslam_ekf_t *ekf)
+{
+    const bslam_real_t *row = ekf->covariance;
+    for (int i = 0; i < ekf->dim; i++) {
+        const bslam_real_t variance = row[i];
+        row += (i / 4 + 1) * 4;
+        // Exactly zero is the pose before the first motion, and a ray's anchor taken from it.
+        if (!bslam_is_number(ekf->mean[i]) || !bslam_in_range(variance, 0, BSLAM_R(1e30))) {
+            return false;
+        }
+    }
+    return true;
+}

@@ -1,0 +1,230 @@
+#include "bslam/model/odometry.h"
+
+#include "base/trig.h"
+
+static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
+static const int64_t TIME_MAX_US = INT64_MAX / 2;
+/// Longer than this is no interval of odometry but an interruption. It also keeps the variance that one
+/// interval can add within what float's digits carry through the next update.
+static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
+/// More than this in one interval is no motion of a robot: 16 turns.
+static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
+/// Limits of a reading's own gyro noise, as of the parameter gyro_sd_radps.
+static const bslam_real_t GYRO_SD_MIN_RADPS = BSLAM_R(1e-6), GYRO_SD_MAX_RADPS = BSLAM_R(100.0);
+
+/// Travel of both wheels in one interval.
+typedef struct wheel_travel {
+    bslam_real_t left_m;
+    bslam_real_t right_m;
+} wheel_travel_t;
+
+void bslam_odometry_init(bslam_odometry_t *odometry)
+{
+    *odometry = (bslam_odometry_t){0};
+}
+
+void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us)
+{
+    if (!odometry->has_time) {
+        odometry->time_us = time_us;
+        odometry->has_time = true;
+    }
+}
+
+void bslam_odometry_restart(bslam_odometry_t *odometry)
+{
+    odometry->has_time = false;
+    odometry->has_ticks = false;
+}
+
+int32_t bslam_odometry_tick_difference(uint32_t before, uint32_t after, int bits)
+{
+    const uint32_t mask = UINT32_MAX >> (32 - bits);
+    const uint32_t half = 1u << (bits - 1);
+    const uint32_t up = (after - before) & mask;
+    if (up < half) {
+        return (int32_t)up;
+    }
+    // 2^bits - up, which is at most half, is how far the counter went down.
+    const uint32_t down = (mask - up) + 1u;
+    return down == half && bits == 32 ? INT32_MIN : -(int32_t)down;
+}
+
+static bslam_status_t ticks_to_travel(const bslam_odometry_t *odometry, const bslam_params_t *params,
+                                      const bslam_odometry_reading_t *reading, wheel_travel_t *travel)
+{
+    const uint32_t mask = UINT32_MAX >> (32 - params->counter_bits);
+    if ((reading->left_ticks & ~mask) != 0 || (reading->right_ticks & ~mask) != 0) {
+        return BSLAM_E_RANGE;
+    }
+    if (!odometry->has_ticks) {
+        *travel = (wheel_travel_t){0, 0};
+        return BSLAM_OK;
+    }
+    const int32_t left =
+        bslam_odometry_tick_difference(odometry->left_ticks, reading->left_ticks, params->counter_bits);
+    const int32_t right =
+        bslam_odometry_tick_difference(odometry->right_ticks, reading->right_ticks, params->counter_bits);
+    const bslam_real_t radians_per_tick = 2 * BSLAM_PI / (bslam_real_t)params->ticks_per_revolution;
+    travel->left_m = (bslam_real_t)left * radians_per_tick * params->left_radius_m;
+    travel->right_m = (bslam_real_t)right * radians_per_tick * params->right_radius_m;
+    return BSLAM_OK;
+}
+
+static bslam_status_t reading_to_travel(const bslam_odometry_t *odometry, const bslam_params_t *params,
+                                        const bslam_odometry_reading_t *reading, bslam_real_t dt_s,
+                                        wheel_travel_t *travel)
+{
+    switch (reading->source) {
+    case BSLAM_ODOMETRY_TICKS:
+        return ticks_to_travel(odometry, params, reading, travel);
+    case BSLAM_ODOMETRY_WHEELS:
+        *travel = (wheel_travel_t){reading->left_m, reading->right_m};
+        break;
+    case BSLAM_ODOMETRY_VELOCITY: {
+        const bslam_real_t half_difference = reading->omega_radps * params->wheelbase_m / 2;
+        travel->left_m = (reading->v_mps - half_difference) * dt_s;
+        travel->right_m = (reading->v_mps + half_difference) * dt_s;
+        break;
+    }
+    default:
+        return BSLAM_E_RANGE;
+    }
+    const bool finite = bslam_is_number(travel->left_m) && bslam_is_number(travel->right_m);
+    return finite ? BSLAM_OK : BSLAM_E_NOT_FINITE;
+}
+
+static bslam_real_t square(bslam_real_t x)
+{
+    return x * x;
+}
+
+/// Wheel travel to body motion, with the noise of the wheels, of the body and of a gap. MATH "Odometry".
+static void travel_to_motion(const bslam_params_t *params, const wheel_travel_t *travel, bslam_real_t dt_s,
+                             bslam_real_t gap_s, bslam_motion_t *motion)
+{
+    const bslam_real_t base = params->wheelbase_m;
+    const bslam_real_t growth = square(params->travel_sd_per_sqrt_m);
+    const bslam_real_t left_var =
+        square(params->left_speed_sd_mps * dt_s) + growth * bslam_abs(travel->left_m);
+    const bslam_real_t right_var =
+        square(params->right_speed_sd_mps * dt_s) + growth * bslam_abs(travel->right_m);
+    motion->dt_s = dt_s;
+    motion->forward_m = (travel->left_m + travel->right_m) / 2;
+    motion->turn_rad = (travel->right_m - travel->left_m) / base;
+    motion->forward_var_m2 = (left_var + right_var) / 4;
+    motion->turn_var_rad2 = (left_var + right_var) / (base * base);
+    motion->forward_turn_cov_mrad = (right_var - left_var) / (2 * base);
+
+    const bslam_real_t way = bslam_abs(motion->forward_m);
+    const bslam_real_t turn = bslam_abs(motion->turn_rad);
+    const bslam_real_t moving_s = way > 0 || turn > 0 ? dt_s : 0;
+    motion->forward_var_m2 +=
+        square(params->forward_sd_per_sqrt_s) * moving_s + square(params->forward_sd_per_sqrt_m) * way;
+    motion->turn_var_rad2 += square(params->turn_sd_per_sqrt_s) * moving_s +
+                             square(params->turn_sd_per_sqrt_m) * way +
+                             square(params->turn_sd_per_sqrt_rad) * turn;
+    motion->forward_var_m2 += square(params->gap_speed_sd_mps * gap_s);
+    motion->turn_var_rad2 += square(params->gap_turn_sd_radps * gap_s);
+}
+
+/// The part of an interval in which the robot may have moved unseen: all of it while the tick reference is
+/// missing.
+static bslam_real_t unseen_s(const bslam_odometry_t *odometry, const bslam_params_t *params,
+                             const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
+{
+    if (reading->source == BSLAM_ODOMETRY_TICKS && !odometry->has_ticks) {
+        return dt_s;
+    }
+    const bslam_real_t excess_s = dt_s - (bslam_real_t)params->gap_us * SECONDS_PER_US;
+    return excess_s > 0 ? excess_s : 0;
+}
+
+/// A stamp that may follow the last one.
+static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
+{
+    if (time_us < 0 || time_us > TIME_MAX_US) {
+        return false;
+    }
+    return !odometry->has_time ||
+           (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
+}
+
+/// True if the wheels cannot have moved like this.
+static bool is_jump(const bslam_params_t *params, const wheel_travel_t *travel, bslam_real_t dt_s)
+{
+    const bslam_real_t travel_max_m = params->speed_max_mps * dt_s;
+    return bslam_abs(travel->left_m) > travel_max_m || bslam_abs(travel->right_m) > travel_max_m ||
+           bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * params->wheelbase_m;
+}
+
+static bslam_status_t check_gyro(const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
+{
+    const bslam_real_t sd_radps = reading->gyro_sd_radps;
+    if (!bslam_is_number(reading->gyro_radps) || !bslam_is_number(sd_radps)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    const bool is_far = bslam_abs(reading->gyro_radps) * dt_s > TURN_MAX_RAD;
+    const bool is_odd = sd_radps != 0 && !bslam_in_range(sd_radps, GYRO_SD_MIN_RADPS, GYRO_SD_MAX_RADPS);
+    return is_far || is_odd ? BSLAM_E_RANGE : BSLAM_OK;
+}
+
+/// Kalman update of (forward, turn) with the turn that the gyro measured.
+static void fuse_gyro(bslam_motion_t *motion, bslam_real_t gyro_turn_rad, bslam_real_t gyro_var_rad2)
+{
+    const bslam_real_t sum = motion->turn_var_rad2 + gyro_var_rad2;
+    const bslam_real_t forward_gain = motion->forward_turn_cov_mrad / sum;
+    const bslam_real_t turn_gain = motion->turn_var_rad2 / sum;
+    const bslam_real_t innovation = gyro_turn_rad - motion->turn_rad;
+    motion->forward_m += forward_gain * innovation;
+    motion->turn_rad += turn_gain * innovation;
+    motion->forward_var_m2 -= forward_gain * motion->forward_turn_cov_mrad;
+    motion->forward_turn_cov_mrad -= turn_gain * motion->forward_turn_cov_mrad;
+    motion->turn_var_rad2 -= turn_gain * motion->turn_var_rad2;
+}
+
+bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_params_t *params,
+                                   const bslam_odometry_reading_t *reading, bslam_motion_t *motion)
+{
+    if (!time_is_valid(odometry, reading->time_us)) {
+        return BSLAM_E_TIME;
+    }
+    const int32_t dt_us = odometry->has_time ? (int32_t)(reading->time_us - odometry->time_us) : 0;
+    const bslam_real_t dt_s = (bslam_real_t)dt_us * SECONDS_PER_US;
+    if (reading->has_gyro) {
+        const bslam_status_t gyro_status = check_gyro(reading, dt_s);
+        if (gyro_status != BSLAM_OK) {
+            return gyro_status;
+        }
+    }
+    wheel_travel_t travel;
+    const bslam_status_t status = reading_to_travel(odometry, params, reading, dt_s, &travel);
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    if (odometry->has_time && is_jump(params, &travel, dt_s)) {
+        // Or the same jump would pass as soon as enough time has gone by.
+        odometry->has_ticks = odometry->has_ticks && reading->source != BSLAM_ODOMETRY_TICKS;
+        return BSLAM_E_JUMP;
+    }
+    if (odometry->has_time) {
+        travel_to_motion(params, &travel, dt_s, unseen_s(odometry, params, reading, dt_s), motion);
+        if (reading->has_gyro) {
+            const bslam_real_t own_sd_radps = reading->gyro_sd_radps;
+            const bslam_real_t sd_radps = own_sd_radps > 0 ? own_sd_radps : params->gyro_sd_radps;
+            fuse_gyro(motion, reading->gyro_radps * dt_s, square(sd_radps * dt_s));
+        }
+    } else {
+        *motion = (bslam_motion_t){0};
+    }
+    odometry->time_us = reading->time_us;
+    odometry->has_time = true;
+    // A reading of another source covers motion that the counters saw too: the next tick reading starts
+    // afresh.
+    odometry->has_ticks = reading->source == BSLAM_ODOMETRY_TICKS;
+    if (odometry->has_ticks) {
+        odometry->left_ticks = reading->left_ticks;
+        odometry->right_ticks = reading->right_ticks;
+    }
+    return BSLAM_OK;
+}

@@ -1,0 +1,112 @@
+// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and
+// looks".
+#include "bslam/slam/slam_internal.h"
+
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+// What one sighting says at most: the next frame shows the same, and may be wrong the same way. One that is
+// surer than that and has a distance is hardly ever of anything else, and says as much as a few.
+static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
+// And one without a distance, of a sensor that measures some.
+static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
+
+/// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
+static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
+{
+    return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
+}
+
+/// What a sighting's score says for a beacon. What has no distance from a sensor that measures some is of
+/// another size than it is taken for, or stands elsewhere, or pale: however sure the detector is of it, that
+/// says next to nothing.
+static bslam_real_t evidence(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
+{
+    const bslam_real_t above = sighting->score - slam->params.existence_score;
+    if (above < SCORE_LOW) {
+        return SCORE_LOW;
+    }
+    const bool is_blind = slam->measures_distance && !sighting->has_range;
+    const bslam_real_t high = is_blind ? BLIND_HIGH : SCORE_HIGH;
+    if (above <= high) {
+        return above;
+    }
+    return sighting->has_range ? SURE : high;
+}
+
+static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    if (has_score(slam, sighting)) {
+        beacon->score_sum += evidence(slam, sighting);
+        beacon->has_scores = true;
+    }
+}
+
+/// A sighting counts if the robot has gone far enough since the last that did, and against the beacon if it
+/// is too far off: what is not of the size that it is taken for is not, seen from the next place, where it
+/// was.
+static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
+{
+    const bslam_params_t *params = &slam->params;
+    const uint32_t least_um = (uint32_t)(params->confirm_travel_m * MICROMETRES_PER_M);
+    if (!beacon->confirmed && slam->travelled_um - beacon->view_um >= least_um) {
+        const bool is_enough = beacon->views >= params->confirm_sightings;  // scores may be missing
+        beacon->view_um = slam->travelled_um;
+        beacon->views = (uint16_t)(distance2 > params->confirm_d2 ? beacon->views - 1
+                                   : is_enough                    ? beacon->views
+                                                                  : beacon->views + 1);
+    }
+}
+
+static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon)
+{
+    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->params.existence_sum;
+    if (!beacon->confirmed && is_sure && beacon->views >= slam->params.confirm_sightings) {
+        beacon->confirmed = true;
+        slam->confirmed_now = true;
+    }
+}
+
+void bslam_slam_confirm_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
+{
+    beacon->view_um = slam->travelled_um;
+    beacon->views = 1;
+    add_score(slam, beacon, sighting);
+    decide(slam, beacon);
+}
+
+void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
+                            bslam_real_t distance2)
+{
+    add_score(slam, beacon, sighting);
+    count_view(slam, beacon, distance2);
+    decide(slam, beacon);
+}
+
+/// A robot that knows few places loses more by waiting.
+static bool knows_few(const bslam_slam_t *slam)
+{
+    int confirmed = 0;
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
+        confirmed += slam->ekf.beacons[b].confirmed ? 1 : 0;
+    }
+    return confirmed < slam->params.existence_beacons;
+}
+
+static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
+{
+    const bslam_params_t *params = &slam->params;
+    return !beacon->confirmed && beacon->has_scores &&
+           beacon->score_sum < (knows_few(slam) ? params->existence_first_sum : params->existence_sum);
+}
+
+void bslam_slam_mark_tentative(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
+{
+    for (int i = 0; i < count; i++) {
+        slam->measures_distance = slam->measures_distance || sightings[i].has_range;
+        bslam_match_t *match = &slam->matches[i];
+        const bool is_tried =
+            match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
+        const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
+                                sightings[i].score < slam->params.existence_score;
+        match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TENTATIVE : match->verdict;
+    }
+}

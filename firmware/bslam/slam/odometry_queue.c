@@ -1,0 +1,106 @@
+#include "bslam/model/pose.h"
+#include "bslam/slam/slam_internal.h"
+
+static const bslam_real_t WAY_MAX_M = BSLAM_R(1000.0);
+static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+
+/// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
+/// filter's own speed has no bound that would keep the conversion defined.
+static uint32_t whole_micrometres(bslam_real_t forward_m)
+{
+    return bslam_in_range(forward_m, -WAY_MAX_M, WAY_MAX_M)
+               ? (uint32_t)(bslam_abs(forward_m) * MICROMETRES_PER_M)
+               : (uint32_t)(WAY_MAX_M * MICROMETRES_PER_M);
+}
+
+/// The filter goes through one waiting motion, or its part before the moment until_us before the newest end.
+static void predict_step(bslam_slam_t *slam, int64_t until_us)
+{
+    bslam_history_place_t place = slam->history.filter;
+    const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+    bslam_motion_t moved;
+    bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
+    if (slam->smoother != NULL) {
+        slam->smoothing->move(slam->smoother, &slam->ekf, &motion);
+    }
+    bslam_history_take(&slam->history, &place, &moved);
+    slam->travelled_um += whole_micrometres(moved.forward_m);
+}
+
+void bslam_slam_predict_until(bslam_slam_t *slam, int64_t until_us)
+{
+    while (slam->history.filter.behind_us > until_us) {
+        predict_step(slam, until_us);
+    }
+}
+
+/// A motion waits until a frame shows what comes after it, or until the room is needed.
+static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_motion_t *motion)
+{
+    const int32_t steps = slam->params.history_steps;
+    const int32_t room = steps < BSLAM_HISTORY_MAX ? steps : BSLAM_HISTORY_MAX;
+    if (bslam_history_is_full(&slam->history, room)) {
+        predict_step(slam, 0);
+    }
+    bslam_history_add(&slam->history, room, duration_us, motion);
+}
+
+static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
+{
+    bslam_odometry_t odometry = slam->odometry;
+    bslam_motion_t motion;
+    bslam_status_t status = bslam_odometry_read(&odometry, &slam->params, reading, &motion);
+    if (status == BSLAM_E_JUMP) {
+        slam->odometry = odometry;
+    }
+    if (status != BSLAM_OK) {
+        return status;
+    }
+    if (motion.dt_s > 0) {
+        status = bslam_ekf_check_motion(&slam->params, &motion);
+        if (status != BSLAM_OK) {
+            return status;
+        }
+        queue_motion(slam, (int32_t)(odometry.time_us - slam->odometry.time_us), &motion);
+        if (slam->smoother != NULL) {
+            slam->smoothing->rest(slam->smoother, &slam->params, &slam->ekf, motion.dt_s);
+        }
+    }
+    slam->odometry = odometry;
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_slam_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
+{
+    const bslam_status_t status = take_odometry(slam, reading);
+    if (status == BSLAM_OK) {
+        slam->counters.odometry++;
+    } else {
+        slam->counters.odometry_refused++;
+        slam->counters.jumps += status == BSLAM_E_JUMP ? 1u : 0u;
+    }
+    return status;
+}
+
+int64_t bslam_slam_behind_us(const bslam_slam_t *slam, int64_t time_us)
+{
+    return slam->odometry.has_time ? slam->odometry.time_us - time_us : 0;
+}
+
+bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, bslam_pose_t *pose)
+{
+    bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
+    bslam_history_place_t place = slam->history.filter;
+    bslam_motion_t moved = bslam_history_newest(&slam->history);
+    const int64_t until_us = behind_us > 0 ? behind_us : 0;
+    while (place.behind_us > until_us) {
+        const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+        bslam_robot_predict(&robot, &slam->params, &motion, &moved);
+    }
+    *pose = bslam_robot_pose(&robot);
+    if (behind_us < 0) {
+        const bslam_pose_t ahead = bslam_history_look_ahead(&slam->params, &moved, -behind_us);
+        *pose = bslam_pose_compose(pose, &ahead);
+    }
+    return robot;
+}

@@ -1,0 +1,85 @@
+/// What the smoother's files share. Not for users.
+#ifndef BSLAM_SMOOTHER_SMOOTHER_INTERNAL_H
+#define BSLAM_SMOOTHER_SMOOTHER_INTERNAL_H
+
+#include "bslam/smoother/smoother.h"
+
+#define BSLAM_SMOOTHER_BEARING_RAD BSLAM_R(9.58737992e-5)  ///< of a bslam_smoother_seen_t's units
+#define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-6)
+#define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
+#define BSLAM_SMOOTHER_BEND BSLAM_R(5e-5)
+#define BSLAM_SMOOTHER_MOVED BSLAM_R(1e-3)
+
+/// A block lasts no longer, nor does a node's motion where nothing is seen.
+#define BSLAM_SMOOTHER_BLOCK_MAX_S BSLAM_R(0.2)
+/// How a joined node's way was driven is known as well as it was when it was joined, and where the robot
+/// turned on the spot, hardly at all. A filter that took it for certain would shrink the map until it fits.
+#define BSLAM_SMOOTHER_JOINED_DOUBT BSLAM_R(0.5)
+/// The way within a block is an arc, as far as the points are right that it is to lead to.
+#define BSLAM_SMOOTHER_BLOCK_DOUBT BSLAM_R(0.2)
+
+/// Node k, counted from the oldest.
+static inline bslam_smoother_node_t *bslam_smoother_node(bslam_smoother_t *smoother, int k)
+{
+    return &smoother->nodes[(smoother->first_node + k) % BSLAM_SMOOTHER_NODES_MAX];
+}
+
+/// Direction or distance k, counted from the oldest.
+static inline bslam_smoother_seen_t *bslam_smoother_seen(bslam_smoother_t *smoother, int k)
+{
+    return &smoother->seen[(smoother->first_seen + k) % BSLAM_SMOOTHER_SEEN_MAX];
+}
+
+static inline bslam_real_t bslam_smoother_bearing_rad(const bslam_smoother_seen_t *direction)
+{
+    return (int16_t)direction->value * BSLAM_SMOOTHER_BEARING_RAD;
+}
+
+static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node)
+{
+    const bslam_bend_t bend = {
+        .turned_rad = node->turned * BSLAM_SMOOTHER_BEND,
+        .stretch = 1 + node->stretched * BSLAM_SMOOTHER_BEND,
+        .doubt_of_miss = node->motion.dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S ? BSLAM_SMOOTHER_JOINED_DOUBT
+                                                                        : BSLAM_SMOOTHER_BLOCK_DOUBT,
+    };
+    return bend;
+}
+
+static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *direction)
+{
+    return (bslam_real_t)((16 + (direction->weight & 15)) << (direction->weight >> 4)) *
+           BSLAM_SMOOTHER_SD_RAD;
+}
+
+/// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the
+/// logarithm of its distance from the base's robot, which is what directions are nearly linear in. O(n²).
+void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
+
+/// sum += motion, which goes on from it or leads to it.
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion);
+
+/// The nearest whole number, 65535 at most.
+int32_t bslam_smoother_units(bslam_real_t value);
+
+/// A standard deviation as a bslam_smoother_seen_t has it.
+uint8_t bslam_smoother_weight(bslam_real_t sd_rad);
+
+/// Of nodes beyond so many, the oldest two of a level become one of the next, whose room is used up first; at
+/// the last one the oldest leaves, into the base. The cycle must be begun anew. O(what is kept).
+void bslam_smoother_thin(bslam_smoother_t *smoother, int nodes_max);
+
+/// Begins a cycle: what is too old leaves first, into the base.
+void bslam_smoother_begin(bslam_smoother_t *smoother);
+
+/// The oldest node leaves, into the base. The cycle must be begun anew.
+void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
+
+/// Does so much work; a node of one phase, in the mean, is a unit. `is_whole`: the newest node is as new as
+/// it can be, so that a cycle may end. True if it did: then smoother->run is the filter at the newest node.
+bool bslam_smoother_work(bslam_smoother_t *smoother, int units, bool is_whole);
+
+/// After that: the map that came of it is what the models are linearised about, and the robot goes up.
+void bslam_smoother_turn(bslam_smoother_t *smoother);
+
+#endif

@@ -1,0 +1,13 @@
+/// What a filter is told of a thing that the front end saw. MATH "A beacon's own scale".
+#ifndef BSLAM_VISION_SIGHTING_H
+#define BSLAM_VISION_SIGHTING_H
+
+#include "base/types.h"
+#include "vision/frame.h"
+
+/// A candidate with has_bearing as a sighting, without identity; its signature stays where it is. The noise
+/// is what changes from frame to frame, a distance's more of it the lower the score is, and a little that
+/// nothing in a frame can tell; what repeats in each distance of the thing is range_scale_sd. O(1).
+bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate);
+
+#endif

@@ -1,0 +1,1 @@
+"""Real logs and pictures, read into the project's own log."""

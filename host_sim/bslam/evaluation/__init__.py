@@ -1,0 +1,1 @@
+"""What a run was worth: errors, consistency, associations against the ground truth."""

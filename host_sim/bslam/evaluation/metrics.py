@@ -1,0 +1,236 @@
+"""How good a run was: the errors step by step, and the figures of `summary.json`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.evaluation.align import Rigid, fit_rigid, fit_scale
+from bslam.evaluation.bound import has_bound, mean_bound_m
+from bslam.evaluation.consistency import POSE_95, nees
+from bslam.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
+from bslam.evaluation.trace import SightingCounts, Trace
+from bslam.evaluation.truth import dead_reckoning, is_dense, odometry_increments, truth_at
+from bslam.log import Log
+
+WINDOW_S: Final = 50.0  # "first" and "last" 50 s
+NEES_FIRST_STEP: Final = 51  # by then the pose covariance has left its start value of 0
+DIVERGED_ERROR_M: Final = 2.0
+DIVERGED_STEPS: Final = 1000  # at the end of the run
+BEACON_SIGHTINGS: Final = 4  # a true beacon counts if it was sighted at least so often
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A run held against the truth; rows as in the trace, NaN where nothing is known."""
+
+    time_s: NDArray[np.float64]  # (n + 1,) since the start
+    truth: NDArray[np.float64]  # (n + 1, 3) true poses, frame of the truth
+    estimate: NDArray[np.float64]  # (n + 1, 3) estimated poses, brought into the frame of the truth
+    error_m: NDArray[
+        np.float64
+    ]  # (n + 1,) distance of the two; NaN at the start, where it is 0 by definition
+    nees: NDArray[np.float64]  # (n + 1,) of the pose; NaN before step 51
+    dead_reckoning_error_m: NDArray[np.float64]  # (n + 1,)
+    to_truth: Rigid  # map frame -> frame of the truth, by the path
+    map_to_truth: Rigid  # the same by the beacons: they are judged by their own alignment
+
+
+def evaluate(log: Log, trace: Trace, options: RunOptions, align: bool) -> Evaluation | None:
+    """Errors of a run; None if the log has no truth. `align`: the truth has its own frame (real logs)."""
+    if log.truth is None:
+        return None
+    truth, known = truth_at(log.truth, trace.time_us)
+    scored = known.copy()
+    scored[0] = False
+    to_truth = _fit(trace.pose, truth, scored) if align else Rigid()
+    estimate = to_truth.poses(trace.pose)
+    scales = (float(trace.parameters.get(name, 1.0)) for name in ("forward_scale", "turn_scale"))
+    alone = dead_reckoning(log, *scales)
+    alone = (_fit(alone, truth, scored) if align else Rigid()).poses(alone)
+    return Evaluation(
+        time_s=trace.time_s,
+        truth=truth,
+        estimate=estimate,
+        error_m=np.where(scored, _distance(estimate, truth), np.nan),
+        nees=_nees(trace, to_truth.inverse().poses(truth), scored, options),
+        dead_reckoning_error_m=np.where(scored, _distance(alone, truth), np.nan),
+        to_truth=to_truth,
+        map_to_truth=_fit_map(log, trace) if align else Rigid(),
+    )
+
+
+def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluation | None) -> dict[str, Any]:
+    """The entry of a run in `summary.json`. A figure that the log cannot give (no truth, say) is left out."""
+    entry = describe(options, log) | {
+        "scenario": log.name,
+        "parameters": trace.parameters,
+        "steps": trace.steps,
+        "path_m": _path_m(log, evaluation),
+        "seen_any_share": float(np.mean(trace.seen[1:])) if trace.steps else 0.0,
+        "beacons_mapped": sum(beacon.confirmed for beacon in trace.beacons),
+        **_count_figures(trace.counts),
+        "refused_inputs": sum(trace.refusals.values()),
+        "counters": trace.counters,
+        "diverged": not np.isfinite(trace.pose).all(),
+    }
+    if trace.target:
+        entry["target_image"] = trace.target
+    else:
+        entry["step_us_median"] = trace.step_us_median
+    if log.beacons is not None:
+        entry["beacons_true"] = _beacons_true(log)
+    if evaluation is not None:
+        entry |= _position_figures(evaluation)
+        entry |= _map_figures(log, trace, evaluation)
+        if options.observation == "direction" and evaluation.to_truth != Rigid():
+            entry |= _scaled_figures(log, trace, evaluation)
+        if has_bound(log, options) and np.isfinite(evaluation.truth).all():
+            entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
+        entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
+    return entry
+
+
+def _count_figures(counts: SightingCounts) -> dict[str, int]:
+    figures = asdict(counts)
+    return figures if figures.pop("told") else {"sightings": counts.sightings}
+
+
+def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
+    """What was run, in the words of the command line; without the log, as far as the options say."""
+    sigma_mps, velocity_states, noise = options.sigma_mps, options.velocity_states, options.noise
+    if log is not None:
+        sigma_mps = log.robot.wheel_speed_sigma_mps if sigma_mps is None else sigma_mps
+        velocity_states = uses_velocity_states(options, log)
+        noise = wheel_noise(options, log)
+    words = {
+        "seed": options.seed,
+        "sigma_mps": sigma_mps,
+        "sensor": options.sensor,
+        "rig": options.rig,
+        "observation": options.observation,
+        "association": options.association_name,
+        "filter": options.filter,
+        "motion": options.motion,
+        "velocity_states": velocity_states,
+        "noise": noise,
+        "target": options.target,
+        "real": options.real,
+        "known_map": options.known_map,
+        "kept_map": options.kept_map,
+        "frozen": options.frozen or None,
+        "recovery": recovery_of(options),
+    }
+    return {word: value for word, value in words.items() if value is not None}
+
+
+def map_pairs(log: Log, trace: Trace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Confirmed beacons and the true ones they stand for, (b, 2) m each; a duplicate counts twice."""
+    if log.beacons is None:
+        return np.empty((0, 2)), np.empty((0, 2))
+    columns = (log.beacons.beacon_id.tolist(), log.beacons.x_m.tolist(), log.beacons.y_m.tolist())
+    true_m = {identity: (x_m, y_m) for identity, x_m, y_m in zip(*columns, strict=True)}
+    pairs = [
+        ((beacon.x_m, beacon.y_m), true_m[beacon.true_id])
+        for beacon in trace.beacons
+        if beacon.confirmed and beacon.true_id in true_m
+    ]
+    both = np.array(pairs, dtype=np.float64).reshape(-1, 2, 2)
+    return both[:, 0], both[:, 1]
+
+
+def _fit(poses: NDArray[np.float64], truth: NDArray[np.float64], rows: NDArray[np.bool_]) -> Rigid:
+    return fit_rigid(poses[rows, :2], truth[rows, :2])
+
+
+def _fit_map(log: Log, trace: Trace) -> Rigid:
+    mapped_m, true_m = map_pairs(log, trace)
+    return fit_rigid(mapped_m, true_m)
+
+
+def _distance(poses: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.hypot(poses[:, 0] - truth[:, 0], poses[:, 1] - truth[:, 1])
+
+
+def _nees(
+    trace: Trace, truth: NDArray[np.float64], scored: NDArray[np.bool_], options: RunOptions
+) -> NDArray[np.float64]:
+    """NEES of the rows that have one; `truth` in the map frame, where the filter keeps its error."""
+    rows = scored.copy()
+    rows[:NEES_FIRST_STEP] = False
+    rows &= np.isfinite(trace.covariance).all(axis=(1, 2))  # not every algorithm says how sure it is
+    result = np.full(len(rows), np.nan)
+    result[rows] = nees(trace.pose[rows], truth[rows], trace.covariance[rows], options.filter)
+    return result
+
+
+def _path_m(log: Log, evaluation: Evaluation | None) -> float:
+    """Length of the true path; of the measured one where the truth has long gaps."""
+    if log.truth is None or evaluation is None or not is_dense(log.truth):
+        return float(np.sum(np.abs(odometry_increments(log)[0])))
+    known = evaluation.truth[np.isfinite(evaluation.truth[:, 0]), :2]
+    return float(np.sum(np.hypot(*np.diff(known, axis=0).T)))
+
+
+def _beacons_true(log: Log) -> int:
+    assert log.beacons is not None
+    sighted = log.sightings.beacon_id[log.sightings.mappable]
+    counts = np.sum(sighted[:, None] == log.beacons.beacon_id[None, :], axis=0)
+    return int(np.sum(counts >= BEACON_SIGHTINGS))
+
+
+def _position_figures(evaluation: Evaluation) -> dict[str, Any]:
+    error_m, time_s = evaluation.error_m, evaluation.time_s
+    figures: dict[str, Any] = {}
+    if np.isfinite(error_m).any():
+        figures["position_error_m"] = {
+            "mean": float(np.nanmean(error_m)),
+            "max": float(np.nanmax(error_m)),
+            "min": float(np.nanmin(error_m)),
+            "std": float(np.nanstd(error_m)),
+            "rmse": float(np.sqrt(np.nanmean(error_m**2))),
+        }
+    figures |= _mean_if_any("position_error_first_50s_m", error_m[time_s <= WINDOW_S])
+    figures |= _mean_if_any("position_error_last_50s_m", error_m[time_s > time_s[-1] - WINDOW_S])
+    figures |= _mean_if_any("dead_reckoning_error_m", evaluation.dead_reckoning_error_m)
+    figures |= _mean_if_any("nees_mean", evaluation.nees)
+    inside = np.where(np.isfinite(evaluation.nees), evaluation.nees < POSE_95, np.nan)
+    return figures | _mean_if_any("nees_inside_95", inside)
+
+
+def _mean_if_any(name: str, values: NDArray[np.float64]) -> dict[str, float]:
+    finite = values[np.isfinite(values)]
+    return {name: float(np.mean(finite))} if len(finite) else {}
+
+
+def _map_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, float]:
+    mapped_m, true_m = map_pairs(log, trace)
+    if len(mapped_m) == 0:
+        return {}
+    distance_m = _distance(evaluation.map_to_truth.points(mapped_m), true_m)
+    return {"map_rmse_m": float(np.sqrt(np.mean(distance_m**2)))}
+
+
+def _scaled_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, float]:
+    """What is left of path and map if the scale, which directions leave to odometry, is fitted, too."""
+    known = np.isfinite(evaluation.error_m)
+    mapped_m, true_m = map_pairs(log, trace)
+    figures = {}
+    for name, moving_m, fixed_m in (
+        ("position", trace.pose[known, :2], evaluation.truth[known, :2]),
+        ("map", mapped_m, true_m),
+    ):
+        if len(moving_m) > 1:
+            scale = fit_scale(moving_m, fixed_m)
+            off_m = fit_rigid(scale * moving_m, fixed_m).points(scale * moving_m) - fixed_m
+            figures[f"{name}_scale"] = scale
+            figures[f"{name}_rmse_scaled_m"] = float(np.sqrt(np.mean(np.sum(off_m**2, axis=1))))
+    return figures
+
+
+def _is_lost(evaluation: Evaluation) -> bool:
+    error_m = evaluation.error_m[np.isfinite(evaluation.error_m)]
+    return bool(np.any(error_m[-DIVERGED_STEPS:] > DIVERGED_ERROR_M))

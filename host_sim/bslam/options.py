@@ -1,0 +1,180 @@
+"""What the user may choose for a run, and the one place where that becomes parameters of the core."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from bslam.errors import BslamError
+from bslam.runs import defaults
+from bslam.log import Log, Robot
+
+OBSERVATIONS = ("distance", "direction")
+ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
+FILTERS = ("standard", "invariant", "smoother")
+MOTIONS = ("euler", "arc")
+SENSORS = ("simulated", "camera")
+REALS = ("float", "double")
+# What shows a run that it is lost: nothing; several beacons that fit a pose elsewhere; or also, in a map that
+# has settled, one that contradicts the pose.
+RECOVERIES = ("off", "growing", "carried")
+
+# A measurement without any noise would leave the filter to divide by what rounding leaves of the
+# uncertainty: a noise-free sensor is told to err by this much. The core's own lowest for directions; over the
+# few metres of a sighting, about as much in m.
+LEAST_BEARING_SD_RAD = 1e-4
+LEAST_RANGE_SD_M = 1e-3
+
+Number = int | float
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """One way of running the filter over a log."""
+
+    observation: str = "distance"
+    association: str = "known"
+    wrong_identity_rate: float = 0.0  # "known:RATE": share of sightings whose identity is replaced by another
+    filter: str = "invariant"
+    motion: str = "arc"
+    velocity_states: bool | None = (
+        None  # None: the best known for the kind of odometry, see `uses_velocity_states`
+    )
+    noise: str | None = None  # what errs, reading or motion; None: as the log's robot says
+    sensor: str = "simulated"
+    rig: str | None = None  # the cameras, if the sensor is one
+    target: str = "host"
+    real: str = "float"  # scalar type of the core: as on the target, or the twin
+    known_map: bool = False  # the log's true beacons are given to the filter, which only localises
+    kept_map: str | None = None  # file of a map to start in, at a place that nobody knows
+    frozen: bool = False  # that map stays as it is
+    recovery: str | None = None  # one of RECOVERIES; None: the usual one, see `recovery_of`
+    sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
+    seed: int = 0  # seed of the harness's own randomness (wrong identities)
+    odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: by kind of log
+    parameters: tuple[tuple[str, Number], ...] = ()  # --params and --set: they win over all else
+
+    @property
+    def association_name(self) -> str:
+        """As on the command line: "known", "known:0.05", "nearest", ..."""
+        if self.association == "known" and self.wrong_identity_rate > 0.0:
+            return f"known:{self.wrong_identity_rate:g}"
+        return self.association
+
+
+def parse_association(text: str) -> tuple[str, float]:
+    """ "known:0.05" -> ("known", 0.05). Raises BslamError for what is not allowed."""
+    name, colon, rate_text = text.partition(":")
+    allowed = f"allowed: known, known:RATE with RATE from 0 to 1, {', '.join(ASSOCIATIONS[1:])}"
+    if name not in ASSOCIATIONS or (colon and name != "known"):
+        raise BslamError(f"association '{text}' does not exist; {allowed}")
+    if not colon:
+        return name, 0.0
+    try:
+        rate = float(rate_text)
+    except ValueError:
+        rate = math.nan
+    if not 0.0 <= rate <= 1.0:
+        raise BslamError(f"association '{text}': '{rate_text}' is not a rate; {allowed}")
+    return name, rate
+
+
+def wheel_noise(options: RunOptions, log: Log) -> str:
+    """What errs, "speedometer" or "actuation": asked for, else what the log says."""
+    return options.noise or log.robot.wheel_noise
+
+
+def uses_velocity_states(options: RunOptions, log: Log) -> bool:
+    """v and omega as states: asked for, else where the reading of a wheel errs and not the wheel.
+
+    They are right for the paper's speedometer noise, and wrong where the wheel itself jitters and for real
+    odometry.
+    """
+    if options.velocity_states is not None:
+        return options.velocity_states
+    sigma_mps = log.robot.wheel_speed_sigma_mps if options.sigma_mps is None else options.sigma_mps
+    return log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
+
+
+def recovery_of(options: RunOptions) -> str:
+    """One of RECOVERIES: asked for, else by what can go wrong.
+
+    In a kept map the robot stands at a place that nobody knows. By looks it may take one beacon for another;
+    "carried" is for those who do carry it, and has false alarms where something new looks like a beacon.
+    """
+    if options.recovery is not None:
+        return options.recovery
+    if options.kept_map is not None:
+        return "carried"
+    return "growing" if options.association == "svm" else "off"
+
+
+def odometry_lead_us(options: RunOptions, log: Log) -> int:
+    """How far odometry runs ahead of the true motion: asked for, else what is known of its data set."""
+    if options.odometry_lead_us is not None:
+        return options.odometry_lead_us
+    return defaults.REAL_ODOMETRY_LEAD_US if log.collection == "mrclam" else 0
+
+
+def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
+    """Parameters of the core, by their names in the C headers; a later source wins over an earlier one."""
+    params: dict[str, Number] = {
+        "filter": FILTERS.index(options.filter),
+        "motion": MOTIONS.index(options.motion),
+        "velocity_states": int(uses_velocity_states(options, log)),
+        "association": ASSOCIATIONS.index(options.association),
+    }
+    if options.observation == "direction":
+        params |= defaults.DIRECTION_ONLY.get(options.filter, {})
+    params |= _robot_params(log.robot, log.odometry.kind)
+    if options.sigma_mps is not None:
+        params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
+    if options.sensor == "camera":
+        params |= defaults.CAMERA
+        if options.association != "known":
+            params |= defaults.CAMERA_UNKNOWN_IDENTITY
+    if log.collection == "mrclam":
+        params |= defaults.REAL_LOG
+        if options.filter == "smoother" and options.observation == "direction":
+            params |= defaults.REAL_LOG_SMOOTHER
+        if options.association != "known":
+            params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
+        if options.velocity_states:
+            params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
+    if log.collection == "dlr":
+        params |= defaults.DLR
+    if recovery_of(options) == "growing":
+        params |= defaults.GROWING
+    return params | dict(options.parameters)
+
+
+def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
+    """What the log says of the robot and its sensor; noise where it says that there is none."""
+    range_sd_per_m = 1.0 / robot.range_sigma_scale_m
+    range_errs = robot.range_sigma_floor_m > 0.0 or robot.range_sigma_fraction > 0.0 or range_sd_per_m > 0.0
+    params: dict[str, Number] = {
+        "wheelbase_m": robot.wheelbase_m,
+        "left_speed_sd_mps": robot.wheel_speed_sigma_mps,
+        "right_speed_sd_mps": robot.wheel_speed_sigma_mps,
+        "gyro_sd_radps": robot.gyro_sigma_radps,
+        "mount_x_m": robot.sensor_x_m,
+        "mount_y_m": robot.sensor_y_m,
+        "mount_yaw_rad": robot.sensor_yaw_rad,
+        "sighting_delay_us": robot.sighting_delay_us,
+        "correlation_m": robot.sighting_correlation_m,
+        "range_scale_sd": robot.sighting_scale_sd,
+        "bearing_sd_rad": max(robot.bearing_sigma_rad, LEAST_BEARING_SD_RAD),
+        "range_sd_floor_m": robot.range_sigma_floor_m if range_errs else LEAST_RANGE_SD_M,
+        "range_sd_fraction": robot.range_sigma_fraction,
+        "range_sd_per_m": range_sd_per_m,
+    }
+    if kind == "ticks":
+        assert robot.left_radius_m is not None and robot.right_radius_m is not None
+        assert robot.ticks_per_revolution is not None and robot.counter_bits is not None
+        params |= {
+            "left_radius_m": robot.left_radius_m,
+            "right_radius_m": robot.right_radius_m,
+            "ticks_per_revolution": robot.ticks_per_revolution,
+            "counter_bits": robot.counter_bits,
+        }
+    return params

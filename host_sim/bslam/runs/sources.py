@@ -1,0 +1,215 @@
+"""Where a log comes from: each kind can be sent to another process and loaded there."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.evaluation.align import Rigid
+from bslam.runs.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
+from bslam.datasets.dlr import load_dlr
+from bslam.datasets.mrclam import best_truth, load_mrclam
+from bslam.log import SIGNATURES, Log, read_folder
+from bslam.recording import Recording, load
+from bslam.recording.aslog import as_log
+from bslam.rig import load_rig
+from bslam.world.scenario import Scenario
+from bslam.world.simulate import load_scenario, simulate
+
+
+class Source(Protocol):
+    """A log that can be made on demand."""
+
+    @property
+    def name(self) -> str:
+        """Scenario, or the log's own name."""
+
+    @property
+    def align(self) -> bool:
+        """The truth has a frame of its own, so that an estimate is aligned before it is compared."""
+
+    @property
+    def truth_kind(self) -> str:
+        """ "simulated", "recorded" or how complete a data set's truth is."""
+
+    @property
+    def has_looks(self) -> bool:
+        """Its sightings have signatures."""
+
+    @property
+    def shared(self) -> Hashable | None:
+        """Sources with the same value rest on the same costly preparation; None: there is none."""
+
+    def prepare(self) -> None:
+        """Do what `shared` speaks of, unless it is done. Raises BslamError."""
+
+    def load(self) -> Log:
+        """The log. Raises BslamError."""
+
+    def walls_m(self) -> NDArray[np.float64]:
+        """Walls (w, 4) x1, y1, x2, y2 in the frame of the truth; none where nobody knows them."""
+
+
+class _Unshared:
+    """Nothing to prepare."""
+
+    shared: ClassVar[Hashable | None] = None
+
+    def prepare(self) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
+class ScenarioSource(_Unshared):
+    """A drive to simulate."""
+
+    scenario: str  # name or path of a TOML file
+    seed: int
+    sigma_mps: float | None  # wheel-speed sigma; None: the scenario's
+    noise: str | None  # what errs; None: as the scenario says
+    noise_draw: int = field(default=0, kw_only=True)  # of [wheels]; 0: the scenario's
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "simulated"
+    has_looks: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:
+        return Path(self.scenario).stem
+
+    def redrawn(self) -> Scenario:
+        """The scenario, with its wheels' noise drawn as is asked for."""
+        scenario = load_scenario(self.scenario)
+        wheels = replace(scenario.wheels, draw=self.noise_draw or scenario.wheels.draw)
+        return replace(scenario, wheels=wheels)
+
+    def load(self) -> Log:
+        return simulate(self.redrawn(), self.seed, self.sigma_mps, self.noise)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        scenario = load_scenario(self.scenario)
+        start = scenario.start
+        ends_m = np.array([(*wall.start, *wall.end) for wall in scenario.arena.walls], dtype=np.float64)
+        to_start = Rigid(start.heading_rad, start.x_m, start.y_m).inverse()
+        return to_start.points(ends_m.reshape(-1, 2)).reshape(-1, 4)
+
+
+@dataclass(frozen=True)
+class CameraSource(ScenarioSource):
+    """A drive to simulate, watched by cameras."""
+
+    rig: str  # name or path of a TOML file
+    store: Path  # where the rendered drives are kept
+    threshold: Threshold = UNTOLD_THRESHOLD  # of the detector's score
+
+    @property
+    def shared(self) -> Hashable | None:  # type: ignore[override]
+        moved = (self.sigma_mps, self.noise_draw) if self.noise == "actuation" else None
+        return self.scenario, self.seed, self.rig, self.noise, moved
+
+    def prepare(self) -> None:
+        self.load()
+
+    def load(self) -> Log:
+        rig, store = load_rig(self.rig), CameraStore(self.store)
+        return camera_log(self.redrawn(), self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
+
+
+@dataclass(frozen=True)
+class FolderSource(_Unshared):
+    """A recorded log folder; its truth is in the frame of the start pose."""
+
+    path: Path
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "recorded"
+
+    @property
+    def name(self) -> str:
+        return self.path.resolve().name
+
+    @property
+    def has_looks(self) -> bool:
+        return (self.path / SIGNATURES).is_file()
+
+    def load(self) -> Log:
+        return read_folder(self.path)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class DlrSource(_Unshared):
+    """The DLR Spatial Cognition data set, held against its least-squares solution."""
+
+    directory: Path
+
+    align: ClassVar[bool] = True
+    truth_kind: ClassVar[str] = "least squares"
+    has_looks: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        return self.directory.resolve().name
+
+    def load(self) -> Log:
+        return load_dlr(self.directory)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class MrclamSource(_Unshared):
+    """One robot of an MRCLAM data set."""
+
+    directory: Path
+    robot: int
+
+    align: ClassVar[bool] = True
+    has_looks: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.directory.resolve().name}_robot{self.robot}"
+
+    @property
+    def truth_kind(self) -> str:
+        return best_truth(self.directory, self.robot)[0]
+
+    def load(self) -> Log:
+        return load_mrclam(self.directory, self.robot)
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class RecordingSource(_Unshared):
+    """A recording; its truth is in the frame of the start pose."""
+
+    path: Path
+
+    align: ClassVar[bool] = False
+    truth_kind: ClassVar[str] = "recorded"
+    has_looks: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:
+        return self.path.stem
+
+    def recording(self) -> Recording:
+        """All of it."""
+        return load(self.path)
+
+    def load(self) -> Log:
+        return as_log(self.recording())
+
+    def walls_m(self) -> NDArray[np.float64]:
+        return np.empty((0, 4))
