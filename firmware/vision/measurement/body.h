@@ -1,4 +1,4 @@
-/// How a body on a wall stands towards the camera, from its upper and lower side. Inside of outline.c; MATH
+/// How a body on a wall stands towards the camera, from its upper and lower side. Inside of outline.c; MATH-CAMERA
 /// "Outline".
 ///
 /// Places are tangents in the plane of bslam_facing_t.

@@ -1,4 +1,4 @@
-/// Direction and distance of an object from its outline, with standard deviations that hold. MATH
+/// Direction and distance of an object from its outline, with standard deviations that hold. MATH-CAMERA
 /// "Measuring".
 #ifndef BSLAM_VISION_MEASUREMENT_MEASURE_H
 #define BSLAM_VISION_MEASUREMENT_MEASURE_H
@@ -21,7 +21,7 @@ typedef struct bslam_size {
 
 /// Refines the rough box and fills the candidate's outline, bearing, range, marks and signature; its class,
 /// margin and score stay as they are. The box may be 4 pixels off on each side, an upright one up to 30 where
-/// the level sides tell that (MATH "Outline"). Without a height there is no distance; without the right depth
+/// the level sides tell that (MATH-CAMERA "Outline"). Without a height there is no distance; without the right depth
 /// a body's flank is taken for a part of its front, and its middle is off by half of what the flank takes.
 ///
 /// Marked and not measured: what is small (less than 5 px wide or 8 px high), or seen to be turned by a
