@@ -1,4 +1,4 @@
-"""docs/MATH.md, the code that it names, and the code that names it, hold together."""
+"""docs/MATH.md, docs/MATH-CAMERA.md, the code that they name, and the code that names them, hold together."""
 
 import re
 from pathlib import Path
@@ -6,14 +6,18 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 DOCS = ROOT / "docs"
 MATH = (DOCS / "MATH.md").read_text(encoding="utf-8")
+CAMERA = (DOCS / "MATH-CAMERA.md").read_text(encoding="utf-8")
+BOTH = {"MATH": MATH, "MATH-CAMERA": CAMERA}
 FIRMWARE = ROOT / "firmware" / "bslam"
 CORE_FILES = sorted(FIRMWARE.rglob("*.[ch]"))
 
-EQUATION = re.compile(r"\\qquad \\mathrm\{\((\d+)\)\}")
+# The estimator's equations are numbered 1, 2, ..., the camera's C1, C2, ...
+EQUATION = re.compile(r"\\qquad \\mathrm\{\((C?\d+)\)\}")
+EQUATION_NAMED = re.compile(r"\((C?\d+)\)")
 LINKED_FUNCTION = re.compile(r"\[`(\w+)\(\)`\]\(([^)]+)\)")
 NAMED_FUNCTION = re.compile(r"`(\w+)\(\)`")
-# MATH "Section", "Section" or MATH 24, in a comment or in the text of a parameter.
-REFERENCE = re.compile(r'\bMATH ((?:"[^"]+"(?:, )?)+|\d+)')
+# MATH "Section", "Section" or MATH 24 or MATH (24), in a comment or in the text of a parameter.
+REFERENCE = re.compile(r'\b(MATH(?:-CAMERA)?) ((?:"[^"]+"(?:, )?)+|\(?C?\d+\)?)')
 DESIGN_REFERENCE = re.compile(r'docs/DESIGN\.md, "([^"]+)"')
 
 
@@ -43,20 +47,30 @@ def references(pattern):
     ]
 
 
-def test_equations_are_numbered_from_1_in_order():
-    numbers = [int(number) for number in EQUATION.findall(MATH)]
-    assert numbers == list(range(1, len(numbers) + 1))
+def equations(text):
+    return EQUATION.findall(text)
+
+
+def test_equations_are_numbered_in_order():
+    assert equations(MATH) == [str(number + 1) for number in range(len(equations(MATH)))]
+    assert equations(CAMERA) == [f"C{number + 1}" for number in range(len(equations(CAMERA)))]
+
+
+def test_every_equation_has_a_number():
+    for name, text in BOTH.items():
+        displays = re.split(r"^\$\$$", text, flags=re.MULTILINE)[1::2]
+        assert len(displays) == len(equations(text)), name
 
 
 def test_every_function_that_math_names_exists():
     python_files = sorted((ROOT / "host_sim" / "bslam").rglob("*.py"))
-    for name in set(NAMED_FUNCTION.findall(MATH)):
+    for name in set(NAMED_FUNCTION.findall(MATH + CAMERA)):
         assert any(defines(path, name) for path in [*CORE_FILES, *python_files]), name
 
 
 def test_every_function_that_math_links_stands_in_the_file():
-    links = set(LINKED_FUNCTION.findall(MATH))
-    assert len(links) > 40
+    links = set(LINKED_FUNCTION.findall(MATH + CAMERA))
+    assert len(links) > 100
     for name, target in links:
         assert defines((DOCS / target).resolve(), name), (name, target)
 
@@ -72,28 +86,32 @@ def test_every_equation_of_the_paper_has_a_row_with_a_function():
 
 
 def test_every_row_of_that_table_names_equations_that_exist():
-    numbers = set(EQUATION.findall(MATH))
+    numbers = set(equations(MATH))
     for row in re.findall(r"^\| (?:\(\d+\)|augment|found or novel) \|[^|]*\|([^|]*)\|", MATH, re.MULTILINE):
-        assert set(re.findall(r"\((\d+)\)", row)) <= numbers, row
-        assert re.search(r"\(\d+\)", row), row
+        assert set(EQUATION_NAMED.findall(row)) <= numbers, row
+        assert EQUATION_NAMED.search(row), row
 
 
 def test_every_equation_that_the_text_refers_to_exists():
-    numbers = {int(number) for number in EQUATION.findall(MATH)}
-    text = re.sub(r"paper(?: equation)? \(\d+\)(?:(?:-| and |, )\(\d+\))*", "", MATH)
+    text = re.sub(r"paper(?: equation)? \(\d+\)(?:(?:-| and |, )\(\d+\))*", "", MATH + CAMERA)
     text = re.sub(r"^\| (?:\(\d+\)) \|", "", text, flags=re.MULTILINE)
-    assert {int(number) for number in re.findall(r"\((\d+)\)", text)} <= numbers
+    assert set(EQUATION_NAMED.findall(text)) <= {*equations(MATH), *equations(CAMERA)}
+
+
+def test_every_section_that_the_text_refers_to_exists():
+    for name, words in REFERENCE.findall(CAMERA):
+        if words.startswith('"'):
+            assert set(re.findall(r'"([^"]+)"', words)) <= headings(BOTH[name]), words
 
 
 def test_every_reference_of_the_code_to_math_resolves():
-    sections, numbers = headings(MATH), set(EQUATION.findall(MATH))
     found = references(REFERENCE)
     assert len(found) > 10
-    for path, words in found:
-        if words.isdigit():
-            assert words in numbers, (path, words)
+    for path, (name, words) in found:
+        if words.startswith('"'):
+            assert set(re.findall(r'"([^"]+)"', words)) <= headings(BOTH[name]), (path, words)
         else:
-            assert set(re.findall(r'"([^"]+)"', words)) <= sections, (path, words)
+            assert words.strip("()") in equations(BOTH[name]), (path, words)
 
 
 def test_every_reference_of_the_code_to_design_resolves():
@@ -109,10 +127,10 @@ def test_the_bend_of_the_model_is_equation_24():
     assert "S_{\\epsilon\\epsilon} S_{bb}" in before.rsplit("$$", 1)[1]
 
 
-def test_maths_is_what_github_renders():
+def check_maths(text):
     """Inline maths within a line; no backslash that Markdown takes; no macro that GitHub refuses."""
     refused = re.compile(r"\\(?:operatorname|mbox|phantom|tag|newcommand|require)\b|\\[^a-zA-Z]|\\$")
-    for number, part in enumerate(re.split(r"^\$\$$", MATH, flags=re.MULTILINE)):
+    for number, part in enumerate(re.split(r"^\$\$$", text, flags=re.MULTILINE)):
         if number % 2:
             assert not refused.search(part), part
             assert "\n\n" not in part.strip("\n"), part
@@ -124,3 +142,8 @@ def test_maths_is_what_github_renders():
             for inline in re.findall(r"\$([^$]*)\$", plain):
                 assert inline == inline.strip(), line
                 assert not refused.search(inline), line
+
+
+def test_maths_is_what_github_renders():
+    for text in BOTH.values():
+        check_maths(text)
