@@ -78,7 +78,7 @@ tables: setup-run ## the tables of the paper, in our figures
 
 .PHONY: train
 train: setup ## train the beacon detectors on rendered worlds, write firmware/models/beacons.h (50 min)
-	$(PYTHON) tools/train_detector.py
+	$(PYTHON) -m tools.training.train_detector
 	@$(MAKE) --silent extension
 
 # --- Testing ------------------------------------------------------------------------------------------------
@@ -105,7 +105,7 @@ PROOF :=
 
 .PHONY: proof
 proof: setup ## every long proof beside its goal, in a table (90 minutes; goes on if stopped); out/proof
-	@$(PYTHON) tools/prove.py $(PROOF)
+	@$(PYTHON) -m tools.proofs.prove $(PROOF)
 
 .PHONY: clean
 clean: ## remove what was built; .venv and out/ stay

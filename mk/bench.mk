@@ -1,23 +1,23 @@
 # What a filter step costs, in instructions as callgrind counts them on the host: unlike time, the same from
-# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, tools/bench.py counts it, and
+# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, tools/bench/bench.py counts it, and
 # runs other people's programs beside it, as far as they are installed.
 
 .PHONY: bench
 bench: ## a step's instructions (valgrind); time, memory, error beside MRPT, Eigen, GTSAM, LIBLINEAR (5 min)
 	@tools/setup.sh bench
-	@$(PYTHON) tools/bench.py
+	@$(PYTHON) -m tools.bench.bench
 
 .PHONY: bench-doc
 bench-doc: ## the same, written into docs/BENCHMARKS.md
 	@tools/setup.sh bench
-	@$(PYTHON) tools/bench.py --out docs
+	@$(PYTHON) -m tools.bench.bench --out docs
 
 .PHONY: bench-vision
 bench-vision: ## count the instructions a pixel of the vision front end (valgrind); renders what it looks at
 	@tools/setup.sh bench
-	@$(PYTHON) tools/bench_vision.py
+	@$(PYTHON) -m tools.bench.bench_vision
 
 .PHONY: bench-learner
 bench-learner: ## count the instructions of learning on the robot (valgrind); renders what is learned first
 	@tools/setup.sh bench
-	@$(PYTHON) tools/bench_learner.py
+	@$(PYTHON) -m tools.bench.bench_learner

@@ -2,4 +2,4 @@
 
 .PHONY: docs
 docs: setup-run ## write the generated parts of docs/: the table of parameters
-	@$(PYTHON) tools/params_doc.py --into docs/API.md
+	@$(PYTHON) -m tools.checks.params_doc --into docs/API.md

@@ -54,13 +54,13 @@ SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inl
 define core_rules
 CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
 CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(call FLAGS_FOR,$(1)) -Os -g \
-    $(SMALLER) -fno-math-errno -DBSLAM_PARAM_MEANINGS=0 -DBSLAM_SIMILARITY=0 \
+    $(SMALLER) -fno-math-errno -DBSLAM_PARAM_MEANINGS=0 \
     -ffunction-sections -fdata-sections \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(call STACK_MAX_FOR,$(1))
 
 .PHONY: library-$(1)
 library-$(1): build/$(1)/libbslam.a
-	@$$(PYTHON) tools/check_symbols.py --nm $(call TOOLS_FOR,$(1))nm $$<
+	@$$(PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$<
 	@$(call TOOLS_FOR,$(1))size --totals $$< | \
 	    awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
 
@@ -82,6 +82,6 @@ firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the imag
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons
-	@$(PYTHON) tools/sizes.py --beacons 6 20 50 --learner 6 32 64 \
+	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 --learner 6 32 64 \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm

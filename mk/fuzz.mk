@@ -49,7 +49,7 @@ FUZZ :=
 fuzz-programs:
 	@tools/setup.sh proof
 	@$(MAKE) --no-print-directory --silent $(FUZZ_TARGETS:%=build/fuzz/%)
-	@$(PYTHON) tools/fuzz.py --built
+	@$(PYTHON) -m tools.proofs.fuzz --built
 
 fuzz: fuzz-programs ## make inputs up for every target until the goals are met, on top of out/fuzz (20 min)
-	@$(PYTHON) tools/fuzz.py $(FUZZ)
+	@$(PYTHON) -m tools.proofs.fuzz $(FUZZ)

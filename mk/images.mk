@@ -20,7 +20,7 @@ APP_SOURCES := $(patsubst %,firmware/app/%.c,session exchange sensors records ca
 PROGRAMS := robot selftest
 
 # How hard the compiler tries: make -B IMAGE_LEVEL=-O3 ... asks what another level costs. A square root needs
-# no errno. The stack that each function takes is for tools/check_image.py.
+# no errno. The stack that each function takes is for tools/checks/check_image.py.
 IMAGE_LEVEL := -O2
 IMAGE_FLAGS := $(IMAGE_LEVEL) -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
     -DBSLAM_PARAM_MEANINGS=0
@@ -44,10 +44,10 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
 build/$(1)/%.elf: build/$(1)/firmware/app/%.o $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
-    firmware/port/sections.ld tools/check_image.py
+    firmware/port/sections.ld tools/checks/check_image.py
 	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
 	    -T firmware/port/$(1)/memory.ld $$(filter %.o,$$^) -lm -o $$@
-	@$$(PYTHON) tools/check_image.py $$@ --objects build/$(1) --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
+	@$$(PYTHON) -m tools.checks.check_image $$@ --objects build/$(1) --tools $(call TOOLS_FOR,$(BOARD_CORE_$(1)))
 
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
@@ -56,7 +56,7 @@ image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
-# An image whose stack is too small, for `bslam faults`: tools/check_image.py refuses it.
+# An image whose stack is too small, for `bslam faults`: tools/checks/check_image.py refuses it.
 build/microbit/shallow.elf: build/microbit/robot.elf
 	@$(BOARD_CC_microbit) $(IMAGE_LINK) $(call LIBC_FOR,m0plus) -Wl,--defsym=STACK=512 \
 	    -T firmware/port/microbit/memory.ld build/microbit/firmware/app/robot.o $(BOARD_OBJECTS_microbit) \
@@ -84,11 +84,11 @@ images: $(BUILT_BOARDS) $(HOST_ROBOT) ## link the images of every board, and che
 
 .PHONY: selftest
 selftest: images ## run the self-test of every board that QEMU has
-	@$(PYTHON) tools/run_image.py selftest
+	@$(PYTHON) -m tools.proofs.run_image selftest
 
 .PHONY: sizes-doc check-sizes
 sizes-doc: images library-m4f ## measure flash, RAM, stack and instructions anew, write docs/SIZES.md
-	@$(PYTHON) tools/sizes_doc.py
+	@$(PYTHON) -m tools.checks.sizes_doc
 
 check-sizes: images library-m4f
-	@$(PYTHON) tools/sizes_doc.py --check
+	@$(PYTHON) -m tools.checks.sizes_doc --check

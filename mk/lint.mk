@@ -1,6 +1,6 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
-C_TEST_FILES := $(wildcard tools/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch] \
+C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/bench/*.[ch] \
     tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] tests/soak/*.c)
 APP_FILES := $(wildcard firmware/app/*.[ch] firmware/port/*.h firmware/port/*/*.[ch])
 CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
@@ -40,13 +40,13 @@ lint-types:
 	@$(PYTHON) -m mypy --no-error-summary
 
 lint-layers:
-	@$(PYTHON) tools/check_layers.py
+	@$(PYTHON) -m tools.checks.check_layers
 
 lint-complexity:
-	@$(PYTHON) tools/check_complexity.py $(CORE_SOURCES) $(CORE_HEADERS) $(APP_FILES) $(PYTHON_DIRS)
+	@$(PYTHON) -m tools.checks.check_complexity $(CORE_SOURCES) $(CORE_HEADERS) $(APP_FILES) $(PYTHON_DIRS)
 
 lint-version:
-	@$(PYTHON) tools/check_version.py
+	@$(PYTHON) -m tools.checks.check_version
 
 .PHONY: format
 format: ## rewrite C and Python files in the house format

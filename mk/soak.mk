@@ -17,7 +17,7 @@ SOAK_PROGRAMS := $(UNIT_REALS:%=build/soak/%/soak)
 
 .PHONY: soak soak-short
 soak: $(SOAK_PROGRAMS) ## 6 simulated hours x 20 seeds, float beside its double twin (5 min)
-	@$(PYTHON) tools/soak.py
+	@$(PYTHON) -m tools.proofs.soak
 
 soak-short: $(SOAK_PROGRAMS)
-	@$(PYTHON) tools/soak.py --minutes 30 --seeds 4 --nees 1.1 5.8
+	@$(PYTHON) -m tools.proofs.soak --minutes 30 --seeds 4 --nees 1.1 5.8

@@ -13,8 +13,7 @@ UNIT_WARNINGS := $(C_WARNINGS) -Wno-unused-parameter
 
 UNIT_REALS := float double
 UNIT_FLAGS_float := -DBSLAM_REAL_DOUBLE=0
-# And the loops over words (math/bytes.h), in plain C, in place of those over sixteen bytes (math/lanes.h).
-UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1 -DBSLAM_SAMPLE_FLOAT=1 -DBSLAM_HAS_SSE2=0
+UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1 -DBSLAM_SAMPLE_FLOAT=1
 UNIT_CORE_WARNINGS_float := $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 UNIT_CORE_WARNINGS_double := $(C_WARNINGS)
 

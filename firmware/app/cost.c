@@ -1,5 +1,5 @@
 /// What the parts of a step cost on this board, in ticks of port_ticks: one line each, "name size ticks", the
-/// mean of several calls. tools/costs.py runs it and knows what a tick is.
+/// mean of several calls. tools/checks/sizes_doc.py runs it and knows what a tick is.
 #include "app/measure.h"
 #include "bslam/bslam.h"
 #include "bslam/math/trig.h"

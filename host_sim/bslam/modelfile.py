@@ -196,11 +196,11 @@ def _load(path: Path) -> Mapping[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         raise BslamError(f"{path}: cannot be read: {error}; allowed: a UTF-8 text file") from error
     except ValueError as error:
-        allowed = "a whole model file, as tools/train_beacons.py writes it"
+        allowed = "a whole model file, as tools/training/train_beacons.py writes it"
         raise BslamError(f"{path}: not JSON, or cut short: {error}; allowed: {allowed}") from error
     if not isinstance(document, dict):
         raise BslamError(
-            f"{path}: holds no table; allowed: a model file, as tools/train_beacons.py writes it"
+            f"{path}: holds no table; allowed: a model file, as tools/training/train_beacons.py writes it"
         )
     return document
 

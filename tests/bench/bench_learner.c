@@ -1,6 +1,6 @@
 // A robot that learns its beacons by sight, from a recording on standard input: records of a machine (int32)
 // and 71 features (float32); those of machine -1, which come first, are seeds. Each sample is shown, and
-// training goes on until nothing is left to do. tools/bench_learner.py counts the instructions of the
+// training goes on until nothing is left to do. tools/bench/bench_learner.py counts the instructions of the
 // measured functions.
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /// Calls a target with inputs that are kept in a file, each behind its length (two bytes, low one first):
-/// without libFuzzer. tools/fuzz.py writes such files.
+/// without libFuzzer. tools/proofs/fuzz.py writes such files.
 #include <stdio.h>
 
 #include "fuzz.h"

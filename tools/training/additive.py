@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.modelfile import AdditiveSvm
-from training.together import minimise
+from tools.training.together import minimise
 
 KNOTS = 9  # as BSLAM_KNOTS
 GRID_KNOTS = (0, 3, 5, 8)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bslam.core.raw import vision_library
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm, weights_in_row
-from training.additive import KNOTS, weights_of
+from tools.training.additive import KNOTS, weights_of
 
 
 def built_in_detector(lens: str) -> DetectorModel:

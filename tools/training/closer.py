@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from bslam.core.vision import DetectorModel, FrontEnd
-from training.detector_fit import (
+from tools.training.detector_fit import (
     FUSION_LIMIT,
     FUSION_SHARE,
     OVERLAP_FOUND,
@@ -27,10 +27,10 @@ from training.detector_fit import (
     machine_values,
     usable,
 )
-from training.detector_samples import BoxSamples, boxes_of_world, joined, model_of
-from training.hinged import decide_hinged, fit_hinged
-from training.render_set import camera_of
-from training.together import fit_together
+from tools.training.detector_samples import BoxSamples, boxes_of_world, joined, model_of
+from tools.training.hinged import decide_hinged, fit_hinged
+from tools.training.render_set import camera_of
+from tools.training.together import fit_together
 
 CLOSE_COST = 0.001
 CLOSE_ITERATIONS = 80

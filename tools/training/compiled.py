@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from training.fit import Matrix, expand
+from tools.training.fit import Matrix, expand
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 TOLERANCE = 1e-5

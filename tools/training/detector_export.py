@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bslam.core.vision import BeaconModel, DetectorModel
-from training.export import Header, c_float, initialiser
+from tools.training.export import Header, c_float, initialiser
 
 
 def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:

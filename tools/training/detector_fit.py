@@ -11,12 +11,12 @@ from sklearn.preprocessing import StandardScaler
 
 from bslam.core.vision import DetectorModel
 from bslam.modelfile import Svm
-from training.additive import decide_additive, fit_additive, most_telling, place_knots
-from training.detector_samples import CLASSES, CLUTTER, RECOLOURED, BoxSamples, CellSamples
-from training.fit import choose_cost, fit, mean_average_precision
-from training.render_set import KINDS
-from training.together import fit_together
-from training.truth import IGNORED, NOTHING
+from tools.training.additive import decide_additive, fit_additive, most_telling, place_knots
+from tools.training.detector_samples import CLASSES, CLUTTER, RECOLOURED, BoxSamples, CellSamples
+from tools.training.fit import choose_cost, fit, mean_average_precision
+from tools.training.render_set import KINDS
+from tools.training.together import fit_together
+from tools.training.truth import IGNORED, NOTHING
 
 CELL_COSTS = (0.01, 0.1)
 KIND_COSTS = (0.0005, 0.002, 0.008)

@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, Proposals, feature_counts
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm, weights_in_row
-from training.additive import KNOTS
-from training.render_set import CELL_PX, KINDS, World, camera_of, read_world
-from training.truth import NOTHING, areas, owners, teaches
+from tools.training.additive import KNOTS
+from tools.training.render_set import CELL_PX, KINDS, World, camera_of, read_world
+from tools.training.truth import NOTHING, areas, owners, teaches
 
 CLASSES = (
     BeaconClass(
@@ -30,7 +30,7 @@ CLASSES = (
     BeaconClass("cabinet", 1.80, 0.375, 1.80, 1.80, 0.02, 0.0, 0.0, 0.8, 1.0, 0.03),
 )
 """In the order of KINDS: whole heights, middling depths, where their upper sides are, how wide they are, and
-what their looks make of a distance in training worlds (tools/measure_outline.py --style train). A radiator's
+what their looks make of a distance in training worlds. A radiator's
 height and a sign's are what is outlined in the mean: the lower side of the one is often found at the skirting
 or the floor, and a pale rim of the other is taken for the wall. The last:
 by how much the distances of one thing are off together over a drive (paper_room, drives 0:8): cabinets are

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from bslam.core.vision import DetectorModel, FrontEnd
-from training.detector_samples import clutter_share, model_of
-from training.render_set import World, camera_of, read_world
-from training.truth import NOTHING, counts, owners
+from tools.training.detector_samples import clutter_share, model_of
+from tools.training.render_set import World, camera_of, read_world
+from tools.training.truth import NOTHING, counts, owners
 
 DUPLICATE = -3
 """A second detection of an object: false."""
@@ -52,18 +52,6 @@ class Sightings:
 
     detections: NDArray[np.void]
     objects: NDArray[np.void]
-
-    def of_worlds(self, worlds: NDArray[np.integer]) -> Sightings:
-        """Those of some worlds, each as often as it is named and under a new number: for the bootstrap."""
-        detections: list[NDArray[np.void]] = []
-        objects: list[NDArray[np.void]] = []
-        for number, world in enumerate(worlds.tolist()):
-            for source, into in ((self.detections, detections), (self.objects, objects)):
-                part = source[source["world"] == world].copy()
-                part["world"] = number
-                into.append(part)
-        found = np.concatenate(detections)
-        return Sightings(found[np.argsort(-found["score"], kind="stable")], np.concatenate(objects))
 
 
 @dataclass(frozen=True)

@@ -128,42 +128,6 @@ def held_out_values(
     return values
 
 
-def add_hard_negatives(
-    x: Matrix, targets: NDArray[np.bool_], kept: NDArray[np.bool_], machine: Machine, most: int
-) -> NDArray[np.bool_]:
-    """A mask (samples,) for the next fit: `kept`, all positives, and the `most` worst of the other negatives.
-
-    The worst have the largest decision value on a row that they do not belong to; none that every row puts
-    beyond its margin (below -1) is added, for such a sample does not move an SVM. Training starts with all
-    positives and some negatives and ends when nothing is added.
-    """
-    values = np.concatenate([machine.decide(part) for part in np.array_split(x, len(x) // 20000 + 1)])
-    worst = np.where(targets, -np.inf, values).max(axis=1)
-    chosen = kept | targets.any(axis=1)
-    candidates = np.flatnonzero(~chosen & (worst > -1.0))
-    mask = chosen.copy()
-    mask[candidates[np.argsort(-worst[candidates], kind="stable")[:most]]] = True
-    return mask
-
-
-def threshold_for_precision(
-    scores: Matrix, right: NDArray[np.bool_], precision: float
-) -> tuple[float, float]:
-    """The lowest threshold whose accepted samples (score >= threshold) are right to the wanted share.
-
-    Returns it and the share of right samples that it accepts (recall). Where no threshold reaches the
-    precision, inf and 0.
-    """
-    order = np.argsort(-scores, kind="stable")
-    hits = np.cumsum(right[order])
-    accepted = np.arange(1, len(scores) + 1)
-    last_of_equals = np.append(np.diff(scores[order]) != 0, True)
-    good = np.flatnonzero(last_of_equals & (hits >= precision * accepted) & (hits > 0))
-    if len(good) == 0:
-        return float("inf"), 0.0
-    return float(scores[order][good[-1]]), float(hits[good[-1]] / right.sum())
-
-
 def quantised(svm: Svm) -> Svm:
     """The machine with 8-bit weights: byte * scale, a scale a row, the largest weight at 127."""
     scale = np.abs(svm.weights).max(axis=1).astype(np.float32) / np.float32(127)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.modelfile import HingedSvm
-from training.together import minimise
+from tools.training.together import minimise
 
 DEVIATION_MIN = 4.0
 """Of a byte: what hardly ever changes is not blown up."""

@@ -1,20 +1,18 @@
-"""Signatures of many objects, to learn from and to test with: of rendered beacons, and of photographs."""
+"""Signatures of many rendered beacons, to learn from and to test with."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core.vision import FrontEnd
-from bslam.rig import Camera, load_rig
+from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, dress, free_pose, make_world
 from bslam.world.scenario import load_scenario
-from training.detector_samples import blank_detector, model_of
-from training.eth80 import WALL_GREY, read_photographs
+from tools.training.detector_samples import blank_detector, model_of
 
 SEEN_PX_MIN = 150
 SEEN_SHARE_MIN = 0.7
@@ -27,14 +25,10 @@ SECONDS_A_FRAME = 0.2
 
 @dataclass(frozen=True)
 class Views:
-    """Signatures (n, 71) of objects, each view with the object's number (n,).
-
-    directions (n, 3): from where a photograph was taken, unit vectors; rows of 0 where that does not matter.
-    """
+    """Signatures (n, 71) of objects, each view with the object's number (n,)."""
 
     signatures: NDArray[np.float32]
     objects: NDArray[np.int64]
-    directions: NDArray[np.float64]
 
     @property
     def object_count(self) -> int:
@@ -58,7 +52,7 @@ def rendered(scenario: str, seed: int, frames: int, least: int) -> Views:
     kept = [name for name in sorted(set(names)) if names.count(name) >= least]
     chosen = [index for index, name in enumerate(names) if name in kept]
     objects = np.array([kept.index(names[index]) for index in chosen], np.int64)
-    return Views(np.array(signatures, np.float32)[chosen], objects, np.zeros((len(chosen), 3)))
+    return Views(np.array(signatures, np.float32)[chosen], objects)
 
 
 def generic(count: int, first_world: int) -> NDArray[np.float32]:
@@ -70,19 +64,6 @@ def generic(count: int, first_world: int) -> NDArray[np.float32]:
         signatures += [one] if one is not None else []
         world += 1
     return np.array(signatures)
-
-
-def photographs(archive: Path) -> Views:
-    """ETH-80: each object before a grey wall, as the front end sees it."""
-    camera = load_rig("three60").cameras[1]
-    front_end = FrontEnd([camera], model_of(blank_detector()))
-    views = sorted(read_photographs(archive).items())
-    signatures = [_photograph(front_end, camera, picture) for _, picture in views]
-    names = [name for (name, _, _), _ in views]
-    directions = [_direction(polar, azimuth) for (_, polar, azimuth), _ in views]
-    kept = sorted(set(names))
-    objects = np.array([kept.index(name) for name in names], np.int64)
-    return Views(np.array(signatures, np.float32), objects, np.array(directions))
 
 
 def _one_of_world(world: int) -> NDArray[np.float32] | None:
@@ -132,23 +113,3 @@ def _is_good(seen: Seen) -> bool:
     """Whole, large enough, hardly hidden and not too slanted."""
     visible = seen.visible_px >= max(SEEN_PX_MIN, SEEN_SHARE_MIN * seen.own_px)
     return visible and not seen.cut and seen.slant_rad < SLANT_MAX_RAD
-
-
-def _photograph(front_end: FrontEnd, camera: Camera, rgba: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """The signature of a photograph of 64x64, doubled and put in the middle of a grey frame."""
-    double = rgba.repeat(2, axis=0).repeat(2, axis=1)
-    inside = double[..., 3] > 0
-    frame = np.full((camera.lens.height_px, camera.lens.width_px, 3), WALL_GREY, np.uint8)
-    top, left = ((np.array(frame.shape[:2]) - double.shape[:2]) // 2).tolist()
-    spot = frame[top : top + double.shape[0], left : left + double.shape[1]]
-    spot[inside] = double[..., :3][inside]
-    rows, columns = np.nonzero(inside.any(axis=1))[0], np.nonzero(inside.any(axis=0))[0]
-    front_end.see(frame, moved=False)
-    box = (left + columns[0] - 0.5, top + rows[0] - 0.5, left + columns[-1] + 0.5, top + rows[-1] + 0.5)
-    signature = front_end.signature(box)
-    return np.zeros(71, np.float32) if signature is None else signature
-
-
-def _direction(polar_deg: int, azimuth_deg: int) -> list[float]:
-    polar, azimuth = math.radians(polar_deg), math.radians(azimuth_deg)
-    return [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]

@@ -8,7 +8,7 @@ they stand under build/training/<lens>_<style>/.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,12 +118,6 @@ def read_world(folder: Path, lens: str, style: str, seed: int) -> World:
     """A world from its file."""
     with np.load(world_path(folder, lens, style, seed)) as file:
         return World(seed, file["pictures"], file["cover"], file["clutter"], file["seen"])
-
-
-def read_set(folder: Path, lens: str, style: str, seeds: Iterable[int]) -> Iterator[World]:
-    """Worlds one by one, from their files."""
-    for seed in seeds:
-        yield read_world(folder, lens, style, seed)
 
 
 def _cell_counts(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:

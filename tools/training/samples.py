@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.learner import flash_seeds
+from bslam.core.learner import rendered_seeds
 from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.errors import BslamError
 from bslam.experiment.pictures import Box, Scaled, camera_for, load_picture
 from bslam.rig import Camera
-from training.folder import FILE, Folder, Label
-from training.truth import areas, intersections, overlaps
+from tools.training.folder import FILE, Folder, Label
+from tools.training.truth import areas, intersections, overlaps
 
 NONE = -1
 """The label of what is none of the objects."""
@@ -96,7 +96,7 @@ def collect(folder: Folder, camera: Camera | None = None, model: BeaconModel | N
         else:
             useless[picture.path.name] = seeing.reason
     own = len(collected.labels)
-    for index, seed in enumerate(flash_seeds()):
+    for index, seed in enumerate(rendered_seeds()):
         collected.add(seed, NONE, index % len(frames))
     drawn = Counter(label.name for picture in folder.pictures for label in picture.labels)
     _check(folder, collected, drawn)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bslam.modelfile import Svm
-from training.fit import Matrix
+from tools.training.fit import Matrix
 
 DEVIATION_MIN = 1e-6
 

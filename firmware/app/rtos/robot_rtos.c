@@ -11,7 +11,7 @@
 
 /// Readings that may wait while a picture is looked at.
 #define READINGS_MAX 64
-/// In words. The robot's is what tools/check_image.py finds for robot.elf, and room for interrupts.
+/// In words. The robot's is what tools/checks/check_image.py finds for robot.elf, and room for interrupts.
 #define ROBOT_STACK 1536
 #define BODY_STACK 160
 #define ROBOT_PRIORITY 1

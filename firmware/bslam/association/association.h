@@ -22,7 +22,6 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or waits
-    BSLAM_REASON_FAR,          ///< it may be new, but its distance is too doubtful to start a beacon
     BSLAM_REASON_LOOKS,        ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room

@@ -83,7 +83,7 @@ void bslam_looks_forget(bslam_looks_t *looks, int index, int count)
 static bslam_opinion_t opinion_of(const bslam_looks_t *looks, const bslam_params_t *params, int32_t machine,
                                   const bslam_sample_t *sample)
 {
-    bslam_opinion_t opinion = {0.0f, 0.0f, 0.0f};
+    bslam_opinion_t opinion = {0.0f, 0.0f};
     if (machine != BSLAM_NO_MACHINE && bslam_learner_knows(&looks->learner, machine)) {
         const float samples = (float)bslam_learner_samples(&looks->learner, machine);
         opinion.value = bslam_sample_decide(&looks->learner.machines[machine].weights, sample);
@@ -92,28 +92,11 @@ static bslam_opinion_t opinion_of(const bslam_looks_t *looks, const bslam_params
     return opinion;
 }
 
-/// How far a sample is from the nearest that a machine keeps, as signatures; 0 if it keeps none.
-static float distance_from_kept(const bslam_learner_t *learner, int32_t machine, const bslam_sample_t *sample)
-{
-    const bslam_sample_t *kept = &learner->samples[machine * BSLAM_SAMPLES_PER_MACHINE];
-    float nearest2 = 0.0f;
-    for (int32_t i = 0; i < learner->machines[machine].samples; i++) {
-        const float distance2 = bslam_sample_distance2(sample, &kept[i]);
-        nearest2 = i == 0 || distance2 < nearest2 ? distance2 : nearest2;
-    }
-    return BSLAM_SAMPLE_UNIT * (float)bslam_sqrt((bslam_real_t)nearest2);
-}
-
 bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                 const bslam_sample_t *sample)
 {
     const int16_t machine = looks->of[index].machine;
-    const bool compares = params->unlike_slope > 0 && params->learn_budget > 0;
-    bslam_opinion_t opinion = opinion_of(looks, params, machine, sample);
-    if (compares && machine != BSLAM_NO_MACHINE && opinion.weight < 0.5f) {
-        opinion.apart = distance_from_kept(&looks->learner, machine, sample);
-    }
-    return opinion;
+    return opinion_of(looks, params, machine, sample);
 }
 
 // ---- classes ----------------------------------------------------------------------------------------------

@@ -52,7 +52,6 @@ typedef struct bslam_look {
 typedef struct bslam_opinion {
     float value;   ///< the machine's decision value
     float weight;  ///< 0: it is not trained yet; towards 1 with the samples it keeps
-    float apart;   ///< while that is below a half: how far the signature is from the nearest of them; else 0
 } bslam_opinion_t;
 
 /// Private but for the counters.
@@ -85,7 +84,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_looks_init(bslam_looks_t *looks, const bsl
 /// Forgets all beacons, in time for another map.
 void bslam_looks_clear(bslam_looks_t *looks);
 
-/// What the machine of beacon `index` says of a sample. O(samples it keeps) if it counts less than half.
+/// What the machine of beacon `index` says of a sample.
 bslam_opinion_t bslam_looks_ask(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                 const bslam_sample_t *sample);
 

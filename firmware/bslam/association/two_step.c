@@ -40,10 +40,8 @@ static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting
 static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinion_t *opinion)
 {
     const bslam_real_t odds = params->looks_slope * (bslam_real_t)opinion->value + params->looks_offset;
-    const bslam_real_t unlike = (bslam_real_t)opinion->apart - params->unlike_distance;
-    const bslam_real_t weight = (bslam_real_t)opinion->weight;
-    return params->looks_weight * (weight * clip(odds, -params->looks_low, params->looks_high) -
-                                   (1 - weight) * clip(params->unlike_slope * unlike, 0, params->looks_low));
+    return params->looks_weight * (bslam_real_t)opinion->weight *
+           clip(odds, -params->looks_low, params->looks_high);
 }
 
 /// What the detector's class adds to the score.
@@ -127,7 +125,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_given_t *given, int
         return false;
     }
     found->distance2 = weight.distance2;
-    found->opinion = (bslam_opinion_t){0.0f, 0.0f, 0.0f};
+    found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
         found->opinion = frame->answers->ask(frame->looks, frame->params, beacon, sample);
     }
@@ -328,20 +326,6 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_given_t
     return -1;
 }
 
-/// Whether a sighting's distance is too doubtful to start a beacon: from afar a Gaussian is no likeness of
-/// where it may be. A robot that sees nothing that it knows takes what it gets.
-static bool is_far(const bslam_sighting_frame_t *frame, int i, const bslam_match_t *matches)
-{
-    const bslam_sighting_t *sighting = &frame->sightings[i];
-    const bslam_real_t sd_m = frame->params->new_range_sd_m;
-    int known = 0;
-    for (int k = 0; k < frame->count; k++) {
-        known += matches[k].verdict == BSLAM_VERDICT_MATCH ? 1 : 0;
-    }
-    return known >= frame->params->new_far_matches && sighting->has_range &&
-           bslam_range_variance_m2(frame->params, sighting, sighting->range_m) > sd_m * sd_m;
-}
-
 /// Whether a sighting is too near to the beacon that fits it best to be new. Of one that was seen a few times
 /// long ago the map hardly knows where it stands, so that much is nearly it: what has a distance, and so a
 /// place, is new there if that is likelier.
@@ -366,9 +350,6 @@ static void decide_rest(const bslam_sighting_frame_t *frame, bslam_given_t *give
     if (is_duplicate) {
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_DUPLICATE;
-    } else if (!waits && is_far(frame, i, matches)) {
-        match->verdict = BSLAM_VERDICT_REJECT;
-        match->reason = BSLAM_REASON_FAR;
     } else if (!waits) {
         match->waits_for = looks_like_another(frame, given, i, matches);
         match->verdict = match->waits_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;

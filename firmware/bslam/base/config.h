@@ -70,14 +70,6 @@
 #error "BSLAM_SMOOTHER_SEEN_MAX is twice BSLAM_BEACONS_MAX to 100000"
 #endif
 
-/// 0: no similarity form (`filter` = 3 is refused), which saves 0.9 KB of flash.
-#ifndef BSLAM_SIMILARITY
-#define BSLAM_SIMILARITY 1
-#endif
-#if BSLAM_SIMILARITY != 0 && BSLAM_SIMILARITY != 1
-#error "BSLAM_SIMILARITY is 0 or 1"
-#endif
-
 /// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: an
 /// instance takes about 117 KB for QVGA and four cameras, 107 KB for one, 46 KB for QQVGA and one. A camera
 /// with a zoom of 2 needs room for twice its width and height: 416 KB for QVGA.

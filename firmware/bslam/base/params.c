@@ -144,10 +144,6 @@ bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)
             return BSLAM_E_PARAMETER;
         }
     }
-    if (BSLAM_SIMILARITY == 0 && params->filter == BSLAM_FILTER_SIMILARITY) {
-        *bad_id = id_at(offsetof(bslam_params_t, filter));
-        return BSLAM_E_PARAMETER;
-    }
     if (params->velocity_states != 0) {
         if (params->scale_states != 0) {
             *bad_id = id_at(offsetof(bslam_params_t, scale_states));

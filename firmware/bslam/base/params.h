@@ -14,8 +14,7 @@
 /// REAL(name, default, low, high, meaning) and INTEGER(the same).
 #define BSLAM_PARAMS(REAL, INTEGER) \
     /* estimator */ \
-    INTEGER(filter, 1, 0, 3, \
-            "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 smoother, 3 similarity") \
+    INTEGER(filter, 1, 0, 2, "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 smoother") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
     INTEGER(velocity_states, 1, 0, 1, \
             "1: v and omega are states and the wheels measure them (speedometer noise)") \
@@ -121,18 +120,11 @@
     REAL(looks_offset, -0.5, -100.0, 100.0, "svm: log odds of the decision value 0") \
     REAL(looks_low, 8.0, 0.0, 100.0, "svm: looks speak against a match by this much at most") \
     REAL(looks_high, 4.0, 0.0, 100.0, "svm: and for one by this much") \
-    REAL(unlike_distance, 0.8, 0.0, 100.0, \
-         "svm: signatures farther apart than this are unlike, to a machine that does not count half yet") \
-    REAL(unlike_slope, 7.4, 0.0, 1e3, \
-         "svm: log odds against a match, by how much farther it is from all that such a machine keeps") \
     REAL(side_low, 3.0, 0.0, 100.0, \
          "svm: log odds against a beacon seen from a right angle or more beside where it was seen from") \
     REAL(side_high, 1.0, 0.0, 100.0, "svm: and for one seen from where it was, if from two sides at least") \
     REAL(class_doubt, 0.1, 1e-3, 1e3, \
          "svm: a beacon counts as seen so often as each class before it is seen at all") \
-    REAL(new_range_sd_m, 0.7, 1e-3, 1e6, \
-         "svm: a sighting whose distance is less sure than this starts no beacon") \
-    INTEGER(new_far_matches, 2, 0, 250, "svm: where its frame has so many matches") \
     REAL(double_m, 1.0, 0.0, 1e3, "svm: two beacons nearer than this may be one") \
     REAL(double_sd_m, 0.1, 0.0, 1e3, "svm: whose two places differ by about this") \
     REAL(double_d2, 9.0, 0.0, 1e3, "svm: and by no more than this squared Mahalanobis distance") \
@@ -169,12 +161,7 @@
 // clang-format on
 
 /// Values of `filter`.
-enum {
-    BSLAM_FILTER_STANDARD = 0,
-    BSLAM_FILTER_INVARIANT = 1,
-    BSLAM_FILTER_SMOOTHER = 2,
-    BSLAM_FILTER_SIMILARITY = 3
-};
+enum { BSLAM_FILTER_STANDARD = 0, BSLAM_FILTER_INVARIANT = 1, BSLAM_FILTER_SMOOTHER = 2 };
 
 #define BSLAM_PARAMS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;
 #define BSLAM_PARAMS_FIELD_INTEGER(name, value, low, high, meaning) int32_t name;

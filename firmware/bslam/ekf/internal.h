@@ -42,11 +42,4 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector);
 void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
                             bslam_real_t variance);
 
-/// Before a correction of the similarity form: brings the covariance up to date and notes how the world would
-/// grow, and what says by how much. False: nothing says it. Nothing may be fused until the other one.
-bool bslam_ekf_note_scale(bslam_ekf_t *ekf, const bslam_params_t *params);
-
-/// After it: P <- A P Aᵀ with A = I + change gaugeᵀ, MATH (55). O(n²).
-void bslam_ekf_scale_covariance(bslam_ekf_t *ekf);
-
 #endif

@@ -520,12 +520,7 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params)
         return;
     }
     const bool invariant = params->filter != BSLAM_FILTER_STANDARD;
-    const bool scales = BSLAM_SIMILARITY != 0 && params->filter == BSLAM_FILTER_SIMILARITY &&
-                        bslam_ekf_note_scale(ekf, params);
     move_mean(ekf, invariant ? ekf->correction[BSLAM_STATE_THETA] : 0);
-    if (scales) {
-        bslam_ekf_scale_covariance(ekf);
-    }
     if (invariant) {
         transport_covariance(ekf);
     } else {

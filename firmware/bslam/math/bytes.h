@@ -1,6 +1,5 @@
 /// Four bytes of a word at a time: what a Cortex-M4 and its elders have instructions for (SIMD32 of the
-/// ACLE), and the same for all others, to the bit: in portable C, or with SSE2. Where that pays, loops over
-/// cells are written a second time for sixteen bytes at a time (lanes.h).
+/// ACLE), and for all others the same in portable C, to the bit.
 #ifndef BSLAM_MATH_BYTES_H
 #define BSLAM_MATH_BYTES_H
 
@@ -10,19 +9,6 @@
 
 #ifdef __ARM_FEATURE_SIMD32
 #include <arm_acle.h>
-#endif
-
-/// 1: an x86 host has the two that all others are made of, and lanes. A test may unset it, to try plain C.
-#ifndef BSLAM_HAS_SSE2
-#ifdef __SSE2__
-#define BSLAM_HAS_SSE2 1
-#else
-#define BSLAM_HAS_SSE2 0
-#endif
-#endif
-
-#if BSLAM_HAS_SSE2
-#include <emmintrin.h>
 #endif
 
 enum { BSLAM_WORD_BYTES = 4 };
@@ -69,8 +55,6 @@ static inline uint32_t bslam_bytes_less(uint32_t a, uint32_t b)
 {
 #ifdef __ARM_FEATURE_SIMD32
     return __uqsub8(a, b);
-#elif BSLAM_HAS_SSE2
-    return (uint32_t)_mm_cvtsi128_si32(_mm_subs_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b)));
 #else
     const uint32_t wrapped = ((a | BSLAM_TOP_BITS) - (b & ~BSLAM_TOP_BITS)) ^ ((a ^ ~b) & BSLAM_TOP_BITS);
     const uint32_t borrows = ((~a & b) | (~(a ^ b) & wrapped)) & BSLAM_TOP_BITS;
@@ -83,8 +67,6 @@ static inline uint32_t bslam_bytes_plus(uint32_t a, uint32_t b)
 {
 #ifdef __ARM_FEATURE_SIMD32
     return __uqadd8(a, b);
-#elif BSLAM_HAS_SSE2
-    return (uint32_t)_mm_cvtsi128_si32(_mm_adds_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b)));
 #else
     return ~bslam_bytes_less(~a, b);
 #endif
@@ -153,20 +135,12 @@ static inline uint32_t bslam_word_above(const uint8_t *one, const uint8_t *other
 /// above the limit: a bit each, the first place's lowest. In flip and limit the same byte stands four times.
 static inline uint32_t bslam_bits_above(const void *one, const void *other, uint32_t flip, uint32_t limit)
 {
-#if BSLAM_HAS_SSE2
-    const __m128i flips = _mm_set1_epi32((int)flip), limits = _mm_set1_epi32((int)limit);
-    const __m128i most = _mm_max_epu8(_mm_xor_si128(_mm_loadu_si128(one), flips),
-                                      _mm_xor_si128(_mm_loadu_si128(other), flips));
-    const __m128i are_within = _mm_cmpeq_epi8(_mm_max_epu8(most, limits), limits);
-    return (uint32_t)_mm_movemask_epi8(are_within) ^ 0xFFFFU;
-#else
     const uint8_t *a = one, *b = other;
     const uint32_t low =
         bslam_top_bits(bslam_word_above(a, b, flip, limit), bslam_word_above(a + 4, b + 4, flip, limit));
     const uint32_t high = bslam_top_bits(bslam_word_above(a + 8, b + 8, flip, limit),
                                          bslam_word_above(a + 12, b + 12, flip, limit));
     return low | high << 8;
-#endif
 }
 
 static inline bool bslam_has_zero_byte(uint32_t bytes)
@@ -200,9 +174,6 @@ static inline uint32_t bslam_bytes_apart_add(uint32_t a, uint32_t b, uint32_t su
 {
 #ifdef __ARM_FEATURE_SIMD32
     return __usada8(a, b, sum);
-#elif BSLAM_HAS_SSE2
-    const __m128i apart = _mm_sad_epu8(_mm_cvtsi32_si128((int)a), _mm_cvtsi32_si128((int)b));
-    return sum + (uint32_t)_mm_cvtsi128_si32(apart);
 #else
     return bslam_bytes_sum(bslam_bytes_apart(a, b), sum);
 #endif

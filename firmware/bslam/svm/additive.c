@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 #include "bslam/svm/svm.h"
 
 #define ROWS_MAX 255
@@ -91,44 +91,10 @@ static const float *knot_below(float x, const float *knots)
     return x >= knots[1] ? knots + 1 : knots;
 }
 
-#if BSLAM_HAS_LANES
-
-/// Places of four features, whose first weights stand so many bytes from where a pair's begin.
-static inline void locate_four(const float *x, const float *knots, uint32_t first,
-                               bslam_between_knots_t *places)
-{
-    const float *a = knot_below(x[0], knots), *b = knot_below(x[1], knots + BSLAM_KNOTS);
-    const float *c = knot_below(x[2], knots + 2 * BSLAM_KNOTS),
-                *d = knot_below(x[3], knots + 3 * BSLAM_KNOTS);
-    const bslam_floats_t from = bslam_floats_of_four(a[0], b[0], c[0], d[0]);
-    const bslam_floats_t to = bslam_floats_of_four(a[1], b[1], c[1], d[1]);
-    const bslam_lanes_t knot = bslam_lanes_of_words((uint32_t)(a - knots), (uint32_t)(b - knots),
-                                                    (uint32_t)(c - knots), (uint32_t)(d - knots));
-    _Static_assert(ROWS == 2, "a knot has two bytes");
-    const bslam_lanes_t at = bslam_words_add(bslam_words_add(knot, knot), bslam_lanes_of(first));
-    const bslam_floats_t shares = (bslam_floats_at(x) - from) / (to - from);
-    const bslam_floats_t within = bslam_floats_within(shares, 0.0f, 1.0f);
-    const bslam_lanes_t upper =
-        bslam_floats_to_words(within * bslam_floats_of((float)BSLAM_SHARE_ONE) + bslam_floats_of(0.5f));
-    const bslam_lanes_t lower =
-        bslam_words_less(upper, bslam_lanes_of(BSLAM_SHARE_ONE)) & bslam_lanes_of(0xFFFFU);
-    const bslam_lanes_t both = lower | bslam_words_up(bslam_words_less(bslam_lanes_zero(), upper), 16);
-    bslam_lanes_put(places, bslam_words_lower_in_turn(at, both));
-    bslam_lanes_put(places + 2, bslam_words_upper_in_turn(at, both));
-}
-
-#endif
-
 void bslam_additive_locate(const bslam_additive_t *machine, const float *x, bslam_additive_place_t *place)
 {
     const float *knots = machine->knots;
-    int32_t i = 0;
-#if BSLAM_HAS_LANES
-    for (; i + 4 <= machine->features; i += 4, knots += 4 * BSLAM_KNOTS) {
-        locate_four(x + i, knots, (uint32_t)(ROWS * BSLAM_KNOTS * i), place->curves + i);
-    }
-#endif
-    for (; i < machine->features; i++, knots += BSLAM_KNOTS) {
+    for (int32_t i = 0; i < machine->features; i++, knots += BSLAM_KNOTS) {
         const float *low = knot_below(x[i], knots);
         place->curves[i].at = (uint32_t)(ROWS * (low - machine->knots));
         place->curves[i].shares = shares_between(x[i], low[0], low[1]);
@@ -156,70 +122,6 @@ static inline void add_pair(const int8_t *weights, uint32_t shares, int32_t sums
     sums[1] = bslam_halves_dot(bslam_bytes_signed_odd(word), shares, sums[1]);
 }
 
-#if BSLAM_HAS_LANES
-
-// --- Four words at a time
-
-/// Adds the same of four words, each with its own shares, to four sums of each row.
-static inline void add_pairs(bslam_lanes_t words, bslam_lanes_t shares, bslam_lanes_t sums[ROWS])
-{
-    sums[0] = bslam_words_add(sums[0], bslam_halves_dots(bslam_bytes_signed_evens(words), shares));
-    sums[1] = bslam_words_add(sums[1], bslam_halves_dots(bslam_bytes_signed_odds(words), shares));
-}
-
-/// Of a pair's curves, in steps of a byte, times -BSLAM_SHARE_ONE: 96 * 127 * 32768 fits.
-static void sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes,
-                       int32_t sums[ROWS])
-{
-    bslam_lanes_t all[ROWS] = {bslam_lanes_zero(), bslam_lanes_zero()};
-    sums[0] = sums[1] = 0;
-    for (const bslam_between_knots_t *end = place + features % 4; place != end; place++) {
-        add_pair(bytes + place->at, place->shares, sums);
-    }
-    for (const bslam_between_knots_t *end = place + features / 4 * 4; place != end; place += 4) {
-        const bslam_lanes_t words =
-            bslam_lanes_of_words(bslam_word_at(bytes + place[0].at), bslam_word_at(bytes + place[1].at),
-                                 bslam_word_at(bytes + place[2].at), bslam_word_at(bytes + place[3].at));
-        add_pairs(words, bslam_words_odd(bslam_lanes_at(place), bslam_lanes_at(place + 2)), all);
-    }
-    sums[0] += bslam_words_sum(all[0]);
-    sums[1] += bslam_words_sum(all[1]);
-}
-
-/// What all grids of a feature with those after it, [b, end), make along its lower knots and its upper ones.
-static inline void sum_grids(const bslam_between_knots_t *b, const bslam_between_knots_t *end,
-                             const int8_t *grid, int32_t low[ROWS], int32_t high[ROWS])
-{
-    enum { NEXT = ROWS * BSLAM_GRID_KNOTS };
-    bslam_lanes_t all[ROWS] = {bslam_lanes_zero(), bslam_lanes_zero()};
-    if ((end - b) % 2 != 0) {
-        const int8_t *at = grid + b->at;
-        add_pairs(bslam_lanes_of_words(bslam_word_at(at), bslam_word_at(at + NEXT), 0, 0),
-                  bslam_lanes_of(b->shares), all);
-        b++;
-        grid += GRID_BYTES;
-    }
-    for (; b != end; b += 2) {
-        const int8_t *at = grid + b[0].at, *next_at = grid + GRID_BYTES + b[1].at;
-        const bslam_lanes_t words =
-            bslam_lanes_of_words(bslam_word_at(at), bslam_word_at(at + NEXT), bslam_word_at(next_at),
-                                 bslam_word_at(next_at + NEXT));
-        const bslam_lanes_t places = bslam_lanes_at(b);
-        add_pairs(words, bslam_words_odd_twice(places), all);
-        grid += 2 * GRID_BYTES;
-    }
-    const bslam_lanes_t rows =
-        bslam_words_add(bslam_words_lower_in_turn(all[0], all[1]), bslam_words_upper_in_turn(all[0], all[1]));
-    low[0] = (int32_t)bslam_lanes_word(rows, 0);
-    low[1] = (int32_t)bslam_lanes_word(rows, 1);
-    high[0] = (int32_t)bslam_lanes_word(rows, 2);
-    high[1] = (int32_t)bslam_lanes_word(rows, 3);
-}
-
-#else
-
-// --- Word by word
-
 /// Of a pair's curves, in steps of a byte, times -BSLAM_SHARE_ONE: 96 * 127 * 32768 fits.
 static void sum_curves(const bslam_between_knots_t *place, int32_t features, const int8_t *bytes,
                        int32_t sums[ROWS])
@@ -246,8 +148,6 @@ static inline void sum_grids(const bslam_between_knots_t *b, const bslam_between
         grid += GRID_BYTES;
     }
 }
-
-#endif
 
 /// Adds a pair's grids, in steps of a byte, times BSLAM_SHARE_ONE squared.
 static void add_grids(const bslam_additive_place_t *place, int32_t crossed_count, const int8_t *bytes,

@@ -4,7 +4,7 @@
 
 #include "bslam/math/bounds.h"
 #include "bslam/vision/spread.h"
-#include "bslam/vision/tone_lanes.h"
+#include "bslam/math/bytes.h"
 
 /// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
 static const uint8_t tone_log[256] = {
@@ -65,75 +65,6 @@ void bslam_background_init(bslam_background_t *background)
     memset(background, 0, sizeof *background);
 }
 
-#if BSLAM_HAS_LANES
-
-// --- Sixteen cells at a time; tables have room for all of them beyond the last cell
-
-static inline bslam_lanes_t logs_of(const uint8_t *channel)
-{
-    uint8_t logs[BSLAM_CELL_STEP];
-    _Pragma("GCC unroll 16") for (int32_t k = 0; k < BSLAM_CELL_STEP; k++)
-    {
-        logs[k] = tone_log[channel[k]];
-    }
-    return bslam_lanes_at(logs);
-}
-
-/// Chromas from the logarithms of two channels, within +-127.
-static inline bslam_lanes_t chromas_of(bslam_lanes_t colour, bslam_lanes_t green)
-{
-    const bslam_lanes_t limit = bslam_lanes_of(~BSLAM_TOP_BITS);
-    return bslam_lanes_wrapped_less(bslam_lanes_least(bslam_lanes_less(colour, green), limit),
-                                    bslam_lanes_least(bslam_lanes_less(green, colour), limit));
-}
-
-/// Light and chroma of the frame's cells.
-static void fill_colours(const bslam_cells_t *cells, int32_t count, bslam_tones_t *tones)
-{
-    for (int32_t i = 0; i < count; i += BSLAM_CELL_STEP) {
-        const bslam_lanes_t red = logs_of(cells->red + i), green = logs_of(cells->green + i);
-        const bslam_lanes_t blue = logs_of(cells->blue + i);
-        bslam_lanes_put(tones->light + i, bslam_lanes_mean(bslam_lanes_mean(red, blue), green));
-        bslam_lanes_put(tones->reddish + i, chromas_of(red, green));
-        bslam_lanes_put(tones->bluish + i, chromas_of(blue, green));
-    }
-}
-
-/// Of eight cells, in halves: 128 times the spread as a part of luma + 8.
-static inline bslam_lanes_t spreads_of(bslam_lanes_t spread, bslam_lanes_t luma)
-{
-    const bslam_lanes_t zero = bslam_lanes_zero();
-    const bslam_lanes_t whole = bslam_halves_up(spread, 7);
-    const bslam_lanes_t part = bslam_halves_add(luma, bslam_lanes_of(8U | 8U << 16));
-    return bslam_words_to_halves(bslam_words_quotients(bslam_halves_lower_in_turn(whole, zero),
-                                                       bslam_halves_lower_in_turn(part, zero)),
-                                 bslam_words_quotients(bslam_halves_upper_in_turn(whole, zero),
-                                                       bslam_halves_upper_in_turn(part, zero)));
-}
-
-static void fill_spreads(const bslam_cells_t *cells, int32_t count, uint8_t *spreads)
-{
-    const bslam_lanes_t zero = bslam_lanes_zero();
-    for (int32_t i = 0; i < count; i += BSLAM_CELL_STEP) {
-        const bslam_lanes_t spread = bslam_lanes_at(cells->spread + i);
-        const bslam_lanes_t green = bslam_lanes_at(cells->green + i);
-        // As thumbnail.c weighs them for the spread.
-        const bslam_lanes_t red =
-            bslam_words_down(bslam_lanes_at(cells->red + i), 1) & bslam_lanes_of(~BSLAM_TOP_BITS);
-        const bslam_lanes_t luma =
-            bslam_halves_add(bslam_bytes_lower_in_turn(green, zero), bslam_bytes_lower_in_turn(red, zero));
-        const bslam_lanes_t next_luma =
-            bslam_halves_add(bslam_bytes_upper_in_turn(green, zero), bslam_bytes_upper_in_turn(red, zero));
-        bslam_lanes_put(spreads + i, bslam_halves_to_bytes(
-                                         spreads_of(bslam_bytes_lower_in_turn(spread, zero), luma),
-                                         spreads_of(bslam_bytes_upper_in_turn(spread, zero), next_luma)));
-    }
-}
-
-#else
-
-// --- Four cells at a time
-
 static uint32_t logs_of(const uint8_t *channel)
 {
     const uint32_t upper = (uint32_t)tone_log[channel[3]] << 8 | tone_log[channel[2]];
@@ -173,8 +104,6 @@ static void fill_spreads(const bslam_cells_t *cells, int32_t count, uint8_t *spr
                                                                                << 8);
     }
 }
-
-#endif
 
 void bslam_background_tones(const bslam_frame_t *frame, bslam_tones_t *tones)
 {
@@ -296,100 +225,6 @@ void bslam_background_learn(bslam_background_t *background, const bslam_frame_t 
 /// So many rows may be no floor before it ends.
 #define ROWS_BETWEEN 2
 
-#if BSLAM_HAS_LANES
-
-// --- Sixteen columns at a time
-
-/// Halves, of eight cells each.
-typedef struct halves {
-    bslam_lanes_t low, high;
-} halves_t;
-
-/// bslam_tone_distance() of two each.
-static inline halves_t distances(const bslam_tone_lanes_t *a, const bslam_tone_lanes_t *b)
-{
-    const bslam_lanes_t zero = bslam_lanes_zero();
-    const bslam_lanes_t light = bslam_lanes_apart(a->light, b->light);
-    const bslam_lanes_t reddish = bslam_lanes_apart(a->reddish, b->reddish);
-    const bslam_lanes_t bluish = bslam_lanes_apart(a->bluish, b->bluish);
-    const bslam_lanes_t low =
-        bslam_halves_add(bslam_bytes_lower_in_turn(reddish, zero), bslam_bytes_lower_in_turn(bluish, zero));
-    const bslam_lanes_t high =
-        bslam_halves_add(bslam_bytes_upper_in_turn(reddish, zero), bslam_bytes_upper_in_turn(bluish, zero));
-    return (halves_t){bslam_halves_add(bslam_bytes_lower_in_turn(light, zero), bslam_halves_up(low, 1)),
-                      bslam_halves_add(bslam_bytes_upper_in_turn(light, zero), bslam_halves_up(high, 1))};
-}
-
-/// How much more each of the cells from the i-th on looks like floor than like wall.
-static inline halves_t floor_evidence(const bslam_background_t *background, const bslam_tones_t *tones,
-                                      int32_t i, const bslam_tone_lanes_t *wall,
-                                      const bslam_tone_lanes_t *floor)
-{
-    const bslam_tone_lanes_t cells = bslam_tone_lanes_at(tones, i);
-    uint16_t bins[BSLAM_CELL_STEP];
-    int16_t frequent[BSLAM_CELL_STEP];
-    bslam_tone_bins(&cells, bins);
-    _Pragma("GCC unroll 16") for (int32_t k = 0; k < BSLAM_CELL_STEP; k++)
-    {
-        frequent[k] = (int16_t)(tone_log[background->counts[BSLAM_ZONE_FLOOR][bins[k]]] -
-                                tone_log[background->counts[BSLAM_ZONE_WALL][bins[k]]]);
-    }
-    const halves_t to_wall = distances(&cells, wall), to_floor = distances(&cells, floor);
-    const bslam_lanes_t low = bslam_halves_within(bslam_halves_minus(to_wall.low, to_floor.low), -64, 64);
-    const bslam_lanes_t high = bslam_halves_within(bslam_halves_minus(to_wall.high, to_floor.high), -64, 64);
-    return (halves_t){bslam_halves_add(low, bslam_lanes_at(frequent)),
-                      bslam_halves_add(high, bslam_lanes_at(frequent + BSLAM_CELL_STEP / 2))};
-}
-
-/// Where an end is not more than ROWS_BETWEEN below the row, and the evidence is above 0, the row.
-static inline bslam_lanes_t ends_at(bslam_lanes_t ends, bslam_lanes_t row, bslam_lanes_t evidence)
-{
-    const bslam_lanes_t is_floor =
-        bslam_halves_are_negative(bslam_halves_minus(bslam_lanes_zero(), evidence));
-    const bslam_lanes_t away =
-        bslam_halves_minus(bslam_halves_minus(ends, row), bslam_lanes_of(ROWS_BETWEEN | ROWS_BETWEEN << 16));
-    const bslam_lanes_t stays =
-        bslam_halves_are_negative(bslam_halves_minus(bslam_lanes_zero(), away)) | ~is_floor;
-    return (ends & stays) | (row & ~stays);
-}
-
-/// Of sixteen columns, from one on.
-static void find_ends(const bslam_background_t *background, const bslam_frame_t *frame,
-                      const bslam_tones_t *tones, int32_t column, int32_t stop, int16_t ends[BSLAM_CELL_STEP])
-{
-    const bslam_tone_lanes_t wall = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_WALL]);
-    const bslam_tone_lanes_t floor = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_FLOOR]);
-    const bslam_lanes_t all = bslam_lanes_of((uint32_t)frame->rows << 16 | (uint32_t)frame->rows);
-    halves_t found = {all, all};
-    int32_t uppermost = frame->rows;
-    for (int32_t row = frame->rows - 1; row >= stop && row >= uppermost - ROWS_BETWEEN; row--) {
-        const bslam_lanes_t here = bslam_lanes_of((uint32_t)row << 16 | (uint32_t)row);
-        const halves_t evidence =
-            floor_evidence(background, tones, row * frame->columns + column, &wall, &floor);
-        const halves_t before = found;
-        found.low = ends_at(found.low, here, evidence.low);
-        found.high = ends_at(found.high, here, evidence.high);
-        const bslam_lanes_t changes = (found.low ^ before.low) | (found.high ^ before.high);
-        uppermost = bslam_bytes_are_zero(changes) != 0xFFFFU ? row : uppermost;
-    }
-    bslam_lanes_put(ends, found.low);
-    bslam_lanes_put(ends + BSLAM_CELL_STEP / 2, found.high);
-}
-
-/// The row of cells below which all of a column is floor, for each; in whole steps, for which tables have
-/// room.
-static void fill_ends(const bslam_background_t *background, const bslam_frame_t *frame,
-                      const bslam_tones_t *tones, int32_t stop, int16_t *ends)
-{
-    for (int32_t column = 0; column < frame->columns; column += BSLAM_CELL_STEP) {
-        find_ends(background, frame, tones, column, stop, ends + column);
-    }
-}
-
-#else
-
-// --- Column by column
-
 /// A tone in a word, its chromas moved above 0; and where these stand: constants that fit an instruction.
 static uint32_t word_of_tone(bslam_tone_t tone)
 {
@@ -439,8 +274,6 @@ static void fill_ends(const bslam_background_t *background, const bslam_frame_t 
         ends[column] = (int16_t)floor_end(background, frame, tones, column, stop);
     }
 }
-
-#endif
 
 /// Horizontal distance of the floor at a pixel, 0 where it does not look down at it.
 static bslam_real_t floor_distance_m(const bslam_camera_t *camera, const bslam_mounting_t *mounting,

@@ -62,8 +62,8 @@ typedef struct bslam_background {
 
 /// Where the floor ends in each column of cells, and how far away that is.
 typedef struct bslam_floor_line {
-    int16_t edge_px[BSLAM_COLUMNS_MAX];                ///< the uppermost pixel row of the floor
-    int16_t row[BSLAM_COLUMNS_MAX + BSLAM_CELL_STEP];  ///< the lowest row of cells that is not floor
+    int16_t edge_px[BSLAM_COLUMNS_MAX];          ///< the uppermost pixel row of the floor
+    int16_t row[BSLAM_COLUMNS_MAX];              ///< the lowest row of cells that is not floor
     bslam_real_t distance_m[BSLAM_COLUMNS_MAX];  ///< horizontal, from the camera; 0 where it cannot be told
 } bslam_floor_line_t;
 

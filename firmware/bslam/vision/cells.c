@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/vision/tone_lanes.h"
+#include "bslam/math/bytes.h"
 
 /// Limits of the features: beyond them a difference says no more.
 #define LIGHT_MAX 96
@@ -12,7 +12,6 @@
 #define DISTANCE_MAX 128
 #define OFTEN BSLAM_FREQUENT_MAX
 #define SELDOM 6
-#define STEP BSLAM_CELL_STEP
 /// A byte in all four of a word.
 #define FOUR 0x01010101U
 /// The sum of all weights times features stays below 2^31 with it.
@@ -42,26 +41,6 @@ static uint8_t difference(uint8_t a, uint8_t b)
     return (uint8_t)((a > b ? a : b) - (a < b ? a : b));
 }
 
-#if BSLAM_HAS_LANES
-
-/// How far the colours of each of `count` cells and of those `apart` cells on are apart; green counts twice.
-static void fill_words(const uint8_t *red, const uint8_t *green, const uint8_t *blue, int32_t apart,
-                       int32_t count, uint8_t *restrict into)
-{
-    for (int32_t i = 0; i < count; i += STEP) {
-        const bslam_lanes_t of_red =
-            bslam_lanes_apart(bslam_lanes_at(red + i), bslam_lanes_at(red + apart + i));
-        const bslam_lanes_t of_green =
-            bslam_lanes_apart(bslam_lanes_at(green + i), bslam_lanes_at(green + apart + i));
-        const bslam_lanes_t of_blue =
-            bslam_lanes_apart(bslam_lanes_at(blue + i), bslam_lanes_at(blue + apart + i));
-        bslam_lanes_put(into + i, bslam_lanes_plus(bslam_lanes_plus(of_red, of_green),
-                                                   bslam_lanes_plus(of_green, of_blue)));
-    }
-}
-
-#else
-
 /// How far four bytes of a channel and those `apart` bytes on are apart; steps on, which costs nothing where
 /// the word that is stepped over is loaded last.
 static inline uint32_t step_of(const uint8_t **channel, int32_t apart)
@@ -84,8 +63,6 @@ __attribute__((noinline)) static void fill_words(const uint8_t *red, const uint8
             into, bslam_bytes_plus(bslam_bytes_plus(of_red, of_green), bslam_bytes_plus(of_green, of_blue)));
     }
 }
-
-#endif
 
 /// Differences of the colours of cells `a` and `b` and those that follow, for at least `count` cells from
 /// `into` on; green counts twice. Whole steps: what is beyond is written over later, or lies in the tables'
@@ -198,181 +175,6 @@ static void fill_bins(const bslam_background_t *background, const int16_t *weigh
         }
     }
 }
-
-#if BSLAM_HAS_LANES
-
-// --- Sixteen cells at a time, feature by feature
-
-/// What cells are looked at with: tones of the room, and weights in pairs, one in each half of a word.
-typedef struct cell_lanes {
-    bslam_tone_lanes_t wall, floor, ceiling, grey;
-    bslam_lanes_t by_light, by_contrast, by_chroma, by_distance, by_spread, by_step, by_wall, by_place;
-    bslam_lanes_t of_row;  ///< what all cells of the row have in common
-    int32_t row;
-} cell_lanes_t;
-
-static bslam_lanes_t weights_of(int32_t even, int32_t odd)
-{
-    return bslam_lanes_of(bslam_halves(even, odd));
-}
-
-static cell_lanes_t cell_lanes(const bslam_background_t *background, const int16_t *w)
-{
-    return (cell_lanes_t){
-        .wall = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_WALL]),
-        .floor = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_FLOOR]),
-        .ceiling = bslam_tone_lanes_of(background->tone[BSLAM_ZONE_CEILING]),
-        .grey = bslam_tone_lanes_of((bslam_tone_t){0}),
-        .by_light = weights_of(w[0], -w[0]),
-        .by_contrast = weights_of(w[1], w[15]),
-        .by_chroma = weights_of(w[2], w[3]),
-        .by_distance = weights_of(w[4], w[5]),
-        .by_spread = weights_of(w[6], w[12]),
-        .by_step = weights_of(w[13], w[14]),
-        .by_wall = weights_of(w[20], -w[21]),
-        .by_place = weights_of(w[16], w[17]),
-    };
-}
-
-static inline bslam_lanes_t at_most(bslam_lanes_t bytes, uint32_t limit)
-{
-    return bslam_lanes_least(bytes, bslam_lanes_of(limit * FOUR));
-}
-
-/// bslam_tone_distance() of each cell from a tone, at most 255.
-static inline bslam_lanes_t distances(const bslam_tone_lanes_t *cells, const bslam_tone_lanes_t *tone)
-{
-    const bslam_lanes_t reddish = bslam_lanes_apart(cells->reddish, tone->reddish);
-    const bslam_lanes_t bluish = bslam_lanes_apart(cells->bluish, tone->bluish);
-    const bslam_lanes_t chroma = bslam_lanes_plus(reddish, bluish);
-    return bslam_lanes_plus(bslam_lanes_apart(cells->light, tone->light), bslam_lanes_plus(chroma, chroma));
-}
-
-/// What 16 cells add up to, four in each.
-typedef struct cell_sums {
-    bslam_lanes_t of[4];
-} cell_sums_t;
-
-/// Adds two features' bytes, each times its weight.
-static inline void add_features(bslam_lanes_t a, bslam_lanes_t b, bslam_lanes_t weights, cell_sums_t *sums)
-{
-    const bslam_lanes_t zero = bslam_lanes_zero();
-    const bslam_lanes_t low = bslam_bytes_lower_in_turn(a, b), high = bslam_bytes_upper_in_turn(a, b);
-    sums->of[0] =
-        bslam_words_add(sums->of[0], bslam_halves_dots(bslam_bytes_lower_in_turn(low, zero), weights));
-    sums->of[1] =
-        bslam_words_add(sums->of[1], bslam_halves_dots(bslam_bytes_upper_in_turn(low, zero), weights));
-    sums->of[2] =
-        bslam_words_add(sums->of[2], bslam_halves_dots(bslam_bytes_lower_in_turn(high, zero), weights));
-    sums->of[3] =
-        bslam_words_add(sums->of[3], bslam_halves_dots(bslam_bytes_upper_in_turn(high, zero), weights));
-}
-
-/// Adds the features of eight cells' place above the floor.
-static inline void add_places(bslam_lanes_t above, bslam_lanes_t weights, bslam_lanes_t sums[2])
-{
-    const bslam_lanes_t far = bslam_halves_within(above, -8, 40), near = bslam_halves_within(above, -3, 3);
-    sums[0] = bslam_words_add(sums[0], bslam_halves_dots(bslam_halves_lower_in_turn(far, near), weights));
-    sums[1] = bslam_words_add(sums[1], bslam_halves_dots(bslam_halves_upper_in_turn(far, near), weights));
-}
-
-/// Adds what depends on a tone alone, but for its bin; on the wall's only where a cell is not below the floor
-/// line.
-static inline void add_tones(const bslam_tone_lanes_t *cells, bslam_lanes_t is_above, bslam_lanes_t spread,
-                             const cell_lanes_t *by, cell_sums_t *sums)
-{
-    const bslam_tone_lanes_t *wall = &by->wall;
-    const bslam_lanes_t brighter = at_most(bslam_lanes_less(cells->light, wall->light), LIGHT_MAX);
-    const bslam_lanes_t darker = at_most(bslam_lanes_less(wall->light, cells->light), LIGHT_MAX);
-    const bslam_lanes_t reddish = at_most(bslam_lanes_apart(cells->reddish, wall->reddish), CHROMA_MAX);
-    const bslam_lanes_t bluish = at_most(bslam_lanes_apart(cells->bluish, wall->bluish), CHROMA_MAX);
-    const bslam_lanes_t chroma = bslam_lanes_plus(bslam_lanes_apart(cells->reddish, by->grey.reddish),
-                                                  bslam_lanes_apart(cells->bluish, by->grey.bluish));
-    const bslam_lanes_t from_wall = at_most(distances(cells, wall), DISTANCE_MAX);
-    const bslam_lanes_t from_floor = at_most(distances(cells, &by->floor), DISTANCE_MAX);
-    const bslam_lanes_t from_ceiling = at_most(distances(cells, &by->ceiling), DISTANCE_MAX);
-    const bslam_lanes_t nearest = bslam_lanes_least(from_wall, bslam_lanes_least(from_floor, from_ceiling));
-    add_features(brighter, darker, by->by_light, sums);
-    add_features(brighter | darker, at_most(chroma, DISTANCE_MAX), by->by_contrast, sums);
-    add_features(reddish, bluish, by->by_chroma, sums);
-    add_features(from_floor, from_ceiling, by->by_distance, sums);
-    add_features(nearest, at_most(spread, CHROMA_MAX), by->by_spread, sums);
-    add_features(from_wall & is_above, darker & is_above, by->by_wall, sums);
-}
-
-/// Adds what the tones' bins add, and notes how frequent they are.
-static inline void add_bins(const bslam_tone_lanes_t *cells, const bslam_cell_tables_t *tables,
-                            uint16_t *frequent, cell_sums_t *sums)
-{
-    uint16_t bins[STEP];
-    int32_t of_bins[STEP];
-    bslam_tone_bins(cells, bins);
-    _Pragma("GCC unroll 16") for (int32_t k = 0; k < STEP; k++)
-    {
-        of_bins[k] = tables->sums[bins[k]];
-        frequent[k] = tables->frequent[bins[k]];
-    }
-    for (int32_t k = 0; k < 4; k++) {
-        sums->of[k] = bslam_words_add(sums->of[k], bslam_lanes_at(of_bins + 4 * k));
-    }
-}
-
-/// Eight sums as cells' values in halves, rounded towards 0 and not below -127.
-static inline bslam_lanes_t values_of(bslam_lanes_t first, bslam_lanes_t next)
-{
-    return bslam_halves_within(
-        bslam_words_to_halves(bslam_words_shifted_to_zero(first, BSLAM_CELL_WEIGHT_SHIFT),
-                              bslam_words_shifted_to_zero(next, BSLAM_CELL_WEIGHT_SHIFT)),
-        -127, 127);
-}
-
-/// Values of 16 cells of a row, from cell i of the frame and its column on.
-static inline void decide_some(const bslam_view_t *view, const cell_lanes_t *by,
-                               const bslam_cell_tables_t *tables, int32_t i, int32_t column,
-                               uint16_t *frequent, int8_t *values)
-{
-    const bslam_tones_t *tones = view->tones;
-    const bslam_tone_lanes_t cells = bslam_tone_lanes_at(tones, i);
-    const int16_t *floor_row = view->floor_line->row + column;
-    const bslam_lanes_t row = bslam_lanes_of(bslam_halves(by->row, by->row));
-    const bslam_lanes_t above = bslam_halves_minus(bslam_lanes_at(floor_row), row);
-    const bslam_lanes_t next_above = bslam_halves_minus(bslam_lanes_at(floor_row + STEP / 2), row);
-    const bslam_lanes_t is_below =
-        bslam_halves_to_signed_bytes(bslam_halves_are_negative(above), bslam_halves_are_negative(next_above));
-    cell_sums_t sums = {{by->of_row, by->of_row, by->of_row, by->of_row}};
-    add_places(above, by->by_place, sums.of);
-    add_places(next_above, by->by_place, sums.of + 2);
-    add_features(at_most(bslam_lanes_at(view->step_x + i), DISTANCE_MAX),
-                 at_most(bslam_lanes_at(view->step_y + i), DISTANCE_MAX), by->by_step, &sums);
-    add_tones(&cells, ~is_below, bslam_lanes_at(tones->spread + i), by, &sums);
-    add_bins(&cells, tables, frequent + i, &sums);
-    bslam_lanes_put(values + i, bslam_halves_to_signed_bytes(values_of(sums.of[0], sums.of[1]),
-                                                             values_of(sums.of[2], sums.of[3])));
-}
-
-/// Whole steps: what is beyond a row is written over by the next one, or lies in the tables' room.
-void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *machine,
-                        bslam_cell_tables_t *tables, bslam_channel_tables_t *channels, uint16_t *frequent,
-                        int8_t *values)
-{
-    const int32_t columns = view->frame->columns, rows = view->frame->rows;
-    const int32_t horizon = bslam_horizon_row(view->camera);
-    const int16_t *w = machine->weights;
-    cell_lanes_t by = cell_lanes(view->background, w);
-    (void)channels;
-    fill_bins(view->background, w, tables);
-    for (by.row = 0; by.row < rows; by.row++) {
-        const int32_t up = bslam_clamp(horizon - by.row, -30, 30);
-        by.of_row = bslam_lanes_of((uint32_t)(machine->bias + w[18] * up + w[19] * bslam_most(up, 0)));
-        for (int32_t column = 0; column < columns; column += STEP) {
-            decide_some(view, &by, tables, by.row * columns + column, column, frequent, values);
-        }
-    }
-}
-
-#else
-
-// --- Cell by cell
 
 // Distances from the tones of the floor, the wall, the ceiling and from grey are the bytes of a word, the
 // first lowest. Those of the three channels add up by an addition that stops at 255, and begin with
@@ -575,5 +377,3 @@ void bslam_cells_decide(const bslam_view_t *view, const bslam_cell_machine_t *ma
         decide_row(view, &tones, row, sums, frequent + first, values + first);
     }
 }
-
-#endif

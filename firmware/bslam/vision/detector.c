@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "bslam/base/types.h"
-#include "bslam/math/lanes.h"
 #include "bslam/vision/glance.h"
 
 /// Of two candidates that overlap more than this, or of which one lies this much within the other, the surer
@@ -37,15 +36,7 @@ void bslam_detector_normalise(const bslam_detector_model_t *model, float feature
 {
     const float *restrict offset = model->blob_offset, *restrict scale = model->blob_scale;
     float *restrict x = features;
-    int32_t i = 0;
-#if BSLAM_HAS_LANES
-    for (; i + 4 <= BSLAM_BLOB_FEATURES; i += 4) {
-        const bslam_floats_t values =
-            (bslam_floats_at(x + i) - bslam_floats_at(offset + i)) * bslam_floats_at(scale + i);
-        bslam_floats_put(x + i, bslam_floats_within(values, -BSLAM_FEATURE_LIMIT, BSLAM_FEATURE_LIMIT));
-    }
-#endif
-    for (; i < BSLAM_BLOB_FEATURES; i++) {
+    for (int32_t i = 0; i < BSLAM_BLOB_FEATURES; i++) {
         const float value = (x[i] - offset[i]) * scale[i];
         // Most are within: one comparison.
         x[i] = fabsf(value) <= BSLAM_FEATURE_LIMIT ? value : clamped(value, BSLAM_FEATURE_LIMIT);

@@ -1,7 +1,7 @@
 #include "bslam/vision/glance.h"
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 #include "bslam/vision/features.h"
 #include "bslam/vision/steps.h"
 
@@ -34,25 +34,6 @@ static void add_cell(const bslam_view_t *view, int32_t i, glanced_t *sums)
     sums->cells++;
 }
 
-#if BSLAM_HAS_LANES
-
-/// Adds `count` cells side by side; tables have room for sixteen beyond the last cell.
-static void add_row(const bslam_view_t *view, int32_t first, int32_t count, glanced_t *sums)
-{
-    const bslam_lanes_t zero = bslam_lanes_of(SIGNED_ZERO);
-    bslam_lanes_t light = bslam_lanes_zero(), value = light;
-    for (int32_t k = 0; k < count; k += BSLAM_CELL_STEP) {
-        const bslam_lanes_t mask = bslam_lanes_first(count - k);
-        light = bslam_lanes_sum_add(bslam_lanes_at(view->tones->light + first + k) & mask, light);
-        value = bslam_lanes_sum_add((bslam_lanes_at(view->values + first + k) ^ zero) & mask, value);
-    }
-    sums->light += (uint32_t)bslam_lanes_sum(light);
-    sums->value += (uint32_t)bslam_lanes_sum(value);
-    sums->cells += count;
-}
-
-#else
-
 /// Adds `count` cells side by side.
 static void add_row(const bslam_view_t *view, int32_t first, int32_t count, glanced_t *sums)
 {
@@ -75,8 +56,6 @@ static void add_row(const bslam_view_t *view, int32_t first, int32_t count, glan
     sums->value = value_sum;
     sums->cells += count;
 }
-
-#endif
 
 /// Means of a box and of what is on its sides.
 typedef struct look {

@@ -1,5 +1,5 @@
 /// Which of a user's own objects a candidate is, by its signature. Paper, module BOR: recognition in detail,
-/// of objects whose size is known. tools/train_beacons.py trains it; docs/RETRAIN.md says how.
+/// of objects whose size is known. tools/training/train_beacons.py trains it; docs/RETRAIN.md says how.
 #ifndef BSLAM_VISION_RECOGNISER_H
 #define BSLAM_VISION_RECOGNISER_H
 

@@ -3,52 +3,11 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 
 /// Lines of cells about a side, in their order from inside: the side's own, those that it may snap to, one on
 /// either side of each.
 enum { SNAP_LINES = 5, OWN = 2, INNER = OWN - 1, OUTER = OWN + 1 };
-
-#if BSLAM_HAS_LANES
-
-/// Columns of cells summed at a time.
-enum { COLUMNS_AT_ONCE = 8 };
-
-static inline bslam_lanes_t limited(bslam_lanes_t steps)
-{
-    return bslam_lanes_least(steps, bslam_lanes_of(BSLAM_EDGE_STEP_MAX * 0x01010101U));
-}
-
-/// Sums down the columns, each step limited: of two rows, and of those two by two.
-static void sum_down(const uint8_t *steps, int32_t columns, int32_t rows, uint16_t sums[COLUMNS_AT_ONCE])
-{
-    const bslam_lanes_t zero = bslam_lanes_zero();
-    bslam_lanes_t all = zero;
-    int32_t left = rows;
-    for (; left > 1; left -= 2, steps += 2 * columns) {
-        const bslam_lanes_t two = bslam_lanes_plus(limited(bslam_lanes_half_at(steps)),
-                                                   limited(bslam_lanes_half_at(steps + columns)));
-        all = bslam_halves_add(all, bslam_bytes_lower_in_turn(two, zero));
-    }
-    if (left > 0) {
-        all = bslam_halves_add(all, bslam_bytes_lower_in_turn(limited(bslam_lanes_half_at(steps)), zero));
-    }
-    bslam_lanes_put(sums, all);
-}
-
-_Static_assert(2 * BSLAM_EDGE_STEP_MAX <= 255, "two rows fit a byte");
-
-/// Tables have room for sixteen cells beyond the last.
-static uint16_t sum_row(const uint8_t *steps, int32_t count)
-{
-    bslam_lanes_t sum = bslam_lanes_zero();
-    for (int32_t k = 0; k < count; k += BSLAM_CELL_STEP) {
-        sum = bslam_lanes_sum_add(limited(bslam_lanes_at(steps + k)) & bslam_lanes_first(count - k), sum);
-    }
-    return (uint16_t)bslam_lanes_sum(sum);
-}
-
-#else
 
 /// What a step leaves free up to the largest byte: where it is added, sums stop at the limit, so much higher.
 #define FREE (255 - BSLAM_EDGE_STEP_MAX)
@@ -93,8 +52,6 @@ static uint16_t sum_row(const uint8_t *steps, int32_t count)
     }
     return (uint16_t)(sum - (uint32_t)(FREE * count));
 }
-
-#endif
 
 /// A side of a box, and the sums of the steps along the lines of cells about it, as far as they were asked
 /// for; 0 outside the frame.

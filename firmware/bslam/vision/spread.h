@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 
 /// Where the channels of a pixel stand once spread: blue in bits 0-4, red in 11-15, green in 21-26. Above
 /// each are 5 free bits or more, so that up to 32 pixels add up.
@@ -18,16 +18,5 @@ static inline uint32_t bslam_spread_pair(uint32_t word)
 {
     return (word & BSLAM_SPREAD_MASK) + (bslam_halves_turned(word) & BSLAM_SPREAD_MASK);
 }
-
-#if BSLAM_HAS_LANES
-
-/// The same of each of four words.
-static inline bslam_lanes_t bslam_spread_pairs(bslam_lanes_t words)
-{
-    const bslam_lanes_t mask = bslam_lanes_of(BSLAM_SPREAD_MASK);
-    return bslam_words_add(words & mask, bslam_words_turned(words) & mask);
-}
-
-#endif
 
 #endif

@@ -3,7 +3,7 @@
 #define BSLAM_VISION_STEPS_H
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 #include "bslam/vision/proposals.h"
 
 /// Sums of steps, of each BSLAM_EDGE_STEP_MAX at most, and how many are above BSLAM_EDGE_STEP_MIN.
@@ -18,24 +18,10 @@ static inline void bslam_step_add(int32_t step, bslam_step_sums_t *sums)
     sums->clear += (uint32_t)(BSLAM_EDGE_STEP_MIN - step) >> 31;  // 1 where it is below 0
 }
 
-/// Of `count` cells that are so far apart; tables have room for sixteen beyond the last.
+/// Of `count` cells that are so far apart.
 static inline bslam_step_sums_t bslam_sum_steps(const uint8_t *step, int32_t count, int32_t apart)
 {
     bslam_step_sums_t sums = {0, 0};
-#if BSLAM_HAS_LANES
-    if (apart == 1) {
-        const uint32_t every = 0x01010101U;
-        const bslam_lanes_t most = bslam_lanes_of(BSLAM_EDGE_STEP_MAX * every), one = bslam_lanes_of(every);
-        const bslam_lanes_t unclear = bslam_lanes_of(BSLAM_EDGE_STEP_MIN * every);
-        bslam_lanes_t sum = bslam_lanes_zero(), clear = sum;
-        for (int32_t k = 0; k < count; k += BSLAM_CELL_STEP) {
-            const bslam_lanes_t steps = bslam_lanes_at(step + k) & bslam_lanes_first(count - k);
-            sum = bslam_lanes_sum_add(bslam_lanes_least(steps, most), sum);
-            clear = bslam_lanes_sum_add(bslam_lanes_least(bslam_lanes_less(steps, unclear), one), clear);
-        }
-        return (bslam_step_sums_t){bslam_lanes_sum(sum), (uint32_t)bslam_lanes_sum(clear)};
-    }
-#endif
     if (count % 2 != 0) {
         bslam_step_add(*step, &sums);
         step += apart;

@@ -36,114 +36,6 @@ static void pack_888(uint16_t *restrict packed, const uint8_t *restrict pixels, 
     }
 }
 
-#if BSLAM_HAS_LANES
-
-// --- Sixteen bytes at a time
-
-/// Pixel pairs that are summed at once, and cells that are made of them.
-enum { PAIRS_AT_ONCE = 8, CELLS_AT_ONCE = 4 };
-
-/// The upper row of two as it comes: words of two pixels, until the lower one makes sums of them.
-static void keep_row(uint32_t *restrict words, const uint8_t *restrict pixels, int32_t pairs)
-{
-    memcpy(words, pixels, (size_t)pairs * sizeof words[0]);
-}
-
-/// The means of 2x2 pixels in RGB565 from their sums, those of even and of odd places.
-static inline bslam_lanes_t means_565(bslam_lanes_t even, bslam_lanes_t odd)
-{
-    const bslam_lanes_t half = bslam_lanes_of(HALF_OF_FOUR), mask = bslam_lanes_of(BSLAM_SPREAD_MASK);
-    const bslam_lanes_t lower = bslam_lanes_of(0xFFFFU);
-    const bslam_lanes_t a = bslam_words_down(bslam_words_add(even, half), 2) & mask;
-    const bslam_lanes_t b = bslam_words_down(bslam_words_add(odd, half), 2) & mask;
-    return ((a | bslam_words_down(a, 16)) & lower) | ((b | bslam_words_up(b, 16)) & ~lower);
-}
-
-/// Makes eight words of the upper row the sums of 2x2 pixels, those of even places first; their means.
-static inline void sum_some(uint32_t *restrict words, uint16_t *restrict half, bslam_lanes_t below,
-                            bslam_lanes_t next_below)
-{
-    const bslam_lanes_t above = bslam_lanes_at(words), next_above = bslam_lanes_at(words + 4);
-    const bslam_lanes_t sums = bslam_words_add(bslam_spread_pairs(above), bslam_spread_pairs(below));
-    const bslam_lanes_t next_sums =
-        bslam_words_add(bslam_spread_pairs(next_above), bslam_spread_pairs(next_below));
-    const bslam_lanes_t even = bslam_words_even(sums, next_sums), odd = bslam_words_odd(sums, next_sums);
-    bslam_lanes_put(words, even);
-    bslam_lanes_put(words + 4, odd);
-    bslam_lanes_put(half, means_565(even, odd));
-}
-
-/// The lower row of two: makes the words of the upper one the sums of 2x2 pixels; their means. Sums and means
-/// have room for whole steps, the row has not: what follows its last four pairs counts as 0.
-static void sum_quads(uint32_t *restrict words, uint16_t *restrict half, const uint8_t *restrict pixels,
-                      int32_t pairs)
-{
-    const uint32_t *end = words + pairs / PAIRS_AT_ONCE * PAIRS_AT_ONCE;
-    while (words != end) {
-        sum_some(words, half, bslam_lanes_at(pixels), bslam_lanes_at(pixels + 16));
-        words += PAIRS_AT_ONCE;
-        half += PAIRS_AT_ONCE;
-        pixels += 4 * PAIRS_AT_ONCE;
-    }
-    if (pairs % PAIRS_AT_ONCE != 0) {
-        sum_some(words, half, bslam_lanes_at(pixels), bslam_lanes_zero());
-    }
-}
-
-/// Sums of 2x2 pixels that are the same, in whole steps, those of even places first.
-static void sum_fours(uint32_t *restrict words, const uint16_t *restrict pixels, int32_t count)
-{
-    const bslam_lanes_t mask = bslam_lanes_of(BSLAM_SPREAD_MASK);
-    for (int32_t i = 0; i < count; i += PAIRS_AT_ONCE) {
-        const bslam_lanes_t some = bslam_lanes_at(pixels + i);
-        const bslam_lanes_t sums = bslam_words_up(bslam_halves_lower_in_turn(some, some) & mask, 2);
-        const bslam_lanes_t next_sums = bslam_words_up(bslam_halves_upper_in_turn(some, some) & mask, 2);
-        bslam_lanes_put(words + i, bslam_words_even(sums, next_sums));
-        bslam_lanes_put(words + i + 4, bslam_words_odd(sums, next_sums));
-    }
-}
-
-/// Brightness of 2x2 sums, 0 to 376: green counts twice as much as red, because it has a bit more.
-static inline bslam_lanes_t lumas(bslam_lanes_t quads)
-{
-    return bslam_words_add(bslam_words_down(quads, BSLAM_SPREAD_RED) & bslam_lanes_of(127),
-                           bslam_words_down(quads, BSLAM_SPREAD_GREEN));
-}
-
-/// A word of each channel's bytes, from the four that come.
-static inline void put_channels(bslam_cells_t *cells, int32_t i, bslam_lanes_t channels)
-{
-    bslam_word_put(cells->red + i, bslam_lanes_word(channels, 0));
-    bslam_word_put(cells->green + i, bslam_lanes_word(channels, 1));
-    bslam_word_put(cells->blue + i, bslam_lanes_word(channels, 2));
-    bslam_word_put(cells->spread + i, bslam_lanes_word(channels, 3));
-}
-
-/// Some cells of a row, from their quarters: left ones and right ones in turn, four each.
-static inline void fill_some(bslam_cells_t *cells, int32_t i, const uint32_t *above, const uint32_t *below)
-{
-    const bslam_lanes_t a = bslam_lanes_at(above), b = bslam_lanes_at(above + 4);
-    const bslam_lanes_t c = bslam_lanes_at(below), d = bslam_lanes_at(below + 4);
-    const bslam_lanes_t of_a = lumas(a), of_b = lumas(b), of_c = lumas(c), of_d = lumas(d);
-    const bslam_lanes_t highest =
-        bslam_halves_most_of(bslam_halves_most_of(of_a, of_b), bslam_halves_most_of(of_c, of_d));
-    const bslam_lanes_t lowest =
-        bslam_halves_least_of(bslam_halves_least_of(of_a, of_b), bslam_halves_least_of(of_c, of_d));
-    const bslam_lanes_t sum = bslam_words_add(bslam_words_add(a, b), bslam_words_add(c, d));
-    const bslam_lanes_t byte = bslam_lanes_of(255);
-    const bslam_lanes_t red = bslam_words_down(sum, BSLAM_SPREAD_RED + 1) & byte;
-    const bslam_lanes_t green = bslam_words_down(sum, BSLAM_SPREAD_GREEN + 2);
-    const bslam_lanes_t blue = bslam_words_down(sum, 1) & byte;
-    // Saturates what is beyond a byte: the spread.
-    put_channels(cells, i,
-                 bslam_halves_to_bytes(bslam_words_to_halves(red, green),
-                                       bslam_words_to_halves(blue, bslam_words_less(highest, lowest))));
-}
-
-#else
-
-// --- By words
-
 /// Pixel pairs that are copied at once.
 #define PAIRS_A_STEP (BSLAM_IMAGE_WIDTH_STEP / 2)
 /// Bytes that a core copies by loading and storing several words each time.
@@ -277,11 +169,8 @@ static inline void fill_some(bslam_cells_t *restrict cells, int32_t i, const uin
     put_channel(cells->blue + i, sum, next_sum, 1);
 }
 
-#endif
-
-/// A row of cells, from cell `first` on, from the sums of their quarters. Whole steps: what is beyond is
-/// written over later, or lies in the tables' room. Not to be inlined twice: then what fills some would not
-/// be.
+/// A row of cells, from cell `first` on, from the sums of their quarters. Not to be inlined twice: then what
+/// fills some would not be.
 __attribute__((noinline)) static void fill_cells(bslam_cells_t *cells, int32_t first,
                                                  const bslam_row_sums_t *sums, int32_t pairs)
 {

@@ -17,8 +17,8 @@ typedef enum bslam_pixel_format {
     BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
 } bslam_pixel_format_t;
 
-/// Room for a row's pairs of pixels, in whole steps of a loop over them.
-#define BSLAM_ROW_SUMS (BSLAM_IMAGE_WIDTH_MAX / 2 + BSLAM_IMAGE_WIDTH_STEP / 2)
+/// A row's pairs of pixels.
+#define BSLAM_ROW_SUMS (BSLAM_IMAGE_WIDTH_MAX / 2)
 
 /// What is summed of a row of cells until it is finished. Scratch of a frame that streams in.
 typedef struct bslam_row_sums {
@@ -36,7 +36,7 @@ typedef struct bslam_thumbnail {
         bslam_cells_t cells;       ///< until the frame's colours have been looked at,
         bslam_cell_notes_t notes;  ///< and then what is made of them
     };
-    uint16_t half[BSLAM_HALF_MAX + BSLAM_CELL_STEP];
+    uint16_t half[BSLAM_HALF_MAX];
 } bslam_thumbnail_t;
 
 /// Starts a frame; what streamed in before is forgotten. BSLAM_E_RANGE, and nothing changed, if the size is

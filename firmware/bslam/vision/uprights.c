@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 
 /// What is looked for: foot, middle and top are so high above the floor, and it is at least and at most so
 /// wide as it appears, slanted by up to 60 degrees.
@@ -117,34 +117,6 @@ static inline int32_t limited_step(const uint8_t *steps, int32_t columns, int32_
     return step < STEP_MAX ? step : STEP_MAX;
 }
 
-#if BSLAM_HAS_LANES
-
-/// Sum of the sideways steps along a part, of rows [row, end).
-static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int32_t end)
-{
-    enum { ROWS_AT_ONCE = 4 };
-    const bslam_floats_t from = bslam_floats_of(part.v_px), height = bslam_floats_of(part.height_px);
-    const bslam_floats_t left = bslam_floats_of(part.u_px), width = bslam_floats_of(part.width_px);
-    const int32_t columns = view->frame->columns;
-    const uint8_t *steps = view->step_x + row * columns;
-    int32_t sum = 0;
-    for (; row < end; row += ROWS_AT_ONCE) {
-        const bslam_floats_t v_px =
-            bslam_floats_of_four(middle_px(row), middle_px(row + 1), middle_px(row + 2), middle_px(row + 3));
-        const bslam_floats_t u_px = left + (v_px - from) / height * width;
-        int32_t crossed[ROWS_AT_ONCE];
-        // What is no number, or too large for a word, becomes the least one.
-        bslam_lanes_put(crossed, bslam_floats_to_words(u_px / bslam_floats_of(BSLAM_CELL_PX)));
-        const int32_t count = bslam_least(end - row, ROWS_AT_ONCE);
-        for (int32_t k = 0; k < count; k++, steps += columns) {
-            sum += limited_step(steps, columns, crossed[k]);
-        }
-    }
-    return sum;
-}
-
-#else
-
 /// The column of cells that a part crosses in a row of them; -1 where it goes far outside, or nowhere,
 /// because both its ends fall on one row.
 static int32_t column_at(const part_t *part, int32_t row)
@@ -165,8 +137,6 @@ static int32_t sum_part(const bslam_view_t *view, part_t part, int32_t row, int3
     }
     return sum;
 }
-
-#endif
 
 /// Mean of the sideways steps along a line that stays in its column, in quarters.
 static inline uint8_t straight_step(const column_sums_t *sums, const side_t *side)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "bslam/math/bounds.h"
-#include "bslam/math/lanes.h"
+#include "bslam/math/bytes.h"
 #include "bslam/math/logarithm.h"
 #include "bslam/math/trig.h"
 #include "bslam/vision/features.h"
@@ -212,27 +212,6 @@ static void judge_cell(bslam_cell_t cell, light_t *light)
     light->saturated += is_saturated ? 1 : 0;
 }
 
-#if BSLAM_HAS_LANES
-
-enum { CELLS_AT_ONCE = BSLAM_CELL_STEP };
-
-/// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has. Most have not in
-/// their green already.
-static inline bool may_count(const bslam_cells_t *cells, int32_t i)
-{
-    const bslam_lanes_t green = bslam_lanes_at(cells->green + i);
-    const bslam_lanes_t turns = (green ^ bslam_words_up(green, 1)) & bslam_lanes_of(HIGH_TURNS);
-    if (bslam_bytes_are_zero(turns) == 0) {
-        return false;
-    }
-    const bslam_lanes_t red = bslam_lanes_at(cells->red + i), blue = bslam_lanes_at(cells->blue + i);
-    const bslam_lanes_t high = bslam_lanes_of(HIGH_BITS);
-    return (bslam_bytes_are_zero((red | green | blue) & high) |
-            bslam_bytes_are_zero(~(red & green & blue) & high)) != 0;
-}
-
-#else
-
 enum { CELLS_AT_ONCE = BSLAM_WORD_BYTES };
 
 /// Whether one of some cells has no bit above BLACK_BELOW, or all that SATURATED_FROM has. Most have not in
@@ -247,8 +226,6 @@ static inline bool may_count(const bslam_cells_t *cells, int32_t i)
     const uint32_t bright = (red | green | blue) & HIGH_BITS, dim = ~(red & green & blue) & HIGH_BITS;
     return bslam_has_zero_byte(bright) || bslam_has_zero_byte(dim);
 }
-
-#endif
 
 /// Cells are looked at one by one only where one of some may count: few do.
 static light_t light_of(const bslam_cells_t *cells, int32_t count)

@@ -5,8 +5,7 @@ Every pose is an unknown, and so is every beacon; the first pose is the origin. 
   arc          what is left of the move beside that arc: 0, to a hundredth of a millimetre
   speeds       (v, omega) of a step against that of the step before, MATH (15), with velocity states
   sightings    direction and distance, MATH (11), (13); the sd of a distance is that of the predicted one
-  beacon       seen in direction only: 4 m along its first direction, +- 2.5 m, or so far from where it was
-               first seen as `first_range_ln` says; one that is known: where it is
+  beacon       seen in direction only: 4 m along its first direction, +- 2.5 m
 Poses couple with their neighbours only: their normal equations are a band, beacons its dense border.
 """
 
@@ -33,7 +32,6 @@ _ITERATIONS_MAX: Final = 500  # Gauss-Newton is slow where a map of another size
 _SETTLED: Final = 1e-7  # m, rad: the largest change of an iteration that changes nothing
 _SETTLED_COST: Final = 1e-10  # nor does one that lessens the cost by so small a share
 _SHORTEST: Final = 1e-6  # share of a step that is still tried
-_LITTLE_COST: Final = 1e-3  # of a logarithm of a probability
 _POSE: Final = 3  # unknowns of a pose
 _BEACON: Final = 2
 
@@ -42,21 +40,14 @@ class Smoother:
     """Takes in odometry and sightings one by one; `solve` moves all poses and beacons to where they fit best.
 
     parameters: values of the core's parameters by name, which are the model.
-    first_range_ln: the logarithm of the distance in m that a beacon without one is first guessed to have, and
-    its standard deviation, MATH "A new beacon"; None: its place is guessed.
     """
 
-    def __init__(
-        self, parameters: Mapping[str, int | float], first_range_ln: tuple[float, float] | None = None
-    ) -> None:
+    def __init__(self, parameters: Mapping[str, int | float]) -> None:
         self._p = parameters
-        self._first_range_ln = first_range_ln
         # dt_s, left_m, right_m, gyro_radps, gyro_sd_radps
         self._steps: list[tuple[float, float, float, float, float]] = []
-        # pose, beacon, bearing_rad, range_m, bearing_sd_rad, range_sd_m
-        self._seen: list[tuple[int, int, float, float, float, float]] = []
-        self._priors: list[tuple[int, float, float, float]] = []  # beacon, x_m, y_m, sd_m
-        self._guesses: list[tuple[int, int, float, float]] = []  # pose, beacon, ln of the distance, sd
+        self._seen: list[tuple[int, int, float, float]] = []  # pose, beacon, bearing_rad, range_m
+        self._priors: list[tuple[int, float, float]] = []  # beacon, x_m, y_m
         self._new_poses: list[tuple[float, float, float]] = []
         self._new_beacons: list[tuple[float, float]] = []
         self._poses: Array = np.zeros((1, _POSE))
@@ -102,55 +93,22 @@ class Smoother:
         self._steps.append((dt_s, left_m, right_m, gyro_radps, gyro_sd_radps))
         self._new_poses.append(pose)
 
-    def add_beacon(self, x_m: float, y_m: float, sd_m: float) -> int:
-        """A beacon whose place, in the first pose's frame, is known so well in each direction; its number."""
-        number = len(self._beacons) + len(self._new_beacons)
-        self._new_beacons.append((x_m, y_m))
-        self._priors.append((number, x_m, y_m, sd_m))
-        return number
-
-    def add_sighting(
-        self,
-        pose: int,
-        beacon: int,
-        bearing_rad: float,
-        range_m: float,
-        bearing_sd_rad: float = math.nan,
-        range_sd_m: float = math.nan,
-    ) -> None:
-        """A sighting from the pose of that number; NaN: no distance, a noise as the parameters have it.
-
-        A new beacon has the next number.
-        """
-        self._seen.append((pose, beacon, bearing_rad, range_m, bearing_sd_rad, range_sd_m))
+    def add_sighting(self, pose: int, beacon: int, bearing_rad: float, range_m: float) -> None:
+        """A sighting from the pose of that number; NaN: no distance. A new beacon has the next number."""
+        self._seen.append((pose, beacon, bearing_rad, range_m))
         if beacon < len(self._beacons) + len(self._new_beacons):
             return
-        guess_m = range_m
+        guess_m = _FIRST_RANGE_M if np.isnan(range_m) else range_m
         x_m, y_m, theta_rad = self.poses[pose].tolist()
-        if np.isnan(range_m):
-            guess_m = math.exp(self._first_range_ln[0]) if self._first_range_ln else _FIRST_RANGE_M
         heading_rad = theta_rad + self._p["mount_yaw_rad"] + bearing_rad
         eye_x_m, eye_y_m = self._mount(np.array([theta_rad]))[0].tolist()
         place = (
             x_m + eye_x_m + guess_m * float(np.cos(heading_rad)),
             y_m + eye_y_m + guess_m * float(np.sin(heading_rad)),
         )
-        if np.isnan(range_m) and self._first_range_ln:
-            self._guesses.append((pose, beacon, *self._first_range_ln))
-        elif np.isnan(range_m):
-            self._priors.append((beacon, *place, _FIRST_RANGE_SD_M))
+        if np.isnan(range_m):
+            self._priors.append((beacon, *place))
         self._new_beacons.append(place)
-
-    def set_out_from(self, poses: Array, beacons: Array | None = None) -> None:
-        """Where `solve` begins, in place of what odometry leads to and of the beacons' guesses.
-
-        poses: (steps + 1, 3), the first is 0, 0, 0. beacons: (beacons, 2); None: where they are.
-        """
-        assert poses.shape == self.poses.shape
-        self._poses = poses.copy()
-        if beacons is not None:
-            assert beacons.shape == self.beacons.shape
-            self._beacons = beacons.copy()
 
     def solve(self) -> int:
         """Iterate until nothing changes; the number of iterations. ArithmeticError if that never is."""
@@ -167,37 +125,8 @@ class Smoother:
                 return iteration
         raise ArithmeticError(f"{self.steps} poses have not settled in {_ITERATIONS_MAX} iterations")
 
-    def first_eyes(self) -> Array:
-        """Where the sensor was when it first saw each beacon, (beacons, 2) m."""
-        first = {beacon: pose for pose, beacon, *_ in reversed(self._seen)}
-        at = self.poses[[first[beacon] for beacon in range(len(self.beacons))]].reshape(-1, _POSE)
-        return at[:, :2] + self._mount(at[:, 2])
-
-    def map_information(self) -> Array:
-        """Inverse covariance of the beacons' x_m, y_m about where they are, (2 beacons, 2 beacons)."""
-        problem = self._problem()
-        weights = problem.weights(self.poses, self.beacons)
-        return problem.linearise(self.poses, self.beacons, weights)[1].reduced()
-
-    def poses_in(self, beacons: Array) -> tuple[Array, float]:
-        """The poses that fit best if the beacons stand there, and the logarithm of how well all of them fit.
-
-        The latter is the integral over the poses, by Laplace, but for a constant. What `solve` found is where
-        it sets out from, and stays.
-        """
-        problem, poses = self._problem(), self.poses
-        for _ in range(_ITERATIONS_MAX):
-            weights = problem.weights(poses, beacons)
-            cost, normal = problem.linearise(poses, beacons, weights)
-            change, half_log_determinant = normal.solve_poses()
-            poses, _ = problem.lower(poses, beacons, change, np.zeros_like(beacons), weights, cost)
-            lowered = problem.cost(poses, beacons, weights)
-            if cost - lowered < _LITTLE_COST:
-                return poses, -lowered - half_log_determinant
-        raise ArithmeticError(f"{self.steps} poses among known beacons have not settled")
-
     def _problem(self) -> _Problem:
-        return _Problem(self._p, self._steps, self._seen, self._priors, self._guesses)
+        return _Problem(self._p, self._steps, self._seen, self._priors)
 
     def _mount(self, theta_rad: Array) -> Array:
         return _mount(self._p, theta_rad)[0]
@@ -233,17 +162,6 @@ class _Normal:
             change[_POSE:] -= solved @ beacon_change
         return change.reshape(-1, _POSE), beacon_change.reshape(-1, _BEACON)
 
-    def reduced(self) -> Array:
-        """What is left of the normal equations for the beacons, (2 beacons, 2 beacons)."""
-        return self._eliminate()[2]
-
-    def solve_poses(self) -> tuple[Array, float]:
-        """Change (poses, 3) if the beacons stay, and half the logarithm of the poses' determinant."""
-        factor = cholesky_banded(self.band[:, _POSE:], lower=True, check_finite=False)
-        gradient = self.pose_gradient.reshape(-1)[_POSE:]
-        change = np.concatenate([np.zeros(_POSE), -cho_solve_banded((factor, True), gradient)])
-        return change.reshape(-1, _POSE), float(np.log(factor[0]).sum())
-
     def _eliminate(self) -> tuple[Array, Array, Array, Array]:
         """Without the poses: their change if beacons stay, what they change by beacons; what is left."""
         band = self.band[:, _POSE:]
@@ -270,9 +188,8 @@ class _Problem:
         self,
         parameters: Mapping[str, int | float],
         steps: list[tuple[float, float, float, float, float]],
-        seen: list[tuple[int, int, float, float, float, float]],
-        priors: list[tuple[int, float, float, float]],
-        guesses: list[tuple[int, int, float, float]],
+        seen: list[tuple[int, int, float, float]],
+        priors: list[tuple[int, float, float]],
     ) -> None:
         self._p = parameters
         self._dt_s, *told = np.array(steps, dtype=np.float64).reshape(-1, 5).T
@@ -281,30 +198,24 @@ class _Problem:
         self._with_speeds = bool(parameters["velocity_states"]) and len(steps) > 0
         if self._with_speeds:
             self._keep, self._speed_weight = _speed_model(parameters, self._dt_s)
-        table = np.array(seen, dtype=np.float64).reshape(-1, 6)
+        table = np.array(seen, dtype=np.float64).reshape(-1, 4)
         self._pose_of, self._beacon_of = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp)
         self._bearing_rad, self._range_m = table[:, 2], table[:, 3]
-        self._bearing_sd_rad, self._range_sd_m = table[:, 4], table[:, 5]
         self._has_range = np.isfinite(self._range_m)
         self._range_m = np.where(self._has_range, self._range_m, 0.0)
-        prior = np.array(priors, dtype=np.float64).reshape(-1, 4)
-        self._prior_of, self._prior_m = prior[:, 0].astype(np.intp), prior[:, 1:3]
-        self._prior_sd_m = prior[:, 3:]
-        guess = np.array(guesses, dtype=np.float64).reshape(-1, 4)
-        self._guess_pose_of, self._guess_beacon_of = guess[:, 0].astype(np.intp), guess[:, 1].astype(np.intp)
-        self._guess_ln, self._guess_sd_ln = guess[:, 2:3], guess[:, 3:]
+        prior = np.array(priors, dtype=np.float64).reshape(-1, 3)
+        self._prior_of, self._prior_m = prior[:, 0].astype(np.intp), prior[:, 1:]
 
     def weights(self, poses: Array, beacons: Array) -> Array:
         """1 / sd of (bearing, range) of each sighting, (m, 2), with the predicted distances; no range: 0."""
-        by_model_m = range_sd_m(self._p, self._look(poses, beacons)[0][:, 1])
-        sd_rad = np.where(np.isnan(self._bearing_sd_rad), self._p["bearing_sd_rad"], self._bearing_sd_rad)
-        sd_m = np.where(np.isnan(self._range_sd_m), by_model_m, self._range_sd_m)
-        return np.column_stack([1.0 / sd_rad, np.where(self._has_range, 1.0 / sd_m, 0.0)])
+        sd_m = range_sd_m(self._p, self._look(poses, beacons)[0][:, 1])
+        by_bearing = np.full(len(sd_m), 1.0 / self._p["bearing_sd_rad"])
+        return np.column_stack([by_bearing, np.where(self._has_range, 1.0 / sd_m, 0.0)])
 
     def cost(self, poses: Array, beacons: Array, weights: Array) -> float:
         """Half the sum of squares."""
         parts = [self._moves(poses)[1], self._sight_residuals(poses, beacons, weights)]
-        parts += [self._prior_residuals(beacons), self._guess_rows(poses, beacons)[0]]
+        parts += [self._prior_residuals(beacons)]
         if self._with_speeds:
             parts += [residual for _, residual in self._speeds(*self._twists(poses))]
         return 0.5 * float(sum(np.sum(part**2) for part in parts))
@@ -320,8 +231,6 @@ class _Problem:
             normal.add_chain(*later)
         self._add_sightings(normal, poses, beacons, weights)
         self._add_priors(normal, beacons)
-        guessed = self._guess_rows(poses, beacons)
-        _add_views(normal, self._guess_pose_of, self._guess_beacon_of, *guessed)
         return self.cost(poses, beacons, weights), normal
 
     def lower(
@@ -431,25 +340,13 @@ class _Problem:
         by_pose, by_beacon = by_pose * weights[:, :, None], by_beacon * weights[:, :, None]
         _add_views(normal, self._pose_of, self._beacon_of, residual, by_pose, by_beacon)
 
-    def _guess_rows(self, poses: Array, beacons: Array) -> tuple[Array, Array, Array]:
-        """Of first distances: residual (g, 1), and by the pose (g, 1, 3) and the beacon (g, 1, 2)."""
-        at = poses[self._guess_pose_of]
-        eye, eye_turned = _mount(self._p, at[:, 2])
-        ray = beacons[self._guess_beacon_of] - at[:, :2] - eye
-        squared = np.maximum(np.sum(ray**2, axis=1, keepdims=True), 1e-12)
-        residual = (0.5 * np.log(squared) - self._guess_ln) / self._guess_sd_ln
-        by_beacon = ray / squared / self._guess_sd_ln
-        by_heading = -np.sum(by_beacon * eye_turned, axis=1, keepdims=True)
-        by_pose = np.concatenate([-by_beacon, by_heading], axis=1)
-        return residual, by_pose[:, None], by_beacon[:, None]
-
     def _prior_residuals(self, beacons: Array) -> Array:
-        return (beacons[self._prior_of] - self._prior_m) / self._prior_sd_m
+        return (beacons[self._prior_of] - self._prior_m) / _FIRST_RANGE_SD_M
 
     def _add_priors(self, normal: _Normal, beacons: Array) -> None:
-        of, weight = self._prior_of, 1.0 / self._prior_sd_m
+        of, weight = self._prior_of, 1.0 / _FIRST_RANGE_SD_M
         for axis in range(_BEACON):
-            normal.corner[of, axis, of, axis] += weight[:, 0] ** 2
+            normal.corner[of, axis, of, axis] += weight**2
         normal.beacon_gradient[of] += weight * self._prior_residuals(beacons)
 
 

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the cameras, a name or a TOML file (default: three60 for a scenario, 60 degrees for pictures)",
     )
     parser.add_argument(
-        "--model", type=Path, metavar="FILE", help="your own objects: the .json of tools/train_beacons.py"
+        "--model", type=Path, metavar="FILE", help="your own objects: the .json of train_beacons.py"
     )
     parser.add_argument("--seed", type=int, default=0, help="of a simulated drive (default: 0)")
     parser.add_argument(

@@ -34,7 +34,7 @@ Key = tuple[float, str, str]
 
 BEST_FILTERS: Final[Filters] = {
     "distance": ["invariant"],
-    "direction": ["invariant", "similarity", "smoother"],
+    "direction": ["invariant", "smoother"],
 }
 """Those worth a column, by observation."""
 
@@ -47,7 +47,7 @@ EXAMPLES = """examples:
   bslam tables --observation direction --filter invariant,smoother --association known
 
 Without --filter there is a column for each estimator that is worth one: the invariant filter, and in
-direction only the similarity form and the smoother beside it.
+direction only the smoother beside it.
 
 Writes tables.md, tables.json, sigmaX.png (errors and NEES over time) and the files of every run."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.raw import Library, library
 from bslam.errors import BslamError
 
@@ -17,7 +16,7 @@ Floats = NDArray[np.float32]
 SIGNATURE_SIZE = 71
 """Values of a signature."""
 
-_SEEDS = FIRMWARE_DIR / "models" / "seeds.h"
+_SEEDS = Path(__file__).with_name("seeds.npy")  # tools/training/make_seeds.py writes it
 _SEED_STEPS = 127  # of 1, as firmware/bslam/svm/sample.h stores them
 
 
@@ -155,8 +154,6 @@ def _floats(ffi: Any, values: Floats) -> Any:
     return ffi.from_buffer("float[]", values)
 
 
-def flash_seeds() -> Floats:
-    """Signatures (n, 71) of beacons that are nobody's: those in flash, which machines start from."""
-    rows = re.findall(r"\{\{(.*?)\}\}", _SEEDS.read_text(encoding="utf-8"), re.DOTALL)
-    stored = np.array([[int(q) for q in re.findall(r"Q\((-?\d+)\)", row)] for row in rows])
-    return (stored[:, :SIGNATURE_SIZE] / _SEED_STEPS).astype(np.float32)
+def rendered_seeds() -> Floats:
+    """Signatures (n, 71) of rendered beacons that are nobody's: what a robot with cameras starts from."""
+    return np.load(_SEEDS).astype(np.float32) / np.float32(_SEED_STEPS)

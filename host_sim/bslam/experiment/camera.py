@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 import bslam.world as world_package
 from bslam.core.builds import FIRMWARE_DIR
-from bslam.core.learner import flash_seeds
+from bslam.core.learner import rendered_seeds
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
@@ -162,7 +162,7 @@ def camera_log(
 
     threshold: what the detector is less sure of is left out; TOLD_THRESHOLD at least.
 
-    Its machines start from the seeds of the flash, as a robot's do.
+    Its machines start from `rendered_seeds`, as a robot's do.
     """
     scenario = _checked(scenario, sigma_mps, noise, rig)
     return _log_of(scenario, seed, rig, store.drive(scenario, seed, rig).surer_than(threshold))
@@ -203,7 +203,7 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sighting_correlation_m=WIDE_CORRELATION_M if is_wide else CORRELATION_M,
         gyro_sigma_radps=VisualGyro.WIDE_SD_RADPS if is_wide else VisualGyro.SD_RADPS,
     )
-    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=flash_seeds())
+    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=rendered_seeds())
     if len(drive.turns) == 0:
         return log
     eyes = Compass(log)

@@ -17,8 +17,7 @@ _IMAGE_DELAY_US: Final = 30_000
 # Its distances are so doubtful that position alone fits too much: looks count twice, and new beacons are
 # expected less. Tried on paper_room, seeds 90:92.
 # Its cameras tell how it turns, so that it is seldom in doubt, and by the side from which a beacon is seen
-# nothing is gained (EXPERIMENTS, "From which side"). Nor by what is unlike all that a young machine keeps
-# ("What is unlike").
+# nothing is gained.
 CAMERA: Final[dict[str, int | float]] = {
     "huber_d": 1.0,
     "gate_d2": 9.0,
@@ -26,7 +25,6 @@ CAMERA: Final[dict[str, int | float]] = {
     "new_per_m2": 0.003,
     "side_low": 0.0,
     "side_high": 0.0,
-    "unlike_slope": 0.0,
 }
 
 # With identity unknown, besides: the detector believes in things that are no beacon, mostly for a few metres
@@ -54,17 +52,9 @@ SMOOTHER: Final[dict[str, int | float]] = {
     "bearing_only_variance_factor": 1.0,
 }
 
-# A filter that knows how the scale of its map may be wrong needs no further doubt of directions.
-SIMILARITY: Final[dict[str, int | float]] = {
-    "velocity_walk_mps_sqrt_s": 0.3,
-    "turn_rate_walk_radps_sqrt_s": 1.2,
-    "bearing_only_variance_factor": 1.0,
-    "bearing_only_curvature_factor": 0.0,
-}
-
-# By filter. Distances tell the scale, and then the smoother, too, does better with the core's own prior
+# Distances tell the scale, and then the smoother, too, does better with the core's own prior
 # on the speed. Tried on paper_room, seeds 100:106.
-DIRECTION_ONLY: Final = {"smoother": SMOOTHER, "similarity": SIMILARITY}
+DIRECTION_ONLY: Final = {"smoother": SMOOTHER}
 
 REAL_LOG: Final[dict[str, int | float]] = {
     # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the

@@ -11,7 +11,7 @@ from bslam.log import Log, Robot
 
 OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
-FILTERS = ("standard", "invariant", "smoother", "similarity")
+FILTERS = ("standard", "invariant", "smoother")
 MOTIONS = ("euler", "arc")
 SENSORS = ("simulated", "camera")
 REALS = ("float", "double")

@@ -50,7 +50,7 @@ class SweepResult:
 def code_digest() -> str:
     """Of the program: runs of two versions are not one sweep."""
     files = [*Path(bslam.__file__).parent.rglob("*.py"), *Path(bslam.__file__).parent.rglob("*.toml")]
-    files += [*FIRMWARE_DIR.rglob("*.[ch]")]
+    files += [*Path(bslam.__file__).parent.rglob("*.npy"), *FIRMWARE_DIR.rglob("*.[ch]")]
     digest = hashlib.sha256()
     for path in sorted(files):
         digest.update(path.read_bytes())

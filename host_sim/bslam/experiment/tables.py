@@ -23,7 +23,6 @@ OBSERVATION_TITLES: Final = {"distance": "Distance observation", "direction": "D
 NAMES: Final = {
     "standard": "standard filter",
     "invariant": "invariant filter",
-    "similarity": "similarity form",
     "smoother": "smoother",
 }
 # Section V, Tables I to III: position error in cm, one run each. (Its text says 0.2 where Table I says 0.3

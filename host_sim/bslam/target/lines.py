@@ -109,7 +109,7 @@ def film_arguments(board: str, film: Path) -> list[str]:
     if address is None:
         raise BslamError(f"{board} looks for no film; allowed: boards with FILM_ADDRESS in their board.mk")
     if not film.is_file():
-        raise BslamError(f"{film} is missing; allowed: a film, as `tools/make_film.py` writes it")
+        raise BslamError(f"{film} is missing; allowed: a film, as `tools/proofs/make_film.py` writes it")
     return ["-device", f"loader,file={film},addr={address[1]},force-raw=on"]
 
 

@@ -3,8 +3,7 @@
 Every beacon has a look: a few colours, the shape of its outline, contrasts. A sighting is that look from the
 side it is seen from (slant and distance shift the shares of the colours, and shift them alike from places
 that are near each other), with some wall taken in, and noise of its own. No two sightings look the same.
-How strongly, is set so that machines tell beacons apart as well as they do the camera's own signatures:
-tools/measure_association.py --looks.
+How strongly, is set so that machines tell beacons apart as well as they do the camera's own signatures.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-enum { SVM_FEATURES = 71 };  // as tools/peers/machines.py writes them
+enum { SVM_FEATURES = 71 };  // as tools/bench/peers/machines.py writes them
 
 typedef struct svm_sample {
     int label;  // in a set 1 or -1; of a test its class

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-import kill_sweep
 from bslam.cli import main
 from bslam.commands import compare
 from bslam.experiment.contest import ContestResult
+from tools.proofs import kill_sweep
 
 BOUND = [
     {"method": "bslam", "on_bound_steps_m": 0.051, "ratio_to_bound": 1.02},

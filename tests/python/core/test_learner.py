@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
 from bslam.core import CoreError
-from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution, flash_seeds
+from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution, rendered_seeds
 from bslam.errors import BslamError
 
 REALS = pytest.mark.parametrize("real", ["float", "double"])
@@ -111,7 +111,7 @@ def test_solver_more_samples_than_it_holds_are_refused() -> None:
         Solution(samples, np.zeros(len(samples), np.bool_), cost=COST, tolerance=0.1)
 
 
-def test_seeds_of_the_flash_are_those_of_the_header():
-    seeds = flash_seeds()
+def test_rendered_seeds_all_differ():
+    seeds = rendered_seeds()
     assert seeds.shape == (64, SIGNATURE_SIZE) and np.abs(seeds).max() <= 1.0
     assert len(np.unique(seeds, axis=0)) == 64

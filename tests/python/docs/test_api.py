@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-import params_doc
 from bslam.cli import COMMANDS, main
 from bslam.core.raw import library
 from bslam.log import Robot
+from tools.checks import params_doc
 
 ROOT = Path(__file__).resolve().parents[3]
 API = (ROOT / "docs" / "API.md").read_text(encoding="utf-8")

@@ -83,16 +83,6 @@ def test_pairs_are_not_told_apart_without_machines(harder_pairs: Log, off: tuple
     assert trace.counts.wrong_associations > 0.03 * trace.counts.sightings
 
 
-def test_a_neighbour_is_not_taken_for_a_beacon_that_was_seen_once() -> None:
-    """Drive 2017 comes back after 43 s to a beacon of one sample, and meets first what stands beside it."""
-    log = simulate(load_scenario("pairs"), 2017, 1.0, "speedometer")
-    log = with_sightings(log, log.sightings.time_us < 50_000_000)
-    trace = run_log(log, SVM)
-    without = run_log(log, replace(SVM, parameters=(("unlike_slope", 0.0),)))
-    assert trace.counts.wrong_associations == 0
-    assert without.counts.wrong_associations > 10
-
-
 def test_without_signatures_position_alone_decides(harder_pairs: Log) -> None:
     log = replace(harder_pairs, sightings=replace(harder_pairs.sightings, signature=None))
     blind = run_log(log, SVM)

@@ -226,13 +226,13 @@ def test_tables_writes_the_paper_s_figures_beside_ours(tmp_path):
     assert "| Mean error | 10.11 |" in text
     assert "## Table II" in text
     cells = json.loads((out / "tables.json").read_text())["cells"]
-    directions = [("direction", name) for name in ("invariant", "similarity", "smoother")]
+    directions = [("direction", name) for name in ("invariant", "smoother")]
     assert [(cell["observation"], cell["filter"]) for cell in cells] == [
         ("distance", "invariant"),
         *directions,
     ]
     assert len({cell["bound_cm"] for cell in cells[1:]}) == 1, "the drives are the same"
-    assert "Direction only: paper | Direction only: invariant filter | Direction only: similarity" in text
+    assert "Direction only: paper | Direction only: invariant filter | Direction only: smoother" in text
     assert "| Mean error of the bound: Jacobians at the truth | | - | |" in text
     assert cells[0]["paper_cm"]["mean"] == 10.11
     own = [entry["position_error_m"]["mean"] for entry in runs(out) if entry["observation"] == "distance"]
@@ -343,7 +343,6 @@ def test_the_module_runs_as_a_program():
         ([], "invariant"),
         (["--observation", "direction"], "smoother"),
         (["--observation", "direction", "--known-map"], "invariant"),
-        (["--observation", "direction", "--filter", "similarity"], "similarity"),
     ],
 )
 def test_direction_only_has_the_smoother_unless_the_map_is_known(log_folder, tmp_path, words, expected):

@@ -110,7 +110,7 @@ def test_sigma_of_the_command_line_wins_over_the_log_s_and_set_over_all(made):
     assert core_params(chosen, log)["filter"] == 0
 
 
-@pytest.mark.parametrize(("name", "walk"), [("smoother", 30.0), ("similarity", 0.3)])
+@pytest.mark.parametrize(("name", "walk"), [("smoother", 30.0)])
 def test_what_is_set_for_directions_alone_is_not_where_distances_are_seen(made, name, walk):
     log, options = made.circle_log(steps=1), RunOptions(observation="direction", filter=name)
     assert core_params(options, log)["velocity_walk_mps_sqrt_s"] == walk

@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
 
-import kill_sweep
 from bslam.cli import main
 from bslam.errors import BslamError
 from bslam.experiment.sweep import Store, forget
+from tools.proofs import kill_sweep
 
 STILL = """
 class Still:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bslam.core.vision import Candidate, FrontEnd
 from bslam.rig import Camera, load_rig
-from training.render_set import render_world
+from tools.training.render_set import render_world
 
 VECTORS = Path(__file__).resolve().parents[2] / "vectors"
 FRAMES, SAID = VECTORS / "frames.npz", VECTORS / "frames.txt"

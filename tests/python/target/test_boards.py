@@ -6,14 +6,13 @@ import subprocess
 
 import pytest
 
-import run_image
-import same_bits
 from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import first_steps
 from bslam.target.lines import ROOT, TargetError, boards_here, emulator_of, qemu_machines
 from bslam.world.simulate import load_scenario, simulate
+from tools.proofs import run_image, same_bits
 
 STEPS = 120
 
@@ -25,7 +24,7 @@ def log():
 
 @pytest.fixture(scope="module")
 def host(log):
-    """What the cores are compared with, of each way to run; more of them in tools/same_bits.py."""
+    """What the cores are compared with, of each way to run; more of them in tools/proofs/same_bits.py."""
     return {words: same_bits.fingerprints(log, RunOptions(**dict(words))) for words in WAYS}
 
 

@@ -38,7 +38,7 @@ from bslam.world.camera.renderer import Renderer
 from bslam.world.camera.rgb565 import to_rgb565
 from bslam.world.camera.worlds import dress
 from bslam.world.simulate import load_scenario, true_drive
-from make_film import STEP_US, camera_record, make_film, smaller, turn_ticks
+from tools.proofs.make_film import STEP_US, camera_record, make_film, smaller, turn_ticks
 
 SILENCE_S = 60.0
 ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"

@@ -8,7 +8,7 @@ import pytest
 from bslam.cli import main
 from bslam.rig import load_rig
 from bslam.target.lines import ROOT
-from make_film import make_film, smaller
+from tools.proofs.make_film import make_film, smaller
 
 KERNEL = os.environ.get("FREERTOS_KERNEL", "")
 

@@ -10,7 +10,7 @@ from sklearn.svm import LinearSVC
 
 from bslam.core.vision import vision_library
 from bslam.modelfile import AdditiveSvm
-from training.additive import (
+from tools.training.additive import (
     DEVIATION_MIN,
     KNOTS,
     decide_additive,
@@ -19,9 +19,9 @@ from training.additive import (
     most_telling,
     place_knots,
 )
-from training.compiled import compile_library
-from training.detector_samples import recoloured
-from training.export import Header
+from tools.training.compiled import compile_library
+from tools.training.detector_samples import recoloured
+from tools.training.export import Header
 
 CROSSED = np.array([0, 1, 4], np.uint8)
 COST = 0.05

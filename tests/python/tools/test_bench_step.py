@@ -4,7 +4,7 @@ import platform
 
 import pytest
 
-import bench
+from tools.bench import bench
 
 BEACONS = 20
 RATIO_MAX = 1.3

@@ -1,10 +1,10 @@
-"""tools/check_complexity.py reports functions that are too long or too branched, in C and in Python."""
+"""check_complexity.py reports functions that are too long or too branched, in C and in Python."""
 
 from pathlib import Path
 
 import pytest
 
-import check_complexity
+from tools.checks import check_complexity
 
 
 def c_function(statements: list[str]) -> str:

@@ -1,7 +1,7 @@
-"""tools/check_image.py: what must not be in an image is found, and the stack is that of the longest path."""
+"""check_image.py: what must not be in an image is found, and the stack is that of the longest path."""
 
-import check_image
-from check_image import CallGraph, read_functions
+from tools.checks import check_image
+from tools.checks.check_image import CallGraph, read_functions
 
 LISTING = """
 00000100 <start_reset>:
@@ -58,7 +58,7 @@ def test_a_function_that_calls_itself_is_found():
 
 def test_a_call_through_a_pointer_needs_a_name():
     graph = CallGraph(read_functions(LISTING.replace("304:\tbx\tlr", "304:\tblx\tr3")), {})
-    assert graph.faults == ["leaf calls through a pointer: whom? tools/check_image.py, CALLED_BY_POINTER"]
+    assert graph.faults == ["leaf calls through a pointer: whom? check_image.py, CALLED_BY_POINTER"]
 
 
 def test_a_call_through_a_pointer_goes_to_all_it_may(monkeypatch):

@@ -1,10 +1,10 @@
-"""tools/check_layers.py reports an include or import that goes the wrong way, and nothing else."""
+"""tools/checks/check_layers.py reports an include or import that goes the wrong way, and nothing else."""
 
 from pathlib import Path
 
 import pytest
 
-import check_layers
+from tools.checks import check_layers
 
 
 def write(root: Path, path: str, text: str) -> None:

@@ -1,11 +1,11 @@
-"""tools/check_symbols.py reports what must not be in the firmware library."""
+"""tools/checks/check_symbols.py reports what must not be in the firmware library."""
 
 import subprocess
 from pathlib import Path
 
 import pytest
 
-import check_symbols
+from tools.checks import check_symbols
 
 CLEAN = """
 static const float table[2] = {1.0f, 2.0f};

@@ -1,10 +1,10 @@
-"""tools/check_version.py wants one version number in all places that state it."""
+"""tools/checks/check_version.py wants one version number in all places that state it."""
 
 from pathlib import Path
 
 import pytest
 
-import check_version
+from tools.checks import check_version
 
 HEADER = "#define BSLAM_VERSION_MAJOR 1\n#define BSLAM_VERSION_MINOR 2\n#define BSLAM_VERSION_PATCH 3\n"
 

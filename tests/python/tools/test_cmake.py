@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-import check_symbols
+from tools.checks import check_symbols
 
 FIRMWARE = Path(__file__).parents[3] / "firmware"
 

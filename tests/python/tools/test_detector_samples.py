@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from training.detector_samples import RECOLOURED, BoxSamples, gather_boxes
-from training.render_set import FRAMES_A_WORLD, render_set
-from training.truth import NOTHING
+from tools.training.detector_samples import RECOLOURED, BoxSamples, gather_boxes
+from tools.training.render_set import FRAMES_A_WORLD, render_set
+from tools.training.truth import NOTHING
 
 SEED = 1
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from training.detector_score import DETECTION, OBJECT, Sightings, score
-from training.render_set import SEEN
-from training.truth import IGNORED, NOTHING, counts, overlaps, owners, teaches
+from tools.training.detector_score import DETECTION, OBJECT, Sightings, score
+from tools.training.render_set import SEEN
+from tools.training.truth import IGNORED, NOTHING, counts, overlaps, owners, teaches
 
 
 def seen(*rows: dict[str, object]) -> np.ndarray:

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from bslam.core.vision import BeaconModel
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
-from train_detector import HEADER, note_of
-from training import export, fit
-from training.built_in import built_in_detector
-from training.compiled import (
+from tools.training import export, fit
+from tools.training.built_in import built_in_detector
+from tools.training.compiled import (
     TOLERANCE,
     CompiledSvm,
     compile_library,
     worst_byte_difference,
     worst_difference,
 )
-from training.detector_export import beacons_header
-from training.detector_samples import CLASSES
+from tools.training.detector_export import beacons_header
+from tools.training.detector_samples import CLASSES
+from tools.training.train_detector import HEADER, note_of
 
 
 def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

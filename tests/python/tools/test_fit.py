@@ -1,11 +1,11 @@
-"""tools/training/fit.py: machines as the C core takes them, cross-validation, thresholds, hard negatives."""
+"""tools/training/fit.py: machines as the C core takes them, cross-validation, weights of bytes."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from training import fit
+from tools.training import fit
 
 
 def blobs(classes: int, samples: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
@@ -110,42 +110,6 @@ def test_choose_cost_samples_of_no_class_may_be_in_one_group() -> None:
     held_out = fit.choose_cost(x, fit.one_vs_rest(labels, 2), groups=groups)[1]
     known = labels < 2  # the others are all in the group that is left out
     assert np.mean((held_out > 0)[known] == fit.one_vs_rest(labels, 2)[known]) > 0.9
-
-
-def test_threshold_for_precision_by_hand() -> None:
-    scores = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
-    right = np.array([True, True, False, True, False])
-    assert fit.threshold_for_precision(scores, right, 1.0) == (4.0, pytest.approx(2 / 3))
-    assert fit.threshold_for_precision(scores, right, 0.75) == (2.0, 1.0)
-    assert fit.threshold_for_precision(scores, right, 0.6) == (1.0, 1.0)
-    assert fit.threshold_for_precision(scores, np.zeros(5, bool), 0.5) == (float("inf"), 0.0)
-
-
-def test_threshold_for_precision_equal_scores_stand_or_fall_together() -> None:
-    scores, right = np.array([2.0, 1.0, 1.0, 1.0]), np.array([True, True, False, False])
-    assert fit.threshold_for_precision(scores, right, 0.6) == (2.0, 0.5)
-
-
-def test_add_hard_negatives_takes_the_worst_and_ends() -> None:
-    x, inside = rings(2000, seed=8)
-    kept = np.zeros(len(x), bool)
-    kept[np.flatnonzero(~inside[:, 0])[:20]] = True
-    mask = kept | inside[:, 0]
-    for _ in range(20):
-        machine = fit.fit(x[mask], inside[mask], 10.0, quadratic=True)
-        grown = fit.add_hard_negatives(x, inside, mask, machine, most=100)
-        added = grown & ~mask
-        assert added.sum() <= 100 and not (added & inside[:, 0]).any()
-        if not added.any():
-            break
-        values = machine.decide(x)[:, 0]
-        assert values[added].min() >= np.sort(values[~grown], axis=None).max()
-        mask = grown
-    else:
-        pytest.fail("hard negatives without end")
-    everything = fit.fit(x, inside, 10.0, quadratic=True)
-    agree = (machine.decide(x) > 0) == (everything.decide(x) > 0)
-    assert np.mean(agree) > 0.98 and mask.sum() < len(x)
 
 
 def test_quantised_weights_are_within_half_a_step() -> None:

@@ -7,7 +7,7 @@ from PIL import ExifTags, Image
 
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
-from training.folder import COLUMNS, Label, read_folder
+from tools.training.folder import COLUMNS, Label, read_folder
 
 HEADER = ",".join(COLUMNS)
 HEIGHTS = HEADER.removesuffix(",depth_m")

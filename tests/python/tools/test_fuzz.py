@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-import fuzz
-from fuzz import FILLER, GOAL_ALL, GOAL_EACH, TARGETS, Slice, main, missing
+from tools.proofs import fuzz
+from tools.proofs.fuzz import FILLER, GOAL_ALL, GOAL_EACH, TARGETS, Slice, main, missing
 
 
 def slices(sources: str, executions: int, crashes: int = 0) -> list[Slice]:

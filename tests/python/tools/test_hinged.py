@@ -11,10 +11,10 @@ from sklearn.svm import LinearSVC
 
 from bslam.core.vision import vision_library
 from bslam.modelfile import HingedSvm
-from training.closer import mirrored
-from training.compiled import compile_library
-from training.export import Header
-from training.hinged import DEVIATION_MIN, decide_hinged, expand_hinges, fit_hinged
+from tools.training.closer import mirrored
+from tools.training.compiled import compile_library
+from tools.training.export import Header
+from tools.training.hinged import DEVIATION_MIN, decide_hinged, expand_hinges, fit_hinged
 
 COST = 0.05
 WIDTH_PX, HEIGHT_PX = 320, 240

@@ -1,4 +1,4 @@
-"""tools/peers: the drives that other people's programs get are those that bslam gets."""
+"""tools/bench/peers: the drives that other people's programs get are those that bslam gets."""
 
 import importlib.util
 from dataclasses import replace
@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import bench
 from bslam.experiment.metrics import evaluate
 from bslam.experiment.options import RunOptions
 from bslam.experiment.runner import run_log
 from bslam.log import first_steps
-from peers.drives import circle, simulated, text
-from peers.programs import CORE, PEERS, run
+from tools.bench import bench
+from tools.bench.peers.drives import circle, simulated, text
+from tools.bench.peers.programs import CORE, PEERS, run
 
 OPTIONS = RunOptions(velocity_states=False)
 BEACONS = 20

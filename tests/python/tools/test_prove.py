@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-import prove
-from prove import Proof, is_enough, kept_result, main, minutes_of, print_table, proofs, run_all
+from tools.proofs import prove
+from tools.proofs.prove import Proof, is_enough, kept_result, main, minutes_of, print_table, proofs, run_all
 
 LONG = "import time; time.sleep(600)"
 COUNT = "import pathlib; f = pathlib.Path('{}'); f.write_text((f.read_text() if f.exists() else '') + 'x'); "

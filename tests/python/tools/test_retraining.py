@@ -6,10 +6,9 @@ import re
 import numpy as np
 import pytest
 
-import example_pictures
-import train_beacons
 from bslam.cli import main
-from training.folder import read_folder
+from tools.training import example_pictures, train_beacons
+from tools.training.folder import read_folder
 
 WORLD = 3
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import pytest
 
-import same_bits
 from bslam.errors import BslamError
 from bslam.experiment.options import RunOptions
 from bslam.log import Log
 from bslam.target.lines import TargetError
+from tools.proofs import same_bits
 
 STATES: dict[str, list[int] | Exception] = {
     "host": [1, 2, 3],

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sizes_doc import differences
+from tools.checks.sizes_doc import differences
 
 STANDS = "| all, pinhole | 2608856 | 38.8 % |"
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from training.fit import fit
-from training.together import fit_together
+from tools.training.fit import fit
+from tools.training.together import fit_together
 
 
 def test_fit_together_decides_as_linear_svc_does() -> None:

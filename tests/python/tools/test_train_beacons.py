@@ -1,4 +1,4 @@
-"""tools/train_beacons.py: from a folder of pictures to a header that compiles and recognises."""
+"""tools/training/train_beacons.py: from a folder of pictures to a header that compiles and recognises."""
 
 import csv
 import ctypes
@@ -14,16 +14,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import example_pictures
-import train_beacons
 from bslam.core.vision import FrontEnd
 from bslam.experiment.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools.blind import blind_model
-from training import samples
-from training.compiled import FIRMWARE, CompiledSvm
-from training.folder import COLUMNS, read_folder
-from training.truth import overlaps
+from tools.training import example_pictures, samples, train_beacons
+from tools.training.compiled import FIRMWARE, CompiledSvm
+from tools.training.folder import COLUMNS, read_folder
+from tools.training.truth import overlaps
 
 SIGNATURE = 71
 WORLD = 1

@@ -14,7 +14,6 @@ static int setup(void **state)
 {
     params = unit_params();
     params.looks_samples = 3;
-    params.unlike_slope = 0;
     params.learn_way_m = BSLAM_R(0.1);
     params.share_value = BSLAM_R(0.3);
     params.share_sightings = SHARE;
@@ -96,29 +95,6 @@ static void test_weight_grows_with_the_samples(void **state)
     }
     bslam_sample_t sample = {{0}};
     assert_near(bslam_looks_ask(&looks, &params, 0, &sample).weight, 0.5, 1e-6);
-}
-
-static void test_a_young_machine_says_how_far_it_is_from_what_it_keeps(void **state)
-{
-    float signature[BSLAM_SAMPLE_FEATURES];
-    bslam_sample_t sample;
-    view_of(0, 0, signature);
-    signature[20] += 0.3f;
-    assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
-    teach(0, 2, 0, 0);
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0, 0);  // nobody asks for it
-    params.unlike_slope = 1;
-    params.learn_budget = 0;
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0, 0);  // nothing is learned
-    params.learn_budget = 1;
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0.3, 0.01);  // before it is trained, too
-    assert_near(bslam_looks_ask(&looks, &params, 1, &sample).apart, 0, 0);       // who has no machine
-    teach(1, 2, 1, 0);
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0.3, 0.01);
-    teach(0, 2, 0, 1);
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0.3, 0.01);  // from the nearest
-    teach(0, 2, 0, 2);
-    assert_near(bslam_looks_ask(&looks, &params, 0, &sample).apart, 0, 0);  // its value counts half by now
 }
 
 static void test_a_robot_that_stands_still_teaches_once(void **state)
@@ -416,7 +392,6 @@ int main(void)
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
         cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_machine, setup),
         cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),
-        cmocka_unit_test_setup(test_a_young_machine_says_how_far_it_is_from_what_it_keeps, setup),
         cmocka_unit_test_setup(test_a_robot_that_stands_still_teaches_once, setup),
         cmocka_unit_test_setup(test_a_new_beacon_that_looks_like_another_shares_its_machine, setup),
         cmocka_unit_test_setup(test_a_beacon_that_only_once_looked_like_another_gets_its_own, setup),

@@ -39,11 +39,8 @@ static bslam_params_t svm_params(void)
     params.looks_offset = BSLAM_R(-0.5);
     params.looks_low = 8;
     params.looks_high = 4;
-    params.unlike_slope = 0;
     params.far_d2 = 300;
     params.class_doubt = BSLAM_R(0.1);
-    params.new_range_sd_m = 100;
-    params.new_far_matches = 1;
     params.learn_d2 = 9;
     params.learn_lead = 4;
     params.learn_margin = 0;
@@ -206,34 +203,6 @@ static void test_score_of_looks_is_clipped(void **state)
     assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 2, 1e-3);
     signature[0] = -1.0f;
     assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 4, 1e-3);
-}
-
-static void test_what_is_unlike_all_that_a_young_machine_keeps_speaks_against_it(void **state)
-{
-    bslam_params_t params = svm_params();
-    params.unlike_distance = BSLAM_R(0.8);
-    params.unlike_slope = 2;
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
-    const double alone = position_score(&params, 4, 0);
-    const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
-    const float kept[2][BSLAM_SAMPLE_FEATURES] = {{0.0f, 1.0f}, {0.0f, 0.5f}};
-    const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
-    give_machine(0, 0.75, 1);
-    assert_int_equal(bslam_sample_encode(kept[0], &looks.learner.samples[0]), BSLAM_OK);
-    assert_int_equal(bslam_sample_encode(kept[1], &looks.learner.samples[1]), BSLAM_OK);
-    // A quarter of 4 * 0.75 - 0.5, and three quarters of what the distance is too much by.
-    const double one = 0.625 - 0.75 * 2 * (sqrt(2.0) - 0.8);
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, alone + one, 0.01);
-    looks.learner.machines[0].samples = 2;
-    const double two = 1.0 - 0.6 * 2 * (sqrt(1.25) - 0.8);  // the nearer of the two
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, alone + two, 0.01);
-    looks.learner.machines[0].samples = 3;  // counts half
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, alone + 1.25, 0.01);
-    looks.learner.machines[0].samples = 1;
-    params.unlike_slope = 1000;
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, alone + 0.625 - 0.75 * 8, 0.01);
-    params.unlike_distance = BSLAM_R(1.5);  // what is nearer speaks neither for nor against
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, alone + 0.625, 0.01);
 }
 
 /// bslam_slam_sightings refuses it; whoever associates by himself gets a decision by position.
@@ -428,26 +397,6 @@ static void test_a_distance_by_another_class_is_not_held_against_it(void **state
     seen.beacon_class = 3;
     unit_assert_decided(&decide(&ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE,
                         -1);
-}
-
-static void test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known(void **state)
-{
-    bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
-    bslam_sighting_t seen[] = {unit_polar(1.5, 12, -1), unit_polar(0, 4, -1)};
-    seen[0].range_sd_m = BSLAM_R(0.8);
-    params.new_range_sd_m = BSLAM_R(0.7);
-    decision_t d = decide(&ekf, &params, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_FAR, -1);
-    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
-    d = decide(&ekf, &params, seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    seen[0].range_sd_m = BSLAM_R(0.6);
-    d = decide(&ekf, &params, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    seen[0] = unit_direction(1.5, -1);
-    d = decide(&ekf, &params, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_far_but_clearly_alike_is_not_new(void **state)
@@ -808,7 +757,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_a_class_counts_as_its_log_odds_say, setup),
         cmocka_unit_test_setup(test_a_distance_by_another_class_is_not_held_against_it, setup),
-        cmocka_unit_test_setup(test_a_far_sighting_starts_a_beacon_only_where_little_else_is_known, setup),
         cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),
         cmocka_unit_test_setup(test_what_was_matched_with_little_is_hardly_held, setup),
@@ -816,7 +764,6 @@ int main(void)
         cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
         cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
         cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
-        cmocka_unit_test_setup(test_what_is_unlike_all_that_a_young_machine_keeps_speaks_against_it, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_is_as_none, setup),
         cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
         cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),

@@ -1329,7 +1329,6 @@ static void test_sightings_of_a_lost_robot_are_deferred_until_it_has_a_pose(void
 
 int main(void)
 {
-    static int32_t similarity = BSLAM_FILTER_SIMILARITY;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_init_bad_parameter_is_refused_and_changes_nothing),
         cmocka_unit_test(test_odometry_every_refusal_changes_nothing),
@@ -1343,15 +1342,6 @@ int main(void)
         cmocka_unit_test(test_add_known_beacon_every_refusal_changes_nothing),
         cmocka_unit_test(test_add_known_beacon_to_a_full_map_is_refused_and_changes_nothing),
         cmocka_unit_test(test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing),
-        cmocka_unit_test_prestate(test_odometry_every_refusal_changes_nothing, &similarity),
-        cmocka_unit_test_prestate(test_sightings_wrong_count_is_refused_and_changes_nothing, &similarity),
-        cmocka_unit_test_prestate(test_sightings_wrong_time_is_refused_and_changes_nothing, &similarity),
-        cmocka_unit_test_prestate(test_sightings_older_than_the_history_are_refused_and_change_nothing,
-                                  &similarity),
-        cmocka_unit_test_prestate(test_sightings_bad_sighting_is_named_and_changes_nothing, &similarity),
-        cmocka_unit_test_prestate(test_add_known_beacon_every_refusal_changes_nothing, &similarity),
-        cmocka_unit_test_prestate(test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothing,
-                                  &similarity),
 
         cmocka_unit_test(test_sightings_new_and_matched_are_accounted_for),
         cmocka_unit_test(test_sightings_rejected_say_why),

@@ -76,7 +76,7 @@ def _stack_overflow(protected: bool) -> Measured:
     _built(_SHALLOW)
     image = BUILD_DIR / _SHALLOW
     if protected:
-        check = [sys.executable, "tools/check_image.py", str(image), "--objects", str(image.parent)]
+        check = [sys.executable, "-m", "tools.checks.check_image", str(image), "--objects", str(image.parent)]
         done = subprocess.run(check, cwd=ROOT, capture_output=True, text=True, check=False)
         said = done.stderr.strip().removeprefix(f"{image}: ").split(":")[0]
         return Measured(done.returncode == 1 and "bytes of stack at worst" in said, f"refused: {said}")

@@ -1,1 +1,0 @@
-"""bslam beside other people's programs: the same drives, timed and counted; tools/bench.py runs it."""
