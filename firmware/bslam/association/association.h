@@ -1,5 +1,5 @@
 /// Data association: which beacon does each sighting of a frame show? One signature for every method, so that
-/// they plug into the same place. MATH "Association".
+/// they plug into the same place. MATH "Data association".
 #ifndef BSLAM_ASSOCIATION_ASSOCIATION_H
 #define BSLAM_ASSOCIATION_ASSOCIATION_H
 

@@ -1,5 +1,5 @@
 /// Two beacons of the map in one place, of which one is a mistake, or no longer there; and two in one
-/// direction from the robot, of which one was hardly ever seen. MATH "Position and looks".
+/// direction from the robot, of which one was hardly ever seen. MATH "Position and appearance".
 #ifndef BSLAM_ASSOCIATION_DOUBLES_H
 #define BSLAM_ASSOCIATION_DOUBLES_H
 

@@ -1,6 +1,6 @@
 /// Innovations given others of the same frame: where the robot errs, all of a frame err together, so that one
 /// sighting that is matched makes the rest much surer. A growing Cholesky factor of their joint covariance.
-/// MATH "Position and looks".
+/// MATH "Position and appearance".
 #ifndef BSLAM_ASSOCIATION_GIVEN_H
 #define BSLAM_ASSOCIATION_GIVEN_H
 

@@ -1,5 +1,5 @@
 // Joint compatibility branch and bound: the pairing of a frame that explains the most sightings together.
-// MATH "Association".
+// MATH "Data association".
 #include <string.h>
 
 #include "bslam/association/association.h"

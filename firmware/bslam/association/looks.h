@@ -1,6 +1,6 @@
 /// What the beacons of a map look like: a machine each that learns from their sightings, and which beacons
 /// share one. The caller owns it and attaches it to a pipeline; who does without pays no RAM for it. MATH
-/// "Position and looks".
+/// "Position and appearance".
 ///
 ///     bslam_looks_init(&looks, seeds, seed_count)
 ///     bslam_slam_attach_looks(&slam, &looks)      and association = 3
@@ -94,7 +94,7 @@ bslam_real_t bslam_looks_class_odds(const bslam_looks_t *looks, const bslam_para
                                     uint8_t beacon_class);
 
 /// Log odds that beacon `index` is seen from this sector, against one that is not in the map: by those from
-/// which it was seen so far. 0 if none is known. MATH equation (47). O(sectors).
+/// which it was seen so far. 0 if none is known. MATH (43). O(sectors).
 bslam_real_t bslam_looks_side_odds(const bslam_looks_t *looks, const bslam_params_t *params, int index,
                                    int sector);
 

@@ -1,4 +1,4 @@
-/// How a beacon of the map and the robot stand to each other. MATH "Position and looks".
+/// How a beacon of the map and the robot stand to each other. MATH "Position and appearance".
 #ifndef BSLAM_ASSOCIATION_OUTLOOK_H
 #define BSLAM_ASSOCIATION_OUTLOOK_H
 

@@ -1,4 +1,4 @@
-// Position selects candidates, looks decide: paper Section IV. MATH "Position and looks".
+// Position selects candidates, looks decide: paper Section IV. MATH "Position and appearance".
 #include "bslam/association/association.h"
 #include "bslam/association/given.h"
 #include "bslam/association/internal.h"

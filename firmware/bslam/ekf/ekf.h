@@ -252,8 +252,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real
                                                     bslam_real_t sd_m, int *index);
 
 /// A ray that is seen with a distance becomes a sized beacon where on it the distance ends, of whose scale is
-/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "A beacon's
-/// own scale". O(n²).
+/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "Beacon scale
+/// states". O(n²).
 bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var);
 
@@ -274,7 +274,7 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
 void bslam_ekf_forget_map(bslam_ekf_t *ekf);
 
 /// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH
-/// "Direction only"). True if it did. O(n²) then.
+/// "Bearing-only"). True if it did. O(n²) then.
 bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
                           int index);
 

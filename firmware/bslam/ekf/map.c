@@ -1,5 +1,5 @@
-// The map: beacons come into the state, leave it, and turn from rays into points. MATH "Augment", "Direction
-// only".
+// The map: beacons come into the state, leave it, and turn from rays into points. MATH "State augmentation",
+// "Bearing-only".
 #include <string.h>
 
 #include "bslam/ekf/ekf.h"
@@ -357,7 +357,7 @@ static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
     ekf->mean[at + 1] = place->y_m;
 }
 
-/// Where on the ray at `at` a sighting's distance ends, MATH (48a), and how that goes with the
+/// Where on the ray at `at` a sighting's distance ends, MATH (38), and how that goes with the
 /// distance. False: nowhere, or so much across the ray that the distance does not tell.
 static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t range_m, int at,
                          place_t *place, bslam_real_t by_range[2])

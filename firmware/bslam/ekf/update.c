@@ -127,7 +127,7 @@ static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bsl
 // ---- innovation -------------------------------------------------------------------------------------------
 
 /// What the bend of the direction's model adds to its variance, to second order: with e = d ln(length) and b
-/// the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Direction only".
+/// the direction, e P eᵀ b P bᵀ + (e P bᵀ)². MATH "Bearing-only".
 static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon,
                                        const bslam_observation_t *seen, const bslam_row_t *bearing)
 {

@@ -22,8 +22,8 @@ static inline bslam_real_t bslam_range_variance_m2(const bslam_params_t *params,
 }
 
 /// The same of a beacon whose scale, by which all of its distances are too long, is known to this variance:
-/// 0 where the scale is a state value, bslam_unknown_scale_var where nobody knows it. MATH "A beacon's own
-/// scale".
+/// 0 where the scale is a state value, bslam_unknown_scale_var where nobody knows it. MATH "Beacon scale
+/// states".
 static inline bslam_real_t bslam_scaled_range_variance_m2(const bslam_params_t *params,
                                                           const bslam_sighting_t *sighting,
                                                           bslam_real_t range_m, bslam_real_t scale_var)
@@ -50,7 +50,7 @@ static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_params_t *par
 }
 
 /// By how much a sighting's variances grow because its error is much like that of the sighting of the same
-/// beacon before it, since when the robot went way_m; at most 100. MATH "Errors that stay alike".
+/// beacon before it, since when the robot went way_m; at most 100. MATH "Correlated errors".
 static inline bslam_real_t bslam_correlation_factor(const bslam_params_t *params, bslam_real_t way_m)
 {
     const bslam_real_t length_m = params->correlation_m;

@@ -1,4 +1,4 @@
-/// Who is seen, by what does not come from where the robot is: labels, or looks. MATH "Lost and found".
+/// Who is seen, by what does not come from where the robot is: labels, or looks. MATH "Recovery".
 #ifndef BSLAM_RECOVERY_IDENTITY_H
 #define BSLAM_RECOVERY_IDENTITY_H
 

@@ -1,5 +1,5 @@
 /// Notices that the robot is not where the filter has it, and finds it again in the same map: after it was
-/// carried away or slipped, and after switching on in a kept map. MATH "Lost and found".
+/// carried away or slipped, and after switching on in a kept map. MATH "Recovery".
 ///
 ///     bslam_recovery_init(&recovery);
 ///     bslam_recovery_sightings(&recovery, &slam, time_us, seen, count);    in place of bslam_slam_sightings

@@ -24,7 +24,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64
                                                        const bslam_sighting_t *sightings, int count,
                                                        int64_t *behind_us);
 
-// ---- trust.c: whether what is seen is a beacon. MATH "Position and looks" ---------------------------------
+// ---- trust.c: whether what is seen is a beacon. MATH "Position and appearance" ----------------------------
 
 /// A beacon that a sighting has just started: what that says for it.
 void bslam_slam_trust_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting);

@@ -1,4 +1,4 @@
-// What a beacon is taken for, and the scale that its distances have by that. MATH "A beacon's own scale".
+// What a beacon is taken for, and the scale that its distances have by that. MATH "Beacon scale states".
 #include "bslam/model/noise.h"
 #include "bslam/slam/internal.h"
 

@@ -1,5 +1,5 @@
 // Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and
-// looks".
+// appearance".
 #include "bslam/slam/internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);

@@ -2,7 +2,7 @@
 /// values at its knots, and chosen pairs of features a surface over a grid of knots. By explicit expansion of
 /// a feature into tents ("hat functions") that is a linear machine, of whose weights only two a feature and
 /// four a pair count for a sample: at the cost of a linear one it tells "about so high" from "higher" and
-/// "lower". MATH "Additive machine".
+/// "lower". MATH-CAMERA "Additive SVM".
 ///
 /// A machine is a view of constant tables, as in svm.h. Always float, in the double build too.
 #ifndef BSLAM_SVM_ADDITIVE_H

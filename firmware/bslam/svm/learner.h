@@ -1,5 +1,5 @@
 /// Support vector machines that learn on the robot: each tells one beacon from all others by its signature.
-/// MATH "Training on the robot".
+/// MATH "The learner".
 ///
 /// A machine keeps a few signatures of its beacon. Its training sets them against the hardest of all other
 /// machines' samples and of generic seeds, and starts from its last solution. Training is cut into pieces of

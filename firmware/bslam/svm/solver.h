@@ -1,5 +1,5 @@
 /// LIBLINEAR's dual coordinate descent for the linear support vector machine with squared hinge loss, on a
-/// small fixed set, one step at a time. MATH "Training on the robot".
+/// small fixed set, one step at a time. MATH "The learner".
 ///
 /// Finds the w that minimises |w|^2 / 2 + C sum of max(0, 1 - y w . x)^2, x with the constant 1 as its last
 /// feature. Hsieh, Chang, Lin, Keerthi, Sundararajan: A Dual Coordinate Descent Method for Large-scale Linear

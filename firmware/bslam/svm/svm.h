@@ -1,6 +1,6 @@
 /// Support vector machines that were trained elsewhere: decision values of a linear machine, or of a
 /// quadratic one by explicit expansion of its features, which leaves a dot product. Binary, or one against
-/// the rest for each of several classes. MATH "Support vector machine".
+/// the rest for each of several classes. MATH-CAMERA "SVM inference".
 ///
 /// A machine is a view of constant tables, in flash for one that tools/training/export.py wrote; the library
 /// copies nothing. Always float, in the double build too: what was trained is what runs.

@@ -26,7 +26,7 @@ bslam_real_t bslam_edge_variance(const bslam_outline_t *o, const bslam_camera_t 
 
 /// Least squares over both sides: each is seen at its height over the camera times the inverse distance. What
 /// errs alike for both, the horizon and the place, counts as one common error: where the place is not known,
-/// it is endless, and all that is left is the apparent height. MATH "Measuring".
+/// it is endless, and all that is left is the apparent height. MATH-CAMERA "Measuring".
 bslam_ahead_t bslam_ahead(const bslam_outline_t *o, const bslam_camera_t *camera, const bslam_size_t *size)
 {
     const bslam_real_t nearness = 1 + o->turn * o->middle;  // of the middle, to what is straight ahead

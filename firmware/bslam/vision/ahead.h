@@ -1,5 +1,5 @@
 /// How far ahead an object is, from where its outline's upper and lower side are seen. Inside of measure.c;
-/// MATH "Measuring".
+/// MATH-CAMERA "Measuring".
 #ifndef BSLAM_VISION_AHEAD_H
 #define BSLAM_VISION_AHEAD_H
 

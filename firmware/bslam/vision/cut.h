@@ -1,4 +1,4 @@
-/// What ends next to the frame's edge: cut off there, or whole. Inside of measure.c; MATH "Measuring".
+/// What ends next to the frame's edge: cut off there, or whole. Inside of measure.c; MATH-CAMERA "Measuring".
 #ifndef BSLAM_VISION_CUT_H
 #define BSLAM_VISION_CUT_H
 

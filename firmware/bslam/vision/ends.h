@@ -1,5 +1,5 @@
 /// Where the upright sides are that an outline missed: a detector's box may reach as far as a neighbour's
-/// edge, or end at a bar or a rib within the object. Inside of measure.c; MATH "Outline".
+/// edge, or end at a bar or a rib within the object. Inside of measure.c; MATH-CAMERA "Outline".
 ///
 /// An outline is looked for a few pixels around a box. Farther off, the level sides tell: along the object
 /// they are seen, beyond it they are not; and the colour, which is the object's or the wall's.

@@ -1,4 +1,4 @@
-/// A camera on the robot: which direction a pixel looks in, and the reverse. MATH "Lens".
+/// A camera on the robot: which direction a pixel looks in, and the reverse. MATH-CAMERA "Lens".
 ///
 /// Two kinds of lens, each with OpenCV's radial distortion, so that OpenCV's calibration can be used as it
 /// is: pinhole (calib3d, k1 and k2) and equidistant (calib3d's fisheye, k1 and k2: r = f theta (1 + k1 theta²

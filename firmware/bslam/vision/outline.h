@@ -1,5 +1,5 @@
 /// Where exactly an object's four sides are: a rough box in, an upright trapezoid out, to a fraction of a
-/// pixel. MATH "Outline".
+/// pixel. MATH-CAMERA "Outline".
 ///
 /// Sides are described in a plane that stands upright at unit distance before the camera and faces the
 /// object, so that neither the lens nor the camera's pitch bends them: upright edges of things in the room

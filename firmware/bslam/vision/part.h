@@ -1,4 +1,4 @@
-/// Is an outline that of a part of something larger? Inside of measure.c; MATH "Outline".
+/// Is an outline that of a part of something larger? Inside of measure.c; MATH-CAMERA "Outline".
 ///
 /// A window's bar or a radiator's rib looks like a side. But a whole object's upper and lower side end where
 /// its upright sides are; where they go on beyond, the outline is that of a part, and so is its middle.

@@ -13,7 +13,7 @@ enum { STRAIGHT_PLACES = 15 };
 
 // Which line is the side: weights of the contrast along it and next to it, from three places outside to one
 // inside. The contrast is C / (C + HALF_CONTRAST). The weights are a multinomial logistic regression's over
-// training worlds: beyond the side the wall is quiet, within it the object has edges of its own. MATH
+// training worlds: beyond the side the wall is quiet, within it the object has edges of its own. MATH-CAMERA
 // "Outline".
 enum { TAPS = 5, TAPS_OUTSIDE = 3 };
 static const float TAP[TAPS] = {-2.2f, -2.6f, 2.6f, 5.0f, 2.1f};

@@ -1,5 +1,5 @@
 /// One side of an object in the half-resolution copy: which line in the frame it is, and how sure that is.
-/// Inside of outline.c; MATH "Outline".
+/// Inside of outline.c; MATH-CAMERA "Outline".
 ///
 /// A side is crossed by scan lines: rows for an upright side, columns for a level one. Boundary p of a scan
 /// line lies between pixels p - 1 and p of the half-resolution copy, at 2 p - 0.5 in the whole frame. On each

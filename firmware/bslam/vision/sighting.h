@@ -1,4 +1,4 @@
-/// What a filter is told of a thing that the front end saw. MATH "A beacon's own scale".
+/// What a filter is told of a thing that the front end saw. MATH-CAMERA "Sighting noise".
 #ifndef BSLAM_VISION_SIGHTING_H
 #define BSLAM_VISION_SIGHTING_H
 

@@ -1,5 +1,5 @@
 /// What an object looks like, in 71 numbers: the paper's feature vector, by which beacons are told apart.
-/// MATH "Signature".
+/// MATH-CAMERA "Signature".
 ///
 /// Taken from the half-resolution copy inside the outline. Colours are divided by the running colour of the
 /// wall, so that neither the light's strength nor its colour, nor the camera's exposure, changes them; then

@@ -1,5 +1,5 @@
 /// How far the robot turned between two frames of a camera, by how far the pattern of the columns went
-/// sideways. MATH "Turning seen".
+/// sideways. MATH-CAMERA "Visual gyro".
 ///
 ///     bslam_turns_init(&turns, &vision)                   once, after bslam_vision_init
 ///     bslam_turns_see(&turns, &vision, &turn)             after each bslam_vision_end

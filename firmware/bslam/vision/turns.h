@@ -1,5 +1,5 @@
 /// Which way a body is turned: by its level sides, by how wide its front may be, and by what front and flank
-/// look like. Inside of body.c; MATH "Outline".
+/// look like. Inside of body.c; MATH-CAMERA "Outline".
 #ifndef BSLAM_VISION_TURNS_H
 #define BSLAM_VISION_TURNS_H
 

@@ -1,5 +1,5 @@
 /// A gyroscope made of images: turns between frames of one camera each, which may overlap in time, become
-/// the robot's turn rate from each step to the next. MATH "Turning seen".
+/// the robot's turn rate from each step to the next. MATH-CAMERA "Visual gyro".
 ///
 ///     bslam_visual_gyro_init(&gyro, BSLAM_VISUAL_GYRO_SD_RADPS)
 ///     bslam_visual_gyro_advance(&gyro, time_us, speed_mps, speed_sd_mps)    at each reading of the wheels,

@@ -514,7 +514,7 @@ static void test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model
 
 static void test_innovation_in_direction_only_grows_with_doubt_of_length_and_direction(void **state)
 {
-    // MATH "Direction only": e P eᵀ b P bᵀ + (e P bᵀ)², where b is the direction's row of H and e the
+    // MATH "Bearing-only": e P eᵀ b P bᵀ + (e P bᵀ)², where b is the direction's row of H and e the
     // gradient of the log of the length: a point's distance, a ray's |g|, g = inverse (anchor - sensor) +
     // direction.
     bslam_params_t params = params_of(0, false);
