@@ -8,8 +8,7 @@ DOCS = ROOT / "docs"
 MATH = (DOCS / "MATH.md").read_text(encoding="utf-8")
 CAMERA = (DOCS / "MATH-CAMERA.md").read_text(encoding="utf-8")
 BOTH = {"MATH": MATH, "MATH-CAMERA": CAMERA}
-FIRMWARE = ROOT / "firmware" / "bslam"
-CORE_FILES = sorted(FIRMWARE.rglob("*.[ch]"))
+C_FILES = sorted((ROOT / "firmware").rglob("*.[ch]"))
 
 # The estimator's equations are numbered 1, 2, ..., the camera's C1, C2, ...
 EQUATION = re.compile(r"\\qquad \\mathrm\{\((C?\d+)\)\}")
@@ -18,7 +17,6 @@ LINKED_FUNCTION = re.compile(r"\[`(\w+)\(\)`\]\(([^)]+)\)")
 NAMED_FUNCTION = re.compile(r"`(\w+)\(\)`")
 # MATH "Section", "Section" or MATH 24 or MATH (24), in a comment or in the text of a parameter.
 REFERENCE = re.compile(r'\b(MATH(?:-CAMERA)?) ((?:"[^"]+"(?:, )?)+|\(?C?\d+\)?)')
-DESIGN_REFERENCE = re.compile(r'docs/DESIGN\.md, "([^"]+)"')
 
 
 def headings(text):
@@ -39,11 +37,13 @@ def joined_comments(path):
     return re.sub(r"\n\s*///? ?", " ", text)
 
 
-def references(pattern):
-    """(file, what the match names) of every reference in the firmware and its tests."""
-    files = CORE_FILES + sorted((ROOT / "tests" / "unit").rglob("*.[ch]"))
+def references():
+    """(file, (document, what it names)) of every reference in the firmware and its tests."""
+    files = C_FILES + sorted((ROOT / "tests" / "unit").rglob("*.[ch]"))
     return [
-        (path.relative_to(ROOT), found) for path in files for found in pattern.findall(joined_comments(path))
+        (path.relative_to(ROOT), found)
+        for path in files
+        for found in REFERENCE.findall(joined_comments(path))
     ]
 
 
@@ -65,7 +65,7 @@ def test_every_equation_has_a_number():
 def test_every_function_that_math_names_exists():
     python_files = sorted((ROOT / "host_sim" / "bslam").rglob("*.py"))
     for name in set(NAMED_FUNCTION.findall(MATH + CAMERA)):
-        assert any(defines(path, name) for path in [*CORE_FILES, *python_files]), name
+        assert any(defines(path, name) for path in [*C_FILES, *python_files]), name
 
 
 def test_every_function_that_math_links_stands_in_the_file():
@@ -105,19 +105,13 @@ def test_every_section_that_the_text_refers_to_exists():
 
 
 def test_every_reference_of_the_code_to_math_resolves():
-    found = references(REFERENCE)
+    found = references()
     assert len(found) > 10
     for path, (name, words) in found:
         if words.startswith('"'):
             assert set(re.findall(r'"([^"]+)"', words)) <= headings(BOTH[name]), (path, words)
         else:
             assert words.strip("()") in equations(BOTH[name]), (path, words)
-
-
-def test_every_reference_of_the_code_to_design_resolves():
-    sections = headings((DOCS / "DESIGN.md").read_text(encoding="utf-8"))
-    for path, section in references(DESIGN_REFERENCE):
-        assert section in sections, (path, section)
 
 
 def test_the_bend_of_the_model_is_equation_24():
