@@ -204,15 +204,21 @@ def run_sweep(
         result.stopped = "stopped"
     except BrokenExecutor:
         result.stopped = "a process died (killed, or out of memory); fewer --jobs need less memory"
-    kept = store.entries()
-    for name, known in beside.items():
-        if name in kept and known in kept:
-            compare_with_known(kept[name], kept[known], store.series(name), store.series(known))
+    kept = _compared(store, beside)
     result.entries = [kept[job.name] for job in jobs if job.name in kept]
     result.missing = len(jobs) - len(result.entries) - len(result.failed)
     if len(result.entries) == len(jobs):
         store.finish()
     return result
+
+
+def _compared(store: Store, beside: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """All entries that are kept, held against known association where that ran beside."""
+    kept = store.entries()
+    for name, known in beside.items():
+        if name in kept and known in kept:
+            compare_with_known(kept[name], kept[known], store.series(name), store.series(known))
+    return kept
 
 
 def beside_known(jobs: Sequence[Job]) -> dict[str, str]:
