@@ -33,7 +33,7 @@ FRAMES_MAX = 12
 
 
 def build_plugin() -> None:
-    source = ROOT / "tools" / "qemu_profile.c"
+    source = Path(__file__).with_name("qemu_profile.c")
     subprocess.run(
         ["cc", "-std=c11", "-O1", "-Wall", "-Wextra", "-shared", "-fPIC", str(source), "-o", str(PLUGIN)],
         check=True,
