@@ -1,5 +1,5 @@
 # What a filter step costs, in instructions as callgrind counts them on the host: unlike time, the same from
-# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, tools/bench/bench.py counts it, and
+# run to run. Instructions are not cycles. tests/bench/bench_step.c is the step, bench.py counts it, and
 # runs other people's programs beside it, as far as they are installed.
 
 .PHONY: bench

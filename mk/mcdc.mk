@@ -1,7 +1,7 @@
 # Modified condition/decision coverage of the core: each condition of a decision has been shown to change its
 # outcome by itself. clang instruments the core, as one shared library, so that every program that runs it
 # adds to one account: the C unit tests to that of build/mcdc/unit, the inputs that fuzzing kept to that of
-# build/mcdc/replay, where the core has the small sizes of tests/fuzz/sizes.h. tools/proofs/mcdc.py prints them.
+# build/mcdc/replay, where the core has the small sizes of tests/fuzz/sizes.h. mcdc.py prints them.
 
 MCDC_COVERAGE := -fprofile-instr-generate -fcoverage-mapping -fcoverage-mcdc
 MCDC_FLAGS_unit := $(UNIT_FLAGS_float)

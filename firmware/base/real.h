@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include "base/config.h"
+#include "config.h"
 
 #if BSLAM_REAL_DOUBLE
 typedef double bslam_real_t;

@@ -6,7 +6,7 @@
 #ifndef BSLAM_CONFIG_H
 #define BSLAM_CONFIG_H
 
-#include "base/config.h"
+#include "config.h"
 
 /// Beacons that the map holds, provisional ones included. RAM grows with the square: `make sizes` prints it.
 #ifndef BSLAM_BEACONS_MAX

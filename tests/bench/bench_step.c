@@ -1,5 +1,5 @@
 // One filter step on a map of BSLAM_BEACONS_MAX beacons: an odometry reading and a frame of 2, 3 and 4
-// sightings in turn, identity known, all beacons mapped beforehand. tools/bench/bench.py counts the instructions of
+// sightings in turn, identity known, all beacons mapped beforehand. bench.py counts the instructions of
 // measured_step.
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-// The vision front end on one picture after the other. tools/bench/bench_vision.py makes the pictures and counts
+// The vision front end on one picture after the other. bench_vision.py makes the pictures and counts
 // the instructions of measured_frame.
 //
 //     vision pinhole|wide WIDTH FILE    FILE: frames of WIDTH x 3/4 WIDTH in RGB565, the camera's rows one

@@ -1,4 +1,4 @@
-// A robot without a camera, for tools/checks/sizes_doc.py to link: what of the library the calls of its loop take.
+// A robot without a camera, for sizes_doc.py to link: what of the library the calls of its loop take.
 // WITH_LOOKS 1: it learns what beacons look like, too.
 #include "bslam/bslam.h"
 

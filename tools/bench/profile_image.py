@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from bslam.commands.arguments import seeds_range
-from bslam.target.lines import BUILD_DIR, ROOT
+from bslam.target.lines import BUILD_DIR
 from tools.checks.check_image import output_of
 from tools.checks.sizes_doc import FRAMES, INSTRUCTIONS_A_TICK, PIXELS, WORLD_SEED, picture_loader
 from tools.proofs.run_image import run_image
@@ -33,7 +33,7 @@ FRAMES_MAX = 12
 
 
 def build_plugin() -> None:
-    source = ROOT / "tools" / "qemu_profile.c"
+    source = Path(__file__).with_name("qemu_profile.c")
     subprocess.run(
         ["cc", "-std=c11", "-O1", "-Wall", "-Wextra", "-shared", "-fPIC", str(source), "-o", str(PLUGIN)],
         check=True,

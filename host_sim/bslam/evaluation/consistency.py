@@ -106,3 +106,11 @@ def half_interval_95(values: Sequence[float]) -> float | None:
     third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
     quantile = {1: 12.7062, 2: 4.3027}.get(dof, z + first / dof + second / dof**2 + third / dof**3)
     return float(quantile * np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def share_interval_95(count: int, total: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a binomial share, of `count` of `total`."""
+    z2 = 1.959964**2
+    middle = (count + 0.5 * z2) / (total + z2)
+    half = float(np.sqrt(z2 * (count * (total - count) / total + 0.25 * z2))) / (total + z2)
+    return max(0.0, middle - half), min(1.0, middle + half)

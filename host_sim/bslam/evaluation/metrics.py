@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bslam.evaluation.align import Rigid, fit_rigid, fit_scale
 from bslam.evaluation.bound import has_bound, mean_bound_m
 from bslam.evaluation.consistency import POSE_95, nees
+from bslam.evaluation.failure import NEES_MAX, is_exact, map_one_to_one, was_off
 from bslam.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
 from bslam.evaluation.trace import SightingCounts, Trace
 from bslam.evaluation.truth import dead_reckoning, is_dense, odometry_increments, truth_at
@@ -82,7 +83,7 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
     else:
         entry["step_us_median"] = trace.step_us_median
     if log.beacons is not None:
-        entry["beacons_true"] = _beacons_true(log)
+        entry["beacons_true"] = int(_often_sighted(log).sum())
     if evaluation is not None:
         entry |= _position_figures(evaluation)
         entry |= _map_figures(log, trace, evaluation)
@@ -91,7 +92,25 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         if has_bound(log, options) and np.isfinite(evaluation.truth).all():
             entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
         entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
+        if log.beacons is not None and (log.sightings.beacon_id >= 0).any():
+            entry["map_one_to_one"] = _map_one_to_one(log, trace, evaluation)
+    entry["failed_by"] = _failures(entry, evaluation)
+    entry["failed"] = bool(entry["failed_by"])
     return entry
+
+
+def _failures(entry: dict[str, Any], evaluation: Evaluation | None) -> list[str]:
+    """Why a run failed, without another one beside it."""
+    failures = ["diverged"] if entry["diverged"] else []
+    if "map_one_to_one" in entry and not is_exact(entry["map_one_to_one"]):
+        failures.append("map")
+    if evaluation is not None:
+        if was_off(evaluation.time_s, evaluation.error_m):
+            failures.append("off")
+        last = evaluation.nees[_last_window(evaluation)]
+        if np.isfinite(last).any() and np.nanmean(last) > NEES_MAX:
+            failures.append("nees")
+    return failures
 
 
 def _count_figures(counts: SightingCounts) -> dict[str, int]:
@@ -175,11 +194,25 @@ def _path_m(log: Log, evaluation: Evaluation | None) -> float:
     return float(np.sum(np.hypot(*np.diff(known, axis=0).T)))
 
 
-def _beacons_true(log: Log) -> int:
+def _often_sighted(log: Log) -> NDArray[np.bool_]:
+    """Which of the true beacons count, (t,)."""
     assert log.beacons is not None
     sighted = log.sightings.beacon_id[log.sightings.mappable]
     counts = np.sum(sighted[:, None] == log.beacons.beacon_id[None, :], axis=0)
-    return int(np.sum(counts >= BEACON_SIGHTINGS))
+    result: NDArray[np.bool_] = counts >= BEACON_SIGHTINGS
+    return result
+
+
+def _map_one_to_one(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, int]:
+    assert log.beacons is not None
+    confirmed_m = np.array([(one.x_m, one.y_m) for one in trace.beacons if one.confirmed]).reshape(-1, 2)
+    true_m = np.column_stack([log.beacons.x_m, log.beacons.y_m])
+    return map_one_to_one(evaluation.map_to_truth.points(confirmed_m), true_m, _often_sighted(log))
+
+
+def _last_window(evaluation: Evaluation) -> NDArray[np.bool_]:
+    late: NDArray[np.bool_] = evaluation.time_s > evaluation.time_s[-1] - WINDOW_S
+    return late
 
 
 def _position_figures(evaluation: Evaluation) -> dict[str, Any]:
@@ -194,7 +227,7 @@ def _position_figures(evaluation: Evaluation) -> dict[str, Any]:
             "rmse": float(np.sqrt(np.nanmean(error_m**2))),
         }
     figures |= _mean_if_any("position_error_first_50s_m", error_m[time_s <= WINDOW_S])
-    figures |= _mean_if_any("position_error_last_50s_m", error_m[time_s > time_s[-1] - WINDOW_S])
+    figures |= _mean_if_any("position_error_last_50s_m", error_m[_last_window(evaluation)])
     figures |= _mean_if_any("dead_reckoning_error_m", evaluation.dead_reckoning_error_m)
     figures |= _mean_if_any("nees_mean", evaluation.nees)
     inside = np.where(np.isfinite(evaluation.nees), evaluation.nees < POSE_95, np.nan)

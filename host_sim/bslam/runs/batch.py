@@ -204,7 +204,7 @@ def write_files(
 
 def failed_entry(job: Job, error: str) -> dict[str, Any]:
     words = describe(job.options) | {"name": job.name, "scenario": job.source.name}
-    return words | {"diverged": True, "error": error}
+    return words | {"diverged": True, "failed": True, "error": error}
 
 
 def outcomes_of(

@@ -11,27 +11,33 @@ import hashlib
 import json
 import sqlite3
 import sys
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from textwrap import shorten
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 import bslam
 from bslam.core.builds import FIRMWARE_DIR
 from bslam.errors import BslamError
 from bslam.runs.batch import Job, Outcome, outcomes_of, prepare
+from bslam.evaluation.failure import was_off
+from bslam.options import RunOptions
 from bslam.runs.output import finite, write_atomically
+from bslam.runs.sources import ScenarioSource
 
 STORE: Final = "sweep.sqlite"
 PARQUET: Final = "results.parquet"
 _FINISHED: Final = "finished"
 _TABLES: Final = """
 create table if not exists plan (word text primary key, value text not null);
-create table if not exists runs (name text primary key, entry text not null);
+create table if not exists runs (name text primary key, entry text not null, series blob);
 """
 _LOG_INTERVAL_S: Final = 30.0  # between lines of progress where there is no terminal
 
@@ -75,8 +81,7 @@ class Store:
             with self._trouble():
                 self._connection.execute("pragma locking_mode = exclusive")
                 self._connection.execute("begin exclusive")
-                for statement in _TABLES.split(";"):
-                    self._connection.execute(statement)
+                self._make_tables()
                 self._agree(plan)
                 self._connection.execute("commit")
         except BaseException:
@@ -93,6 +98,10 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _make_tables(self) -> None:
+        for statement in _TABLES.split(";"):
+            self._connection.execute(statement)
+
     def _agree(self, plan: Mapping[str, str]) -> None:
         then = dict(self._connection.execute("select word, value from plan"))
         finished = then.pop(_FINISHED, None)
@@ -105,7 +114,8 @@ class Store:
             )
         if changed:
             self._connection.execute("delete from plan")
-            self._connection.execute("delete from runs")
+            self._connection.execute("drop table runs")  # another version's may have other columns
+            self._make_tables()
             self._connection.executemany("insert into plan values (?, ?)", plan.items())
 
     def finish(self) -> None:
@@ -119,11 +129,17 @@ class Store:
             rows = self._connection.execute("select name, entry from runs").fetchall()
         return {name: json.loads(entry) for name, entry in rows}
 
-    def keep(self, name: str, entry: Mapping[str, Any]) -> None:
-        """Keep a run that is finished; one that is kept stays as it is."""
+    def keep(self, name: str, entry: Mapping[str, Any], series: bytes | None = None) -> None:
+        """Keep a run that is finished, and its error over time; one that is kept stays as it is."""
         text = json.dumps(finite(dict(entry)), allow_nan=False)
         with self._trouble():
-            self._connection.execute("insert or ignore into runs values (?, ?)", (name, text))
+            self._connection.execute("insert or ignore into runs values (?, ?, ?)", (name, text, series))
+
+    def series(self, name: str) -> NDArray[np.float64]:
+        """The kept time in s and error in m of a run, (2, n + 1)."""
+        with self._trouble():
+            (packed,) = self._connection.execute("select series from runs where name = ?", (name,)).fetchone()
+        return np.frombuffer(zlib.decompress(packed), np.float32).reshape(2, -1).astype(np.float64)
 
     @contextlib.contextmanager
     def _trouble(self) -> Iterator[None]:
@@ -163,6 +179,8 @@ def run_sweep(
 ) -> SweepResult:
     """Make the runs that are not kept yet, and keep each as it is finished. Raises BslamError."""
     out = out.absolute()
+    beside = beside_known(jobs)
+    compared = {*beside, *beside.values()}
     kept = store.entries()
     todo = [job for job in jobs if job.name not in kept]
     result = SweepResult([], kept=len(jobs) - len(todo))
@@ -179,18 +197,63 @@ def run_sweep(
                 if outcome.failed:
                     result.failed.append(outcome)
                 else:
-                    store.keep(todo[index].name, outcome.entry)
+                    name = todo[index].name
+                    store.keep(name, outcome.entry, _packed(outcome) if name in compared else None)
                 bar.update()
     except KeyboardInterrupt:
         result.stopped = "stopped"
     except BrokenExecutor:
         result.stopped = "a process died (killed, or out of memory); fewer --jobs need less memory"
-    kept = store.entries()
+    kept = _compared(store, beside)
     result.entries = [kept[job.name] for job in jobs if job.name in kept]
     result.missing = len(jobs) - len(result.entries) - len(result.failed)
     if len(result.entries) == len(jobs):
         store.finish()
     return result
+
+
+def _compared(store: Store, beside: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """All entries that are kept, held against known association where that ran beside."""
+    kept = store.entries()
+    for name, known in beside.items():
+        if name in kept and known in kept:
+            compare_with_known(kept[name], kept[known], store.series(name), store.series(known))
+    return kept
+
+
+def beside_known(jobs: Sequence[Job]) -> dict[str, str]:
+    """Of each run the one with known association on the same drive, by name, where there is another one."""
+    known = {
+        _drive(job): job.name for job in jobs if job.maker is None and job.options.association_name == "known"
+    }
+    pairs = {job.name: known[drive] for job in jobs if (drive := _drive(job)) in known}
+    return {name: other for name, other in pairs.items() if name != other}
+
+
+def _drive(job: Job) -> tuple[str, RunOptions]:
+    where = job.source.scenario if isinstance(job.source, ScenarioSource) else job.source.name
+    return where, replace(job.options, association="known", wrong_identity_rate=0.0)
+
+
+def _packed(outcome: Outcome) -> bytes:
+    """As `Store.series` reads it."""
+    return zlib.compress(np.stack([outcome.time_s, outcome.error_m]).astype(np.float32).tobytes())
+
+
+def compare_with_known(
+    entry: dict[str, Any],
+    known: Mapping[str, Any],
+    series: NDArray[np.float64],
+    known_series: NDArray[np.float64],
+) -> None:
+    """Adds the ratio of the mean errors, and judges anew whether the run was off; series as `Store`'s."""
+    if series.shape != known_series.shape or "position_error_m" not in known:
+        return
+    entry["ratio_to_known"] = entry["position_error_m"]["mean"] / known["position_error_m"]["mean"]
+    entry["failed_by"] = [why for why in entry["failed_by"] if why != "off"]
+    if was_off(series[0], series[1], known_series[1]):
+        entry["failed_by"].append("off")
+    entry["failed"] = bool(entry["failed_by"])
 
 
 def write_parquet(path: Path, entries: Sequence[Mapping[str, Any]]) -> None:

@@ -1,5 +1,5 @@
 // What a program that is timed beside bslam offers: four functions, of which drive.c measures one. All
-// programs read the same drive (tools/bench/peers/drives.py writes it), so that they differ in nothing but these.
+// programs read the same drive (peers/drives.py writes it), so that they differ in nothing but these.
 #ifndef BENCH_PEER_H
 #define BENCH_PEER_H
 

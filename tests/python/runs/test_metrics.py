@@ -54,6 +54,31 @@ def test_diverged_looks_at_the_last_1000_steps(made, log):
         assert figures(log, made.trace(poses, step_times_us(log)))["diverged"] is expected
 
 
+def test_a_run_fails_by_what_is_named(made, log):
+    exact = [
+        made.map_beacon(uid, *one)
+        for uid, one in enumerate(
+            zip(made.beacons.beacon_id, made.beacons.x_m, made.beacons.y_m, strict=True)
+        )
+    ]
+    poses, times_us = true_poses(log), step_times_us(log)
+    good = figures(log, made.trace(poses, times_us, exact))
+    assert good["map_one_to_one"] == {"matched": 3, "doubled": 0, "missing": 0, "false": 0}
+    assert (good["failed"], good["failed_by"]) == (False, [])
+    lacking = figures(log, made.trace(poses, times_us, exact[:2]))
+    assert lacking["map_one_to_one"]["missing"] == 1 and lacking["failed_by"] == ["map"]
+    off = poses.copy()
+    off[500:640, 0] += 1.1  # 5.6 s
+    assert figures(log, made.trace(off, times_us, exact))["failed_by"] == ["off"]
+    sure = np.tile(1e-4 * np.eye(3), (STEPS + 1, 1, 1))
+    late = poses.copy()
+    late[-1200:, 0] += 0.05  # NEES 25
+    assert figures(log, made.trace(late, times_us, exact, sure))["failed_by"] == ["nees"]
+    late[-1:, 0] += 3.0
+    entry = figures(log, made.trace(late, times_us, exact, sure))
+    assert entry["failed"] is True and entry["failed_by"] == ["diverged", "nees"]
+
+
 def test_what_is_not_finite_is_diverged(made, log):
     poses = true_poses(log)
     poses[100] = np.nan

@@ -7,13 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
 
 from bslam.cli import main
 from bslam.errors import BslamError
-from bslam.runs.sweep import Store, forget
+from bslam.runs.sweep import Store, compare_with_known, forget
 from tools.proofs import kill_sweep
 
 STILL = """
@@ -74,6 +75,41 @@ def test_sweep_file_makes_every_combination_and_a_table(
     assert sorted(path.name for path in out.iterdir()) == [
         "results.parquet", "summary.json", "sweep.sqlite", "sweep.txt"
     ]  # fmt: skip
+
+
+def test_sweep_holds_other_associations_against_known_on_the_same_drive(sweep: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    sweep.write_text(sweep.read_text().replace('"known"', '["known", "mahalanobis"]'))
+    assert sweep_into(out, sweep) == 0
+    made = {(run["association"], run["seed"], run["sigma_mps"], run["parameters"]["gate_d2"]): run
+            for run in runs(out)}  # fmt: skip
+    assert len(made) == 16
+    for (association, *drive), run in made.items():
+        known = made["known", *drive]["position_error_m"]["mean"]
+        ratio = None if association == "known" else run["position_error_m"]["mean"] / known
+        assert run.get("ratio_to_known") == (ratio if ratio is None else pytest.approx(ratio))
+        assert run["failed"] is (run["failed_by"] != [])
+    first, *lines = (out / "sweep.txt").read_text().splitlines()
+    assert all(word in first for word in ("/ known", "wrong %", "exact", "failed"))
+    assert all((" +- " in line) == ("mahalanobis" in line) for line in lines)
+    before = runs(out)
+    assert sweep_into(out, sweep) == 0  # from what is kept
+    assert runs(out) == before
+
+
+def test_compare_with_known_forgives_what_known_does_too() -> None:
+    time_s = np.arange(0.0, 20.0, 0.1)
+    entry = {"position_error_m": {"mean": 1.5}, "failed_by": ["off"], "failed": True}
+    known = {"position_error_m": {"mean": 0.6}}
+    compare_with_known(entry, known, *(np.stack([time_s, 0 * time_s + off]) for off in (1.5, 0.6)))
+    assert entry == {
+        "position_error_m": {"mean": 1.5},
+        "failed_by": [],
+        "failed": False,
+        "ratio_to_known": 2.5,
+    }
+    compare_with_known(entry, known, *(np.stack([time_s, 0 * time_s + off]) for off in (1.5, 0.4)))
+    assert entry["failed_by"] == ["off"] and entry["failed"] is True
 
 
 def test_sweep_killed_in_the_middle_loses_nothing_and_counts_nothing_twice(tmp_path: Path) -> None:
