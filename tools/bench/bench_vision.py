@@ -19,7 +19,7 @@ from tools.training.render_set import RIGS, camera_of, render_world
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "bench"
 WIDTHS = (320, 160)
-PER_PIXEL_MAX = 32
+PER_PIXEL_MAX = 75
 STAGES = {
     "rows": ("bslam_thumbnail_row", "bslam_thumbnail_row_doubled"),
     "room": ("bslam_background_tones", "bslam_background_learn", "bslam_background_floor_line"),
