@@ -54,7 +54,7 @@ SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inl
 define core_rules
 CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
 CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(call FLAGS_FOR,$(1)) -Os -g \
-    $(SMALLER) -fno-math-errno -DBSLAM_PARAM_MEANINGS=0 \
+    $(SMALLER) -fno-math-errno -DBSLAM_SETTING_MEANINGS=0 \
     -ffunction-sections -fdata-sections \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(call STACK_MAX_FOR,$(1))
 

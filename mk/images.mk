@@ -23,7 +23,7 @@ PROGRAMS := robot selftest
 # no errno. The stack that each function takes is for tools/checks/check_image.py.
 IMAGE_LEVEL := -O2
 IMAGE_FLAGS := $(IMAGE_LEVEL) -g -ffunction-sections -fdata-sections -fno-math-errno -fstack-usage \
-    -DBSLAM_PARAM_MEANINGS=0
+    -DBSLAM_SETTING_MEANINGS=0
 
 IMAGE_LINK := -nostartfiles -Wl,--gc-sections -Wl,--build-id=sha1 \
     -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments
@@ -35,9 +35,8 @@ define board_rules
 BOARD_CC_$(1) := $(call TOOLS_FOR,$(BOARD_CORE_$(1)))gcc $(call FLAGS_FOR,$(BOARD_CORE_$(1)))
 BOARD_COMPILE_$(1) := $$(BOARD_CC_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT)
-BOARD_LIBRARIES_$(1) := bslam link $(if $(findstring SESSION_VISION=1,$(BOARD_FLAGS_$(1))),vision)
-BOARD_OBJECTS_$(1) := $$(patsubst %.c,build/$(1)/%.o,$(ROBOT_SOURCES) $(BOARD_SOURCES_$(1)) \
-    $$(sort $$(foreach library,$$(BOARD_LIBRARIES_$(1)),$$(LIBRARY_SOURCES_$$(library)))))
+BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(ROBOT_SOURCES) $(BOARD_SOURCES_$(1)) \
+    $(sort $(foreach library,$(or $(BOARD_LIBRARIES_$(1)),$(LIBRARIES)),$(LIBRARY_SOURCES_$(library)))))
 BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
 BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
 

@@ -13,7 +13,7 @@
 
 static bslam_slam_t slam;
 static bslam_appearance_t appearance;
-static bslam_params_t params;
+static bslam_settings_t settings;
 static int64_t time_us;
 static float signatures[BSLAM_BEACONS_MAX][BSLAM_SAMPLE_FEATURES];
 static uint32_t random_state = 1;
@@ -52,17 +52,17 @@ static void look_at(int first, int count)
 static void start(int beacons, int association)
 {
     int bad_id = 0;
-    params.association = association;
-    measure_need(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK);
+    settings.association = association;
+    measure_need(bslam_slam_init(&slam, &settings, &bad_id) == BSLAM_OK);
     time_us = 0;
-    params.association = 0;
+    settings.association = 0;
     for (int b = 0; b < beacons; b++) {
         const bslam_sighting_t sighting = see(b);
-        slam.params.association = 0;
+        slam.settings.association = 0;
         measure_need(bslam_slam_sightings(&slam, time_us, &sighting, 1) == BSLAM_OK);
         time_us++;
     }
-    slam.params.association = association;
+    slam.settings.association = association;
     measure_need(bslam_slam_beacon_count(&slam) == beacons);
 }
 
@@ -98,16 +98,16 @@ static uint32_t filter_ticks(int beacons)
         }
         bool good = true;
         const uint32_t began = port_ticks();
-        bslam_ekf_predict(&slam.ekf, &slam.params, &motion, &moved);
+        bslam_ekf_predict(&slam.ekf, &slam.settings, &motion, &moved);
         for (int i = 0; i < SEEN; i++) {
-            good = bslam_ekf_innovation(&slam.ekf, &slam.params, &mount, &seen[i], first + i,
+            good = bslam_ekf_innovation(&slam.ekf, &slam.settings, &mount, &seen[i], first + i,
                                         &innovations[i]) == BSLAM_OK &&
                    good;
         }
         for (int i = 0; i < SEEN; i++) {
-            good = bslam_ekf_fuse(&slam.ekf, &slam.params, &innovations[i], &fusion) == BSLAM_OK && good;
+            good = bslam_ekf_fuse(&slam.ekf, &slam.settings, &innovations[i], &fusion) == BSLAM_OK && good;
         }
-        bslam_ekf_correct(&slam.ekf, &slam.params);
+        bslam_ekf_correct(&slam.ekf, &slam.settings);
         ticks += port_ticks() - began;
         measure_need(good);
     }
@@ -142,8 +142,8 @@ static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
         for (int i = 0; i < SEEN; i++) {
             seen[i] = see((k * SEEN + i) % beacons);
         }
-        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.params, &appearance, &bslam_appearance_answers,
-                                              &mount,    seen,         SEEN,   0};
+        const bslam_sighting_frame_t frame = {
+            &slam.ekf, &slam.settings, &appearance, &bslam_appearance_answers, &mount, seen, SEEN, 0};
         const uint32_t began = port_ticks();
         associate(&frame, matches);
         ticks += port_ticks() - began;
@@ -181,9 +181,9 @@ static uint32_t train_ticks(int classifiers)
 
 static void measure_filter(int beacons, int velocity_states)
 {
-    bslam_params_default(&params);
-    params.velocity_states = velocity_states;
-    params.confirm_window_us = 0;
+    bslam_settings_default(&settings);
+    settings.velocity_states = velocity_states;
+    settings.confirm_window_us = 0;
     start(beacons, 0);
     (void)step_ticks(beacons, SEEN);  // until the covariance has no zeros left
     measure_report(velocity_states != 0 ? "predict_velocity" : "predict", beacons, step_ticks(beacons, 0));

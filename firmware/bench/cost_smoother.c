@@ -26,15 +26,15 @@ static uint32_t random_state;
 
 static void start(void)
 {
-    bslam_params_t params;
+    bslam_settings_t settings;
     int bad_id = 0;
-    bslam_params_default(&params);
-    params.filter = BSLAM_FILTER_SMOOTHER;
-    params.velocity_walk_mps_sqrt_s = 30;
-    params.turn_rate_walk_radps_sqrt_s = 1;
-    params.turn_rate_decay_s = 1;
-    params.confirm_window_us = 0;
-    measure_need(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK);
+    bslam_settings_default(&settings);
+    settings.filter = BSLAM_FILTER_SMOOTHER;
+    settings.velocity_walk_mps_sqrt_s = 30;
+    settings.turn_rate_walk_radps_sqrt_s = 1;
+    settings.turn_rate_decay_s = 1;
+    settings.confirm_window_us = 0;
+    measure_need(bslam_slam_init(&slam, &settings, &bad_id) == BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     pose = (bslam_pose_t){0, 0, 0};
     time_us = 0;

@@ -118,10 +118,10 @@ static bool take_step(const vector_step_t *step, const vector_sighting_t *sighti
     return bslam_slam_sightings(&slam, step->time_us, seen, step->sighting_count) == BSLAM_OK;
 }
 
-static bool run_is_the_references(const bslam_params_t *params, run_t run)
+static bool run_is_the_references(const bslam_settings_t *settings, run_t run)
 {
     int bad_id = -1;
-    if (bslam_slam_init(&slam, params, &bad_id) != BSLAM_OK) {
+    if (bslam_slam_init(&slam, settings, &bad_id) != BSLAM_OK) {
         return false;
     }
     for (int k = 0; k < run.step_count; k++) {
@@ -145,16 +145,16 @@ static bool run_is_the_references(const bslam_params_t *params, run_t run)
 
 static bool test_standard_filter(void)
 {
-    bslam_params_t params;
-    standard_params(&params);
-    return run_is_the_references(&params, RUN(standard));
+    bslam_settings_t settings;
+    standard_params(&settings);
+    return run_is_the_references(&settings, RUN(standard));
 }
 
 static bool test_invariant_filter(void)
 {
-    bslam_params_t params;
-    invariant_params(&params);
-    return run_is_the_references(&params, RUN(invariant));
+    bslam_settings_t settings;
+    invariant_params(&settings);
+    return run_is_the_references(&settings, RUN(invariant));
 }
 
 // ---- known values and refusals ----------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 /// bslam: simultaneous localisation and mapping with beacons, in fixed memory.
 ///
-/// Start at slam/slam.h. Sizes: config.h. Parameters: params.h. The vision front end, which a robot
+/// Start at slam/slam.h. Sizes: config.h. Parameters: settings.h. The vision front end, which a robot
 /// with a detector of its own does without, is apart: vision/vision.h.
 #ifndef BSLAM_H
 #define BSLAM_H

@@ -1,8 +1,8 @@
 /// Every compile-time size of the estimator, in one place.
 ///
 /// Override with -D or by naming a header in BSLAM_CONFIG_HEADER; not "config.h", which would be this one.
-/// Tuning that may change at run time is not here: it stands in bslam_params_t. `make sizes` prints what each
-/// choice costs.
+/// Tuning that may change at run time is not here: it stands in bslam_settings_t. `make sizes` prints what
+/// each choice costs.
 #ifndef BSLAM_CONFIG_H
 #define BSLAM_CONFIG_H
 
@@ -85,12 +85,12 @@
 #error "BSLAM_LEARNER_STEPS_MAX is 100 to 100000"
 #endif
 
-/// 0: bslam_params_info has no texts of what a parameter means, which saves 4 KB of flash.
-#ifndef BSLAM_PARAM_MEANINGS
-#define BSLAM_PARAM_MEANINGS 1
+/// 0: bslam_settings_info has no texts of what a parameter means, which saves 4 KB of flash.
+#ifndef BSLAM_SETTING_MEANINGS
+#define BSLAM_SETTING_MEANINGS 1
 #endif
-#if BSLAM_PARAM_MEANINGS != 0 && BSLAM_PARAM_MEANINGS != 1
-#error "BSLAM_PARAM_MEANINGS is 0 or 1"
+#if BSLAM_SETTING_MEANINGS != 0 && BSLAM_SETTING_MEANINGS != 1
+#error "BSLAM_SETTING_MEANINGS is 0 or 1"
 #endif
 
 /// 0: samples have 8 bits a feature. 1: float32, four times the RAM.

@@ -43,11 +43,11 @@ static bslam_status_t advance(bslam_visual_gyro_t *gyro, int64_t time_us, const 
     return bslam_visual_gyro_advance(gyro, time_us, speed_mps, sd_mps);
 }
 
-bool gyro_wait_wait(gyro_wait_t *turning, const bslam_vision_t *vision, const bslam_params_t *params,
-                  const bslam_odometry_reading_t *reading)
+bool gyro_wait_wait(gyro_wait_t *turning, const bslam_vision_t *vision, const bslam_settings_t *settings,
+                    const bslam_odometry_reading_t *reading)
 {
     bslam_motion_t motion;
-    if (bslam_odometry_read(&turning->wheels, params, reading, &motion) != BSLAM_OK ||
+    if (bslam_odometry_read(&turning->wheels, settings, reading, &motion) != BSLAM_OK ||
         advance(&turning->gyro, reading->time_us, &motion) != BSLAM_OK) {
         gyro_wait_start(turning, vision);
         return false;

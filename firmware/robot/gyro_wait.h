@@ -1,5 +1,6 @@
-/// How fast the robot turns, by its own cameras, for a robot without a gyro (vision/gyro/frame_rotation.h): a reading
-/// of the encoders waits until the picture of its moment has been looked at, and goes on with what it tells.
+/// How fast the robot turns, by its own cameras, for a robot without a gyro (vision/gyro/frame_rotation.h): a
+/// reading of the encoders waits until the picture of its moment has been looked at, and goes on with what it
+/// tells.
 #ifndef ROBOT_GYRO_WAIT_H
 #define ROBOT_GYRO_WAIT_H
 
@@ -28,8 +29,8 @@ void gyro_wait_start(gyro_wait_t *turning, const bslam_vision_t *vision);
 
 /// A reading begins to wait. False, and it does not: the wheels' speed cannot be had of it, or it came too
 /// long after the one before.
-bool gyro_wait_wait(gyro_wait_t *turning, const bslam_vision_t *vision, const bslam_params_t *params,
-                  const bslam_odometry_reading_t *reading);
+bool gyro_wait_wait(gyro_wait_t *turning, const bslam_vision_t *vision, const bslam_settings_t *settings,
+                    const bslam_odometry_reading_t *reading);
 
 /// The front end has finished a camera's picture of that moment. If a reading of the same moment waits, it
 /// has a gyro's rate and its noise from now on, where the picture tells.

@@ -58,7 +58,7 @@ void health_end_step(health_t *watch, const bslam_slam_t *slam, int64_t time_us)
 }
 
 bslam_status_t health_sightings(health_t *watch, bslam_slam_t *slam, int64_t time_us,
-                               const bslam_sighting_t *sightings, int count)
+                                const bslam_sighting_t *sightings, int count)
 {
     if (!watch->recovers) {
         return bslam_slam_sightings(slam, time_us, sightings, count);

@@ -47,7 +47,7 @@ void health_end_step(health_t *watch, const bslam_slam_t *slam, int64_t time_us)
 
 /// bslam_slam_sightings, or bslam_recovery_sightings where it recovers.
 BSLAM_MUST_CHECK bslam_status_t health_sightings(health_t *watch, bslam_slam_t *slam, int64_t time_us,
-                                                const bslam_sighting_t *sightings, int count);
+                                                 const bslam_sighting_t *sightings, int count);
 
 /// HEALTH.
 void health_put_health(const health_t *watch, const bslam_slam_t *slam, bslam_link_writer_t *out);

@@ -48,7 +48,8 @@ bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t
     return true;
 }
 
-bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size, bslam_map_mode_t mode)
+bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
+                                 bslam_map_mode_t mode)
 {
     const uint32_t held = size < sizeof carried->bytes ? size : (uint32_t)sizeof carried->bytes;
     const bslam_map_source_t source = bslam_map_from_memory(carried->bytes, held);
@@ -65,7 +66,8 @@ bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t
     return false;
 }
 
-bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size, bslam_map_mode_t mode)
+bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
+                                 bslam_map_mode_t mode)
 {
     (void)slam;
     (void)size;

@@ -29,6 +29,6 @@ bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t
 
 /// Loads the `size` bytes that were taken (bslam_map_load).
 BSLAM_MUST_CHECK bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
-                                             bslam_map_mode_t mode);
+                                                  bslam_map_mode_t mode);
 
 #endif

@@ -48,11 +48,11 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         session->open = true;
         session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
         if ((flags & FLAG_AS_IT_IS) != 0) {
-            session->params = session->slam.params;
+            session->settings = session->slam.settings;
         } else {
             session->uses_appearance = (flags & FLAG_LOOKS) != 0;
             health_init(&session->watch, (flags & FLAG_RECOVERY) != 0, (flags & FLAG_GUARD) != 0);
-            bslam_params_default(&session->params);
+            bslam_settings_default(&session->settings);
         }
         forget_seeds(session);
         keep(session, BSLAM_OK);
@@ -62,12 +62,13 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
 /// Where the host wishes it, and where identity is told by looks.
 static uint8_t attach_looks(session_t *session)
 {
-    session->uses_appearance |= session->params.association == BSLAM_ASSOCIATION_SVM;
+    session->uses_appearance |= session->settings.association == BSLAM_ASSOCIATION_SVM;
     if (!session->uses_appearance) {
         return BSLAM_OK;
     }
 #if SESSION_APPEARANCE
-    const bslam_status_t status = bslam_appearance_init(&session->appearance, session->seeds, session->seed_count);
+    const bslam_status_t status =
+        bslam_appearance_init(&session->appearance, session->seeds, session->seed_count);
     if (status == BSLAM_OK) {
         bslam_slam_attach_appearance(&session->slam, &session->appearance);
     }
@@ -84,13 +85,13 @@ static uint8_t attach_smoother(session_t *session)
     bslam_slam_attach_smoother(&session->slam, &session->smoother);
     return BSLAM_OK;
 #else
-    return session->params.filter == BSLAM_FILTER_SMOOTHER ? SESSION_E_SMOOTHER : BSLAM_OK;
+    return session->settings.filter == BSLAM_FILTER_SMOOTHER ? SESSION_E_SMOOTHER : BSLAM_OK;
 #endif
 }
 
 uint8_t session_start_over(session_t *session, int *bad_id)
 {
-    const bslam_status_t status = bslam_slam_init(&session->slam, &session->params, bad_id);
+    const bslam_status_t status = bslam_slam_init(&session->slam, &session->settings, bad_id);
     session->fingerprint = BSLAM_FINGERPRINT_START;
     health_restart(&session->watch);
     uint8_t attached = (uint8_t)status;
@@ -277,7 +278,7 @@ static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
     const int id = bslam_link_get_u16(reader);
     const bslam_real_t value = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_params_set(&session->params, id, value));
+        keep(session, bslam_settings_set(&session->settings, id, value));
     }
 }
 
@@ -285,7 +286,7 @@ static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
 {
     if (is_whole(session, reader)) {
         session->last_status =
-            param_store_params_save(&session->params) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+            param_store_params_save(&session->settings) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
     }
 }
 
@@ -375,7 +376,7 @@ static void apply_look(session_t *session, bslam_link_reader_t *reader)
         bslam_status_t status = camera_input_look(seeing, moved);
         if (status == BSLAM_OK) {
             status = health_sightings(&session->watch, &session->slam, session->parser.header.time_us,
-                                     seeing->sightings, seeing->count);
+                                      seeing->sightings, seeing->count);
         }
         keep(session, status);
         session->ticks += port_ticks() - began;
@@ -402,7 +403,7 @@ static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_
     bslam_link_put_u16(out, BSLAM_RAYS_MAX);
     bslam_link_put_u16(out, BSLAM_SIGHTINGS_MAX);
     bslam_link_put_u16(out, BSLAM_HISTORY_MAX);
-    bslam_link_put_u16(out, (uint16_t)bslam_params_count());
+    bslam_link_put_u16(out, (uint16_t)bslam_settings_count());
     bslam_link_put_u16(out, param_store_names_crc());
     bslam_link_put_u32(out, port_ticks_hz());
     const uint8_t *build_id = port_build_id();
@@ -434,7 +435,7 @@ static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bsla
 static void answer_param(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     const int id = bslam_link_get_u16(reader);
-    bslam_link_put_real(out, bslam_params_get(&session->params, id));
+    bslam_link_put_real(out, bslam_settings_get(&session->settings, id));
 }
 
 static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)

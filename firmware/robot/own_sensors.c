@@ -60,7 +60,7 @@ static bool waits(session_t *session, const bslam_odometry_reading_t *reading)
 #if SESSION_TURNS
     camera_input_t *seeing = &session->seeing;
     return !reading->has_gyro && seeing->vision.camera_count > 0 &&
-           gyro_wait_wait(&seeing->turning, &seeing->vision, &session->slam.params, reading);
+           gyro_wait_wait(&seeing->turning, &seeing->vision, &session->slam.settings, reading);
 #else
     (void)session;
     (void)reading;

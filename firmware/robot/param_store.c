@@ -7,13 +7,13 @@
 
 static const char *param_name(int id)
 {
-    return bslam_params_info(id)->name;
+    return bslam_settings_info(id)->name;
 }
 
 uint16_t param_store_names_crc(void)
 {
     uint16_t crc = BSLAM_CRC16_START;
-    for (int id = 0; id < bslam_params_count(); id++) {
+    for (int id = 0; id < bslam_settings_count(); id++) {
         const char *name = param_name(id);
         for (size_t i = 0; i <= strlen(name); i++) {
             crc = bslam_crc16_add(crc, (uint8_t)name[i]);
@@ -37,18 +37,18 @@ static uint16_t crc_of(const uint8_t *bytes, size_t count)
 
 static size_t param_store_size(void)
 {
-    return 4 * (size_t)bslam_params_count() + 4;
+    return 4 * (size_t)bslam_settings_count() + 4;
 }
 
-bool param_store_params_save(const bslam_params_t *params)
+bool param_store_params_save(const bslam_settings_t *settings)
 {
     uint8_t bytes[STORED_BYTES_MAX];
     const size_t size = param_store_size();
     if (size > sizeof bytes) {
         return false;
     }
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const float value = (float)bslam_params_get(params, id);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const float value = (float)bslam_settings_get(settings, id);
         memcpy(&bytes[4 * id], &value, sizeof value);
     }
     const uint16_t names = param_store_names_crc();
@@ -58,26 +58,26 @@ bool param_store_params_save(const bslam_params_t *params)
     return port_save(bytes, size);
 }
 
-bool param_store_params_load(bslam_params_t *params)
+bool param_store_params_load(bslam_settings_t *settings)
 {
     uint8_t bytes[STORED_BYTES_MAX];
     const size_t size = param_store_size();
     uint16_t names = 0;
     uint16_t crc = 0;
-    bslam_params_default(params);
+    bslam_settings_default(settings);
     if (size > sizeof bytes || !port_load(bytes, size)) {
         return false;
     }
     memcpy(&names, &bytes[size - 4], sizeof names);
     memcpy(&crc, &bytes[size - 2], sizeof crc);
     bool good = names == param_store_names_crc() && crc == crc_of(bytes, size - 2);
-    for (int id = 0; id < bslam_params_count() && good; id++) {
+    for (int id = 0; id < bslam_settings_count() && good; id++) {
         float value;
         memcpy(&value, &bytes[4 * id], sizeof value);
-        good = bslam_params_set(params, id, value) == BSLAM_OK;
+        good = bslam_settings_set(settings, id, value) == BSLAM_OK;
     }
     if (!good) {
-        bslam_params_default(params);
+        bslam_settings_default(settings);
     }
     return good;
 }

@@ -163,15 +163,16 @@ static int open_eyes(session_t *session)
 static uint8_t start_with_params(session_t *session, bool has_eyes)
 {
     int bad_id = NO_DETAIL;
-    if (param_store_params_load(&session->params)) {
+    if (param_store_params_load(&session->settings)) {
         const uint8_t status = session_start_over(session, &bad_id);
         if (status == BSLAM_OK) {
             return status;
         }
-        bslam_params_default(&session->params);  // they contradict each other
+        bslam_settings_default(&session->settings);  // they contradict each other
     }
     if (has_eyes) {
-        session->params.association = SESSION_APPEARANCE ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
+        session->settings.association =
+            SESSION_APPEARANCE ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
     }
     return session_start_over(session, &bad_id);
 }
@@ -190,10 +191,10 @@ static bool is_kept(session_t *session)
 /// Time stamps and the counters of wheels begin anew, and the robot may have rolled on meanwhile.
 static uint8_t go_on(session_t *session)
 {
-    const bslam_params_t *params = &session->slam.params;
-    const bslam_real_t way_sd_m = params->gap_speed_sd_mps * RESTART_S;
-    const bslam_real_t turn_sd_rad = params->gap_turn_sd_radps * RESTART_S;
-    session->params = *params;
+    const bslam_settings_t *settings = &session->slam.settings;
+    const bslam_real_t way_sd_m = settings->gap_speed_sd_mps * RESTART_S;
+    const bslam_real_t turn_sd_rad = settings->gap_turn_sd_radps * RESTART_S;
+    session->settings = *settings;
     session->uses_appearance = session->slam.appearance != NULL;
     health_go_on(&session->watch, port_time_us());
     return (uint8_t)bslam_slam_resume_odometry(&session->slam, way_sd_m < 30 ? way_sd_m : 30,

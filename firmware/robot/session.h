@@ -78,7 +78,7 @@ typedef enum session_status {
     SESSION_E_TYPE = 0x41,        ///< no such message
     SESSION_E_LENGTH = 0x42,      ///< the payload is not as long as its message is
     SESSION_E_STORE = 0x43,       ///< the board keeps nothing, or failed to
-    SESSION_E_APPEARANCE = 0x44,       ///< the image learns no looks
+    SESSION_E_APPEARANCE = 0x44,  ///< the image learns no looks
     SESSION_E_SMOOTHER = 0x45     ///< the image has no smoother
 } session_status_t;
 
@@ -102,7 +102,7 @@ typedef struct session {
 #if SESSION_VISION
     camera_input_t seeing;
 #endif
-    bslam_params_t params;  ///< as set, for the next reset
+    bslam_settings_t settings;  ///< as set, for the next reset
     bslam_link_parser_t parser;
     uint32_t id;  ///< the host's number of this session
     bool open;

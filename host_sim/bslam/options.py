@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from bslam.errors import BslamError
-from bslam.runs import defaults
 from bslam.log import Log, Robot
+from bslam.runs import defaults
 
 OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")

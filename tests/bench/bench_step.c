@@ -53,11 +53,11 @@ static void place_beacons(void)
 
 int main(int argc, char **argv)
 {
-    bslam_params_t params;
+    bslam_settings_t settings;
     int bad_id = -1;
-    bslam_params_default(&params);
-    params.velocity_states = argc > 1 && strcmp(argv[1], "velocity") == 0 ? 1 : 0;
-    if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
+    bslam_settings_default(&settings);
+    settings.velocity_states = argc > 1 && strcmp(argv[1], "velocity") == 0 ? 1 : 0;
+    if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         return 1;
     }
     place_beacons();

@@ -5,7 +5,7 @@
 int main(void);
 
 static bslam_slam_t slam;
-static bslam_params_t params;
+static bslam_settings_t settings;
 #if WITH_LOOKS
 static bslam_appearance_t appearance;
 #endif
@@ -37,8 +37,8 @@ static bslam_status_t robot_step(void)
 int main(void)
 {
     int bad_id;
-    bslam_params_default(&params);
-    bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);
+    bslam_settings_default(&settings);
+    bslam_status_t status = bslam_slam_init(&slam, &settings, &bad_id);
 #if WITH_LOOKS
     if (status == BSLAM_OK) {
         status = bslam_appearance_init(&appearance, NULL, 0);

@@ -126,19 +126,19 @@ static bslam_status_t call_load(fuzz_input_t *input)
 /// Starts over with other parameters, some of which may contradict each other.
 static bslam_status_t call_init(fuzz_input_t *input)
 {
-    bslam_params_t params = robot.slam.params;
+    bslam_settings_t settings = robot.slam.settings;
     for (unsigned i = fuzz_u8(input) % 4; i > 0; i--) {
-        const int id = (int)fuzz_u8(input) % bslam_params_count();
-        const bslam_param_info_t *info = bslam_params_info(id);
+        const int id = (int)fuzz_u8(input) % bslam_settings_count();
+        const bslam_setting_info_t *info = bslam_settings_info(id);
         const bslam_real_t value = fuzz_real(input, (double)info->low, (double)info->high);
         const bslam_real_t whole =
             bslam_in_range(value, -1000000, 1000000) ? (bslam_real_t)(int32_t)value : value;
-        const bslam_real_t old = bslam_params_get(&params, id);
-        const bslam_status_t set = bslam_params_set(&params, id, info->is_integer ? whole : value);
-        fuzz_require(set == BSLAM_OK || bslam_params_get(&params, id) == old);
+        const bslam_real_t old = bslam_settings_get(&settings, id);
+        const bslam_status_t set = bslam_settings_set(&settings, id, info->is_integer ? whole : value);
+        fuzz_require(set == BSLAM_OK || bslam_settings_get(&settings, id) == old);
     }
     int bad_id;
-    const bslam_status_t status = bslam_slam_init(&robot.slam, &params, &bad_id);
+    const bslam_status_t status = bslam_slam_init(&robot.slam, &settings, &bad_id);
     if (status == BSLAM_OK) {
         bslam_slam_attach_appearance(&robot.slam, (fuzz_u8(input) & 1u) != 0 ? &robot.appearance : NULL);
     }
@@ -203,19 +203,19 @@ static void start(fuzz_input_t *input)
     static robot_t fresh;
     static bool is_made;
     if (!is_made) {
-        bslam_params_t params;
+        bslam_settings_t settings;
         int bad_id;
-        bslam_params_default(&params);
-        params.learn_budget = 50;
-        fuzz_require(bslam_slam_init(&fresh.slam, &params, &bad_id) == BSLAM_OK);
+        bslam_settings_default(&settings);
+        settings.learn_budget = 50;
+        fuzz_require(bslam_slam_init(&fresh.slam, &settings, &bad_id) == BSLAM_OK);
         fuzz_require(bslam_appearance_init(&fresh.appearance, NULL, 0) == BSLAM_OK);
         bslam_recovery_init(&fresh.recovery);
         is_made = true;
     }
     const unsigned choice = fuzz_u8(input);
     memcpy(&robot, &fresh, sizeof robot);
-    robot.slam.params.association = (int32_t)(choice % 5);
-    robot.slam.params.filter = (int32_t)(choice / 5 % 2);
+    robot.slam.settings.association = (int32_t)(choice % 5);
+    robot.slam.settings.filter = (int32_t)(choice / 5 % 2);
     bslam_slam_attach_appearance(&robot.slam, choice >= 128 ? &robot.appearance : NULL);
     blob_size = 0;
 }

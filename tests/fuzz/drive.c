@@ -202,15 +202,15 @@ static void prepare(robot_t *start, world_t *world, unsigned how)
     static robot_t made[8];
     static world_t stands[8];
     if (stands[how].now_us == 0) {
-        bslam_params_t params;
+        bslam_settings_t settings;
         int bad_id;
-        bslam_params_default(&params);
-        params.association = (how & 1u) != 0 ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_KNOWN;
-        params.filter = (how & 4u) != 0 ? BSLAM_FILTER_SMOOTHER : BSLAM_FILTER_INVARIANT;
-        params.learn_travel_m = 0;
-        params.learn_budget = 50;
-        params.confirm_travel_m = 0;
-        fuzz_require(bslam_slam_init(&robot.slam, &params, &bad_id) == BSLAM_OK);
+        bslam_settings_default(&settings);
+        settings.association = (how & 1u) != 0 ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_KNOWN;
+        settings.filter = (how & 4u) != 0 ? BSLAM_FILTER_SMOOTHER : BSLAM_FILTER_INVARIANT;
+        settings.learn_travel_m = 0;
+        settings.learn_budget = 50;
+        settings.confirm_travel_m = 0;
+        fuzz_require(bslam_slam_init(&robot.slam, &settings, &bad_id) == BSLAM_OK);
         fuzz_require(bslam_appearance_init(&robot.appearance, NULL, 0) == BSLAM_OK);
         bslam_slam_attach_appearance(&robot.slam, (how & 1u) != 0 ? &robot.appearance : NULL);
         bslam_slam_attach_smoother(&robot.slam, (how & 4u) != 0 ? &robot.smoother : NULL);

@@ -25,8 +25,8 @@ static void count_walk(const bslam_slam_t *slam)
 {
     const int64_t now_us = slam->odometry.time_us - slam->history.filter.behind_us;
     const double gone_s = 1e-6 * (double)(now_us - filter_us);
-    const double walk =
-        fmax((double)slam->params.velocity_walk_mps_sqrt_s, (double)slam->params.turn_rate_walk_radps_sqrt_s);
+    const double walk = fmax((double)slam->settings.velocity_walk_mps_sqrt_s,
+                             (double)slam->settings.turn_rate_walk_radps_sqrt_s);
     if (slam->ekf.base_dim > BSLAM_STATE_FORWARD && gone_s > 0) {
         largest_variance = fmax(largest_variance, walk * walk * gone_s);
     }
@@ -112,14 +112,14 @@ void fuzz_clear_unused(bslam_slam_t *slam)
 
 void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    bslam_params_t params;
+    bslam_settings_t settings;
     int bad_id;
-    bslam_params_default(&params);
-    params.association = BSLAM_ASSOCIATION_SVM;
-    params.learn_travel_m = 0;
-    params.left_speed_sd_mps = BSLAM_R(1e-3);
-    params.right_speed_sd_mps = BSLAM_R(1e-3);
-    fuzz_require(bslam_slam_init(slam, &params, &bad_id) == BSLAM_OK);
+    bslam_settings_default(&settings);
+    settings.association = BSLAM_ASSOCIATION_SVM;
+    settings.learn_travel_m = 0;
+    settings.left_speed_sd_mps = BSLAM_R(1e-3);
+    settings.right_speed_sd_mps = BSLAM_R(1e-3);
+    fuzz_require(bslam_slam_init(slam, &settings, &bad_id) == BSLAM_OK);
     if (appearance != NULL) {
         fuzz_require(bslam_appearance_init(appearance, NULL, 0) == BSLAM_OK);
         bslam_slam_attach_appearance(slam, appearance);

@@ -148,18 +148,18 @@ static int look(world_t *world, bslam_sighting_t seen[BEACONS])
 
 // ---- the filter against the truth -------------------------------------------------------------------------
 
-static bslam_params_t filter_params(void)
+static bslam_settings_t filter_params(void)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
-    params.wheelbase_m = measured(WHEELBASE_M);
-    params.left_speed_sd_mps = measured(WHEEL_SD_MPS);
-    params.right_speed_sd_mps = measured(WHEEL_SD_MPS);
-    params.bearing_sd_rad = measured(BEARING_SD_RAD);
-    params.range_sd_floor_m = 0;
-    params.range_sd_fraction = measured(RANGE_SD_FRACTION);
-    params.range_sd_per_m = measured(1 / RANGE_SCALE_M);
-    return params;
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
+    settings.wheelbase_m = measured(WHEELBASE_M);
+    settings.left_speed_sd_mps = measured(WHEEL_SD_MPS);
+    settings.right_speed_sd_mps = measured(WHEEL_SD_MPS);
+    settings.bearing_sd_rad = measured(BEARING_SD_RAD);
+    settings.range_sd_floor_m = 0;
+    settings.range_sd_fraction = measured(RANGE_SD_FRACTION);
+    settings.range_sd_per_m = measured(1 / RANGE_SCALE_M);
+    return settings;
 }
 
 /// eᵀ P⁻¹ e of the pose, by Cholesky's factor of P in double.
@@ -204,9 +204,9 @@ static void require(bool condition, const char *what)
 static void soak(uint64_t seed, long steps, long standing)
 {
     static bslam_slam_t slam;
-    const bslam_params_t params = filter_params();
+    const bslam_settings_t settings = filter_params();
     int bad_id;
-    require(bslam_slam_init(&slam, &params, &bad_id) == BSLAM_OK, "a parameter is refused");
+    require(bslam_slam_init(&slam, &settings, &bad_id) == BSLAM_OK, "a parameter is refused");
     world_t world = begin(seed);
     world_t start = world;
     double nees = 0;

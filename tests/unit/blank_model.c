@@ -8,7 +8,7 @@ static const bslam_beacon_class_t classes[UNIT_MODEL_CLASSES] = {
 };
 
 static bslam_svm_t classifier(int32_t rows, int32_t features, bool quadratic, const float *weights,
-                           const float *bias)
+                              const float *bias)
 {
     const bslam_svm_t svm = {
         .rows = rows, .features = features, .quadratic = quadratic, .weights = weights, .bias = bias};

@@ -2,15 +2,15 @@
 
 enum { STEP_US = 40000 };
 
-bslam_params_t kept_params(void)
+bslam_settings_t kept_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.association = 3;
-    params.left_speed_sd_mps = BSLAM_R(1e-3);
-    params.right_speed_sd_mps = BSLAM_R(1e-3);
-    params.learn_travel_m = 0;
-    params.learn_budget = 2000;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.association = 3;
+    settings.left_speed_sd_mps = BSLAM_R(1e-3);
+    settings.right_speed_sd_mps = BSLAM_R(1e-3);
+    settings.learn_travel_m = 0;
+    settings.learn_budget = 2000;
+    return settings;
 }
 
 const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_FEATURES])
@@ -26,10 +26,10 @@ const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_F
 
 void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    const bslam_params_t params = kept_params();
+    const bslam_settings_t settings = kept_params();
     int bad_id;
     memset(slam, 0, sizeof *slam);
-    assert_int_equal(bslam_slam_init(slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(slam, &settings, &bad_id), BSLAM_OK);
     if (appearance != NULL) {
         memset(appearance, 0, sizeof *appearance);
         assert_int_equal(bslam_appearance_init(appearance, NULL, 0), BSLAM_OK);

@@ -8,7 +8,7 @@
 enum { KEPT_BYTES_MAX = 65536 };
 
 /// Parameters of association by position and looks.
-bslam_params_t kept_params(void);
+bslam_settings_t kept_params(void);
 
 /// A signature of an object, a little different with each view.
 const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_FEATURES]);

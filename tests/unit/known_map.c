@@ -4,14 +4,14 @@
 
 static const bslam_pose_t on_axle = {0, 0, 0};
 
-bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2], int count)
+bslam_ekf_t unit_map_of(const bslam_settings_t *settings, const double (*places)[2], int count)
 {
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, params);
+    bslam_ekf_init(&ekf, settings);
     for (int i = 0; i < count; i++) {
         const bslam_sighting_t sighting = unit_polar(0, 1, -1);
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, settings, &on_axle, &sighting, &index), BSLAM_OK);
         const int at = ekf.beacons[index].at;
         for (int k = 0; k < 2; k++) {
             ekf.mean[at + k] = real(places[i][k]);

@@ -5,7 +5,7 @@
 #include "bslam/association/association.h"
 
 /// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
-bslam_ekf_t unit_map_of(const bslam_params_t *params, const double (*places)[2], int count);
+bslam_ekf_t unit_map_of(const bslam_settings_t *settings, const double (*places)[2], int count);
 
 /// A machine for beacon `index` that has learned from `samples` (16 at most), and answers value * first
 /// feature.

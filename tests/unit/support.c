@@ -75,10 +75,10 @@ double unit_angle_between(double a, double b)
     return remainder(a - b, 6.283185307179586476925);
 }
 
-bslam_params_t unit_params(void)
+bslam_settings_t unit_params(void)
 {
-    bslam_params_t p;
-    bslam_params_default(&p);
+    bslam_settings_t p;
+    bslam_settings_default(&p);
     p.filter = 0;
     p.motion = 0;
     p.velocity_states = 0;

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include "bslam/params.h"
+#include "bslam/settings.h"
 #include "base/types.h"
 
 /// Half the distance from 1 to the next number of bslam_real_t: the relative error of one rounding.
@@ -68,7 +68,7 @@ double unit_angle_between(double a, double b);
 /// Parameters for tests that compare with numbers: every value a test may rely on is set, whatever its
 /// default. Standard EKF, Euler step, no velocity or scale states, known identity, no gate, no Huber, no
 /// delay, sensor on the axle.
-bslam_params_t unit_params(void);
+bslam_settings_t unit_params(void);
 
 /// A sighting with a distance, or in direction only.
 bslam_sighting_t unit_polar(double bearing_rad, double range_m, int32_t label);

@@ -50,15 +50,15 @@ static void randomise_beacon(bslam_ekf_t *ekf, unit_random_t *random, const bsla
     state[3] = real(1 / hypot(px - anchor_x, py - anchor_y));
 }
 
-void twin_randomise(bslam_ekf_t *ekf, const bslam_params_t *params, unit_random_t *random, int points,
+void twin_randomise(bslam_ekf_t *ekf, const bslam_settings_t *settings, unit_random_t *random, int points,
                     int rays)
 {
     const bslam_pose_t mount = {0, 0, 0};
-    bslam_ekf_init(ekf, params);
+    bslam_ekf_init(ekf, settings);
     for (int i = 0; i < points + rays; i++) {
         const bslam_sighting_t sighting = i < points ? unit_polar(0, 5, i) : unit_direction(0, i);
         int index;
-        assert_int_equal(bslam_ekf_add(ekf, params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(ekf, settings, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(index, i);
     }
     assert_true(ekf->dim <= DENSE_MAX);

@@ -16,7 +16,7 @@ typedef struct twin {
 
 /// A filter with this many points and rays (points first), 2 to 8 m from the robot. Standard deviations
 /// between 0.05 and 0.5 m or rad, all correlated; those of inverse distances a tenth of that.
-void twin_randomise(bslam_ekf_t *ekf, const bslam_params_t *params, unit_random_t *random, int points,
+void twin_randomise(bslam_ekf_t *ekf, const bslam_settings_t *settings, unit_random_t *random, int points,
                     int rays);
 
 twin_t twin_of(const bslam_ekf_t *ekf);

@@ -1,9 +1,9 @@
 // Written by tests/python/reference/make_vectors.py from the NumPy reference: not edited by hand.
 // Types and layout: tests/unit/slam/test_vectors.c.
 
-static void standard_params(bslam_params_t *p)
+static void standard_params(bslam_settings_t *p)
 {
-    bslam_params_default(p);
+    bslam_settings_default(p);
     p->filter = 0;
     p->motion = 0;
     p->velocity_states = 0;
@@ -428,9 +428,9 @@ static const double standard_covariances[] = {
     0.0001819131294, -0.0004435977475, 5.571800719e-05, 0.001038089161,
 };
 
-static void invariant_params(bslam_params_t *p)
+static void invariant_params(bslam_settings_t *p)
 {
-    bslam_params_default(p);
+    bslam_settings_default(p);
     p->filter = 1;
     p->motion = 1;
     p->velocity_states = 1;

@@ -26,11 +26,11 @@ CALLED_BY_POINTER = (
         r"bslam_slam_|associate_ticks",
         r"bslam_associate_|bslam_slam_learn_appearance|bslam_appearance_(clear|forget)|bslam_smoother_\w+",
     ),
-    (r"weigh|find_best|decide_rest|bslam_associate_svm", r"bslam_appearance_(ask|class_odds|has_waited)"),
+    (r"weigh|find_best|decide_rest|bslam_associate_svm", r"bslam_appearance_(ask|class_odds|is_due)"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
     (r"read_head|kept_|port_(save|load)|look_at|flush|read_map|bslam_slots_", r"(erase|write|read)$"),
-    (r"bslam_passage_|variance_at", r"take_piece|write_piece|read_memory|read_map"),
+    (r"bslam_codec_|variance_at", r"take_piece|write_piece|read_memory|read_map"),
 )
 """Callers, and whom they may call through a pointer."""
 

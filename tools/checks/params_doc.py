@@ -16,13 +16,13 @@ END = "<!-- parameters: end -->"
 
 
 def table() -> str:
-    """Every parameter as a row of a Markdown table, in the order of firmware/bslam/params.h."""
+    """Every parameter as a row of a Markdown table, in the order of firmware/bslam/settings.h."""
     lines = ["| parameter | type | default | from | to | meaning |", "|---|---|---:|---:|---:|---|"]
     return "\n".join([*lines, *map(row, Slam.parameters())]) + "\n"
 
 
 def row(parameter: Parameter) -> str:
-    """One parameter, with the type of its field in bslam_params_t."""
+    """One parameter, with the type of its field in bslam_settings_t."""
     values = (parameter.default, parameter.low, parameter.high)
     shown = [f"{int(value)}" if parameter.is_integer else f"{value:g}" for value in values]
     kind = "integer" if parameter.is_integer else "real"

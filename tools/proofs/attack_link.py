@@ -23,12 +23,12 @@ from cobs import cobs
 
 from bslam.core.raw import library
 from bslam.core.slam import Slam
-from bslam.options import RunOptions
-from bslam.runs.runner import run_log
 from bslam.link import messages
 from bslam.link.frames import crc16
 from bslam.link.messages import Message
 from bslam.log import Log, first_steps
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.target import client
 from bslam.target.client import Client
 from bslam.target.lines import Line, open_line

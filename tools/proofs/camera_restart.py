@@ -36,15 +36,15 @@ from numpy.typing import NDArray
 
 from bslam.commands.arguments import CAMERA_STORE, seeds_range
 from bslam.evaluation.align import Rigid, fit_rigid
-from bslam.runs.camera import CameraStore, camera_log
 from bslam.evaluation.metrics import map_pairs
-from bslam.options import RunOptions
-from bslam.runs.runner import run_log
 from bslam.evaluation.trace import Trace
 from bslam.evaluation.truth import truth_at
 from bslam.log import Log, Sightings
 from bslam.maps.blob import SUFFIX
+from bslam.options import RunOptions
 from bslam.rig import load_rig
+from bslam.runs.camera import CameraStore, camera_log
+from bslam.runs.runner import run_log
 from bslam.world.simulate import load_scenario
 
 SCENARIO, RIG, SIGMA_MPS = "paper_room", "three60", 0.6

@@ -24,12 +24,12 @@ from typing import Any
 from bslam.commands.arguments import CAMERA_STORE
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.runs.camera import CameraStore, camera_log
-from bslam.options import FILTERS, RunOptions
-from bslam.runs.runner import run_log
 from bslam.log import Log, first_steps, read_folder
+from bslam.options import FILTERS, RunOptions
 from bslam.recording.recorder import FINGERPRINT_START
 from bslam.rig import load_rig
+from bslam.runs.camera import CameraStore, camera_log
+from bslam.runs.runner import run_log
 from bslam.target.lines import TargetError, boards_here
 from bslam.target.remote import connect
 from bslam.world.simulate import load_scenario, simulate

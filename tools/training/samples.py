@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from bslam.core.learner import rendered_seeds
 from bslam.core.vision import BeaconModel, Candidate, FrontEnd
-from bslam.errors import BslamError
 from bslam.datasets.pictures import Box, Scaled, camera_for, load_picture
+from bslam.errors import BslamError
 from bslam.rig import Camera
 from tools.training.folder import FILE, Folder, Label
 from tools.training.truth import areas, intersections, overlaps

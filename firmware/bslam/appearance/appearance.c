@@ -7,8 +7,9 @@
 static const bslam_beacon_look_t BLANK = {.classifier = BSLAM_NO_CLASSIFIER, .twin = BSLAM_NO_CLASSIFIER};
 static const uint32_t MICROMETRES_PER_M = 1000000;
 
-const bslam_appearance_answers_t bslam_appearance_answers = {bslam_appearance_ask, bslam_appearance_class_odds,
-                                                   bslam_appearance_viewpoint_odds, bslam_appearance_is_due};
+const bslam_appearance_answers_t bslam_appearance_answers = {
+    bslam_appearance_ask, bslam_appearance_class_odds, bslam_appearance_viewpoint_odds,
+    bslam_appearance_is_due};
 
 enum { SEEN_AS_MAX = 32 };
 enum { SECTORS = BSLAM_APPEARANCE_SECTORS };
@@ -17,7 +18,8 @@ enum { NEAR_SECTORS = 1, FAR_SECTORS = 4 };
 // A beacon that was seen from one sector alone was seen in passing: whoever stands beside it was not noticed.
 enum { KNOWN_SECTORS = 2 };
 
-bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance, const bslam_sample_t *seeds, int32_t seed_count)
+bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance, const bslam_sample_t *seeds,
+                                     int32_t seed_count)
 {
     const bslam_status_t status = bslam_learner_init(&appearance->learner, seeds, seed_count);
     if (status == BSLAM_OK) {
@@ -80,23 +82,23 @@ void bslam_appearance_forget(bslam_appearance_t *appearance, int index, int coun
 
 // ---- opinions ---------------------------------------------------------------------------------------------
 
-static bslam_opinion_t opinion_of(const bslam_appearance_t *appearance, const bslam_params_t *params, int32_t classifier,
-                                  const bslam_sample_t *sample)
+static bslam_opinion_t opinion_of(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                                  int32_t classifier, const bslam_sample_t *sample)
 {
     bslam_opinion_t opinion = {0.0f, 0.0f};
     if (classifier != BSLAM_NO_CLASSIFIER && bslam_learner_knows(&appearance->learner, classifier)) {
         const float samples = (float)bslam_learner_samples(&appearance->learner, classifier);
         opinion.value = bslam_sample_decide(&appearance->learner.classifiers[classifier].weights, sample);
-        opinion.weight = samples / (samples + (float)params->appearance_samples);
+        opinion.weight = samples / (samples + (float)settings->appearance_samples);
     }
     return opinion;
 }
 
-bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                const bslam_sample_t *sample)
+bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                                     int index, const bslam_sample_t *sample)
 {
     const int16_t classifier = appearance->of[index].classifier;
-    return opinion_of(appearance, params, classifier, sample);
+    return opinion_of(appearance, settings, classifier, sample);
 }
 
 // ---- classes ----------------------------------------------------------------------------------------------
@@ -106,8 +108,8 @@ static bool is_evidence(uint8_t beacon_class)
     return beacon_class >= 1 && beacon_class <= BSLAM_APPEARANCE_CLASSES;
 }
 
-bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                    uint8_t beacon_class)
+bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance,
+                                         const bslam_settings_t *settings, int index, uint8_t beacon_class)
 {
     if (!is_evidence(beacon_class)) {
         return 0;
@@ -117,9 +119,10 @@ bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance, c
     for (int k = 0; k < BSLAM_APPEARANCE_CLASSES; k++) {
         all += seen_as[k];
     }
-    const bslam_real_t doubt = params->class_doubt;
+    const bslam_real_t doubt = settings->class_doubt;
     const bslam_real_t as_this = (bslam_real_t)seen_as[beacon_class - 1] + doubt;
-    return bslam_ln(BSLAM_APPEARANCE_CLASSES * as_this / ((bslam_real_t)all + BSLAM_APPEARANCE_CLASSES * doubt));
+    return bslam_ln(BSLAM_APPEARANCE_CLASSES * as_this /
+                    ((bslam_real_t)all + BSLAM_APPEARANCE_CLASSES * doubt));
 }
 
 uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index)
@@ -155,8 +158,8 @@ static int sectors_between(int one, int other)
     return apart < SECTORS - apart ? apart : SECTORS - apart;
 }
 
-bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                   int sector)
+bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearance,
+                                             const bslam_settings_t *settings, int index, int sector)
 {
     int known = 0, nearest = SECTORS;
     for (int k = 0; k < SECTORS; k++) {
@@ -170,10 +173,10 @@ bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearanc
         return 0;
     }
     if (nearest == 0) {
-        return known >= KNOWN_SECTORS ? params->viewpoint_high : 0;
+        return known >= KNOWN_SECTORS ? settings->viewpoint_high : 0;
     }
     const int far = nearest < FAR_SECTORS ? nearest : FAR_SECTORS;
-    return -params->viewpoint_low * (bslam_real_t)(far - NEAR_SECTORS) / (FAR_SECTORS - NEAR_SECTORS);
+    return -settings->viewpoint_low * (bslam_real_t)(far - NEAR_SECTORS) / (FAR_SECTORS - NEAR_SECTORS);
 }
 
 // ---- views ------------------------------------------------------------------------------------------------
@@ -186,30 +189,33 @@ void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam
 // ---- waiting ----------------------------------------------------------------------------------------------
 
 /// How long matches with a beacon have waited; 0 if not, or if none did within the last decision_delay_us.
-static uint32_t delayed_us(const bslam_beacon_look_t *look, const bslam_params_t *params, int64_t time_us)
+static uint32_t delayed_us(const bslam_beacon_look_t *look, const bslam_settings_t *settings, int64_t time_us)
 {
     const uint32_t pause_us = (uint32_t)time_us - look->last_delay_us;
-    return look->delayed_us == 0 || pause_us > (uint32_t)params->decision_delay_us ? 0 : look->delayed_us + pause_us;
+    return look->delayed_us == 0 || pause_us > (uint32_t)settings->decision_delay_us
+               ? 0
+               : look->delayed_us + pause_us;
 }
 
-void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_params_t *params, int index, int64_t time_us)
+void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                                 int64_t time_us)
 {
     bslam_beacon_look_t *look = &appearance->of[index];
-    const uint32_t so_far_us = delayed_us(look, params, time_us);
+    const uint32_t so_far_us = delayed_us(look, settings, time_us);
     look->delayed_us = so_far_us > 0 ? so_far_us : 1;  // 0 says that none waits
     look->last_delay_us = (uint32_t)time_us;
 }
 
-bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                            int64_t time_us)
+bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                             int index, int64_t time_us)
 {
-    return delayed_us(&appearance->of[index], params, time_us) >= (uint32_t)params->decision_delay_us;
+    return delayed_us(&appearance->of[index], settings, time_us) >= (uint32_t)settings->decision_delay_us;
 }
 
 // ---- learning ---------------------------------------------------------------------------------------------
 
 /// Another machine than `own` that takes a sample for its own, the surest; BSLAM_NO_CLASSIFIER if none does.
-static int16_t find_twin(const bslam_appearance_t *appearance, const bslam_params_t *params, int16_t own,
+static int16_t find_twin(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int16_t own,
                          const bslam_sample_t *sample, float at_least)
 {
     int16_t best = BSLAM_NO_CLASSIFIER;
@@ -217,7 +223,7 @@ static int16_t find_twin(const bslam_appearance_t *appearance, const bslam_param
         if (m == own) {
             continue;
         }
-        const bslam_opinion_t opinion = opinion_of(appearance, params, m, sample);
+        const bslam_opinion_t opinion = opinion_of(appearance, settings, m, sample);
         if (opinion.weight >= 0.5f && opinion.value > at_least) {
             best = m;
             at_least = opinion.value;
@@ -239,18 +245,18 @@ static bool persists(uint8_t *count, bool holds, int32_t limit)
 
 /// Whether another machine takes this beacon for its own again and again, as surely as the beacon's machine
 /// does: then they look alike, and two machines would be trained to contradict each other.
-static bool has_twin(const bslam_appearance_t *appearance, const bslam_params_t *params, bslam_beacon_look_t *look,
-                     const bslam_sample_t *sample)
+static bool has_twin(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                     bslam_beacon_look_t *look, const bslam_sample_t *sample)
 {
-    const bslam_opinion_t own = opinion_of(appearance, params, look->classifier, sample);
-    const float least = (float)params->share_value;
+    const bslam_opinion_t own = opinion_of(appearance, settings, look->classifier, sample);
+    const float least = (float)settings->share_value;
     const float at_least = own.weight > 0.0f && own.value > least ? own.value : least;
-    const int16_t twin = find_twin(appearance, params, look->classifier, sample, at_least);
+    const int16_t twin = find_twin(appearance, settings, look->classifier, sample, at_least);
     if (twin != BSLAM_NO_CLASSIFIER && twin != look->twin && look->twin_count == 0) {
         look->twin = twin;
     }
     const bool again = twin != BSLAM_NO_CLASSIFIER && twin == look->twin;
-    return persists(&look->twin_count, again, params->share_sightings);
+    return persists(&look->twin_count, again, settings->share_sightings);
 }
 
 /// A machine of its own for a beacon, if there is one left.
@@ -265,16 +271,16 @@ static void give_machine(bslam_appearance_t *appearance, bslam_beacon_look_t *lo
 }
 
 /// Decides which machine a beacon has; false while that is open, when nothing is to be learned.
-static bool settle_machine(bslam_appearance_t *appearance, const bslam_params_t *params, int index, int count,
-                           const bslam_sample_t *sample)
+static bool settle_machine(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                           int count, const bslam_sample_t *sample)
 {
     bslam_beacon_look_t *look = &appearance->of[index];
-    const bool is_shared =
-        look->classifier != BSLAM_NO_CLASSIFIER && has_other_owner(appearance, index, count, look->classifier);
+    const bool is_shared = look->classifier != BSLAM_NO_CLASSIFIER &&
+                           has_other_owner(appearance, index, count, look->classifier);
     if (is_shared) {
-        const bslam_opinion_t own = opinion_of(appearance, params, look->classifier, sample);
+        const bslam_opinion_t own = opinion_of(appearance, settings, look->classifier, sample);
         const bool refused = own.weight > 0.0f && own.value < 0.0f;
-        if (persists(&look->disowned, refused, params->share_sightings)) {
+        if (persists(&look->disowned, refused, settings->share_sightings)) {
             look->disowned = 0;
             release(appearance, index, count);
             give_machine(appearance, look);
@@ -282,7 +288,7 @@ static bool settle_machine(bslam_appearance_t *appearance, const bslam_params_t 
         }
         return look->classifier != BSLAM_NO_CLASSIFIER;
     }
-    if (has_twin(appearance, params, look, sample)) {
+    if (has_twin(appearance, settings, look, sample)) {
         const int16_t twin = look->twin;
         look->twin = BSLAM_NO_CLASSIFIER;
         look->twin_count = 0;
@@ -295,11 +301,11 @@ static bool settle_machine(bslam_appearance_t *appearance, const bslam_params_t 
     return look->classifier != BSLAM_NO_CLASSIFIER;
 }
 
-void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_params_t *params, int index, int count,
-                       uint32_t travelled_um, const bslam_sighting_t *sighting)
+void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                            int count, uint32_t travelled_um, const bslam_sighting_t *sighting)
 {
     bslam_beacon_look_t *look = &appearance->of[index];
-    const uint32_t least_um = (uint32_t)(params->learn_travel_m * (bslam_real_t)MICROMETRES_PER_M);
+    const uint32_t least_um = (uint32_t)(settings->learn_travel_m * (bslam_real_t)MICROMETRES_PER_M);
     bslam_sample_t sample;
     if (look->is_trained && travelled_um - look->trained_um < least_um) {
         return;
@@ -308,7 +314,7 @@ void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_params_t
     look->trained_um = travelled_um;
     note_class(look, sighting->beacon_class);
     if (sighting->signature != NULL && bslam_sample_encode(sighting->signature, &sample) == BSLAM_OK &&
-        settle_machine(appearance, params, index, count, &sample) &&
+        settle_machine(appearance, settings, index, count, &sample) &&
         bslam_learner_show(&appearance->learner, look->classifier, sighting->signature) == BSLAM_OK) {
         appearance->counters.taught++;
     }

@@ -7,7 +7,7 @@
 #ifndef BSLAM_APPEARANCE_APPEARANCE_H
 #define BSLAM_APPEARANCE_APPEARANCE_H
 
-#include "bslam/params.h"
+#include "bslam/settings.h"
 #include "base/types.h"
 #include "bslam/appearance/learner.h"
 
@@ -37,15 +37,16 @@ typedef struct bslam_beacon_look {
     uint8_t alone;       ///< how often it was seen without near_uid, or that without it
     uint8_t ousted;      ///< how many beacons were retired for being in this one's place
     bool is_trained;
-    uint32_t near_uid;                       ///< an older beacon in the same place
-    uint32_t trained_um;                      ///< the robot's way when it was taught last
-    uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];    ///< how often as which class, from 1 on
-    uint32_t missed_um;                      ///< the robot's way when it was seen last, or not expected
-    uint8_t missed;                          ///< from how many directions, since it was seen last
-    uint8_t seen_from[BSLAM_APPEARANCE_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
-    bslam_real_t view_score;                 ///< association.h: as of its last match
+    uint32_t near_uid;                          ///< an older beacon in the same place
+    uint32_t trained_um;                        ///< the robot's way when it was taught last
+    uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];  ///< how often as which class, from 1 on
+    uint32_t missed_um;                         ///< the robot's way when it was seen last, or not expected
+    uint8_t missed;                             ///< from how many directions, since it was seen last
+    uint8_t
+        seen_from[BSLAM_APPEARANCE_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
+    bslam_real_t view_score;                  ///< association.h: as of its last match
     uint32_t delayed_us;                      ///< how long matches with it had waited by then; 0: not
-    uint32_t last_delay_us;                       ///< when the last one did, modulo 72 minutes
+    uint32_t last_delay_us;                   ///< when the last one did, modulo 72 minutes
 } bslam_beacon_look_t;
 
 /// What the looks of a sighting say of a beacon.
@@ -58,64 +59,66 @@ typedef struct bslam_opinion {
 typedef struct bslam_appearance {
     bslam_appearance_counters_t counters;
     bslam_beacon_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
-    bslam_real_t left_rad;               ///< how far to the left of the robot a beacon was seen
-    bslam_real_t right_rad;              ///< and to the right, below 0
+    bslam_real_t left_rad;                      ///< how far to the left of the robot a beacon was seen
+    bslam_real_t right_rad;                     ///< and to the right, below 0
     bslam_learner_t learner;
 } bslam_appearance_t;
 
 /// What association asks: functions below. It reaches them by this alone, so that a linker leaves looks out
 /// where none are attached.
 typedef struct bslam_appearance_answers {
-    bslam_opinion_t (*ask)(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
+    bslam_opinion_t (*ask)(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                            const bslam_sample_t *sample);
-    bslam_real_t (*class_odds)(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                               uint8_t beacon_class);
-    bslam_real_t (*viewpoint_odds)(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                              int sector);
-    bool (*has_waited)(const bslam_appearance_t *appearance, const bslam_params_t *params, int index, int64_t time_us);
+    bslam_real_t (*class_odds)(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                               int index, uint8_t beacon_class);
+    bslam_real_t (*viewpoint_odds)(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                                   int index, int sector);
+    bool (*has_waited)(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                       int64_t time_us);
 } bslam_appearance_answers_t;
 
 extern const bslam_appearance_answers_t bslam_appearance_answers;
 
 /// Nothing known. Seeds and errors as bslam_learner_init has them.
-BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance, const bslam_sample_t *seeds,
-                                                 int32_t seed_count);
+BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance,
+                                                      const bslam_sample_t *seeds, int32_t seed_count);
 
 /// Forgets all beacons, in time for another map.
 void bslam_appearance_clear(bslam_appearance_t *appearance);
 
 /// What the machine of beacon `index` says of a sample.
-bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                const bslam_sample_t *sample);
+bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                                     int index, const bslam_sample_t *sample);
 
 /// Log odds that beacon `index` is seen as this class, against a beacon of which nothing is known; 0 for a
 /// class that is no evidence.
-bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                    uint8_t beacon_class);
+bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance,
+                                         const bslam_settings_t *settings, int index, uint8_t beacon_class);
 
 /// Log odds that beacon `index` is seen from this sector, against one that is not in the map: by those from
 /// which it was seen so far. 0 if none is known. MATH (43). O(sectors).
-bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                                   int sector);
+bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearance,
+                                             const bslam_settings_t *settings, int index, int sector);
 
 /// The class that beacon `index` was surely seen as most often; BSLAM_CLASS_NONE: it never was.
 uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index);
 
-/// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone travelled_um. Its
-/// class is noted and its machine is shown it, unless the last one was a few centimetres ago; a machine is
-/// found for a beacon that has none. O(machines).
-void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_params_t *params, int index, int count,
-                       uint32_t travelled_um, const bslam_sighting_t *sighting);
+/// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone
+/// travelled_um. Its class is noted and its machine is shown it, unless the last one was a few centimetres
+/// ago; a machine is found for a beacon that has none. O(machines).
+void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                            int count, uint32_t travelled_um, const bslam_sighting_t *sighting);
 
 /// Beacon `index` was matched, or has begun, with this `view_score` (association.h).
 void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam_real_t view_score);
 
 /// A match with beacon `index` waits at this moment: association.h, `delayed_for`.
-void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_params_t *params, int index, int64_t time_us);
+void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                                 int64_t time_us);
 
 /// Whether matches with beacon `index` have waited for `decision_delay_us` by now, without a longer pause.
-bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_params_t *params, int index,
-                            int64_t time_us);
+bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
+                             int index, int64_t time_us);
 
 /// Beacon `index` of `count` leaves the map; those behind it move up.
 void bslam_appearance_forget(bslam_appearance_t *appearance, int index, int count);

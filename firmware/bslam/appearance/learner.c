@@ -189,8 +189,8 @@ bool bslam_learner_knows(const bslam_learner_t *learner, int32_t classifier)
 // ---- decisions
 // ------------------------------------------------------------------------------------------------
 
-bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t classifier, const bslam_sample_t *sample,
-                                    float *value)
+bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t classifier,
+                                    const bslam_sample_t *sample, float *value)
 {
     if (!exists(learner, classifier)) {
         learner->counters.refused_no_machine++;

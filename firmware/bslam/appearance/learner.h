@@ -43,13 +43,13 @@ typedef struct bslam_learner_counters {
 typedef struct bslam_classifier {
     bool used;
     bool trained;
-    bool waiting;     ///< for a training
-    uint8_t again;    ///< how many more trainings it may ask for itself, if one does not converge
-    uint8_t turn;     ///< which part of the other machines the next training looks through
-    uint8_t samples;  ///< how many it keeps
+    bool waiting;        ///< for a training
+    uint8_t again;       ///< how many more trainings it may ask for itself, if one does not converge
+    uint8_t turn;        ///< which part of the other machines the next training looks through
+    uint8_t samples;     ///< how many it keeps
     uint16_t negatives;  ///< length of rival[]
     uint16_t own_alpha[BSLAM_SAMPLES_PER_CLASSIFIER];  ///< dual variables, in units of BSLAM_ALPHA_UNIT
-    uint16_t negative[BSLAM_NEGATIVES_MAX];               ///< samples inside its margin, by number
+    uint16_t negative[BSLAM_NEGATIVES_MAX];            ///< samples inside its margin, by number
     uint16_t negative_alpha[BSLAM_NEGATIVES_MAX];
     bslam_weights_t weights;
 } bslam_classifier_t;
@@ -68,7 +68,7 @@ typedef enum bslam_stage {
 /// The training under way. Private.
 typedef struct bslam_training {
     bslam_stage_t stage;
-    int32_t classifier;      ///< in training, or trained last
+    int32_t classifier;   ///< in training, or trained last
     int32_t first_block;  ///< samples are looked at in blocks, those of a machine or as many seeds: this one,
     int32_t block_step;   ///< and each so-manieth after it
     int32_t block;        ///< next
@@ -115,9 +115,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_learner_show(bslam_learner_t *learner, int
                                                    const float signature[BSLAM_SAMPLE_FEATURES]);
 
 /// Goes on with the training under way, or begins the next one asked for: at most `budget` pieces, of which
-/// each is a dual step, or a look at BSLAM_SAMPLES_PER_CLASSIFIER samples. docs/EXPERIMENTS.md says what a piece
-/// takes. A training ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it goes on
-/// after the others that wait, up to 20 times. True if work is left.
+/// each is a dual step, or a look at BSLAM_SAMPLES_PER_CLASSIFIER samples. docs/EXPERIMENTS.md says what a
+/// piece takes. A training ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it
+/// goes on after the others that wait, up to 20 times. True if work is left.
 bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 
 /// Decision value of a sample (bslam_sample_encode): above 0 is "this beacon", 1 and -1 are the margins. 0

@@ -24,9 +24,9 @@ static bslam_real_t clip(bslam_real_t x, bslam_real_t low, bslam_real_t high)
 }
 
 /// Log density of beacons that are not in the map, in the units of a sighting: 1/(m rad), or 1/rad.
-static bslam_real_t log_new(const bslam_params_t *params, const bslam_sighting_t *sighting)
+static bslam_real_t log_new(const bslam_settings_t *settings, const bslam_sighting_t *sighting)
 {
-    return bslam_ln(sighting->has_range ? params->new_per_m2 * sighting->range_m : params->new_per_rad);
+    return bslam_ln(sighting->has_range ? settings->new_per_m2 * sighting->range_m : settings->new_per_rad);
 }
 
 /// Log density, in 1/m, of a distance that says nothing because the thing is taken for another kind: between
@@ -37,20 +37,21 @@ static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting
 }
 
 /// What looks add to the score.
-static bslam_real_t looks_score(const bslam_params_t *params, const bslam_opinion_t *opinion)
+static bslam_real_t looks_score(const bslam_settings_t *settings, const bslam_opinion_t *opinion)
 {
-    const bslam_real_t odds = params->appearance_slope * (bslam_real_t)opinion->value + params->appearance_offset;
-    return params->appearance_weight * (bslam_real_t)opinion->weight *
-           clip(odds, -params->appearance_low, params->appearance_high);
+    const bslam_real_t odds =
+        settings->appearance_slope * (bslam_real_t)opinion->value + settings->appearance_offset;
+    return settings->appearance_weight * (bslam_real_t)opinion->weight *
+           clip(odds, -settings->appearance_low, settings->appearance_high);
 }
 
 /// What the detector's class adds to the score.
 static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                int beacon)
 {
-    return frame->appearance == NULL
-               ? 0
-               : frame->answers->class_odds(frame->appearance, frame->params, beacon, sighting->beacon_class);
+    return frame->appearance == NULL ? 0
+                                     : frame->answers->class_odds(frame->appearance, frame->settings, beacon,
+                                                                  sighting->beacon_class);
 }
 
 /// What the side from which the robot sees a beacon adds to the score, where it is known.
@@ -60,8 +61,9 @@ static bslam_real_t viewpoint_odds(const bslam_sighting_frame_t *frame, int beac
         return 0;
     }
     const bslam_viewpoint_t outlook = bslam_viewpoint_of(frame->ekf, beacon);
-    return outlook.is_sure ? frame->answers->viewpoint_odds(frame->appearance, frame->params, beacon, outlook.sector)
-                           : 0;
+    return outlook.is_sure
+               ? frame->answers->viewpoint_odds(frame->appearance, frame->settings, beacon, outlook.sector)
+               : 0;
 }
 
 static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
@@ -72,16 +74,19 @@ static int64_t seen_ago_us(const bslam_sighting_frame_t *frame, int beacon)
 /// Whether a beacon does not count, and was not seen for a while.
 static bool is_old(const bslam_sighting_frame_t *frame, int beacon)
 {
-    return !frame->ekf->beacons[beacon].confirmed && seen_ago_us(frame, beacon) > frame->params->decision_delay_us;
+    return !frame->ekf->beacons[beacon].confirmed &&
+           seen_ago_us(frame, beacon) > frame->settings->decision_delay_us;
 }
 
 /// The best score without again_odds that a beacon has had since it came into view, where its next one is
 /// this.
 static bslam_real_t view_score(const bslam_sighting_frame_t *frame, int beacon, bslam_real_t score)
 {
-    const bool is_in_view = frame->appearance != NULL && seen_ago_us(frame, beacon) <= frame->params->decision_delay_us;
-    return is_in_view && frame->appearance->of[beacon].view_score > score ? frame->appearance->of[beacon].view_score
-                                                                     : score;
+    const bool is_in_view =
+        frame->appearance != NULL && seen_ago_us(frame, beacon) <= frame->settings->decision_delay_us;
+    return is_in_view && frame->appearance->of[beacon].view_score > score
+               ? frame->appearance->of[beacon].view_score
+               : score;
 }
 
 /// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
@@ -91,12 +96,13 @@ static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_
                                int beacon)
 {
     const int64_t ago_us = seen_ago_us(frame, beacon);
-    const bool is_just = ago_us > 0 && ago_us <= frame->params->again_us;
+    const bool is_just = ago_us > 0 && ago_us <= frame->settings->again_us;
     if (!is_just || bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting)) {
         return 0;
     }
-    const bslam_real_t odds = frame->params->again_odds;
-    return frame->appearance == NULL ? odds : clip(VIEW_WORTH * frame->appearance->of[beacon].view_score, 0, odds);
+    const bslam_real_t odds = frame->settings->again_odds;
+    return frame->appearance == NULL ? odds
+                                     : clip(VIEW_WORTH * frame->appearance->of[beacon].view_score, 0, odds);
 }
 
 /// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
@@ -119,7 +125,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     bslam_innovation_t innovation;
     bslam_weight_t weight;
     if (is_another_kind(frame, sighting, beacon) ||
-        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, beacon, &innovation) !=
+        bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, &taken, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_conditional_weigh(frame->ekf, conditional, &innovation, &weight) != BSLAM_OK) {
         return false;
@@ -127,11 +133,11 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     found->distance2 = weight.distance2;
     found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
-        found->opinion = frame->answers->ask(frame->appearance, frame->params, beacon, sample);
+        found->opinion = frame->answers->ask(frame->appearance, frame->settings, beacon, sample);
     }
-    found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->params, sighting) +
-                   looks_score(frame->params, &found->opinion) + class_odds(frame, sighting, beacon);
-    if (weight.distance2 <= frame->params->candidate_d2) {  // beyond, nobody asks the score
+    found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->settings, sighting) +
+                   looks_score(frame->settings, &found->opinion) + class_odds(frame, sighting, beacon);
+    if (weight.distance2 <= frame->settings->candidate_d2) {  // beyond, nobody asks the score
         found->score += viewpoint_odds(frame, beacon);
     }
     found->view_score = view_score(frame, beacon, found->score);
@@ -153,7 +159,8 @@ static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_match_t *m
 static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int i, bslam_sample_t *sample)
 {
     const float *signature = frame->sightings[i].signature;
-    if (frame->appearance == NULL || signature == NULL || bslam_sample_encode(signature, sample) != BSLAM_OK) {
+    if (frame->appearance == NULL || signature == NULL ||
+        bslam_sample_encode(signature, sample) != BSLAM_OK) {
         return NULL;
     }
     return sample;
@@ -161,34 +168,34 @@ static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int 
 
 /// Whether a machine may learn from a match: it is near, no other beacon comes close, and it looks like it,
 /// if that is known.
-static bool is_sure(const bslam_params_t *params, const candidate_t *best, bslam_real_t lead)
+static bool is_sure(const bslam_settings_t *settings, const candidate_t *best, bslam_real_t lead)
 {
     const bool looks_right =
-        best->opinion.weight < 0.5f || (bslam_real_t)best->opinion.value >= params->learn_margin;
-    return best->distance2 <= params->learn_d2 && lead >= params->learn_lead && looks_right;
+        best->opinion.weight < 0.5f || (bslam_real_t)best->opinion.value >= settings->learn_margin;
+    return best->distance2 <= settings->learn_d2 && lead >= settings->learn_lead && looks_right;
 }
 
 /// Whether a machine of few samples is against a match. It may be another beacon that stands near, and the
 /// two are told apart once both are in view; or else the machine has not seen that side of its beacon yet.
 static bool is_doubted(const bslam_sighting_frame_t *frame, const candidate_t *best)
 {
-    return best->opinion.weight < 0.5f && best->score < frame->params->learn_lead &&
-           looks_score(frame->params, &best->opinion) < 0;
+    return best->opinion.weight < 0.5f && best->score < frame->settings->learn_lead &&
+           looks_score(frame->settings, &best->opinion) < 0;
 }
 
 /// Whether a match that little speaks for can wait: another beacon in view holds the robot in its place.
 static bool can_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
-    return frame->appearance != NULL && best->score < frame->params->decision_delay_score &&
-           bslam_is_placed(frame->ekf, frame->params->again_us, beacon, frame->time_us);
+    return frame->appearance != NULL && best->score < frame->settings->decision_delay_score &&
+           bslam_is_placed(frame->ekf, frame->settings->again_us, beacon, frame->time_us);
 }
 
 /// Whether a match has to wait. Not one with a beacon in view: that it was seen just now says more.
 static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
-    return best->score > 0 && seen_ago_us(frame, beacon) > frame->params->decision_delay_us &&
+    return best->score > 0 && seen_ago_us(frame, beacon) > frame->settings->decision_delay_us &&
            (is_doubted(frame, best) || can_wait(frame, beacon, best)) &&
-           !frame->answers->has_waited(frame->appearance, frame->params, beacon, frame->time_us);
+           !frame->answers->has_waited(frame->appearance, frame->settings, beacon, frame->time_us);
 }
 
 /// Finds the best beacon of a sighting among those that are not taken.
@@ -204,7 +211,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *
     match->beacon = -1;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         candidate_t one;
-        if (!weigh(frame, conditional, i, b, sample, &one) || one.distance2 > frame->params->candidate_d2) {
+        if (!weigh(frame, conditional, i, b, sample, &one) || one.distance2 > frame->settings->candidate_d2) {
             continue;
         }
         if (is_taken(frame, matches, b)) {
@@ -224,7 +231,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *
     match->view_score = best.view_score;
     // Another beacon, or a new one, whose score is 0.
     match->lead = best.score - (has_second && second > 0 ? second : 0);
-    match->sure = match->beacon >= 0 && is_sure(frame->params, &best, match->lead);
+    match->sure = match->beacon >= 0 && is_sure(frame->settings, &best, match->lead);
     match->delayed_for = match->beacon >= 0 && has_to_wait(frame, match->beacon, &best) ? match->beacon : -1;
 }
 
@@ -248,12 +255,13 @@ static int next_to_settle(const bslam_match_t *matches, int count)
 }
 
 /// Takes a match into what is given for the others.
-static void give(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i, const bslam_match_t *match)
+static void give(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                 const bslam_match_t *match)
 {
     const bslam_sighting_t taken =
         bslam_ekf_taken_as(&frame->ekf->beacons[match->beacon], &frame->sightings[i]);
     bslam_innovation_t innovation;
-    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &taken, match->beacon, &innovation) ==
+    if (bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, &taken, match->beacon, &innovation) ==
         BSLAM_OK) {
         (void)bslam_conditional_add(frame->ekf, conditional, &innovation);
     }
@@ -272,7 +280,7 @@ static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *mat
     bool contested = false;
     for (int i = 0; i < frame->count; i++) {
         if (i != next && is_open(&matches[i]) && matches[i].beacon == matches[next].beacon &&
-            matches[i].score > matches[next].score - frame->params->competitor_lead) {
+            matches[i].score > matches[next].score - frame->settings->competitor_lead) {
             leave_open(&matches[i]);
             contested = true;
         }
@@ -285,7 +293,8 @@ static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *mat
 
 /// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
 /// made anew, given the matches so far.
-static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, bslam_match_t *matches)
+static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional,
+                   bslam_match_t *matches)
 {
     for (int next = next_to_settle(matches, frame->count); next >= 0;
          next = next_to_settle(matches, frame->count)) {
@@ -295,7 +304,7 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *con
         matches[next].verdict = BSLAM_VERDICT_MATCH;
         give(frame, conditional, next, &matches[next]);
         for (int i = 0; i < frame->count; i++) {
-            const bool is_clear = matches[i].lead >= frame->params->learn_lead;
+            const bool is_clear = matches[i].lead >= frame->settings->learn_lead;
             if (is_open(&matches[i]) && (!is_clear || matches[i].beacon == matches[next].beacon)) {
                 find_best(frame, conditional, i, matches);
             }
@@ -315,11 +324,11 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditi
     for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
         candidate_t one;
         if (!is_taken(frame, matches, b) && weigh(frame, conditional, i, b, sample, &one) &&
-            one.distance2 <= frame->params->far_d2 && one.opinion.weight >= 0.5f &&
+            one.distance2 <= frame->settings->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
-            looks_score(frame->params, &one.opinion) >= 0.5f * frame->params->appearance_high &&
-            !(bslam_is_placed(frame->ekf, frame->params->decision_delay_us, b, frame->time_us) &&
-              frame->answers->has_waited(frame->appearance, frame->params, b, frame->time_us))) {
+            looks_score(frame->settings, &one.opinion) >= 0.5f * frame->settings->appearance_high &&
+            !(bslam_is_placed(frame->ekf, frame->settings->decision_delay_us, b, frame->time_us) &&
+              frame->answers->has_waited(frame->appearance, frame->settings, b, frame->time_us))) {
             return b;
         }
     }
@@ -336,7 +345,7 @@ static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t 
         return false;
     }
     const bool may_be_new = sighting->has_range && is_old(frame, match->beacon);
-    return match->score > (may_be_new ? 0 : -frame->params->defer_score);
+    return match->score > (may_be_new ? 0 : -frame->settings->defer_score);
 }
 
 /// What becomes of a sighting that matches no beacon.

@@ -60,7 +60,7 @@ static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bsla
 {
     bslam_innovation_t innovation;
     bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+    if (bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
         return -1;
@@ -79,7 +79,7 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
     if (sighting->has_range) {
         const bslam_sighted_point_t seen =
             bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
-        const bslam_real_t limit = frame->params->nearest_threshold_m;
+        const bslam_real_t limit = frame->settings->nearest_threshold_m;
         const bslam_real_t dx = (seen.x_m - x) / limit;
         const bslam_real_t dy = (seen.y_m - y) / limit;
         return dx * dx + dy * dy;
@@ -88,7 +88,7 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
     const bslam_real_t direction = bslam_atan2(y - sensor.pose.y_m, x - sensor.pose.x_m);
     const bslam_real_t difference =
         bslam_angle_wrap(direction - sensor.pose.theta_rad - bslam_angle_wrap(sighting->bearing_rad)) /
-        frame->params->nearest_threshold_rad;
+        frame->settings->nearest_threshold_rad;
     return difference * difference;
 }
 
@@ -116,7 +116,7 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
         }
         negatives++;
     }
-    const bslam_real_t gate_d2 = frame->params->gate_d2;
+    const bslam_real_t gate_d2 = frame->settings->gate_d2;
     const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
     const bool may_rival = is_out && sighting->has_range && negatives < RIVALS_MAX;
     if (negatives == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
@@ -197,13 +197,13 @@ void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t 
 
 void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
 {
-    associate_by_distance(frame, mahalanobis2, frame->params->match_d2, frame->params->new_d2, matches);
+    associate_by_distance(frame, mahalanobis2, frame->settings->match_d2, frame->settings->new_d2, matches);
 }
 
-bslam_associate_fn bslam_associate_method(const bslam_params_t *params)
+bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings)
 {
     static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
                                                  bslam_associate_mahalanobis, bslam_associate_svm,
                                                  bslam_associate_joint};
-    return methods[params->association];
+    return methods[settings->association];
 }

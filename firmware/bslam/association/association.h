@@ -22,13 +22,13 @@ typedef enum bslam_reason {
     BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
     BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
     BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or waits
-    BSLAM_REASON_APPEARANCE,        ///< too far from any beacon to match, but it looks like one that may be here
+    BSLAM_REASON_APPEARANCE,   ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
     BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
     BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
     BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
-    BSLAM_REASON_TENTATIVE,        ///< it shows a beacon that may be none, as far as the detector's scores tell
+    BSLAM_REASON_TENTATIVE,    ///< it shows a beacon that may be none, as far as the detector's scores tell
     BSLAM_REASON_COUNT
 } bslam_reason_t;
 
@@ -37,8 +37,9 @@ typedef enum bslam_verdict {
     BSLAM_VERDICT_REJECT = 0,
     BSLAM_VERDICT_MATCH,
     BSLAM_VERDICT_NEW,
-    BSLAM_VERDICT_DEFER,  ///< undecided: used for nothing
-    BSLAM_VERDICT_TENTATIVE   ///< no method's: a match or a new one that says whether there is a beacon, no more
+    BSLAM_VERDICT_DEFER,     ///< undecided: used for nothing
+    BSLAM_VERDICT_TENTATIVE  ///< no method's: a match or a new one that says whether there is a beacon, no
+                             ///< more
 } bslam_verdict_t;
 
 typedef struct bslam_match {
@@ -57,10 +58,10 @@ typedef struct bslam_match {
 /// All a method may look at.
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
-    const bslam_params_t *params;
-    const bslam_appearance_t *appearance;            ///< what the beacons look like; NULL: nobody knows
+    const bslam_settings_t *settings;
+    const bslam_appearance_t *appearance;       ///< what the beacons look like; NULL: nobody knows
     const bslam_appearance_answers_t *answers;  ///< how looks are asked
-    const bslam_pose_t *mount;             ///< the sensor relative to the robot's present pose
+    const bslam_pose_t *mount;                  ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
     int64_t time_us;
@@ -93,7 +94,7 @@ void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *m
 /// `within_us`: then the robot's pose is not what is wrong. O(beacons).
 bool bslam_is_placed(const bslam_ekf_t *ekf, int64_t within_us, int other_than, int64_t time_us);
 
-/// The method that params->association names.
-bslam_associate_fn bslam_associate_method(const bslam_params_t *params);
+/// The method that settings->association names.
+bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings);
 
 #endif

@@ -13,8 +13,8 @@ static int32_t row_at(int32_t i)
 }
 
 /// Appends one scalar: its row of the factor, and its part of the innovation that the others do not explain.
-static bool push(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const bslam_row_t *row, bslam_real_t y,
-                 bslam_real_t variance)
+static bool push(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const bslam_row_t *row,
+                 bslam_real_t y, bslam_real_t variance)
 {
     const int32_t n = conditional->count;
     bslam_real_t *l = &conditional->factor[row_at(n)];
@@ -49,7 +49,7 @@ static bool push_innovation(const bslam_ekf_t *ekf, bslam_conditional_t *conditi
 }
 
 bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf, bslam_conditional_t *conditional,
-                                 const bslam_innovation_t *innovation, bslam_weight_t *weight)
+                                       const bslam_innovation_t *innovation, bslam_weight_t *weight)
 {
     const int32_t before = conditional->count;
     const bool pushed = push_innovation(ekf, conditional, innovation);
@@ -69,7 +69,8 @@ bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf, bslam_conditional
     return BSLAM_OK;
 }
 
-bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const bslam_innovation_t *innovation)
+bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditional,
+                           const bslam_innovation_t *innovation)
 {
     const int32_t before = conditional->count;
     if (before + 2 > 2 * BSLAM_GIVEN_MAX || !push_innovation(ekf, conditional, innovation)) {

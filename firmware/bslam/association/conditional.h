@@ -32,12 +32,14 @@ static inline void bslam_conditional_init(bslam_conditional_t *conditional)
 
 /// Weighs an innovation; *given is scratch meanwhile and comes back as it was. BSLAM_E_SINGULAR: S is not
 /// positive definite; *weight is unchanged then. O(count²).
-BSLAM_MUST_CHECK bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf, bslam_conditional_t *conditional,
-                                                  const bslam_innovation_t *innovation,
-                                                  bslam_weight_t *weight);
+BSLAM_MUST_CHECK bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf,
+                                                        bslam_conditional_t *conditional,
+                                                        const bslam_innovation_t *innovation,
+                                                        bslam_weight_t *weight);
 
 /// Adds an innovation to what is given. False, and no change, if there is no room or S is singular.
-bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const bslam_innovation_t *innovation);
+bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditional,
+                           const bslam_innovation_t *innovation);
 
 /// Squared Mahalanobis distance of all that is given together. O(count).
 bslam_real_t bslam_conditional_distance2(const bslam_conditional_t *conditional);

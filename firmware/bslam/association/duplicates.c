@@ -22,7 +22,7 @@ static bool has_place(const bslam_beacon_t *beacon)
 }
 
 /// Whether two beacons may stand in the same place, as far as the map knows; no farther apart than so far.
-static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b,
+static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b,
                          bslam_real_t apart_m)
 {
     const int at = ekf->beacons[a].at;
@@ -36,7 +36,7 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
         return false;
     }
     const bslam_real_t *p = ekf->covariance;
-    const bslam_real_t floor_m2 = params->duplicate_sd_m * params->duplicate_sd_m;
+    const bslam_real_t floor_m2 = settings->duplicate_sd_m * settings->duplicate_sd_m;
     const bslam_real_t xx = floor_m2 + bslam_symmat_get(p, at, at) + bslam_symmat_get(p, bt, bt) -
                             2 * bslam_symmat_get(p, at, bt);
     const bslam_real_t yy = floor_m2 + bslam_symmat_get(p, at + 1, at + 1) +
@@ -44,15 +44,15 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_params_t *params, i
     const bslam_real_t xy = bslam_symmat_get(p, at + 1, at) + bslam_symmat_get(p, bt + 1, bt) -
                             bslam_symmat_get(p, at + 1, bt) - bslam_symmat_get(p, bt + 1, at);
     const bslam_real_t det = xx * yy - xy * xy;
-    return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= params->duplicate_d2 * det;
+    return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= settings->duplicate_d2 * det;
 }
 
 /// Whether two beacons stand one behind the other, as the robot sees it, and one of them was hardly ever
 /// seen: two distances of one far thing, each of which began a beacon. Without an arc tangent, by the sine of
 /// the angle between them: all pairs of what is seen are asked in every frame.
-static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_params_t *params, int a, int b)
+static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b)
 {
-    const uint32_t few = (uint32_t)params->doubt_sightings;
+    const uint32_t few = (uint32_t)settings->doubt_sightings;
     if (ekf->beacons[a].sightings >= few && ekf->beacons[b].sightings >= few) {
         return false;
     }
@@ -65,7 +65,7 @@ static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_params_t *param
     bx -= robot.x_m;
     by -= robot.y_m;
     const bslam_real_t a2 = ax * ax + ay * ay, b2 = bx * bx + by * by;
-    const bslam_real_t cross = ax * by - ay * bx, apart = ONE_DIRECTION_SD * params->bearing_sd_rad;
+    const bslam_real_t cross = ax * by - ay * bx, apart = ONE_DIRECTION_SD * settings->bearing_sd_rad;
     return ax * bx + ay * by > 0 && cross * cross <= apart * apart * a2 * b2 && a2 < FARTHER2 * b2 &&
            b2 < FARTHER2 * a2;
 }
@@ -91,20 +91,21 @@ static bool count_pair(bslam_beacon_look_t *younger, uint32_t older_uid, bool to
 
 /// Which of two leaves: the one with fewer sightings, unless others have left for being in the same place
 /// again and again while it was not seen: then what was there is there no longer.
-static int who_leaves(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params, int a,
-                      int b, bool in_place, int64_t time_us)
+static int who_leaves(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                      const bslam_settings_t *settings, int a, int b, bool in_place, int64_t time_us)
 {
     const int less = ekf->beacons[a].sightings < ekf->beacons[b].sightings ? a : b;
     const int more = less == a ? b : a;
-    const bool is_ousted = in_place && time_us - ekf->beacons[more].last_seen_us > params->decision_delay_us;
+    const bool is_ousted =
+        in_place && time_us - ekf->beacons[more].last_seen_us > settings->decision_delay_us;
     appearance->of[more].ousted = (uint8_t)(appearance->of[more].ousted + (is_ousted ? 1 : 0));
     return is_ousted && appearance->of[more].ousted >= OUSTED_MAX ? more : less;
 }
 
 /// The oldest other beacon that beacon `index` may be: one in its place, or else one in its direction;
 /// BSLAM_NO_DUPLICATE if there is none.
-static int find_other(const bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                      int index, bool *in_place)
+static int find_other(const bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                      const bslam_settings_t *settings, int index, bool *in_place)
 {
     int in_direction = BSLAM_NO_DUPLICATE;
     for (int b = 0; b < ekf->beacon_count; b++) {
@@ -113,35 +114,35 @@ static int find_other(const bslam_appearance_t *appearance, const bslam_ekf_t *e
         }
         const bool are_two = are_of_two_classes(appearance, index, b);
         const bslam_real_t apart_m =
-            are_two && TWO_CLASSES_M < params->duplicate_m ? TWO_CLASSES_M : params->duplicate_m;
-        *in_place = is_one_place(ekf, params, index, b, apart_m);
+            are_two && TWO_CLASSES_M < settings->duplicate_m ? TWO_CLASSES_M : settings->duplicate_m;
+        *in_place = is_one_place(ekf, settings, index, b, apart_m);
         if (*in_place) {
             return b;
         }
-        if (in_direction == BSLAM_NO_DUPLICATE && !are_two && is_one_direction(ekf, params, index, b)) {
+        if (in_direction == BSLAM_NO_DUPLICATE && !are_two && is_one_direction(ekf, settings, index, b)) {
             in_direction = b;
         }
     }
     return in_direction;
 }
 
-int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                         int64_t time_us)
+int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                            const bslam_settings_t *settings, int64_t time_us)
 {
     for (int b = 0; b < ekf->beacon_count; b++) {
         bool in_place = false;
-        const int other =
-            is_seen(ekf, b, time_us) ? find_other(appearance, ekf, params, b, &in_place) : BSLAM_NO_DUPLICATE;
+        const int other = is_seen(ekf, b, time_us) ? find_other(appearance, ekf, settings, b, &in_place)
+                                                   : BSLAM_NO_DUPLICATE;
         if (other == BSLAM_NO_DUPLICATE) {
             continue;
         }
         const int younger = ekf->beacons[other].uid > ekf->beacons[b].uid ? other : b;
         const int older = younger == b ? other : b;
         if (count_pair(&appearance->of[younger], ekf->beacons[older].uid, is_seen(ekf, other, time_us),
-                       params->doubt_sightings)) {
+                       settings->doubt_sightings)) {
             appearance->of[younger].alone = 0;
             appearance->counters.retired++;
-            return who_leaves(appearance, ekf, params, b, other, in_place, time_us);
+            return who_leaves(appearance, ekf, settings, b, other, in_place, time_us);
         }
     }
     return BSLAM_NO_DUPLICATE;

@@ -9,9 +9,9 @@
 #define BSLAM_NO_DUPLICATE (-1)
 
 /// Goes through the beacons that the frame of time_us showed. Answers which beacon is to leave, because it
-/// has been in another's place, or direction, for long enough without being seen beside it; BSLAM_NO_DUPLICATE:
-/// none. O(beacons seen * beacons).
-int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                         int64_t time_us);
+/// has been in another's place, or direction, for long enough without being seen beside it;
+/// BSLAM_NO_DUPLICATE: none. O(beacons seen * beacons).
+int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                            const bslam_settings_t *settings, int64_t time_us);
 
 #endif

@@ -22,11 +22,11 @@ typedef struct search {
 
 /// The chi-squared value of `freedoms` that is exceeded as rarely as the normal deviation joint_sd
 /// (Wilson and Hilferty).
-static bslam_real_t joint_limit(const bslam_params_t *params, int32_t freedoms)
+static bslam_real_t joint_limit(const bslam_settings_t *settings, int32_t freedoms)
 {
     const bslam_real_t n = (bslam_real_t)freedoms;
     const bslam_real_t spread = 2 / (9 * n);
-    const bslam_real_t root = 1 - spread + params->joint_sd * bslam_sqrt(spread);
+    const bslam_real_t root = 1 - spread + settings->joint_sd * bslam_sqrt(spread);
     return n * root * root * root;
 }
 
@@ -53,13 +53,15 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
     bslam_innovation_t innovation;
     bslam_real_t distance2;
     if (bslam_ekf_classes_differ(&frame->ekf->beacons[beacon], sighting) ||
-        bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, sighting, beacon, &innovation) !=
+        bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, sighting, beacon, &innovation) !=
             BSLAM_OK ||
         bslam_ekf_distance2(frame->ekf, &innovation, &distance2) != BSLAM_OK ||
-        distance2 > frame->params->match_d2 || !bslam_conditional_add(frame->ekf, &search->conditional, &innovation)) {
+        distance2 > frame->settings->match_d2 ||
+        !bslam_conditional_add(frame->ekf, &search->conditional, &innovation)) {
         return false;
     }
-    return bslam_conditional_distance2(&search->conditional) <= joint_limit(frame->params, search->conditional.count);
+    return bslam_conditional_distance2(&search->conditional) <=
+           joint_limit(frame->settings, search->conditional.count);
 }
 
 /// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better: one of
@@ -101,7 +103,7 @@ static void run(const bslam_sighting_frame_t *frame, const bslam_match_t *matche
 {
     int32_t level = 0;
     search->next[0] = 0;
-    for (int32_t node = 0; node < frame->params->joint_nodes && level >= 0; node++) {
+    for (int32_t node = 0; node < frame->settings->joint_nodes && level >= 0; node++) {
         if (search->next[level] > frame->ekf->beacon_count) {
             level--;
         } else if (try_next(frame, matches, search, level)) {
@@ -122,14 +124,14 @@ static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_ma
         bslam_innovation_t innovation;
         bslam_real_t distance2;
         if (!bslam_ekf_classes_differ(&frame->ekf->beacons[b], &frame->sightings[i]) &&
-            bslam_ekf_innovation(frame->ekf, frame->params, frame->mount, &frame->sightings[i], b,
+            bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, &frame->sightings[i], b,
                                  &innovation) == BSLAM_OK &&
             bslam_ekf_distance2(frame->ekf, &innovation, &distance2) == BSLAM_OK &&
             (match->distance2 < 0 || distance2 < match->distance2)) {
             match->distance2 = distance2;
         }
     }
-    const bool is_new = match->distance2 < 0 || match->distance2 > frame->params->new_d2;
+    const bool is_new = match->distance2 < 0 || match->distance2 > frame->settings->new_d2;
     match->verdict = is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_REJECT;
     match->reason = is_new ? BSLAM_REASON_NONE : BSLAM_REASON_AMBIGUOUS;
 }

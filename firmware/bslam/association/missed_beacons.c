@@ -23,8 +23,10 @@ static void note_seen(bslam_appearance_t *appearance, int index, const bslam_vie
     const bslam_real_t steps = outlook->range_m * STEPS_PER_M + 1;
     look->seen_from[outlook->sector] = (uint8_t)(steps < STEPS_MAX ? steps : STEPS_MAX);
     look->missed = 0;
-    appearance->left_rad = outlook->bearing_rad > appearance->left_rad ? outlook->bearing_rad : appearance->left_rad;
-    appearance->right_rad = outlook->bearing_rad < appearance->right_rad ? outlook->bearing_rad : appearance->right_rad;
+    appearance->left_rad =
+        outlook->bearing_rad > appearance->left_rad ? outlook->bearing_rad : appearance->left_rad;
+    appearance->right_rad =
+        outlook->bearing_rad < appearance->right_rad ? outlook->bearing_rad : appearance->right_rad;
 }
 
 /// Whether a beacon that stands where the map has it would be seen.
@@ -38,12 +40,13 @@ static bool is_expected(const bslam_appearance_t *appearance, const bslam_ekf_t 
            bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && outlook->is_sure;
 }
 
-int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                        int64_t time_us, uint32_t travelled_um, bool judges)
+int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                              const bslam_settings_t *settings, int64_t time_us, uint32_t travelled_um,
+                              bool judges)
 {
     const uint32_t least_um = (uint32_t)(MISSED_M * MICROMETRES_PER_M);
     int vanished = BSLAM_NO_MISSED_BEACON;
-    for (int b = 0; b < ekf->beacon_count && params->missed_views > 0; b++) {
+    for (int b = 0; b < ekf->beacon_count && settings->missed_views > 0; b++) {
         bslam_beacon_look_t *look = &appearance->of[b];
         if (!bslam_has_viewpoint(&ekf->beacons[b])) {
             continue;
@@ -59,7 +62,7 @@ int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t 
             look->missed_um = travelled_um;
             look->seen_from[outlook.sector] = 0;
             look->missed++;
-            vanished = look->missed >= params->missed_views ? b : vanished;
+            vanished = look->missed >= settings->missed_views ? b : vanished;
         }
     }
     appearance->counters.vanished += vanished != BSLAM_NO_MISSED_BEACON ? 1u : 0u;

@@ -1,5 +1,6 @@
 /// Beacons that are there no longer, with nothing in their place. The core knows no walls and no field of
-/// view; it knows from where each beacon was seen, and misses it where it stands there again. MATH "Position and appearance".
+/// view; it knows from where each beacon was seen, and misses it where it stands there again. MATH "Position
+/// and appearance".
 #ifndef BSLAM_ASSOCIATION_MISSED_BEACONS_H
 #define BSLAM_ASSOCIATION_MISSED_BEACONS_H
 
@@ -11,9 +12,10 @@
 /// Notes from where the beacons of the frame of time_us were seen, when the robot had gone travelled_um. If
 /// `judges`, which holds for a frame whose every sighting found its beacon, it notes which others are missed.
 /// Answers the beacon that was missed from missed_views of the directions from which it had been seen, since
-/// it was seen last; BSLAM_NO_MISSED_BEACON: none. Of a wall's corner, which hides a beacon from one or two of
-/// them for good, each direction speaks but once. O(beacons).
-int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf, const bslam_params_t *params,
-                        int64_t time_us, uint32_t travelled_um, bool judges);
+/// it was seen last; BSLAM_NO_MISSED_BEACON: none. Of a wall's corner, which hides a beacon from one or two
+/// of them for good, each direction speaks but once. O(beacons).
+int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
+                              const bslam_settings_t *settings, int64_t time_us, uint32_t travelled_um,
+                              bool judges);
 
 #endif

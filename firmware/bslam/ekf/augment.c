@@ -1,4 +1,5 @@
-// The map: beacons come into the state, leave it, and turn from rays into points. MATH "State augmentation", "Bearing-only".
+// The map: beacons come into the state, leave it, and turn from rays into points. MATH "State augmentation",
+// "Bearing-only".
 #include <string.h>
 
 #include "bslam/ekf/ekf.h"
@@ -40,7 +41,7 @@ static void append_value(bslam_ekf_t *ekf, const new_value_t *value)
 }
 
 /// The sighted point, with which the caller may go on. scale_var: of the scale that all its distances have.
-static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t *params,
+static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                           const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                           bslam_real_t scale_var)
 {
@@ -48,8 +49,8 @@ static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t
     const bslam_sighted_point_t point =
         bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
     const bslam_real_t range_var =
-        bslam_scaled_range_variance_m2(params, sighting, sighting->range_m, scale_var);
-    const bslam_real_t bearing_var = bslam_bearing_variance_rad2(params, sighting);
+        bslam_scaled_range_variance_m2(settings, sighting, sighting->range_m, scale_var);
+    const bslam_real_t bearing_var = bslam_bearing_variance_rad2(settings, sighting);
     const bslam_real_t x_by_pose[3] = {1, 0, point.x_by_theta};
     const bslam_real_t y_by_pose[3] = {0, 1, point.y_by_theta};
     const bslam_real_t xx = point.x_by_range * point.x_by_range * range_var +
@@ -68,11 +69,11 @@ static bslam_sighted_point_t append_point(bslam_ekf_t *ekf, const bslam_params_t
 }
 
 /// As a point, and the scale: where it is larger, the point is nearer.
-static void append_sized(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+static void append_sized(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                          const bslam_sighting_t *sighting, bslam_real_t scale_var)
 {
     static const bslam_real_t BY_NOTHING[3] = {0, 0, 0};
-    const bslam_sighted_point_t point = append_point(ekf, params, mount, sighting, scale_var);
+    const bslam_sighted_point_t point = append_point(ekf, settings, mount, sighting, scale_var);
     const bslam_real_t by_range = -scale_var * sighting->range_m;
     const new_value_t scale = {BY_NOTHING, 1, scale_var};
     const int at = ekf->dim;
@@ -87,7 +88,7 @@ static int room_of(const bslam_ekf_t *ekf)
     return 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;
 }
 
-static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+static void append_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                        const bslam_sighting_t *sighting)
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
@@ -97,13 +98,13 @@ static void append_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
     const bslam_real_t direction_by_pose[3] = {0, 0, 1};
     const bslam_real_t distance_by_pose[3] = {0, 0, 0};
     const bslam_real_t direction_rad = bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad);
-    const bslam_real_t direction_var = bslam_bearing_variance_rad2(params, sighting);
-    const bslam_real_t sd = params->ray_inverse_distance_sd_per_m;
+    const bslam_real_t direction_var = bslam_bearing_variance_rad2(settings, sighting);
+    const bslam_real_t sd = settings->ray_inverse_distance_sd_per_m;
     const new_value_t values[BSLAM_RAY_DIM] = {
         {x_by_pose, sensor.pose.x_m, 0},
         {y_by_pose, sensor.pose.y_m, 0},
         {direction_by_pose, direction_rad, direction_var},
-        {distance_by_pose, params->ray_inverse_distance_per_m, sd * sd},
+        {distance_by_pose, settings->ray_inverse_distance_per_m, sd * sd},
     };
     for (int k = 0; k < BSLAM_RAY_DIM; k++) {
         append_value(ekf, &values[k]);
@@ -123,26 +124,26 @@ static int append_beacon(bslam_ekf_t *ekf, bslam_beacon_kind_t kind)
     return index;
 }
 
-bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                              const bslam_sighting_t *sighting, int *index)
 {
     const bool ray = !sighting->has_range;
-    const bslam_real_t scale_var = bslam_unknown_scale_var(params, sighting);
+    const bslam_real_t scale_var = bslam_unknown_scale_var(settings, sighting);
     const int room = room_of(ekf);
     if (ekf->beacon_count == BSLAM_BEACONS_MAX || (ray && room < 2)) {
         return BSLAM_E_MAP_FULL;
     }
     if (ray) {
         *index = append_beacon(ekf, BSLAM_BEACON_RAY);
-        append_ray(ekf, params, mount, sighting);
+        append_ray(ekf, settings, mount, sighting);
         ekf->ray_count++;
     } else if (scale_var > 0 && room > 0) {
         *index = append_beacon(ekf, BSLAM_BEACON_SIZED);
-        append_sized(ekf, params, mount, sighting, scale_var);
+        append_sized(ekf, settings, mount, sighting, scale_var);
         ekf->sized_count++;
     } else {
         *index = append_beacon(ekf, BSLAM_BEACON_POINT);
-        (void)append_point(ekf, params, mount, sighting, scale_var);
+        (void)append_point(ekf, settings, mount, sighting, scale_var);
     }
     return BSLAM_OK;
 }
@@ -217,7 +218,7 @@ bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
 /// What hangs on a scale becomes as doubtful as if that had been doubted by more_var more from the start,
 /// when it was by scale_var: a measurement of negative variance takes back what is too much. What is thought
 /// stays.
-static void doubt_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int at, bslam_real_t scale_var,
+static void doubt_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int at, bslam_real_t scale_var,
                         bslam_real_t more_var)
 {
     const bslam_real_t left_var = ekf->covariance[bslam_symmat_at(at, at)];
@@ -225,16 +226,16 @@ static void doubt_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int at, 
     var = var > SCALE_VAR_MIN ? var : SCALE_VAR_MIN;
     const bslam_row_t row = {.other = {1}, .at = (uint16_t)at, .dim = 1};
     bslam_ekf_apply_scalar(ekf, &row, 0, -(var + var * var / more_var));
-    bslam_ekf_correct(ekf, params);
+    bslam_ekf_correct(ekf, settings);
 }
 
-void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int index, bslam_real_t scale_var,
-                           bslam_real_t more_var)
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int index,
+                           bslam_real_t scale_var, bslam_real_t more_var)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
     if (beacon->kind == BSLAM_BEACON_SIZED) {
         const int at = beacon->at + BSLAM_POINT_DIM;
-        doubt_scale(ekf, params, at, scale_var, more_var);
+        doubt_scale(ekf, settings, at, scale_var, more_var);
         begin_scale(ekf, at, scale_var + more_var);
     }
 }
@@ -285,7 +286,7 @@ void bslam_ekf_forget_map(bslam_ekf_t *ekf)
 
 /// Civera's linearity index of a ray seen from the sensor: 4 sd(distance) |cos(parallax)| / distance from the
 /// sensor.
-static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                           int at)
 {
     const bslam_real_t *ray = &ekf->mean[at];
@@ -302,7 +303,7 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_params_t *params, 
     const bslam_real_t square = dx * dx + dy * dy;
     const bslam_real_t along = bslam_abs((point.x_m - ray[0]) * dx + (point.y_m - ray[1]) * dy) * inverse;
     const bslam_real_t distance_sd = bslam_sqrt(variance) / (inverse * inverse);
-    return 4 * distance_sd * along < params->ray_linear_limit * square;
+    return 4 * distance_sd * along < settings->ray_linear_limit * square;
 }
 
 /// A point by what the state has: how it goes with that, and what it errs besides.
@@ -377,7 +378,7 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
     return true;
 }
 
-bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var)
 {
     bslam_beacon_t *beacon = &ekf->beacons[index];
@@ -388,7 +389,7 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const
     if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, mount, range_m, at, &place, by_range)) {
         return false;
     }
-    const bslam_real_t variance = bslam_scaled_range_variance_m2(params, sighting, range_m, scale_var);
+    const bslam_real_t variance = bslam_scaled_range_variance_m2(settings, sighting, range_m, scale_var);
     place.own.xx = by_range[0] * by_range[0] * variance;
     place.own.xy = by_range[0] * by_range[1] * variance;
     place.own.yy = by_range[1] * by_range[1] * variance;
@@ -403,12 +404,12 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const
     return true;
 }
 
-bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                           int index)
 {
     bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
-    if (beacon->kind != BSLAM_BEACON_RAY || !ray_is_linear(ekf, params, mount, at)) {
+    if (beacon->kind != BSLAM_BEACON_RAY || !ray_is_linear(ekf, settings, mount, at)) {
         return false;
     }
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);

@@ -10,7 +10,7 @@
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
-#include "bslam/params.h"
+#include "bslam/settings.h"
 #include "base/status.h"
 #include "base/types.h"
 #include "bslam/linalg/smallmat.h"
@@ -65,11 +65,11 @@ typedef struct bslam_beacon {
     bslam_real_t known_y_m;
     int64_t first_seen_us;
     int64_t last_seen_us;
-    uint32_t sightings;  ///< that were matched with it, the one that started it included
-    uint32_t gated;      ///< sightings taken for it that its gate rejected
-    uint32_t travelled_um;     ///< that the robot had gone when it was fused last, modulo 4.3 km
-    uint32_t view_um;    ///< the same when it was last counted in views
-    uint16_t views;      ///< sightings far apart that count towards its confirmation, less those against
+    uint32_t sightings;     ///< that were matched with it, the one that started it included
+    uint32_t gated;         ///< sightings taken for it that its gate rejected
+    uint32_t travelled_um;  ///< that the robot had gone when it was fused last, modulo 4.3 km
+    uint32_t view_um;       ///< the same when it was last counted in views
+    uint16_t views;         ///< sightings far apart that count towards its confirmation, less those against
     bool confirmed;
     uint8_t beacon_class;
     uint8_t class_lead;        ///< by how many votes it leads, slam/beacon_scale.c
@@ -99,18 +99,18 @@ typedef struct bslam_ekf {
 } bslam_ekf_t;
 
 /// Robot at the origin, which it knows exactly; no beacons.
-void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params);
+void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings);
 
 // ---- time -------------------------------------------------------------------------------------------------
 
 /// BSLAM_E_SINGULAR: the motion's noise is not positive definite, which velocity states need.
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_check_motion(const bslam_params_t *params,
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_check_motion(const bslam_settings_t *settings,
                                                        const bslam_motion_t *motion);
 
 /// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states
 /// the increment is a measurement of v and omega instead, fused here; one that bslam_ekf_check_motion refuses
 /// measures nothing. *moved is the motion that the filter took for the interval.
-void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                        bslam_motion_t *moved);
 
 /// The robot's own part of a state. It goes through odometry alone as it does with the map: neither motions
@@ -125,7 +125,7 @@ typedef struct bslam_robot {
 bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf);
 
 /// What bslam_ekf_predict does to the robot. O(1).
-void bslam_robot_predict(bslam_robot_t *robot, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings, const bslam_motion_t *motion,
                          bslam_motion_t *moved);
 
 bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
@@ -133,7 +133,7 @@ bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
 /// The robot may have moved unseen and stands still now: adds variance to its position (each axis) and
 /// heading, up to (30 m)² and (3.2 rad)² in all, beyond which it is lost anyway; velocity states become as at
 /// the start. O(n).
-void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
+void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,
                       bslam_real_t heading_var_rad2);
 
 /// Puts the robot somewhere, whatever was thought before: its pose has these variances (each axis) and is
@@ -165,7 +165,7 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
 /// Innovation of a sighting if it shows beacon `index`, at the mean and covariance before the frame: take all
 /// of a frame before the first bslam_ekf_fuse. BSLAM_E_SINGULAR: the beacon stands at the sensor, or is a ray
 /// without a positive inverse distance and the sighting has a distance. O(1).
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                                      const bslam_pose_t *mount,
                                                      const bslam_sighting_t *sighting, int index,
                                                      bslam_innovation_t *innovation);
@@ -188,12 +188,12 @@ typedef struct bslam_fusion {
 /// Equations (9)-(11) for one sighting, given those fused since the last bslam_ekf_correct. The mean moves
 /// only with bslam_ekf_correct. BSLAM_E_RANGE: outside the gate, not used. BSLAM_E_SINGULAR: S is not
 /// positive definite, not used.
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                                const bslam_innovation_t *innovation, bslam_fusion_t *fusion);
 
 /// Ends a frame: moves the mean, by the exponential map in the invariant form, and brings the covariance up
 /// to date.
-void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params);
+void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings);
 
 // ---- about given points -----------------------------------------------------------------------------------
 
@@ -220,12 +220,13 @@ typedef struct bslam_bend {
 /// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the
 /// models are linearised about from then on, with velocity states the motion, too. *transition, if not NULL,
 /// becomes what it did.
-void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                              const bslam_bend_t *bend, const bslam_real_t *next,
                              bslam_transition_t *transition);
 
 /// The speedometers' part, where there are velocity states.
-void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion);
+void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                              const bslam_motion_t *motion);
 
 /// The state value at `at` is its mean and this much more, up to `variance`.
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance);
@@ -236,9 +237,9 @@ void bslam_ekf_settle(bslam_ekf_t *ekf);
 // ---- map --------------------------------------------------------------------------------------------------
 
 /// Adds the beacon that a sighting shows: as a ray if it has no distance, else as a point, or a sized one
-/// where it or params->range_scale_sd is set and there is room for its third value. *index is its place.
+/// where it or settings->range_scale_sd is set and there is room for its third value. *index is its place.
 /// BSLAM_E_MAP_FULL: no room for it. O(n).
-BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_params_t *params,
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                               const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                               int *index);
 
@@ -252,8 +253,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real
                                                     bslam_real_t sd_m, int *index);
 
 /// A ray that is seen with a distance becomes a sized beacon where on it the distance ends, of whose scale is
-/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "Beacon scale states". O(n²).
-bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "Beacon scale
+/// states". O(n²).
+bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var);
 
 /// A point whose distances are measured from now on becomes a sized beacon, of whose scale is known this
@@ -263,8 +265,8 @@ bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 /// A sized beacon is something else than was thought: its scale is 1 again, to this variance and more_var >
 /// 0, whatever was learned of it. All means stay, but what hung on the scale becomes as doubtful as if that
 /// had been doubted by more_var more from the start. No correction may be under way. O(n²).
-void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_params_t *params, int index, bslam_real_t scale_var,
-                           bslam_real_t more_var);
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int index,
+                           bslam_real_t scale_var, bslam_real_t more_var);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
@@ -274,7 +276,7 @@ void bslam_ekf_forget_map(bslam_ekf_t *ekf);
 
 /// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH
 /// "Bearing-only"). True if it did. O(n²) then.
-bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_pose_t *mount,
+bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                           int index);
 
 // ---- queries ----------------------------------------------------------------------------------------------

@@ -165,12 +165,12 @@ static void walk_state(const moving_t *state, int at, bslam_real_t keep, bslam_r
     state->covariance[bslam_symmat_at(at, at)] += walk_var;
 }
 
-static void step_pose(const moving_t *state, const bslam_params_t *params, bslam_real_t forward_m,
+static void step_pose(const moving_t *state, const bslam_settings_t *settings, bslam_real_t forward_m,
                       bslam_real_t turn_rad, bslam_motion_jacobian_t *jacobian)
 {
     const bslam_pose_t before = {state->mean[BSLAM_STATE_X], state->mean[BSLAM_STATE_Y],
                                  state->mean[BSLAM_STATE_THETA]};
-    const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
+    const bslam_motion_kind_t kind = settings->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
     const bslam_pose_t after = bslam_motion_step(kind, &before, forward_m, turn_rad, jacobian);
     state->mean[BSLAM_STATE_X] = after.x_m;
     state->mean[BSLAM_STATE_Y] = after.y_m;
@@ -180,17 +180,17 @@ static void step_pose(const moving_t *state, const bslam_params_t *params, bslam
 // ---- the motion -------------------------------------------------------------------------------------------
 
 /// v and omega walk, and move the robot for dt_s.
-static void drive_by_velocity(const moving_t *state, const bslam_params_t *params, bslam_real_t dt_s)
+static void drive_by_velocity(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s)
 {
-    const bslam_real_t v_walk = params->velocity_walk_mps_sqrt_s;
-    const bslam_real_t turn_walk = params->turn_rate_walk_radps_sqrt_s;
-    const bslam_real_t v_keep = 1 / (1 + dt_s / params->velocity_decay_s);
-    const bslam_real_t turn_keep = 1 / (1 + dt_s / params->turn_rate_decay_s);
+    const bslam_real_t v_walk = settings->velocity_walk_mps_sqrt_s;
+    const bslam_real_t turn_walk = settings->turn_rate_walk_radps_sqrt_s;
+    const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
+    const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
     walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_walk * v_walk * dt_s);
     walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
     bslam_motion_jacobian_t jacobian;
     bslam_transition_t transition;
-    step_pose(state, params, state->mean[BSLAM_STATE_FORWARD] * dt_s, state->mean[BSLAM_STATE_TURN] * dt_s,
+    step_pose(state, settings, state->mean[BSLAM_STATE_FORWARD] * dt_s, state->mean[BSLAM_STATE_TURN] * dt_s,
               &jacobian);
     fill_transition(&jacobian, dt_s, dt_s, &transition);
     transition.keep[0] = v_keep;
@@ -199,20 +199,21 @@ static void drive_by_velocity(const moving_t *state, const bslam_params_t *param
 }
 
 /// The increment moves the robot, times its scales. *moved is what moved it.
-static void drive_by_increment(const moving_t *state, const bslam_params_t *params,
+static void drive_by_increment(const moving_t *state, const bslam_settings_t *settings,
                                const bslam_motion_t *motion, bslam_motion_t *moved)
 {
-    const bool scales = params->scale_states != 0;
+    const bool scales = settings->scale_states != 0;
     if (scales) {
-        const bslam_real_t walk_var = params->scale_walk_sqrt_s * params->scale_walk_sqrt_s * motion->dt_s;
+        const bslam_real_t walk_var =
+            settings->scale_walk_sqrt_s * settings->scale_walk_sqrt_s * motion->dt_s;
         walk_state(state, BSLAM_STATE_FORWARD, 1, walk_var);
         walk_state(state, BSLAM_STATE_TURN, 1, walk_var);
     }
-    moved->forward_m *= scales ? state->mean[BSLAM_STATE_FORWARD] : params->forward_scale;
-    moved->turn_rad *= scales ? state->mean[BSLAM_STATE_TURN] : params->turn_scale;
+    moved->forward_m *= scales ? state->mean[BSLAM_STATE_FORWARD] : settings->forward_scale;
+    moved->turn_rad *= scales ? state->mean[BSLAM_STATE_TURN] : settings->turn_scale;
     bslam_motion_jacobian_t jacobian;
     bslam_transition_t transition;
-    step_pose(state, params, moved->forward_m, moved->turn_rad, &jacobian);
+    step_pose(state, settings, moved->forward_m, moved->turn_rad, &jacobian);
     fill_transition(&jacobian, motion->forward_m, motion->turn_rad, &transition);
     move_covariance(state, &transition);
     add_motion_noise(state, &jacobian, motion);
@@ -234,7 +235,7 @@ static bslam_status_t noise_of_motion(const bslam_motion_t *motion, bslam_lower2
 }
 
 /// v = forward/dt and omega = turn/dt, whose errors L⁻¹ makes independent. False if it cannot.
-static bool read_speedometers(const bslam_real_t *mean, const bslam_params_t *params,
+static bool read_speedometers(const bslam_real_t *mean, const bslam_settings_t *settings,
                               const bslam_motion_t *motion, speeds_t *speeds)
 {
     bslam_lower2_t noise;
@@ -245,8 +246,9 @@ static bool read_speedometers(const bslam_real_t *mean, const bslam_params_t *pa
     const bslam_real_t forward_weight = 1 / (noise.xx * rate);
     const bslam_real_t turn_weight = 1 / (noise.yy * rate);
     const bslam_real_t carried = -noise.yx / noise.xx * turn_weight;
-    const bslam_real_t forward = motion->forward_m * params->forward_scale * rate - mean[BSLAM_STATE_FORWARD];
-    const bslam_real_t turn = motion->turn_rad * params->turn_scale * rate - mean[BSLAM_STATE_TURN];
+    const bslam_real_t forward =
+        motion->forward_m * settings->forward_scale * rate - mean[BSLAM_STATE_FORWARD];
+    const bslam_real_t turn = motion->turn_rad * settings->turn_scale * rate - mean[BSLAM_STATE_TURN];
     *speeds = (speeds_t){
         .by_velocity = {{forward_weight, 0}, {carried, turn_weight}},
         .innovation = {forward_weight * forward, carried * forward + turn_weight * turn},
@@ -288,14 +290,14 @@ static void apply_speed(bslam_robot_t *robot, const bslam_real_t by[2], bslam_re
 
 /// measure_speeds without a map. The transport of the invariant form is what a motion by the correction does
 /// to the covariance.
-static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state, const bslam_params_t *params,
-                                  const speeds_t *speeds)
+static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state,
+                                  const bslam_settings_t *settings, const speeds_t *speeds)
 {
     bslam_real_t correction[BSLAM_ROBOT_DIM_MAX] = {0};
     for (int k = 0; k < 2; k++) {
         apply_speed(robot, speeds->by_velocity[k], speeds->innovation[k], correction);
     }
-    if (params->filter != 0) {
+    if (settings->filter != 0) {
         const bslam_turning_t turning = bslam_turning(correction[BSLAM_STATE_THETA]);
         bslam_turning_apply(&turning, &correction[BSLAM_STATE_X], &correction[BSLAM_STATE_Y]);
         const bslam_motion_jacobian_t shift = {.x_theta = -correction[BSLAM_STATE_Y],
@@ -312,10 +314,10 @@ static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state, c
 
 // ---- prediction -------------------------------------------------------------------------------------------
 
-bslam_status_t bslam_ekf_check_motion(const bslam_params_t *params, const bslam_motion_t *motion)
+bslam_status_t bslam_ekf_check_motion(const bslam_settings_t *settings, const bslam_motion_t *motion)
 {
     bslam_lower2_t unused;
-    return params->velocity_states != 0 ? noise_of_motion(motion, &unused) : BSLAM_OK;
+    return settings->velocity_states != 0 ? noise_of_motion(motion, &unused) : BSLAM_OK;
 }
 
 /// With velocity states the filter takes the interval for one at the speeds that it arrives at.
@@ -326,27 +328,27 @@ static void note_velocity(const bslam_real_t *mean, bslam_motion_t *moved)
 }
 
 /// All but the measurement of the speeds. True if there is one.
-static bool drive(const moving_t *state, const bslam_params_t *params, const bslam_motion_t *motion,
+static bool drive(const moving_t *state, const bslam_settings_t *settings, const bslam_motion_t *motion,
                   bslam_motion_t *moved, speeds_t *speeds)
 {
     *moved = *motion;
-    if (params->velocity_states == 0) {
-        drive_by_increment(state, params, motion, moved);
+    if (settings->velocity_states == 0) {
+        drive_by_increment(state, settings, motion, moved);
         return false;
     }
-    drive_by_velocity(state, params, motion->dt_s);
+    drive_by_velocity(state, settings, motion->dt_s);
     note_velocity(state->mean, moved);
-    return read_speedometers(state->mean, params, motion, speeds);
+    return read_speedometers(state->mean, settings, motion, speeds);
 }
 
-void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                        bslam_motion_t *moved)
 {
     const moving_t state = {ekf->mean, ekf->covariance, NULL, NULL, ekf->base_dim, ekf->dim};
     speeds_t speeds;
-    if (drive(&state, params, motion, moved, &speeds)) {
+    if (drive(&state, settings, motion, moved, &speeds)) {
         measure_speeds(ekf, &speeds);
-        bslam_ekf_correct(ekf, params);
+        bslam_ekf_correct(ekf, settings);
         note_velocity(ekf->mean, moved);
     }
 }
@@ -356,15 +358,15 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_params_t *params, const bsl
 static const bslam_real_t WAY_SD_MAX_M = BSLAM_R(1.5);
 
 /// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
-static void drive_about(const moving_t *state, const bslam_params_t *params, bslam_real_t dt_s,
+static void drive_about(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s,
                         bslam_real_t stretch, const bslam_real_t *next)
 {
-    const bslam_real_t v_walk = params->velocity_walk_mps_sqrt_s;
-    const bslam_real_t turn_walk = params->turn_rate_walk_radps_sqrt_s;
+    const bslam_real_t v_walk = settings->velocity_walk_mps_sqrt_s;
+    const bslam_real_t turn_walk = settings->turn_rate_walk_radps_sqrt_s;
     bslam_transition_t transition;
     bslam_motion_jacobian_t jacobian;
-    const bslam_real_t v_keep = 1 / (1 + dt_s / params->velocity_decay_s);
-    const bslam_real_t turn_keep = 1 / (1 + dt_s / params->turn_rate_decay_s);
+    const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
+    const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
     const bslam_real_t v_var = v_walk * v_walk * dt_s;
     const bslam_real_t v_sd_max = WAY_SD_MAX_M / dt_s;
     walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_var < v_sd_max * v_sd_max ? v_var : v_sd_max * v_sd_max);
@@ -373,7 +375,7 @@ static void drive_about(const moving_t *state, const bslam_params_t *params, bsl
         state->correction[i] += state->mean[i] - next[i];
         state->mean[i] = next[i];
     }
-    step_pose(state, params, next[BSLAM_STATE_FORWARD] * dt_s * stretch, next[BSLAM_STATE_TURN] * dt_s,
+    step_pose(state, settings, next[BSLAM_STATE_FORWARD] * dt_s * stretch, next[BSLAM_STATE_TURN] * dt_s,
               &jacobian);
     fill_transition(&jacobian, dt_s * stretch, dt_s, &transition);
     transition.keep[0] = v_keep;
@@ -392,19 +394,19 @@ static void doubt_way(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t s
     }
 }
 
-void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                              const bslam_bend_t *bend, const bslam_real_t *next,
                              bslam_transition_t *transition)
 {
     bslam_ekf_settle(ekf);
     const moving_t state = {ekf->mean, ekf->covariance, ekf->correction, transition, ekf->base_dim, ekf->dim};
     ekf->mean[BSLAM_STATE_THETA] += bend->turned_rad;
-    if (params->velocity_states == 0) {
+    if (settings->velocity_states == 0) {
         bslam_motion_t moved = *motion;
         moved.forward_m *= bend->stretch;
-        drive_by_increment(&state, params, motion, &moved);
+        drive_by_increment(&state, settings, motion, &moved);
     } else {
-        drive_about(&state, params, motion->dt_s, bend->stretch, next);
+        drive_about(&state, settings, motion->dt_s, bend->stretch, next);
     }
     ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
     doubt_way(ekf, next, bend->doubt_of_miss);
@@ -415,10 +417,11 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_params_t *params, con
     }
 }
 
-void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_motion_t *motion)
+void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                              const bslam_motion_t *motion)
 {
     speeds_t speeds;
-    if (params->velocity_states != 0 && read_speedometers(ekf->mean, params, motion, &speeds)) {
+    if (settings->velocity_states != 0 && read_speedometers(ekf->mean, settings, motion, &speeds)) {
         measure_speeds(ekf, &speeds);
     }
 }
@@ -432,13 +435,13 @@ bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf)
     return robot;
 }
 
-void bslam_robot_predict(bslam_robot_t *robot, const bslam_params_t *params, const bslam_motion_t *motion,
+void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings, const bslam_motion_t *motion,
                          bslam_motion_t *moved)
 {
     const moving_t state = {robot->mean, robot->covariance, NULL, NULL, robot->dim, robot->dim};
     speeds_t speeds;
-    if (drive(&state, params, motion, moved, &speeds)) {
-        measure_robots_speeds(robot, &state, params, &speeds);
+    if (drive(&state, settings, motion, moved, &speeds)) {
+        measure_robots_speeds(robot, &state, settings, &speeds);
         note_velocity(robot->mean, moved);
     }
 }
@@ -470,15 +473,15 @@ static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t sd)
     bslam_symmat_set(ekf->covariance, at, at, sd * sd);
 }
 
-void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_real_t position_var_m2,
+void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,
                       bslam_real_t heading_var_rad2)
 {
     add_variance(ekf, BSLAM_STATE_X, position_var_m2, BSLAM_R(900.0));
     add_variance(ekf, BSLAM_STATE_Y, position_var_m2, BSLAM_R(900.0));
     add_variance(ekf, BSLAM_STATE_THETA, heading_var_rad2, BSLAM_R(10.24));
-    if (params->velocity_states != 0) {
-        forget_state(ekf, BSLAM_STATE_FORWARD, params->velocity_sd_mps);
-        forget_state(ekf, BSLAM_STATE_TURN, params->turn_rate_sd_radps);
+    if (settings->velocity_states != 0) {
+        forget_state(ekf, BSLAM_STATE_FORWARD, settings->velocity_sd_mps);
+        forget_state(ekf, BSLAM_STATE_TURN, settings->turn_rate_sd_radps);
     }
 }
 

@@ -2,21 +2,21 @@
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
 
-void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_params_t *params)
+void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     *ekf = (bslam_ekf_t){0};
     ekf->dim = 3;
-    if (params->velocity_states != 0) {
+    if (settings->velocity_states != 0) {
         ekf->dim = 5;
         ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] =
-            params->velocity_sd_mps * params->velocity_sd_mps;
+            settings->velocity_sd_mps * settings->velocity_sd_mps;
         ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] =
-            params->turn_rate_sd_radps * params->turn_rate_sd_radps;
-    } else if (params->scale_states != 0) {
+            settings->turn_rate_sd_radps * settings->turn_rate_sd_radps;
+    } else if (settings->scale_states != 0) {
         ekf->dim = 5;
-        const bslam_real_t variance = params->scale_sd * params->scale_sd;
-        ekf->mean[BSLAM_STATE_FORWARD] = params->forward_scale;
-        ekf->mean[BSLAM_STATE_TURN] = params->turn_scale;
+        const bslam_real_t variance = settings->scale_sd * settings->scale_sd;
+        ekf->mean[BSLAM_STATE_FORWARD] = settings->forward_scale;
+        ekf->mean[BSLAM_STATE_TURN] = settings->turn_scale;
         ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] = variance;
         ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] = variance;
     }
@@ -35,7 +35,8 @@ static bslam_ray_point_t ray_point(const bslam_ekf_t *ekf, int at)
 {
     const bslam_real_t inverse = ekf->mean[at + 3];
     const bslam_real_t ray[BSLAM_RAY_DIM] = {ekf->mean[at], ekf->mean[at + 1], ekf->mean[at + 2],
-                                             inverse > BSLAM_FAR_INVERSE_PER_M ? inverse : BSLAM_FAR_INVERSE_PER_M};
+                                             inverse > BSLAM_FAR_INVERSE_PER_M ? inverse
+                                                                               : BSLAM_FAR_INVERSE_PER_M};
     return bslam_ray_to_point(ray);
 }
 

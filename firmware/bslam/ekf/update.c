@@ -165,12 +165,12 @@ static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beac
 }
 
 /// Of a beacon without a scale of its own, what it would have counts as noise.
-static bslam_real_t range_variance_m2(const bslam_params_t *params, const bslam_sighting_t *sighting,
+static bslam_real_t range_variance_m2(const bslam_settings_t *settings, const bslam_sighting_t *sighting,
                                       const bslam_beacon_t *beacon, bslam_real_t range_m)
 {
     const bool has_scale = beacon->kind == BSLAM_BEACON_SIZED || beacon->known_scale > 0;
-    return bslam_scaled_range_variance_m2(params, sighting, range_m,
-                                          has_scale ? 0 : bslam_unknown_scale_var(params, sighting));
+    return bslam_scaled_range_variance_m2(settings, sighting, range_m,
+                                          has_scale ? 0 : bslam_unknown_scale_var(settings, sighting));
 }
 
 bool bslam_ekf_classes_differ(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting)
@@ -187,7 +187,7 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
     return taken;
 }
 
-bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t *params,
+bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                     const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
 {
@@ -200,18 +200,18 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_params_t
     if (sighting->has_range && !(seen.range_m > 0)) {
         return BSLAM_E_SINGULAR;
     }
-    innovation->gate_d2 = params->gate_d2;
+    innovation->gate_d2 = settings->gate_d2;
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
-    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(params, sighting);
+    innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
-    if (!sighting->has_range && params->bearing_only_curvature_factor > 0) {
-        innovation->bearing_var_rad2 += params->bearing_only_curvature_factor *
+    if (!sighting->has_range && settings->bearing_only_curvature_factor > 0) {
+        innovation->bearing_var_rad2 += settings->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
     if (sighting->has_range) {
         innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = range_variance_m2(params, sighting, beacon, seen.range_m);
+        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, seen.range_m);
         fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
     }
     return BSLAM_OK;
@@ -353,13 +353,13 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
-static bslam_status_t judge(const bslam_params_t *params, bslam_real_t gate_d2, bslam_fusion_t *fusion)
+static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_d2, bslam_fusion_t *fusion)
 {
     if (gate_d2 > 0 && !(fusion->distance2 <= gate_d2)) {
         fusion->weight = 0;
         return BSLAM_E_RANGE;
     }
-    const bslam_real_t limit = params->huber_d;
+    const bslam_real_t limit = settings->huber_d;
     fusion->weight =
         limit > 0 && fusion->distance2 > limit * limit ? limit / bslam_sqrt(fusion->distance2) : 1;
     return BSLAM_OK;
@@ -380,7 +380,7 @@ static bslam_real_t noise_of(const bslam_ekf_t *ekf, const bslam_row_t *row, bsl
     return variance > rounding ? variance : rounding;
 }
 
-bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
+bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                               const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
     if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
@@ -406,7 +406,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_params_t *params,
     if (status != BSLAM_OK) {
         return status;
     }
-    status = judge(params, innovation->gate_d2, fusion);
+    status = judge(settings, innovation->gate_d2, fusion);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -514,12 +514,12 @@ void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real
     bslam_ekf_apply_scalar(ekf, &row, innovation, variance);
 }
 
-void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_params_t *params)
+void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     if (!ekf->has_correction) {
         return;
     }
-    const bool invariant = params->filter != BSLAM_FILTER_STANDARD;
+    const bool invariant = settings->filter != BSLAM_FILTER_STANDARD;
     move_mean(ekf, invariant ? ekf->correction[BSLAM_STATE_THETA] : 0);
     if (invariant) {
         transport_covariance(ekf);

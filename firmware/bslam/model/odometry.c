@@ -50,10 +50,10 @@ int32_t bslam_odometry_tick_difference(uint32_t before, uint32_t after, int bits
     return down == half && bits == 32 ? INT32_MIN : -(int32_t)down;
 }
 
-static bslam_status_t ticks_to_travel(const bslam_odometry_t *odometry, const bslam_params_t *params,
+static bslam_status_t ticks_to_travel(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
                                       const bslam_odometry_reading_t *reading, wheel_travel_t *travel)
 {
-    const uint32_t mask = UINT32_MAX >> (32 - params->counter_bits);
+    const uint32_t mask = UINT32_MAX >> (32 - settings->counter_bits);
     if ((reading->left_ticks & ~mask) != 0 || (reading->right_ticks & ~mask) != 0) {
         return BSLAM_E_RANGE;
     }
@@ -62,27 +62,27 @@ static bslam_status_t ticks_to_travel(const bslam_odometry_t *odometry, const bs
         return BSLAM_OK;
     }
     const int32_t left =
-        bslam_odometry_tick_difference(odometry->left_ticks, reading->left_ticks, params->counter_bits);
+        bslam_odometry_tick_difference(odometry->left_ticks, reading->left_ticks, settings->counter_bits);
     const int32_t right =
-        bslam_odometry_tick_difference(odometry->right_ticks, reading->right_ticks, params->counter_bits);
-    const bslam_real_t radians_per_tick = 2 * BSLAM_PI / (bslam_real_t)params->ticks_per_revolution;
-    travel->left_m = (bslam_real_t)left * radians_per_tick * params->left_radius_m;
-    travel->right_m = (bslam_real_t)right * radians_per_tick * params->right_radius_m;
+        bslam_odometry_tick_difference(odometry->right_ticks, reading->right_ticks, settings->counter_bits);
+    const bslam_real_t radians_per_tick = 2 * BSLAM_PI / (bslam_real_t)settings->ticks_per_revolution;
+    travel->left_m = (bslam_real_t)left * radians_per_tick * settings->left_radius_m;
+    travel->right_m = (bslam_real_t)right * radians_per_tick * settings->right_radius_m;
     return BSLAM_OK;
 }
 
-static bslam_status_t reading_to_travel(const bslam_odometry_t *odometry, const bslam_params_t *params,
+static bslam_status_t reading_to_travel(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
                                         const bslam_odometry_reading_t *reading, bslam_real_t dt_s,
                                         wheel_travel_t *travel)
 {
     switch (reading->source) {
     case BSLAM_ODOMETRY_TICKS:
-        return ticks_to_travel(odometry, params, reading, travel);
+        return ticks_to_travel(odometry, settings, reading, travel);
     case BSLAM_ODOMETRY_WHEELS:
         *travel = (wheel_travel_t){reading->left_m, reading->right_m};
         break;
     case BSLAM_ODOMETRY_VELOCITY: {
-        const bslam_real_t half_difference = reading->omega_radps * params->wheelbase_m / 2;
+        const bslam_real_t half_difference = reading->omega_radps * settings->wheelbase_m / 2;
         travel->left_m = (reading->v_mps - half_difference) * dt_s;
         travel->right_m = (reading->v_mps + half_difference) * dt_s;
         break;
@@ -100,15 +100,15 @@ static bslam_real_t square(bslam_real_t x)
 }
 
 /// Wheel travel to body motion, with the noise of the wheels, of the body and of a gap. MATH "Odometry".
-static void travel_to_motion(const bslam_params_t *params, const wheel_travel_t *travel, bslam_real_t dt_s,
-                             bslam_real_t gap_s, bslam_motion_t *motion)
+static void travel_to_motion(const bslam_settings_t *settings, const wheel_travel_t *travel,
+                             bslam_real_t dt_s, bslam_real_t gap_s, bslam_motion_t *motion)
 {
-    const bslam_real_t base = params->wheelbase_m;
-    const bslam_real_t growth = square(params->travel_sd_per_sqrt_m);
+    const bslam_real_t base = settings->wheelbase_m;
+    const bslam_real_t growth = square(settings->travel_sd_per_sqrt_m);
     const bslam_real_t left_var =
-        square(params->left_speed_sd_mps * dt_s) + growth * bslam_abs(travel->left_m);
+        square(settings->left_speed_sd_mps * dt_s) + growth * bslam_abs(travel->left_m);
     const bslam_real_t right_var =
-        square(params->right_speed_sd_mps * dt_s) + growth * bslam_abs(travel->right_m);
+        square(settings->right_speed_sd_mps * dt_s) + growth * bslam_abs(travel->right_m);
     motion->dt_s = dt_s;
     motion->forward_m = (travel->left_m + travel->right_m) / 2;
     motion->turn_rad = (travel->right_m - travel->left_m) / base;
@@ -120,23 +120,23 @@ static void travel_to_motion(const bslam_params_t *params, const wheel_travel_t 
     const bslam_real_t turn = bslam_abs(motion->turn_rad);
     const bslam_real_t moving_s = way > 0 || turn > 0 ? dt_s : 0;
     motion->forward_var_m2 +=
-        square(params->forward_sd_per_sqrt_s) * moving_s + square(params->forward_sd_per_sqrt_m) * way;
-    motion->turn_var_rad2 += square(params->turn_sd_per_sqrt_s) * moving_s +
-                             square(params->turn_sd_per_sqrt_m) * way +
-                             square(params->turn_sd_per_sqrt_rad) * turn;
-    motion->forward_var_m2 += square(params->gap_speed_sd_mps * gap_s);
-    motion->turn_var_rad2 += square(params->gap_turn_sd_radps * gap_s);
+        square(settings->forward_sd_per_sqrt_s) * moving_s + square(settings->forward_sd_per_sqrt_m) * way;
+    motion->turn_var_rad2 += square(settings->turn_sd_per_sqrt_s) * moving_s +
+                             square(settings->turn_sd_per_sqrt_m) * way +
+                             square(settings->turn_sd_per_sqrt_rad) * turn;
+    motion->forward_var_m2 += square(settings->gap_speed_sd_mps * gap_s);
+    motion->turn_var_rad2 += square(settings->gap_turn_sd_radps * gap_s);
 }
 
 /// The part of an interval in which the robot may have moved unseen: all of it while the tick reference is
 /// missing.
-static bslam_real_t unseen_s(const bslam_odometry_t *odometry, const bslam_params_t *params,
+static bslam_real_t unseen_s(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
                              const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
 {
     if (reading->source == BSLAM_ODOMETRY_TICKS && !odometry->has_ticks) {
         return dt_s;
     }
-    const bslam_real_t excess_s = dt_s - (bslam_real_t)params->gap_us * SECONDS_PER_US;
+    const bslam_real_t excess_s = dt_s - (bslam_real_t)settings->gap_us * SECONDS_PER_US;
     return excess_s > 0 ? excess_s : 0;
 }
 
@@ -151,11 +151,11 @@ static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
 }
 
 /// True if the wheels cannot have moved like this.
-static bool is_jump(const bslam_params_t *params, const wheel_travel_t *travel, bslam_real_t dt_s)
+static bool is_jump(const bslam_settings_t *settings, const wheel_travel_t *travel, bslam_real_t dt_s)
 {
-    const bslam_real_t travel_max_m = params->speed_max_mps * dt_s;
+    const bslam_real_t travel_max_m = settings->speed_max_mps * dt_s;
     return bslam_abs(travel->left_m) > travel_max_m || bslam_abs(travel->right_m) > travel_max_m ||
-           bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * params->wheelbase_m;
+           bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * settings->wheelbase_m;
 }
 
 static bslam_status_t check_gyro(const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
@@ -183,7 +183,7 @@ static void fuse_gyro(bslam_motion_t *motion, bslam_real_t gyro_turn_rad, bslam_
     motion->turn_var_rad2 -= turn_gain * motion->turn_var_rad2;
 }
 
-bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_params_t *params,
+bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_settings_t *settings,
                                    const bslam_odometry_reading_t *reading, bslam_motion_t *motion)
 {
     if (!time_is_valid(odometry, reading->time_us)) {
@@ -198,20 +198,20 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_param
         }
     }
     wheel_travel_t travel;
-    const bslam_status_t status = reading_to_travel(odometry, params, reading, dt_s, &travel);
+    const bslam_status_t status = reading_to_travel(odometry, settings, reading, dt_s, &travel);
     if (status != BSLAM_OK) {
         return status;
     }
-    if (odometry->has_time && is_jump(params, &travel, dt_s)) {
+    if (odometry->has_time && is_jump(settings, &travel, dt_s)) {
         // Or the same jump would pass as soon as enough time has gone by.
         odometry->has_ticks = odometry->has_ticks && reading->source != BSLAM_ODOMETRY_TICKS;
         return BSLAM_E_JUMP;
     }
     if (odometry->has_time) {
-        travel_to_motion(params, &travel, dt_s, unseen_s(odometry, params, reading, dt_s), motion);
+        travel_to_motion(settings, &travel, dt_s, unseen_s(odometry, settings, reading, dt_s), motion);
         if (reading->has_gyro) {
             const bslam_real_t own_sd_radps = reading->gyro_sd_radps;
-            const bslam_real_t sd_radps = own_sd_radps > 0 ? own_sd_radps : params->gyro_sd_radps;
+            const bslam_real_t sd_radps = own_sd_radps > 0 ? own_sd_radps : settings->gyro_sd_radps;
             fuse_gyro(motion, reading->gyro_radps * dt_s, square(sd_radps * dt_s));
         }
     } else {

@@ -5,7 +5,7 @@
 #ifndef BSLAM_MODEL_ODOMETRY_H
 #define BSLAM_MODEL_ODOMETRY_H
 
-#include "bslam/params.h"
+#include "bslam/settings.h"
 #include "base/types.h"
 
 typedef enum bslam_odometry_source {
@@ -54,7 +54,8 @@ void bslam_odometry_restart(bslam_odometry_t *odometry);
 /// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
 /// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
 /// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.
-BSLAM_MUST_CHECK bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_params_t *params,
+BSLAM_MUST_CHECK bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry,
+                                                    const bslam_settings_t *settings,
                                                     const bslam_odometry_reading_t *reading,
                                                     bslam_motion_t *motion);
 

@@ -78,11 +78,11 @@ void bslam_history_take(bslam_history_t *history, const bslam_history_place_t *p
 }
 
 /// A part of a motion, as a pose in the frame at its beginning.
-static bslam_pose_t part_of_motion(const bslam_params_t *params, bslam_real_t forward_m,
+static bslam_pose_t part_of_motion(const bslam_settings_t *settings, bslam_real_t forward_m,
                                    bslam_real_t turn_rad, bslam_real_t share)
 {
     const bslam_pose_t start = {0, 0, 0};
-    const bslam_motion_kind_t kind = params->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
+    const bslam_motion_kind_t kind = settings->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
     bslam_motion_jacobian_t unused;
     return bslam_motion_step(kind, &start, forward_m * share, turn_rad * share, &unused);
 }
@@ -99,7 +99,7 @@ static bslam_history_step_t taken_step(const bslam_history_t *history, int32_t b
     return step;
 }
 
-bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bslam_params_t *params,
+bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bslam_settings_t *settings,
                                        int64_t back_us, bslam_pose_t *relative)
 {
     bslam_pose_t since = {0, 0, 0};
@@ -111,7 +111,7 @@ bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bsl
         // From 32 bits, since the conversion of 64 takes double arithmetic on an ARMv6-M.
         const bslam_real_t share =
             begins_before ? (bslam_real_t)(int32_t)left_us / (bslam_real_t)step.duration_us : 1;
-        const bslam_pose_t part = part_of_motion(params, step.forward_m, step.turn_rad, share);
+        const bslam_pose_t part = part_of_motion(settings, step.forward_m, step.turn_rad, share);
         since = bslam_pose_compose(&part, &since);
         if (begins_before) {
             *relative = bslam_pose_inverse(&since);
@@ -134,12 +134,12 @@ bslam_motion_t bslam_history_newest(const bslam_history_t *history)
     return motion;
 }
 
-bslam_pose_t bslam_history_look_ahead(const bslam_params_t *params, const bslam_motion_t *last,
+bslam_pose_t bslam_history_look_ahead(const bslam_settings_t *settings, const bslam_motion_t *last,
                                       int64_t ahead_us)
 {
     if (!(last->dt_s > 0)) {
         return (bslam_pose_t){0, 0, 0};
     }
-    return part_of_motion(params, last->forward_m, last->turn_rad,
+    return part_of_motion(settings, last->forward_m, last->turn_rad,
                           (bslam_real_t)(int32_t)ahead_us * SECONDS_PER_US / last->dt_s);
 }

@@ -3,7 +3,7 @@
 #ifndef BSLAM_MODEL_ODOMETRY_HISTORY_H
 #define BSLAM_MODEL_ODOMETRY_HISTORY_H
 
-#include "bslam/params.h"
+#include "bslam/settings.h"
 #include "base/types.h"
 
 /// One motion: as odometry reported it while it waits, as the filter took it from then on.
@@ -57,14 +57,14 @@ void bslam_history_take(bslam_history_t *history, const bslam_history_place_t *p
 /// The robot back_us > 0 before the filter, as seen from where the filter stands. O(count). BSLAM_E_TIME, and
 /// no change: older than the history.
 BSLAM_MUST_CHECK bslam_status_t bslam_history_look_back(const bslam_history_t *history,
-                                                        const bslam_params_t *params, int64_t back_us,
+                                                        const bslam_settings_t *settings, int64_t back_us,
                                                         bslam_pose_t *relative);
 
 /// The newest motion as it stands; dt_s = 0 if there is none.
 bslam_motion_t bslam_history_newest(const bslam_history_t *history);
 
 /// The robot ahead_us < 2^31 after the end of `last` as seen from there, if it goes on as in that motion.
-bslam_pose_t bslam_history_look_ahead(const bslam_params_t *params, const bslam_motion_t *last,
+bslam_pose_t bslam_history_look_ahead(const bslam_settings_t *settings, const bslam_motion_t *last,
                                       int64_t ahead_us);
 
 #endif

@@ -29,7 +29,7 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
     float best_value = RECOGNISE_VALUE;
     float next_value = RECOGNISE_VALUE - RECOGNISE_LEAD;
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
-        const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, &slam->params, b, sample);
+        const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, &slam->settings, b, sample);
         if (opinion.weight < RECOGNISE_WEIGHT || (best >= 0 && looks_alike(slam, b, best))) {
             continue;
         }
@@ -47,7 +47,8 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
 static int find_looks(const bslam_slam_t *slam, const float *signature)
 {
     bslam_sample_t sample;
-    if (slam->appearance == NULL || signature == NULL || bslam_sample_encode(signature, &sample) != BSLAM_OK) {
+    if (slam->appearance == NULL || signature == NULL ||
+        bslam_sample_encode(signature, &sample) != BSLAM_OK) {
         return BSLAM_NOBODY;
     }
     const int best = find_machine(slam, &sample);
@@ -64,8 +65,8 @@ static int find(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
     if (sighting->beacon_class == BSLAM_CLASS_NOT_MAPPABLE) {
         return BSLAM_NOBODY;
     }
-    return slam->params.association == BSLAM_ASSOCIATION_KNOWN ? find_label(&slam->ekf, sighting->label)
-                                                               : find_looks(slam, sighting->signature);
+    return slam->settings.association == BSLAM_ASSOCIATION_KNOWN ? find_label(&slam->ekf, sighting->label)
+                                                                 : find_looks(slam, sighting->signature);
 }
 
 static bool is_seen_once(const int *who, int count, int i)
@@ -91,7 +92,7 @@ void bslam_identify(const bslam_slam_t *slam, const bslam_sighting_t *sightings,
 
 bool bslam_may_be(const bslam_slam_t *slam, int who, int beacon)
 {
-    const bool by_looks = slam->params.association != BSLAM_ASSOCIATION_KNOWN && slam->appearance != NULL;
+    const bool by_looks = slam->settings.association != BSLAM_ASSOCIATION_KNOWN && slam->appearance != NULL;
     return beacon == who ||
            (by_looks && slam->ekf.beacons[beacon].confirmed && looks_alike(slam, beacon, who));
 }
@@ -99,9 +100,9 @@ bool bslam_may_be(const bslam_slam_t *slam, int who, int beacon)
 static bool is_known(const bslam_slam_t *slam, int beacon)
 {
     static const bslam_sample_t ANY = {{0}};
-    return slam->params.association == BSLAM_ASSOCIATION_KNOWN ||
+    return slam->settings.association == BSLAM_ASSOCIATION_KNOWN ||
            (slam->appearance != NULL &&
-            bslam_appearance_ask(slam->appearance, &slam->params, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
+            bslam_appearance_ask(slam->appearance, &slam->settings, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
 }
 
 bool bslam_is_findable(const bslam_slam_t *slam)

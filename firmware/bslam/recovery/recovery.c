@@ -96,13 +96,13 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const int at = beacon->at + BSLAM_POINT_DIM;
     bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
     bslam_real_t scale_var = is_sized ? bslam_symmat_get(ekf->covariance, at, at)
-                                      : bslam_unknown_scale_var(&slam->params, sighting);
+                                      : bslam_unknown_scale_var(&slam->settings, sighting);
     if (beacon->known_scale > 0) {
         scale = beacon->known_scale;
         scale_var = 0;
     }
     clue->range_m = sighting->range_m / scale;
-    clue->range_var_m2 = bslam_scaled_range_variance_m2(&slam->params, sighting, clue->range_m, scale_var);
+    clue->range_var_m2 = bslam_scaled_range_variance_m2(&slam->settings, sighting, clue->range_m, scale_var);
 }
 
 /// A remembered sighting, taken for a beacon, as it looks from where the robot is now, by odometry.
@@ -125,7 +125,7 @@ static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memo
     const bslam_real_t drift_m2 = way2_m2 * (WAY_SD * WAY_SD + turn_var / 3) + (place.xx + place.yy) / 2;
     const bslam_real_t range_m = sighting->has_range && sighting->range_m > 1 ? sighting->range_m : 1;
     clue.bearing_var_rad2 =
-        bslam_bearing_variance_rad2(&slam->params, sighting) + turn_var + drift_m2 / (range_m * range_m);
+        bslam_bearing_variance_rad2(&slam->settings, sighting) + turn_var + drift_m2 / (range_m * range_m);
     if (sighting->has_range) {
         make_distance(slam, &ekf->beacons[beacon], sighting, &clue);
         clue.range_var_m2 += drift_m2;
@@ -187,7 +187,7 @@ static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *m
     bslam_innovation_t innovation;
     bslam_real_t distance2;
     const bool has =
-        bslam_ekf_innovation(&slam->ekf, &slam->params, mount, sighting, beacon, &innovation) == BSLAM_OK &&
+        bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, sighting, beacon, &innovation) == BSLAM_OK &&
         bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK;
     return has ? distance2 : -1;
 }
@@ -466,8 +466,8 @@ static void note_growth(bslam_recovery_t *recovery, const bslam_slam_t *slam, in
 /// Whether something began within `settled_us`, so that more may, and look like a beacon of the map.
 static bool is_growing(const bslam_recovery_t *recovery, const bslam_slam_t *slam, int64_t time_us)
 {
-    return slam->params.association != BSLAM_ASSOCIATION_KNOWN && !slam->is_frozen && recovery->has_grown &&
-           time_us - recovery->grew_us < slam->params.settled_us;
+    return slam->settings.association != BSLAM_ASSOCIATION_KNOWN && !slam->is_frozen && recovery->has_grown &&
+           time_us - recovery->grew_us < slam->settings.settled_us;
 }
 
 /// Whether there is a pose that has many more of the recognised beacons where they were seen than the present

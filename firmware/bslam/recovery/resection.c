@@ -339,7 +339,8 @@ static void try_all(search_t *search)
 /// Whether no pose by other beacons is about as good.
 static bool is_told(const search_t *search)
 {
-    return search->negative.beacons < search->vote.beacons || search->negative.agreeing < search->vote.agreeing ||
+    return search->negative.beacons < search->vote.beacons ||
+           search->negative.agreeing < search->vote.agreeing ||
            search->negative.distance2 > search->vote.distance2 + TOLD_D2;
 }
 

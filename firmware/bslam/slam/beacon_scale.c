@@ -10,7 +10,7 @@ static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
 /// filter, whose beacons have none.
 static bslam_real_t scale_variance(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
-    return sighting->has_range && slam->smoother == NULL ? bslam_unknown_scale_var(&slam->params, sighting)
+    return sighting->has_range && slam->smoother == NULL ? bslam_unknown_scale_var(&slam->settings, sighting)
                                                          : 0;
 }
 
@@ -22,10 +22,10 @@ static bool fits(const bslam_slam_t *slam, const bslam_pose_t *mount, int index,
     bslam_innovation_t innovation;
     bslam_real_t distance2;
     looked_at.has_range = looked_at.has_range && with_range;
-    return bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &looked_at, index, &innovation) ==
+    return bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &looked_at, index, &innovation) ==
                BSLAM_OK &&
            bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK &&
-           (!(slam->params.gate_d2 > 0) || distance2 <= slam->params.gate_d2);
+           (!(slam->settings.gate_d2 > 0) || distance2 <= slam->settings.gate_d2);
 }
 
 bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int index,
@@ -38,7 +38,7 @@ bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int i
         return false;
     }
     const bool begins =
-        is_ray ? bslam_ekf_measure_ray(&slam->ekf, &slam->params, mount, sighting, index, variance)
+        is_ray ? bslam_ekf_measure_ray(&slam->ekf, &slam->settings, mount, sighting, index, variance)
                : bslam_ekf_give_scale(&slam->ekf, index, variance);
     if (begins) {
         beacon->beacon_class = sighting->beacon_class;
@@ -72,7 +72,7 @@ bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int
         return false;
     }
     const bslam_real_t variance = scale_variance(slam, sighting);
-    bslam_ekf_renew_scale(&slam->ekf, &slam->params, index, variance, CONFUSED_VAR);
+    bslam_ekf_renew_scale(&slam->ekf, &slam->settings, index, variance, CONFUSED_VAR);
     return true;
 }
 
@@ -94,7 +94,7 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
         beacon->beacon_class = sighting->beacon_class;
         beacon->class_lead = 1;
         if (variance > 0) {
-            bslam_ekf_renew_scale(&slam->ekf, &slam->params, index, variance, CONFUSED_VAR);
+            bslam_ekf_renew_scale(&slam->ekf, &slam->settings, index, variance, CONFUSED_VAR);
         }
     }
 }

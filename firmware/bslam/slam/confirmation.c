@@ -1,4 +1,5 @@
-// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and appearance".
+// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and
+// appearance".
 #include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
@@ -11,7 +12,7 @@ static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 /// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
-    return slam->params.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
+    return slam->settings.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
 /// What a sighting's score says for a beacon. What has no distance from a sensor that measures some is of
@@ -19,7 +20,7 @@ static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting
 /// says next to nothing.
 static bslam_real_t evidence(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
-    const bslam_real_t above = sighting->score - slam->params.existence_score;
+    const bslam_real_t above = sighting->score - slam->settings.existence_score;
     if (above < SCORE_LOW) {
         return SCORE_LOW;
     }
@@ -44,21 +45,21 @@ static void add_score(const bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
 /// was.
 static void count_view(const bslam_slam_t *slam, bslam_beacon_t *beacon, bslam_real_t distance2)
 {
-    const bslam_params_t *params = &slam->params;
-    const uint32_t least_um = (uint32_t)(params->confirm_travel_m * MICROMETRES_PER_M);
+    const bslam_settings_t *settings = &slam->settings;
+    const uint32_t least_um = (uint32_t)(settings->confirm_travel_m * MICROMETRES_PER_M);
     if (!beacon->confirmed && slam->travelled_um - beacon->view_um >= least_um) {
-        const bool is_enough = beacon->views >= params->confirm_sightings;  // scores may be missing
+        const bool is_enough = beacon->views >= settings->confirm_sightings;  // scores may be missing
         beacon->view_um = slam->travelled_um;
-        beacon->views = (uint16_t)(distance2 > params->confirm_d2 ? beacon->views - 1
-                                   : is_enough                    ? beacon->views
-                                                                  : beacon->views + 1);
+        beacon->views = (uint16_t)(distance2 > settings->confirm_d2 ? beacon->views - 1
+                                   : is_enough                      ? beacon->views
+                                                                    : beacon->views + 1);
     }
 }
 
 static void decide(bslam_slam_t *slam, bslam_beacon_t *beacon)
 {
-    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->params.existence_sum;
-    if (!beacon->confirmed && is_sure && beacon->views >= slam->params.confirm_sightings) {
+    const bool is_sure = !beacon->has_scores || beacon->score_sum >= slam->settings.existence_sum;
+    if (!beacon->confirmed && is_sure && beacon->views >= slam->settings.confirm_sightings) {
         beacon->confirmed = true;
         slam->confirmed_now = true;
     }
@@ -73,7 +74,7 @@ void bslam_slam_confirm_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bs
 }
 
 void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
-                            bslam_real_t distance2)
+                              bslam_real_t distance2)
 {
     add_score(slam, beacon, sighting);
     count_view(slam, beacon, distance2);
@@ -87,14 +88,14 @@ static bool knows_few(const bslam_slam_t *slam)
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
         confirmed += slam->ekf.beacons[b].confirmed ? 1 : 0;
     }
-    return confirmed < slam->params.existence_beacons;
+    return confirmed < slam->settings.existence_beacons;
 }
 
 static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
-    const bslam_params_t *params = &slam->params;
+    const bslam_settings_t *settings = &slam->settings;
     return !beacon->confirmed && beacon->has_scores &&
-           beacon->score_sum < (knows_few(slam) ? params->existence_first_sum : params->existence_sum);
+           beacon->score_sum < (knows_few(slam) ? settings->existence_first_sum : settings->existence_sum);
 }
 
 void bslam_slam_mark_tentative(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
@@ -105,7 +106,7 @@ void bslam_slam_mark_tentative(bslam_slam_t *slam, const bslam_sighting_t *sight
         const bool is_tried =
             match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
         const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
-                                sightings[i].score < slam->params.existence_score;
+                                sightings[i].score < slam->settings.existence_score;
         match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TENTATIVE : match->verdict;
     }
 }

@@ -14,7 +14,7 @@ static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 /// ahead of it, where it will be.
 static bslam_pose_t mount_of_frame(const bslam_slam_t *slam, int64_t behind_us)
 {
-    const bslam_params_t *p = &slam->params;
+    const bslam_settings_t *p = &slam->settings;
     const bslam_pose_t mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
     if (behind_us >= 0) {
         return mount;
@@ -65,10 +65,10 @@ static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_
                       const bslam_match_t *match, bslam_account_t *account)
 {
     bslam_beacon_t *beacon = match->beacon >= 0 ? &slam->ekf.beacons[match->beacon] : NULL;
-    if (beacon != NULL && slam->params.gate_d2 > 0 && match->distance2 > slam->params.gate_d2) {
+    if (beacon != NULL && slam->settings.gate_d2 > 0 && match->distance2 > slam->settings.gate_d2) {
         reject(slam, BSLAM_REASON_GATE, beacon, account);
         beacon->gated++;
-        account->test_ratio = test_ratio(slam->params.gate_d2, match->distance2);
+        account->test_ratio = test_ratio(slam->settings.gate_d2, match->distance2);
         return;
     }
     fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
@@ -81,12 +81,13 @@ static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_
 static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
                        bslam_beacon_t *beacon, bslam_innovation_t *innovation, bslam_account_t *account)
 {
-    const bslam_real_t travelled_m = (bslam_real_t)(slam->travelled_um - beacon->travelled_um) / MICROMETRES_PER_M;
-    const bslam_real_t factor = bslam_correlation_factor(&slam->params, travelled_m);
+    const bslam_real_t travelled_m =
+        (bslam_real_t)(slam->travelled_um - beacon->travelled_um) / MICROMETRES_PER_M;
+    const bslam_real_t factor = bslam_correlation_factor(&slam->settings, travelled_m);
     innovation->range_var_m2 *= factor;
     innovation->bearing_var_rad2 *= factor;
     bslam_fusion_t fusion = {.distance2 = -1, .weight = 0};
-    const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->params, innovation, &fusion);
+    const bslam_status_t status = bslam_ekf_fuse(&slam->ekf, &slam->settings, innovation, &fusion);
     if (status != BSLAM_OK) {
         reject(slam, status == BSLAM_E_RANGE ? BSLAM_REASON_GATE : BSLAM_REASON_SINGULAR, beacon, account);
         beacon->gated += status == BSLAM_E_RANGE ? 1u : 0u;
@@ -110,7 +111,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
 static void note_rivals(bslam_slam_t *slam, int index)
 {
     bslam_beacon_t *beacons = slam->ekf.beacons;
-    for (int b = 0; b < index && slam->params.association == BSLAM_ASSOCIATION_KNOWN; b++) {
+    for (int b = 0; b < index && slam->settings.association == BSLAM_ASSOCIATION_KNOWN; b++) {
         const uint32_t negatives = beacons[b].label == beacons[index].label ? 1 : 0;
         beacons[b].gated += negatives;
         beacons[index].gated += negatives;
@@ -123,7 +124,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     int index;
     const bslam_status_t status =
         slam->smoother != NULL ? slam->smoothing->add(slam->smoother, &slam->ekf, mount, sighting, &index)
-                               : bslam_ekf_add(&slam->ekf, &slam->params, mount, sighting, &index);
+                               : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, &index);
     if (status != BSLAM_OK) {
         reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;
@@ -149,11 +150,11 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
 /// it should be, it is the pose that errs: all that association takes for a candidate is used.
 static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
 {
-    const bslam_params_t *params = &slam->params;
-    const bool opens = params->association == BSLAM_ASSOCIATION_SVM && params->gate_d2 > 0 &&
-                       params->gate_d2 < params->candidate_d2 &&
-                       !bslam_is_placed(&slam->ekf, params->decision_delay_us, -1, time_us);
-    return opens ? params->candidate_d2 : params->gate_d2;
+    const bslam_settings_t *settings = &slam->settings;
+    const bool opens = settings->association == BSLAM_ASSOCIATION_SVM && settings->gate_d2 > 0 &&
+                       settings->gate_d2 < settings->candidate_d2 &&
+                       !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
+    return opens ? settings->candidate_d2 : settings->gate_d2;
 }
 
 /// Whether a match would turn the robot to whatever it is taken for: it has no distance that might contradict
@@ -162,11 +163,12 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
 static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
                      const bslam_match_t *match)
 {
-    const bslam_params_t *params = &slam->params;
-    return params->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance && !sighting->has_range &&
+    const bslam_settings_t *settings = &slam->settings;
+    return settings->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance &&
+           !sighting->has_range &&
            (bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
-            match->lead < params->decision_delay_score) &&
-           !bslam_is_placed(&slam->ekf, params->decision_delay_us, -1, time_us);
+            match->lead < settings->decision_delay_score) &&
+           !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
 }
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
@@ -189,7 +191,7 @@ static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_po
             const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
             const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, &sightings[i]);
             bslam_innovation_t *innovation = &slam->innovations[i];
-            if (bslam_ekf_innovation(&slam->ekf, &slam->params, mount, &taken, match->beacon, innovation) !=
+            if (bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &taken, match->beacon, innovation) !=
                 BSLAM_OK) {
                 reject(slam, BSLAM_REASON_SINGULAR, beacon, &slam->accounts[i]);
                 match->verdict = BSLAM_VERDICT_REJECT;
@@ -223,7 +225,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
                        &slam->accounts[i]);
         }
     }
-    bslam_ekf_correct(&slam->ekf, &slam->params);
+    bslam_ekf_correct(&slam->ekf, &slam->settings);
     for (int i = 0; i < count; i++) {
         if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH &&
             slam->accounts[i].outcome == BSLAM_OUTCOME_MATCHED) {
@@ -256,17 +258,18 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
         const bslam_account_t *account = &slam->accounts[i];
         const bslam_match_t *match = &slam->matches[i];
         if (match->delayed_for >= 0) {
-            bslam_appearance_note_delay(slam->appearance, &slam->params, match->delayed_for, time_us);
+            bslam_appearance_note_delay(slam->appearance, &slam->settings, match->delayed_for, time_us);
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
             bslam_appearance_note_view(slam->appearance, bslam_slam_find_beacon(slam, account->beacon_uid),
-                                  slam->params.again_odds);
+                                       slam->settings.again_odds);
         } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account)) {
             bslam_appearance_note_view(slam->appearance, match->beacon, match->view_score);
         }
     }
 }
 
-void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
+                                 int count)
 {
     note_matches(slam, time_us, count);
     if (slam->is_frozen) {
@@ -283,31 +286,31 @@ void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bsla
         }
         const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
         if (is_new || slam->matches[i].sure) {
-            bslam_appearance_train(slam->appearance, &slam->params, index, slam->ekf.beacon_count, slam->travelled_um,
-                              &sightings[i]);
+            bslam_appearance_train(slam->appearance, &slam->settings, index, slam->ekf.beacon_count,
+                                   slam->travelled_um, &sightings[i]);
         } else {
             slam->appearance->counters.unsure++;
         }
     }
-    const int leaves = bslam_duplicates_settle(slam->appearance, &slam->ekf, &slam->params, time_us);
+    const int leaves = bslam_duplicates_settle(slam->appearance, &slam->ekf, &slam->settings, time_us);
     if (leaves != BSLAM_NO_DUPLICATE) {
         bslam_slam_drop_beacon(slam, leaves);
     }
-    const int vanished =
-        bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->params, time_us, slam->travelled_um, all_matched);
+    const int vanished = bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->settings, time_us,
+                                                   slam->travelled_um, all_matched);
     if (vanished != BSLAM_NO_MISSED_BEACON) {
         bslam_slam_drop_beacon(slam, vanished);
     }
-    (void)bslam_learner_work(&slam->appearance->learner, slam->params.learn_budget);
+    (void)bslam_learner_work(&slam->appearance->learner, slam->settings.learn_budget);
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
 /// A provisional beacon leaves when its time is up, or as much spoke against it as for it. Where its identity
 /// was told, leaving the view early is no reason against it: it leaves if sightings contradicted it.
-static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *beacon, int64_t time_us)
+static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_t *beacon, int64_t time_us)
 {
-    const int64_t window_us = params->confirm_window_us;
+    const int64_t window_us = settings->confirm_window_us;
     if (beacon->confirmed) {
         return false;
     }
@@ -318,13 +321,13 @@ static bool is_unconfirmed(const bslam_params_t *params, const bslam_beacon_t *b
     if (window_us == 0 || beacon->has_scores || time_us - beacon->first_seen_us <= window_us) {
         return false;
     }
-    return params->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
+    return settings->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
 }
 
 /// The first that is confirmed of several with one told label stays, the others leave.
 static void drop_rivals(bslam_slam_t *slam)
 {
-    const bool is_told = slam->params.association == BSLAM_ASSOCIATION_KNOWN;
+    const bool is_told = slam->settings.association == BSLAM_ASSOCIATION_KNOWN;
     for (int b = slam->ekf.beacon_count - 1; b >= 0 && is_told; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
         for (int i = 0; i < slam->ekf.beacon_count && !beacon->confirmed; i++) {
@@ -343,11 +346,11 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
 {
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
-        if (is_unconfirmed(&slam->params, beacon, time_us)) {
+        if (is_unconfirmed(&slam->settings, beacon, time_us)) {
             bslam_slam_drop_beacon(slam, b);
             slam->counters.removed++;
         } else if (beacon->kind == BSLAM_BEACON_RAY &&
-                   bslam_ekf_settle_ray(&slam->ekf, &slam->params, mount, b)) {
+                   bslam_ekf_settle_ray(&slam->ekf, &slam->settings, mount, b)) {
             slam->counters.settled++;
         }
     }
@@ -400,12 +403,12 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
 {
     if (use && !slam->is_lost) {
         const bslam_appearance_answers_t *answers = slam->appearance != NULL ? slam->learning->answers : NULL;
-        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->params, slam->appearance, answers,
-                                              mount,      sightings,     count,       time_us};
-        const bslam_associate_fn associate = bslam_associate_method(&slam->params);
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, answers, mount,
+                                              sightings,  count,           time_us};
+        const bslam_associate_fn associate = bslam_associate_method(&slam->settings);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        if (slam->appearance != NULL && slam->params.association == BSLAM_ASSOCIATION_SVM) {
+        if (slam->appearance != NULL && slam->settings.association == BSLAM_ASSOCIATION_SVM) {
             slam->learning->learn(slam, time_us, sightings, count);
         }
     } else {
@@ -417,7 +420,7 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
         tidy_map(slam, time_us, mount);
     }
     if (slam->smoother != NULL) {
-        slam->smoothing->frame(slam->smoother, &slam->params, &slam->ekf);
+        slam->smoothing->frame(slam->smoother, &slam->settings, &slam->ekf);
     }
     slam->last_frame_us = time_us;
     slam->has_frame = true;

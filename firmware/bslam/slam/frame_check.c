@@ -83,8 +83,8 @@ bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const
             return status;
         }
     }
-    *behind_us = bslam_slam_behind_us(slam, time_us - slam->params.sighting_delay_us);
+    *behind_us = bslam_slam_behind_us(slam, time_us - slam->settings.sighting_delay_us);
     const bool in_reach =
-        *behind_us <= slam->history.filter.behind_us && *behind_us >= -slam->params.ahead_max_us;
+        *behind_us <= slam->history.filter.behind_us && *behind_us >= -slam->settings.ahead_max_us;
     return in_reach ? BSLAM_OK : BSLAM_E_TIME;
 }

@@ -19,7 +19,7 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     bslam_history_place_t place = slam->history.filter;
     const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
-    bslam_ekf_predict(&slam->ekf, &slam->params, &motion, &moved);
+    bslam_ekf_predict(&slam->ekf, &slam->settings, &motion, &moved);
     if (slam->smoother != NULL) {
         slam->smoothing->move(slam->smoother, &slam->ekf, &motion);
     }
@@ -37,7 +37,7 @@ void bslam_slam_predict_until(bslam_slam_t *slam, int64_t until_us)
 /// A motion waits until a frame shows what comes after it, or until the room is needed.
 static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_motion_t *motion)
 {
-    const int32_t steps = slam->params.history_steps;
+    const int32_t steps = slam->settings.history_steps;
     const int32_t room = steps < BSLAM_HISTORY_MAX ? steps : BSLAM_HISTORY_MAX;
     if (bslam_history_is_full(&slam->history, room)) {
         predict_step(slam, 0);
@@ -49,7 +49,7 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
 {
     bslam_odometry_t odometry = slam->odometry;
     bslam_motion_t motion;
-    bslam_status_t status = bslam_odometry_read(&odometry, &slam->params, reading, &motion);
+    bslam_status_t status = bslam_odometry_read(&odometry, &slam->settings, reading, &motion);
     if (status == BSLAM_E_JUMP) {
         slam->odometry = odometry;
     }
@@ -57,13 +57,13 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
         return status;
     }
     if (motion.dt_s > 0) {
-        status = bslam_ekf_check_motion(&slam->params, &motion);
+        status = bslam_ekf_check_motion(&slam->settings, &motion);
         if (status != BSLAM_OK) {
             return status;
         }
         queue_motion(slam, (int32_t)(odometry.time_us - slam->odometry.time_us), &motion);
         if (slam->smoother != NULL) {
-            slam->smoothing->rest(slam->smoother, &slam->params, &slam->ekf, motion.dt_s);
+            slam->smoothing->rest(slam->smoother, &slam->settings, &slam->ekf, motion.dt_s);
         }
     }
     slam->odometry = odometry;
@@ -95,11 +95,11 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
     const int64_t until_us = behind_us > 0 ? behind_us : 0;
     while (place.behind_us > until_us) {
         const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
-        bslam_robot_predict(&robot, &slam->params, &motion, &moved);
+        bslam_robot_predict(&robot, &slam->settings, &motion, &moved);
     }
     *pose = bslam_robot_pose(&robot);
     if (behind_us < 0) {
-        const bslam_pose_t ahead = bslam_history_look_ahead(&slam->params, &moved, -behind_us);
+        const bslam_pose_t ahead = bslam_history_look_ahead(&slam->settings, &moved, -behind_us);
         *pose = bslam_pose_compose(pose, &ahead);
     }
     return robot;

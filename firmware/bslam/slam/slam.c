@@ -7,17 +7,17 @@
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
 
-bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params, int *bad_id)
+bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *settings, int *bad_id)
 {
-    const bslam_status_t status = bslam_params_check(params, bad_id);
+    const bslam_status_t status = bslam_settings_check(settings, bad_id);
     if (status != BSLAM_OK) {
         return status;
     }
-    const bslam_params_t copy = *params;  // params may stand in *slam: starting over
+    const bslam_settings_t copy = *settings;  // settings may stand in *slam: starting over
     *slam = (bslam_slam_t){0};
-    slam->params = copy;
+    slam->settings = copy;
     slam->bad_sighting = -1;
-    bslam_ekf_init(&slam->ekf, &slam->params);
+    bslam_ekf_init(&slam->ekf, &slam->settings);
     bslam_odometry_init(&slam->odometry);
     return BSLAM_OK;
 }
@@ -25,7 +25,7 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
 void bslam_slam_restart_smoother(bslam_slam_t *slam)
 {
     if (slam->smoother != NULL) {
-        slam->smoothing->restart(slam->smoother, &slam->params, &slam->ekf);
+        slam->smoothing->restart(slam->smoother, &slam->settings, &slam->ekf);
     }
 }
 
@@ -44,7 +44,7 @@ bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t posit
         return BSLAM_E_RANGE;
     }
     bslam_slam_predict_until(slam, 0);
-    bslam_ekf_resume(&slam->ekf, &slam->params, position_sd_m * position_sd_m,
+    bslam_ekf_resume(&slam->ekf, &slam->settings, position_sd_m * position_sd_m,
                      heading_sd_rad * heading_sd_rad);
     bslam_slam_restart_smoother(slam);
     bslam_odometry_restart(&slam->odometry);
@@ -84,14 +84,14 @@ void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
         bslam_smoother_restart, bslam_smoother_move,   bslam_smoother_rest, bslam_smoother_see,
         bslam_smoother_add,     bslam_smoother_remove, bslam_smoother_frame};
     slam->smoothing = &smoothing;
-    slam->smoother = slam->params.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
+    slam->smoother = slam->settings.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
     bslam_slam_restart_smoother(slam);
 }
 
 void bslam_slam_attach_appearance(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    static const bslam_learning_t learning = {bslam_appearance_clear, bslam_appearance_forget, bslam_slam_learn_appearance,
-                                              &bslam_appearance_answers};
+    static const bslam_learning_t learning = {bslam_appearance_clear, bslam_appearance_forget,
+                                              bslam_slam_learn_appearance, &bslam_appearance_answers};
     slam->appearance = appearance;
     slam->learning = &learning;
     if (appearance != NULL) {
@@ -183,7 +183,7 @@ bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bsl
         return BSLAM_E_TIME;
     }
     const int64_t behind_us = bslam_slam_behind_us(slam, time_us);
-    if (behind_us < -slam->params.ahead_max_us) {
+    if (behind_us < -slam->settings.ahead_max_us) {
         return BSLAM_E_TIME;
     }
     const int64_t back_us = behind_us - slam->history.filter.behind_us;
@@ -192,7 +192,8 @@ bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bsl
         return BSLAM_OK;
     }
     bslam_pose_t relative;
-    const bslam_status_t status = bslam_history_look_back(&slam->history, &slam->params, back_us, &relative);
+    const bslam_status_t status =
+        bslam_history_look_back(&slam->history, &slam->settings, back_us, &relative);
     if (status == BSLAM_OK) {
         const bslam_pose_t filter = bslam_ekf_pose(&slam->ekf);
         *pose = bslam_pose_compose(&filter, &relative);

@@ -3,7 +3,7 @@
 /// One struct an instance, owned by the caller; no heap, no global state, no output. Feed it in order of
 /// time:
 ///
-///     bslam_slam_init(&slam, &params, &bad);
+///     bslam_slam_init(&slam, &settings, &bad);
 ///     bslam_slam_odometry(&slam, &reading);              // each control step
 ///     bslam_slam_sightings(&slam, time_us, seen, count); // each image
 ///     bslam_slam_pose(&slam);
@@ -67,15 +67,15 @@ typedef struct bslam_account {
 /// What an attached smoother needs of the library: smoother/smoother.h. Private, reached by this alone as
 /// below.
 typedef struct bslam_smoothing {
-    void (*restart)(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf);
+    void (*restart)(bslam_smoother_t *smoother, const bslam_settings_t *settings, const bslam_ekf_t *ekf);
     void (*move)(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
-    void (*rest)(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+    void (*rest)(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
                  bslam_real_t dt_s);
     void (*see)(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
     bslam_status_t (*add)(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_pose_t *mount,
                           const bslam_sighting_t *sighting, int *index);
     void (*remove)(bslam_smoother_t *smoother, int index);
-    void (*frame)(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf);
+    void (*frame)(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf);
 } bslam_smoothing_t;
 
 /// What attached looks need of the library. Private: reached by this alone, so that a linker leaves learning
@@ -90,7 +90,7 @@ typedef struct bslam_learning {
 
 /// All members are the pipeline's own; read them through the functions below.
 typedef struct bslam_slam {
-    bslam_params_t params;
+    bslam_settings_t settings;
     bslam_ekf_t ekf;
     bslam_odometry_t odometry;
     bslam_history_t history;
@@ -101,7 +101,7 @@ typedef struct bslam_slam {
     bool measures_distance;              ///< some sighting had one
     bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
     bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
-    bslam_appearance_t *appearance;                ///< the caller's; NULL: none attached
+    bslam_appearance_t *appearance;      ///< the caller's; NULL: none attached
     const bslam_learning_t *learning;    ///< theirs
     bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
     const bslam_smoothing_t *smoothing;  ///< theirs
@@ -114,9 +114,9 @@ typedef struct bslam_slam {
     bslam_innovation_t innovations[BSLAM_SIGHTINGS_MAX];
 } bslam_slam_t;
 
-/// Robot at the origin, empty map. params is copied. BSLAM_E_PARAMETER with *bad_id, see bslam_params_check:
-/// then *slam is unchanged.
-BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_params_t *params,
+/// Robot at the origin, empty map. settings is copied. BSLAM_E_PARAMETER with *bad_id, see
+/// bslam_settings_check: then *slam is unchanged.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *settings,
                                                 int *bad_id);
 
 /// From now on the pipeline learns what beacons look like, and association 3 decides by it. *looks has been

@@ -24,14 +24,15 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64
                                                        const bslam_sighting_t *sightings, int count,
                                                        int64_t *behind_us);
 
-// ---- trust.c: whether what is seen is a beacon. MATH "Position and appearance" ---------------------------------
+// ---- trust.c: whether what is seen is a beacon. MATH "Position and appearance"
+// ---------------------------------
 
 /// A beacon that a sighting has just started: what that says for it.
 void bslam_slam_confirm_new(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
 
 /// A sighting was matched with it, at this squared Mahalanobis distance: it may be confirmed by that.
 void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const bslam_sighting_t *sighting,
-                            bslam_real_t distance2);
+                              bslam_real_t distance2);
 
 /// Notes whether the sensor measures distances, and turns matches with beacons of which nobody knows yet
 /// whether they are any, and new ones that would be refuted at once, into BSLAM_VERDICT_TENTATIVE. Before
@@ -72,7 +73,7 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
 /// Notes which matches wait, and how well others fit. Unless the map is frozen, machines learn from what a
 /// frame surely showed, and train for a bounded time.
 void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                            int count);
+                                 int count);
 
 // ---- slam.c -----------------------------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ static const bslam_real_t DOUBT_MIN = BSLAM_R(1e-6);
 // ---- along the nodes --------------------------------------------------------------------------------------
 
 /// `range`: NULL without one.
-static bslam_sighting_t sighting_of(const bslam_params_t *model, const bslam_smoother_seen_t *direction,
+static bslam_sighting_t sighting_of(const bslam_settings_t *model, const bslam_smoother_seen_t *direction,
                                     const bslam_smoother_seen_t *range)
 {
     bslam_sighting_t sighting = {.bearing_rad = bslam_smoother_bearing_rad(direction),
@@ -72,7 +72,7 @@ static bslam_status_t guess_range(bslam_innovation_t *innovation)
 }
 
 /// What was seen of a beacon, into a filter, and how it fitted. False if it cannot be used.
-static bool take_seen(const bslam_params_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
+static bool take_seen(const bslam_settings_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
                       const bslam_smoother_seen_t *range, bslam_fusion_t *fusion)
 {
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};

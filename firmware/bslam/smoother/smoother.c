@@ -33,16 +33,17 @@ static void clear_block(bslam_smoother_t *smoother)
     smoother->block_s = 0;
 }
 
-void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf)
+void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *settings,
+                            const bslam_ekf_t *ekf)
 {
-    smoother->model = *params;
+    smoother->model = *settings;
     smoother->model.filter = BSLAM_FILTER_STANDARD;
-    smoother->free_walk = params->velocity_walk_mps_sqrt_s;
-    smoother->path_walk = params->path_walk_mps_sqrt_s;
+    smoother->free_walk = settings->velocity_walk_mps_sqrt_s;
+    smoother->path_walk = settings->path_walk_mps_sqrt_s;
     smoother->model.bearing_only_variance_factor = 1;
     smoother->model.bearing_only_curvature_factor = 0;
     // A model without a gate rests on Huber's rule, and keeps its own.
-    smoother->model.huber_d = params->gate_d2 > 0 || params->huber_d <= 0 ? HUBER_D : params->huber_d;
+    smoother->model.huber_d = settings->gate_d2 > 0 || settings->huber_d <= 0 ? HUBER_D : settings->huber_d;
     smoother->model.gate_d2 = 0;
     smoother->base = *ekf;
     memset(smoother->base.correction, 0, sizeof smoother->base.correction);
@@ -329,14 +330,14 @@ void bslam_smoother_remove(bslam_smoother_t *smoother, int index)
 // ---- as time goes on --------------------------------------------------------------------------------------
 
 /// The filter becomes what a cycle has made of it, and goes on to now.
-static void take_over(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
+static void take_over(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf)
 {
     const bslam_ekf_t *run = &smoother->run;
     memcpy(ekf->mean, run->mean, sizeof ekf->mean);
     memcpy(ekf->covariance, run->covariance, sizeof ekf->covariance);
     if (smoother->from_middle.dt_s > 0) {
         bslam_motion_t moved;
-        bslam_ekf_predict(ekf, params, &smoother->from_middle, &moved);
+        bslam_ekf_predict(ekf, settings, &smoother->from_middle, &moved);
     }
     smoother->cycles++;
 }
@@ -354,18 +355,19 @@ static bslam_real_t unseen_max_s(const bslam_smoother_t *smoother)
 }
 
 /// Does a bounded piece of work. Where a cycle ends, the filter is replaced by what came of it.
-static void work(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf, bool is_whole)
+static void work(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
+                 bool is_whole)
 {
     const int units = UNITS_FIRST - smoother->node_count / NODES_A_UNIT_LESS;
     if (!bslam_smoother_work(smoother, units, is_whole)) {
         return;
     }
     if (bslam_ekf_is_sane(&smoother->run)) {
-        take_over(smoother, params, ekf);
+        take_over(smoother, settings, ekf);
         bslam_smoother_turn(smoother);
     } else {
         smoother->insane++;
-        bslam_smoother_restart(smoother, params, ekf);
+        bslam_smoother_restart(smoother, settings, ekf);
     }
 }
 
@@ -384,7 +386,7 @@ void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, con
     }
 }
 
-void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
                          bslam_real_t dt_s)
 {
     smoother->idle_s += dt_s;
@@ -394,11 +396,11 @@ void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_params_t *param
         if (smoother->frames > 0) {
             close_block(smoother);
         }
-        work(smoother, params, ekf, true);
+        work(smoother, settings, ekf, true);
     }
 }
 
-void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf)
+void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf)
 {
     smoother->frames++;
     if (smoother->frames <= BSLAM_SMOOTHER_FRAMES / 2 + 1) {
@@ -410,7 +412,7 @@ void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *para
         close_block(smoother);
     }
     if (!smoother->rested) {  // else this step of the robot's has done its work
-        work(smoother, params, ekf, is_whole);
+        work(smoother, settings, ekf, is_whole);
     }
     smoother->rested = false;
     smoother->idle_s = 0;

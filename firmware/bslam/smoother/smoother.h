@@ -96,7 +96,7 @@ typedef enum bslam_smoother_phase {
 
 /// All members are the smoother's own.
 typedef struct bslam_smoother {
-    bslam_params_t model;                          ///< the pipeline's, without gate and with Huber's rule
+    bslam_settings_t model;                        ///< the pipeline's, without gate and with Huber's rule
     bslam_real_t free_walk;                        ///< of v: what the estimate rests on
     bslam_real_t path_walk;                        ///< of v: where the models are linearised
     bslam_ekf_t base;                              ///< before the first node, a correction about its mean
@@ -144,14 +144,15 @@ typedef struct bslam_smoother {
 } bslam_smoother_t;
 
 /// Starts anew from what the filter knows now: it becomes the base, and all nodes are forgotten.
-void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_params_t *params, const bslam_ekf_t *ekf);
+void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *settings,
+                            const bslam_ekf_t *ekf);
 
 /// The filter has gone through this motion (as odometry reported it, before any scale). O(1).
 void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
 
 /// Odometry was read over so much time. Where no frame has come for a while, works as bslam_smoother_frame
 /// does, so that what was seen last is settled before something is seen again.
-void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf,
+void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
                          bslam_real_t dt_s);
 
 /// A sighting of the present frame was taken for beacon `index` of the filter. O(1).
@@ -168,6 +169,6 @@ void bslam_smoother_remove(bslam_smoother_t *smoother, int index);
 
 /// The present frame is over: at the end of a block makes a node. Does a bounded piece of work; where a cycle
 /// ends, the filter is replaced by what came of it.
-void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_params_t *params, bslam_ekf_t *ekf);
+void bslam_smoother_frame(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf);
 
 #endif

@@ -35,7 +35,7 @@ static bslam_pose_t pose_at(const bslam_real_t *at)
 
 /// How far the node's speeds drive it and turn it; odometry's increments, times their scales, where there are
 /// no speeds.
-static void arc_to(const bslam_params_t *model, const bslam_smoother_node_t *node, bslam_real_t *forward_m,
+static void arc_to(const bslam_settings_t *model, const bslam_smoother_node_t *node, bslam_real_t *forward_m,
                    bslam_real_t *turn_rad)
 {
     const bslam_motion_t *motion = &node->motion;
@@ -47,7 +47,7 @@ static void arc_to(const bslam_params_t *model, const bslam_smoother_node_t *nod
 }
 
 /// How the chord from `from` to the node differs from that of the arc that its speeds or odometry tell.
-static void bend_way(const bslam_params_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
+static void bend_way(const bslam_settings_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
 {
     bslam_real_t forward_m;
     bslam_real_t turn_rad;
@@ -131,7 +131,7 @@ static const bslam_smoother_seen_t *range_behind(bslam_smoother_t *smoother, int
 static void carry(const bslam_smoother_t *smoother, const pair_t *pair, int which,
                   bslam_smoother_seen_t seen[2])
 {
-    const bslam_params_t *model = &smoother->model;
+    const bslam_settings_t *model = &smoother->model;
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
     bslam_real_t x_m;
     bslam_real_t y_m;

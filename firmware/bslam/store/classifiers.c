@@ -163,7 +163,7 @@ static void read_rival(bslam_codec_t *codec, uint32_t classifiers, named_t *name
     const uint32_t place = name & 0xffu;
     const bool is_seed = owner == SEED;
     bslam_codec_require(codec, is_seed ? place < BSLAM_SEEDS_MAX : owner < classifiers && place < UINT8_MAX,
-                          BSLAM_MAP_CONTENT);
+                        BSLAM_MAP_CONTENT);
     if (codec->fault != BSLAM_MAP_FINE) {
         return;
     }
@@ -173,7 +173,8 @@ static void read_rival(bslam_codec_t *codec, uint32_t classifiers, named_t *name
     // A robot with fewer seeds trains without those it does not have.
     if (classifier != NULL && (!is_seed || (int32_t)place < learner->seed_count)) {
         const uint32_t first = is_seed ? BSLAM_LEARNER_SLOTS : owner;
-        classifier->negative[classifier->negatives] = (uint16_t)(first * BSLAM_SAMPLES_PER_CLASSIFIER + place);
+        classifier->negative[classifier->negatives] =
+            (uint16_t)(first * BSLAM_SAMPLES_PER_CLASSIFIER + place);
         classifier->negative_alpha[classifier->negatives] = (uint16_t)alpha;
         classifier->negatives++;
     }
@@ -187,7 +188,7 @@ static void read_machine(bslam_codec_t *codec, uint32_t classifiers, named_t *na
     const uint32_t trained = bslam_codec_whole(codec, 0, 1);
     const uint32_t negatives = bslam_codec_whole(codec, 0, 2);
     bslam_codec_require(codec, samples <= BSLAM_SAMPLES_PER_CLASSIFIER && negatives <= BSLAM_NEGATIVES_MAX,
-                          BSLAM_MAP_CLASSIFIERS);
+                        BSLAM_MAP_CLASSIFIERS);
     bslam_codec_require(codec, trained <= 1, BSLAM_MAP_CONTENT);
     bslam_weights_t weights = {0};
     move_weights(codec, &weights);

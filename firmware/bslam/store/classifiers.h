@@ -16,8 +16,8 @@ static inline bool bslam_map_saves(const bslam_ekf_t *ekf, int index)
 /// Whether a machine's slot is that of a beacon that goes into the blob.
 bool bslam_map_owns(const bslam_slam_t *slam, int32_t slot);
 
-/// The number that a machine has in the blob, by its slot: saved ones in order. BSLAM_MAP_NO_CLASSIFIER: it is
-/// not saved.
+/// The number that a machine has in the blob, by its slot: saved ones in order. BSLAM_MAP_NO_CLASSIFIER: it
+/// is not saved.
 uint32_t bslam_map_classifier_number(const bslam_slam_t *slam, int32_t slot);
 
 void bslam_map_write_classifier(bslam_codec_t *codec, const bslam_slam_t *slam, int32_t slot);

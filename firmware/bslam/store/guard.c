@@ -31,7 +31,7 @@ static uint32_t checksum_of(const bslam_slam_t *slam)
     const size_t counts = offsetof(bslam_ekf_t, beacons) - offsetof(bslam_ekf_t, dim);
     const size_t flags = sizeof *ekf - offsetof(bslam_ekf_t, pending_count);
     const size_t rest = offsetof(bslam_slam_t, accounts) - offsetof(bslam_slam_t, odometry);
-    uint32_t sum = add(START, &slam->params, sizeof slam->params);
+    uint32_t sum = add(START, &slam->settings, sizeof slam->settings);
     sum = add(sum, ekf->mean, sizeof ekf->mean);
     sum = add(sum, ekf->covariance, rows * sizeof ekf->covariance[0]);
     sum = add(sum, &ekf->dim, counts);

@@ -80,7 +80,7 @@ static void move_header(bslam_codec_t *codec, header_t *header)
     bslam_codec_require(codec, order == ORDER, BSLAM_MAP_NO_MAP);
     codec->version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
     bslam_codec_require(codec, codec->version >= 1 && codec->version <= BSLAM_MAP_VERSION,
-                          BSLAM_MAP_OTHER_VERSION);
+                        BSLAM_MAP_OTHER_VERSION);
     header->length = bslam_codec_whole(codec, header->length, 4);
     header->beacons = bslam_codec_whole(codec, header->beacons, 2);
     header->values = bslam_codec_whole(codec, header->values, 2);
@@ -89,8 +89,7 @@ static void move_header(bslam_codec_t *codec, header_t *header)
     header->next_uid = bslam_codec_whole(codec, header->next_uid, 4);
     const uint32_t reserved = bslam_codec_whole(codec, 0, 4);
     bslam_codec_require(codec, header->beacons <= BSLAM_BEACONS_MAX, BSLAM_MAP_BEACONS);
-    bslam_codec_require(codec, header->values <= BSLAM_STATE_MAX - BSLAM_ROBOT_DIM_MAX,
-                          BSLAM_MAP_BEACONS);
+    bslam_codec_require(codec, header->values <= BSLAM_STATE_MAX - BSLAM_ROBOT_DIM_MAX, BSLAM_MAP_BEACONS);
     bslam_codec_require(codec, header->classifiers <= BSLAM_LEARNER_SLOTS, BSLAM_MAP_CLASSIFIERS);
     bslam_codec_require(codec, features == BSLAM_SAMPLE_FEATURES, BSLAM_MAP_CLASSIFIERS);
     bslam_codec_require(codec, reserved == 0, BSLAM_MAP_CONTENT);
@@ -181,7 +180,8 @@ static void take_record(const target_t *target, const record_t *record)
     ekf->dim += bslam_beacon_dim(beacon->kind);
     if (target->slam->appearance != NULL) {
         bslam_beacon_look_t *look = &target->slam->appearance->of[index];
-        look->classifier = record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
+        look->classifier =
+            record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
         memcpy(look->seen_as, record->seen_as, sizeof look->seen_as);
     }
 }
@@ -200,9 +200,9 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
                                                               : 0u;
         const uint32_t uid = record.beacon.uid;
         bslam_codec_require(codec, uid >= least_uid && uid < header->next_uid, BSLAM_MAP_CONTENT);
-        bslam_codec_require(codec,
-                              record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
-                              BSLAM_MAP_CONTENT);
+        bslam_codec_require(
+            codec, record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
+            BSLAM_MAP_CONTENT);
         least_uid = uid + 1;
         if (is_taken(target, &record.beacon)) {
             take_record(target, &record);
@@ -223,9 +223,9 @@ static bslam_real_t variance_at(bslam_codec_t *codec, uint32_t covariance_at, ui
         return 0;
     }
     bslam_codec_require(codec, codec->source->read(codec->source->context, at, bytes, REAL_BYTES),
-                          BSLAM_MAP_UNREADABLE);
+                        BSLAM_MAP_UNREADABLE);
     return (bslam_real_t)bslam_codec_float_of((uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 |
-                                                (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
+                                              (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
 }
 
 /// Without room for more: no variance is negative, no two values are correlated beyond 1.
@@ -251,7 +251,7 @@ static void check_whole(bslam_codec_t *codec, uint32_t values, const room_t *roo
             bslam_symmat_set(room->factor, i, j, bslam_codec_real(codec, 0));
         }
         bslam_codec_require(codec, bslam_symmat_factor_row(room->factor, i, room->raise),
-                              BSLAM_MAP_COVARIANCE);
+                            BSLAM_MAP_COVARIANCE);
     }
 }
 
@@ -324,7 +324,7 @@ static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf)
         do {
             (void)next_value(ekf, &j);
             (void)bslam_codec_real(codec,
-                                     bslam_symmat_get(ekf->covariance, state_at(ekf, &i), state_at(ekf, &j)));
+                                   bslam_symmat_get(ekf->covariance, state_at(ekf, &i), state_at(ekf, &j)));
         } while (i.beacon != j.beacon || i.value != j.value);
     }
 }

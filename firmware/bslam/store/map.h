@@ -22,10 +22,10 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_BYTE_ORDER,  ///< written high byte first
     BSLAM_MAP_OTHER_VERSION,
     BSLAM_MAP_BAD_CRC,
-    BSLAM_MAP_BEACONS,     ///< more beacons, or rays, than this build holds
-    BSLAM_MAP_CLASSIFIERS,    ///< machines, samples or rivals beyond what this build holds; other signatures
-    BSLAM_MAP_NOT_FINITE,  ///< a NaN, an infinity, or beyond 1e12
-    BSLAM_MAP_CONTENT,     ///< a field that contradicts others, or outside its range
+    BSLAM_MAP_BEACONS,      ///< more beacons, or rays, than this build holds
+    BSLAM_MAP_CLASSIFIERS,  ///< machines, samples or rivals beyond what this build holds; other signatures
+    BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
+    BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range
     BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1, values that cannot be so together
     BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, the sink cannot be written
     BSLAM_MAP_NO_ROOM,     ///< to look at its covariance beside the robot's own map: forget that first

@@ -1,6 +1,7 @@
 /// Hinged support vector machines: linear ones on bytes, each told twice, as it is and by how much it exceeds
 /// a knot of its own: by that explicit expansion every feature has a curve of two straight parts in each row.
-/// For hundreds of features of a picture, where the curves of additive.h would take too much. MATH-CAMERA "Hinged SVM".
+/// For hundreds of features of a picture, where the curves of additive.h would take too much. MATH-CAMERA
+/// "Hinged SVM".
 ///
 /// A machine is a view of constant tables, as in svm.h. Sums are whole numbers, the same on every core.
 #ifndef BSLAM_VISION_CLASSIFIERS_HINGED_H

@@ -86,7 +86,7 @@ typedef struct bslam_cell_notes {
     union {
         bslam_cell_tables_t tables;            ///< while these are worked out,
         uint32_t masks[2 * BSLAM_MASK_WORDS];  ///< then bits: segmentations join these cells;
-        bslam_edge_steps_t steps;           ///< and then while uprights are looked for
+        bslam_edge_steps_t steps;              ///< and then while uprights are looked for
     };
 } bslam_cell_notes_t;
 

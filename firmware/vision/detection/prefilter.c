@@ -177,7 +177,7 @@ static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p
 }
 
 void bslam_box_prefilter(const bslam_view_t *view, const bslam_proposal_t *box,
-                      float glance[BSLAM_GLANCE_FEATURES])
+                         float glance[BSLAM_GLANCE_FEATURES])
 {
     float *x = place_features(view, box, glance);
     x = side_features(view, box, x);

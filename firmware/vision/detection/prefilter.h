@@ -8,6 +8,6 @@
 
 /// The numbers of a glance, all finite; tools/training sees them in this order.
 void bslam_box_prefilter(const bslam_view_t *view, const bslam_proposal_t *box,
-                      float glance[BSLAM_GLANCE_FEATURES]);
+                         float glance[BSLAM_GLANCE_FEATURES]);
 
 #endif

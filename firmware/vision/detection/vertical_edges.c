@@ -489,7 +489,7 @@ __attribute__((noinline)) static void propose_kind(bslam_proposals_t *proposals,
 }
 
 void bslam_vertical_edges_propose(bslam_proposals_t *proposals, const bslam_view_t *view,
-                            bslam_edge_steps_t *steps)
+                                  bslam_edge_steps_t *steps)
 {
     wall_t wall;
     find_wall(view, &wall);

@@ -11,6 +11,6 @@
 
 /// Adds boxes to those known. `steps` is scratch, whose content does not matter before or after.
 void bslam_vertical_edges_propose(bslam_proposals_t *proposals, const bslam_view_t *view,
-                            bslam_edge_steps_t *steps);
+                                  bslam_edge_steps_t *steps);
 
 #endif

@@ -237,7 +237,8 @@ static bool start_at(shift_state_t *state, const bslam_pattern_pair_t *pair,
         return false;
     }
     adapt(state, &residuals);
-    state->shift += within(slope_residual / slope2, STEP_MAX) - travelled_m * parallax / slope2 / pair->step_rad;
+    state->shift +=
+        within(slope_residual / slope2, STEP_MAX) - travelled_m * parallax / slope2 / pair->step_rad;
     state->travelled_m = travelled_m;
     state->doubtful_m = bslam_abs(travelled_m) > LEAST_WAY_M ? travelled_m : LEAST_WAY_M;
     return true;

@@ -1,5 +1,5 @@
-/// How a body on a wall stands towards the camera, from its upper and lower side. Inside of outline.c; MATH-CAMERA
-/// "Outline".
+/// How a body on a wall stands towards the camera, from its upper and lower side. Inside of outline.c;
+/// MATH-CAMERA "Outline".
 ///
 /// Places are tangents in the plane of bslam_facing_t.
 #ifndef BSLAM_VISION_MEASUREMENT_BODY_H

@@ -21,8 +21,9 @@ typedef struct bslam_size {
 
 /// Refines the rough box and fills the candidate's outline, bearing, range, marks and signature; its class,
 /// margin and score stay as they are. The box may be 4 pixels off on each side, an upright one up to 30 where
-/// the level sides tell that (MATH-CAMERA "Outline"). Without a height there is no distance; without the right depth
-/// a body's flank is taken for a part of its front, and its middle is off by half of what the flank takes.
+/// the level sides tell that (MATH-CAMERA "Outline"). Without a height there is no distance; without the
+/// right depth a body's flank is taken for a part of its front, and its middle is off by half of what the
+/// flank takes.
 ///
 /// Marked and not measured: what is small (less than 5 px wide or 8 px high), or seen to be turned by a
 /// tangent of more than 1.5; and a part, whose level sides go on beyond it, unless it is as wide as its kind

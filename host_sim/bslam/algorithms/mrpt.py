@@ -92,7 +92,9 @@ class MrptEkf:
         p, dt_s = self._p, (time_us - self._time_us) * 1e-6
         (travelled_m, turn_rad), covariance = measured_motion(p, dt_s, left_m, right_m, *self._gyro)
         half_turn_m = 0.5 * turn_rad * p["wheelbase_m"]
-        end = move_on_arc((0.0, 0.0, 0.0), travelled_m - half_turn_m, travelled_m + half_turn_m, p["wheelbase_m"])
+        end = move_on_arc(
+            (0.0, 0.0, 0.0), travelled_m - half_turn_m, travelled_m + half_turn_m, p["wheelbase_m"]
+        )
         c, s = math.cos(0.5 * turn_rad), math.sin(0.5 * turn_rad)
         by_read = np.array([[c, -0.5 * travelled_m * s], [s, 0.5 * travelled_m * c], [0.0, 1.0]])
         spread = by_read @ covariance @ by_read.T

@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.errors import BslamError
 from bslam.calibration.calibrate import Estimate
 from bslam.datasets.pictures import SUFFIXES
+from bslam.errors import BslamError
 from bslam.rig import Camera, Lens
 
 try:

@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.vision import Candidate, FrontEnd, Picture
-from bslam.errors import BslamError
 from bslam.calibration.calibrate import Estimate
+from bslam.core.vision import Candidate, FrontEnd, Picture
 from bslam.datasets.pictures import SUFFIXES, load_picture
+from bslam.errors import BslamError
 from bslam.rig import Camera
 from bslam.world.camera.lens import unproject
 from bslam.world.kinds import KINDS, Kind

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.calibration.calibrate import Estimate
 from bslam.errors import BslamError
 from bslam.evaluation.align import wrap_angle
-from bslam.calibration.calibrate import Estimate
 from bslam.evaluation.truth import dead_reckoning, step_times_us, truth_at
 from bslam.log import Log
 

@@ -13,7 +13,8 @@ import joblib
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.runs.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
+from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
+from bslam.maps.blob import SUFFIX
 from bslam.options import (
     ASSOCIATIONS,
     FILTERS,
@@ -26,9 +27,8 @@ from bslam.options import (
     RunOptions,
     parse_association,
 )
+from bslam.runs.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.runs.sources import CameraSource, ScenarioSource
-from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
-from bslam.maps.blob import SUFFIX
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 from bslam.world.scenario import load_scenario
 

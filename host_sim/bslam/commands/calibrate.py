@@ -6,16 +6,16 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from bslam.calibration.calibrate import Calibration, as_toml, calibrate
 from bslam.commands.arguments import core_parameters
 from bslam.commands.calibrate_camera import add_camera_arguments, execute_camera
 from bslam.commands.drawing import draw
 from bslam.commands.replay import log_sources
 from bslam.commands.report import finish, table_of
-from bslam.errors import BslamError
-from bslam.runs.batch import Job, run_batch
-from bslam.calibration.calibrate import Calibration, as_toml, calibrate
 from bslam.datasets.mrclam import ROBOTS
+from bslam.errors import BslamError
 from bslam.options import RunOptions
+from bslam.runs.batch import Job, run_batch
 from bslam.runs.output import write_atomically
 from bslam.runs.sources import Source
 

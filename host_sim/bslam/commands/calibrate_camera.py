@@ -7,8 +7,6 @@ import math
 import re
 from pathlib import Path
 
-from bslam.commands.report import table_of
-from bslam.errors import BslamError
 from bslam.calibration.calibrate import Estimate
 from bslam.calibration.calibrate_camera import (
     Board,
@@ -20,10 +18,12 @@ from bslam.calibration.calibrate_camera import (
     find_mounting,
 )
 from bslam.calibration.camera_pitch import find_pitch, load_drive
-from bslam.runs.output import write_atomically
 from bslam.calibration.sensor_yaw import find_yaw
+from bslam.commands.report import table_of
+from bslam.errors import BslamError
 from bslam.log import read_folder
 from bslam.rig import LENS_KINDS, Camera
+from bslam.runs.output import write_atomically
 
 _ROLL_SEEN_RAD = math.radians(1.0)
 

@@ -22,9 +22,9 @@ from bslam.commands.arguments import (
 )
 from bslam.commands.report import table_of
 from bslam.errors import BslamError
+from bslam.options import RunOptions
 from bslam.runs.contest import ContestResult, hold_contest, make_bouts, means
 from bslam.runs.methods import BOUND, Method, own_method, shipped_methods
-from bslam.options import RunOptions
 from bslam.runs.output import write_atomically, write_json, write_summary
 from bslam.runs.sources import FolderSource, Source
 from bslam.view.comparison import Contender, draw_comparison

@@ -16,14 +16,14 @@ from bslam.commands.arguments import add_filter_options, run_options
 from bslam.commands.report import table_of
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
-from bslam.runs.kept import read_blob
-from bslam.options import ASSOCIATIONS
-from bslam.runs.runner import run_log
 from bslam.link.messages import Health, PoseReport
 from bslam.log import Log, read_folder
+from bslam.options import ASSOCIATIONS
 from bslam.recording import RecordingWriter
 from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, Start, State
 from bslam.recording.recorder import MAP_PERIOD_US
+from bslam.runs.kept import read_blob
+from bslam.runs.runner import run_log
 from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
 from bslam.target.remote import RemoteSlam, Told
 from bslam.world.simulate import load_scenario, simulate

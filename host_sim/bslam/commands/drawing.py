@@ -8,10 +8,10 @@ import numpy as np
 
 from bslam.evaluation.consistency import nees_band_95
 from bslam.evaluation.metrics import WINDOW_S, Evaluation
-from bslam.runs.output import write_atomically
-from bslam.runs.sources import Source
 from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.log import Log
+from bslam.runs.output import write_atomically
+from bslam.runs.sources import Source
 from bslam.view.room import Mapped, Room, draw_room
 from bslam.view.series import Series, draw_run
 from bslam.view.style import png

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.options import RunOptions
-from bslam.runs.output import tum, write_atomically
-from bslam.runs.runner import run_log
 from bslam.log import Log, read_folder, write_folder
+from bslam.options import RunOptions
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.recording.entries import State, TruePose
 from bslam.recording.reader import SUFFIX
+from bslam.runs.output import tum, write_atomically
+from bslam.runs.runner import run_log
 
 SUMMARY = "write a recording or a log in another format: tum, csv, mcap"
 EXAMPLES = """examples:

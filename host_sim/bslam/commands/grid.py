@@ -9,8 +9,8 @@ from typing import Any
 
 from bslam.commands.arguments import run_options, scenario_source
 from bslam.commands.drawing import draw
-from bslam.runs.batch import Job, make_jobs
 from bslam.options import RunOptions
+from bslam.runs.batch import Job, make_jobs
 from bslam.runs.sources import Source
 from bslam.world.simulate import load_scenario
 

@@ -13,11 +13,11 @@ from bslam.commands.report import table_of
 from bslam.core.builds import SIZE_CLASSES
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.runs.kept import ensure_sound, read_blob
-from bslam.runs.output import write_atomically
 from bslam.maps.blob import SUFFIX, KeptMap, pack, parse
 from bslam.maps.merge import merge
 from bslam.maps.text import from_json, to_json
+from bslam.runs.kept import ensure_sound, read_blob
+from bslam.runs.output import write_atomically
 from bslam.view.room import Mapped, Room, draw_room
 from bslam.view.style import png
 

@@ -22,20 +22,20 @@ from bslam.commands.drawing import draw
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
 from bslam.errors import BslamError
+from bslam.evaluation.truth import step_times_us
+from bslam.log import Log
+from bslam.moment import FAILED, Stage
+from bslam.options import RunOptions
+from bslam.recording.reader import SUFFIX
+from bslam.rig import load_rig
 from bslam.runs.batch import BatchResult, Job, Outcome, make_jobs, run_job, write_files
 from bslam.runs.camera import unseen_log
 from bslam.runs.eye import Eye
-from bslam.options import RunOptions
 from bslam.runs.output import write_summary
 from bslam.runs.player import Player
 from bslam.runs.rerun import options_of
 from bslam.runs.runner import Watcher
 from bslam.runs.sources import CameraSource, RecordingSource, Source
-from bslam.evaluation.truth import step_times_us
-from bslam.log import Log
-from bslam.moment import FAILED, Stage
-from bslam.recording.reader import SUFFIX
-from bslam.rig import load_rig
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "watch the filter at work in the browser: pause it, step it, see why each sighting was taken"

@@ -11,11 +11,11 @@ from pathlib import Path
 from bslam.commands.arguments import positive_count
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Seeing
 from bslam.errors import BslamError
+from bslam.modelfile import read_recogniser
+from bslam.rig import load_rig
 from bslam.runs.camera import NO_BEACON, covering_beacon
 from bslam.runs.output import write_atomically
 from bslam.runs.shots import VIDEOS, Shot, Source, folder, simulated, video
-from bslam.modelfile import read_recogniser
-from bslam.rig import load_rig
 from bslam.view.frames import RIGHT, UNKNOWN, WRONG, Mark, annotate, contact_sheet, png
 from bslam.world.simulate import load_scenario
 

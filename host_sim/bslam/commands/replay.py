@@ -9,13 +9,13 @@ from typing import Any
 from bslam.commands.arguments import add_batch_options, add_filter_options, core_parameters, run_options
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
-from bslam.errors import BslamError
-from bslam.runs.batch import Job, make_jobs, run_batch
 from bslam.datasets.datasets import find_directory
 from bslam.datasets.mrclam import ROBOTS, robots_in
+from bslam.errors import BslamError
+from bslam.recording.reader import SUFFIX
+from bslam.runs.batch import Job, make_jobs, run_batch
 from bslam.runs.rerun import options_of
 from bslam.runs.sources import DlrSource, FolderSource, MrclamSource, RecordingSource, Source
-from bslam.recording.reader import SUFFIX
 
 SUMMARY = "run the filter on recorded logs"
 EXAMPLES = """examples:

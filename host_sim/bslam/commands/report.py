@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from bslam.errors import BslamError
-from bslam.runs.batch import BatchResult
 from bslam.maps.blob import SUFFIX
+from bslam.runs.batch import BatchResult
 
 # Heading, and how to get the text of an entry.
 _COLUMNS = (

@@ -18,9 +18,9 @@ import joblib
 
 from bslam.commands import compare, replay, run, sweep, tables
 from bslam.commands.arguments import positive_count, seeds_range, whole_number
-from bslam.runs.batch import BatchResult, Job, run_batch
-from bslam.evaluation.consistency import half_interval_95
 from bslam.datasets.datasets import VARIABLE, data_root
+from bslam.evaluation.consistency import half_interval_95
+from bslam.runs.batch import BatchResult, Job, run_batch
 from bslam.runs.output import write_atomically
 from bslam.runs.sweep import code_digest
 from bslam.runs.tables import (

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from bslam.errors import BslamError
-from bslam.runs.output import write_atomically
 from bslam.log import Beacons
+from bslam.runs.output import write_atomically
 from bslam.view.style import png
 from bslam.view.world import World, draw_world
 from bslam.world.scenario import SCENARIOS, Scenario, load_scenario, scenario_names

@@ -23,13 +23,14 @@ from bslam.commands.drawing import draw
 from bslam.commands.grid import grid
 from bslam.commands.report import HEADINGS, mean_row, table_of
 from bslam.errors import BslamError
+from bslam.evaluation.consistency import half_interval_95, share_interval_95
+from bslam.evaluation.failure import is_exact
+from bslam.options import RunOptions
+from bslam.parsing.settings import check_keys, load_toml
 from bslam.runs.batch import Job, make_jobs
 from bslam.runs.cluster import cluster
-from bslam.evaluation.consistency import half_interval_95, share_interval_95
 from bslam.runs.contest import Guest, guest_jobs
-from bslam.evaluation.failure import is_exact
 from bslam.runs.methods import method_digest, own_method
-from bslam.options import RunOptions
 from bslam.runs.output import write_atomically, write_summary
 from bslam.runs.sources import Source
 from bslam.runs.sweep import (
@@ -42,7 +43,6 @@ from bslam.runs.sweep import (
     run_sweep,
     write_parquet,
 )
-from bslam.parsing.settings import check_keys, load_toml
 from bslam.world.simulate import load_scenario
 
 SUMMARY = "run every combination of scenarios, sigmas, observations, filters, associations, parameters"

@@ -12,10 +12,10 @@ import numpy as np
 from bslam.commands.arguments import add_batch_options, add_filter_options, add_sensor_options
 from bslam.commands.grid import Filters, grid_jobs
 from bslam.commands.report import finish, table_of
-from bslam.runs.batch import Job, Outcome, run_batch
 from bslam.evaluation.consistency import nees_band_95
 from bslam.evaluation.metrics import WINDOW_S
 from bslam.options import OBSERVATIONS
+from bslam.runs.batch import Job, Outcome, run_batch
 from bslam.runs.output import write_atomically, write_json
 from bslam.runs.tables import (
     NAMES,

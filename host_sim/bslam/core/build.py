@@ -106,12 +106,14 @@ def _compile(name: str, declared: str, source: str, macros: Macros, library: str
         ffi.set_source(
             name,
             source,
-            sources=sorted(str(path) for folder in SOURCES[library] for path in (FIRMWARE_DIR / folder).rglob("*.c")),
+            sources=sorted(
+                str(path) for folder in SOURCES[library] for path in (FIRMWARE_DIR / folder).rglob("*.c")
+            ),
             include_dirs=[str(FIRMWARE_DIR)],
             define_macros=list(macros),
             extra_compile_args=[
                 "-std=c11",
-                "-O2",
+                "-O3",  # the loops over pixels are written plainly: half the instructions of -O2
                 "-ffp-contract=off",
                 "-fvisibility=hidden",
                 "-w",

@@ -117,8 +117,8 @@ class Slam:
 
     def _init(self, params: Mapping[str, float]) -> None:
         table = {p.name: p for p in self.parameters(self._raw.real)}
-        c_params = self._ffi.new("bslam_params_t *")
-        self._lib.bslam_params_default(c_params)
+        c_params = self._ffi.new("bslam_settings_t *")
+        self._lib.bslam_settings_default(c_params)
         for name, value in params.items():
             if name not in table:
                 raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(table)}")
@@ -131,7 +131,7 @@ class Slam:
         bad_id = self._ffi.new("int *", -1)
         status = self._lib.bslam_slam_init(self._slam, c_params, bad_id)
         if status:
-            name = self._raw.text(self._lib.bslam_params_info(bad_id[0]).name)
+            name = self._raw.text(self._lib.bslam_settings_info(bad_id[0]).name)
             message = f"parameter {name} = {getattr(c_params, name):g} contradicts velocity_states = 1"
             self._raw.ensure(status, f"{message}: allowed beside it is {_BESIDE_VELOCITY_STATES[name]}")
 
@@ -140,8 +140,8 @@ class Slam:
         """Every parameter with its meaning, default and range, in the order of the C table."""
         raw = library(real, 1)
         found = []
-        for index in range(raw.lib.bslam_params_count()):
-            info = raw.lib.bslam_params_info(index)
+        for index in range(raw.lib.bslam_settings_count()):
+            info = raw.lib.bslam_settings_info(index)
             # Float's 0.1 prints as 0.10000000149; nine digits round-trip float and read as written.
             initial, low, high = (float(f"{value:.7g}") for value in (info.initial, info.low, info.high))
             found.append(
@@ -157,7 +157,7 @@ class Slam:
     @property
     def params(self) -> dict[str, float]:
         """The values in force."""
-        return self._raw.fields(self._slam.params, "bslam_params_t")
+        return self._raw.fields(self._slam.params, "bslam_settings_t")
 
     @property
     def state_bytes(self) -> bytes:

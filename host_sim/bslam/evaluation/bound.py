@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.evaluation.align import wrap_angle
-from bslam.options import RunOptions, wheel_noise
 from bslam.evaluation.truth import odometry_increments, starts_at_origin
 from bslam.log import Log
+from bslam.options import RunOptions, wheel_noise
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from bslam.evaluation.align import Rigid, fit_rigid, fit_scale
 from bslam.evaluation.bound import has_bound, mean_bound_m
 from bslam.evaluation.consistency import POSE_95, nees
 from bslam.evaluation.failure import NEES_MAX, is_exact, map_one_to_one, was_off
-from bslam.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
 from bslam.evaluation.trace import SightingCounts, Trace
 from bslam.evaluation.truth import dead_reckoning, is_dense, odometry_increments, truth_at
 from bslam.log import Log
+from bslam.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
 
 WINDOW_S: Final = 50.0  # "first" and "last" 50 s
 NEES_FIRST_STEP: Final = 51  # by then the pose covariance has left its start value of 0

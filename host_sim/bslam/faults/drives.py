@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 
 from bslam.core.slam import Slam
-from bslam.faults.promise import STEP_S, Fault, Measured
 from bslam.evaluation.metrics import evaluate
+from bslam.evaluation.trace import Trace
+from bslam.faults.promise import STEP_S, Fault, Measured
+from bslam.log import Log
 from bslam.options import RunOptions, core_params
 from bslam.runs.runner import run_log
-from bslam.evaluation.trace import Trace
-from bslam.log import Log
 from bslam.world.simulate import load_scenario, simulate
 
 SIGMA_MPS = 0.6

@@ -60,7 +60,7 @@ def _guarded_bits(protected: bool) -> Measured:
     memory = memory_of(slam)
     rows, beacons = slam._slam.ekf.dim, slam._slam.ekf.beacon_count
     regions = [
-        ("params", (offset_of(slam, "params"), slam._ffi.sizeof("bslam_params_t"))),
+        ("params", (offset_of(slam, "params"), slam._ffi.sizeof("bslam_settings_t"))),
         ("mean", (offset_of(slam, "ekf", "mean"), 4 * rows)),
         ("covariance", (offset_of(slam, "ekf", "covariance"), 4 * _row(rows))),
         (

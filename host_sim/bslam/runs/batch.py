@@ -22,13 +22,13 @@ from tqdm import tqdm
 
 from bslam.errors import BslamError
 from bslam.evaluation.metrics import Evaluation, describe, evaluate, summarise
+from bslam.evaluation.trace import Trace
+from bslam.log import Log, write_folder
 from bslam.options import RunOptions
 from bslam.runs.output import write_run, write_summary
 from bslam.runs.rerun import rerun
 from bslam.runs.runner import FrameFeed, Watcher, run_log
 from bslam.runs.sources import RecordingSource, ScenarioSource, Source
-from bslam.evaluation.trace import Trace
-from bslam.log import Log, write_folder
 from bslam.target.lines import TargetError
 
 _LOST = (

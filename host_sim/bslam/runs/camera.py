@@ -24,9 +24,9 @@ from bslam.core.learner import rendered_seeds
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
-from bslam.runs.compass import Compass
 from bslam.log import Log, Sightings
 from bslam.rig import Rig
+from bslam.runs.compass import Compass
 from bslam.world.arena import Arena, Beacon
 from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Scenario

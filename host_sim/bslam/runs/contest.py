@@ -23,9 +23,9 @@ import numpy as np
 from tqdm import tqdm
 
 from bslam.errors import BslamError
+from bslam.options import RunOptions
 from bslam.runs.batch import Job, Outcome, failed_entry, write_files
 from bslam.runs.methods import OURS, Method, load_method
-from bslam.options import RunOptions
 from bslam.runs.rival import run_algorithm
 from bslam.runs.sources import Source
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from bslam.core.vision import Candidate
 from bslam.errors import BslamError
-from bslam.runs.camera import SEEN, TURNS, CameraDrive, Glance
-from bslam.runs.compass import Compass
-from bslam.options import ASSOCIATIONS, RunOptions
-from bslam.runs.runner import Frames
 from bslam.log import Log, Sightings
 from bslam.moment import Box, Shown, Told
+from bslam.options import ASSOCIATIONS, RunOptions
+from bslam.runs.camera import SEEN, TURNS, CameraDrive, Glance
+from bslam.runs.compass import Compass
+from bslam.runs.runner import Frames
 
 
 class Eye:

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.evaluation.align import Rigid, fit_rigid, wrap_angle
-from bslam.runs.eye import Eye
-from bslam.runs.runner import Watcher
 from bslam.evaluation.truth import step_times_us, truth_at
 from bslam.log import Log
 from bslam.moment import FAILED, FINISHED, PAUSED, RUNNING, Course, Moment, Spot, Told
+from bslam.runs.eye import Eye
+from bslam.runs.runner import Watcher
 
 _PUBLISH_S: Final = 0.03  # moments that follow each other sooner nobody sees
 _ALIGN_S: Final = 1.0

@@ -15,14 +15,14 @@ from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.evaluation.ledger import Ledger
-from bslam.options import ASSOCIATIONS, FILTERS, MOTIONS, Number, RunOptions
-from bslam.runs.runner import Rows, Watcher, make_trace
 from bslam.evaluation.trace import Trace
 from bslam.evaluation.truth import step_times_us
+from bslam.options import ASSOCIATIONS, FILTERS, MOTIONS, Number, RunOptions
 from bslam.recording import Recording
 from bslam.recording.aslog import as_log
 from bslam.recording.entries import Call, Entry, Frame, Gap, Reading, State
 from bslam.recording.recorder import FINGERPRINT_START
+from bslam.runs.runner import Rows, Watcher, make_trace
 from bslam.target.remote import connect
 
 

@@ -15,11 +15,11 @@ from bslam.algorithms import Algorithm, Landmark, Setup, Sighting
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.evaluation.ledger import Ledger
-from bslam.options import RunOptions, core_params
-from bslam.runs.runner import MAPPABLE, Frames, beacons_to_hold
 from bslam.evaluation.trace import MapBeacon, SightingCounts, Trace
 from bslam.evaluation.truth import gyro_rates, step_times_us, wheel_travel
 from bslam.log import Log
+from bslam.options import RunOptions, core_params
+from bslam.runs.runner import MAPPABLE, Frames, beacons_to_hold
 
 STANDS_FOR_M = 1.0
 """A landmark without a label stands for the true beacon nearest to it, if that is nearer than this."""

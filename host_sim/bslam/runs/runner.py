@@ -19,15 +19,15 @@ from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.runs.kept import read_blob
 from bslam.evaluation.ledger import Ledger, corrupt_identities
-from bslam.runs.local_map import LocalMap
-from bslam.options import Number, RunOptions, core_params, odometry_lead_us, recovery_of
 from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
+from bslam.options import Number, RunOptions, core_params, odometry_lead_us, recovery_of
 from bslam.recording import Recorder, RecordingWriter
 from bslam.recording.aslog import start_of, true_poses
+from bslam.runs.kept import read_blob
+from bslam.runs.local_map import LocalMap
 from bslam.target.remote import connect
 
 SlamFactory = Callable[[Mapping[str, Number], int], Any]

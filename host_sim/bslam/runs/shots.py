@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from bslam.errors import BslamError
 from bslam.datasets.pictures import SUFFIXES, camera_for, load_picture, scale_picture
+from bslam.errors import BslamError
 from bslam.rig import Camera, Rig
 from bslam.world.camera import Renderer, dress
 from bslam.world.scenario import Scenario

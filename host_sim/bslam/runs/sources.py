@@ -10,14 +10,14 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.evaluation.align import Rigid
-from bslam.runs.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
 from bslam.datasets.dlr import load_dlr
 from bslam.datasets.mrclam import best_truth, load_mrclam
+from bslam.evaluation.align import Rigid
 from bslam.log import SIGNATURES, Log, read_folder
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
+from bslam.runs.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import load_scenario, simulate
 

@@ -26,9 +26,9 @@ from tqdm import tqdm
 import bslam
 from bslam.core.builds import FIRMWARE_DIR
 from bslam.errors import BslamError
-from bslam.runs.batch import Job, Outcome, outcomes_of, prepare
 from bslam.evaluation.failure import was_off
 from bslam.options import RunOptions
+from bslam.runs.batch import Job, Outcome, outcomes_of, prepare
 from bslam.runs.output import finite, write_atomically
 from bslam.runs.sources import ScenarioSource
 

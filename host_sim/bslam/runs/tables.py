@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from bslam.runs.batch import Outcome
 from bslam.evaluation.consistency import half_interval_95, nees_band_95
+from bslam.runs.batch import Outcome
 
 STATISTICS: Final = ("max", "min", "mean", "std")  # in the paper's order
 TITLES: Final = {

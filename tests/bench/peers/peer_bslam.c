@@ -22,12 +22,12 @@ static void fail(const char *what)
     exit(1);
 }
 
-static void set(bslam_params_t *params, const char *name, size_t length, double value)
+static void set(bslam_settings_t *settings, const char *name, size_t length, double value)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const char *its = bslam_params_info(id)->name;
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const char *its = bslam_settings_info(id)->name;
         if (strlen(its) == length && strncmp(its, name, length) == 0 &&
-            bslam_params_set(params, id, (bslam_real_t)value) == BSLAM_OK) {
+            bslam_settings_set(settings, id, (bslam_real_t)value) == BSLAM_OK) {
             return;
         }
     }
@@ -66,24 +66,24 @@ static step_t step_of(const bench_step_t *from)
 
 void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count, int words, char **word)
 {
-    bslam_params_t params;
+    bslam_settings_t settings;
     int bad_id = -1;
-    bslam_params_default(&params);
+    bslam_settings_default(&settings);
     const double step_s = (double)(steps[count - 1].time_us) * 1e-6 / (count - 1);
-    params.wheelbase_m = (bslam_real_t)model->wheelbase_m;
-    params.left_speed_sd_mps = params.right_speed_sd_mps = (bslam_real_t)(model->wheel_sd_m / step_s);
-    params.bearing_sd_rad = (bslam_real_t)model->bearing_sd_rad;
-    params.range_sd_floor_m = (bslam_real_t)model->range_sd_floor_m;
-    params.range_sd_fraction = (bslam_real_t)model->range_sd_fraction;
-    params.range_sd_per_m = (bslam_real_t)model->range_sd_per_m;
+    settings.wheelbase_m = (bslam_real_t)model->wheelbase_m;
+    settings.left_speed_sd_mps = settings.right_speed_sd_mps = (bslam_real_t)(model->wheel_sd_m / step_s);
+    settings.bearing_sd_rad = (bslam_real_t)model->bearing_sd_rad;
+    settings.range_sd_floor_m = (bslam_real_t)model->range_sd_floor_m;
+    settings.range_sd_fraction = (bslam_real_t)model->range_sd_fraction;
+    settings.range_sd_per_m = (bslam_real_t)model->range_sd_per_m;
     for (int i = 1; i < words; i++) {
         const char *equals = strchr(word[i], '=');
         if (equals == NULL) {
             fail(word[i]);
         }
-        set(&params, word[i], (size_t)(equals - word[i]), atof(equals + 1));
+        set(&settings, word[i], (size_t)(equals - word[i]), atof(equals + 1));
     }
-    if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
+    if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         fail("a parameter is refused");
     }
     own_steps = room((size_t)count, sizeof *own_steps);

@@ -8,11 +8,11 @@ import pytest
 
 from bslam.algorithms import Sighting
 from bslam.errors import BslamError
-from bslam.runs import methods
 from bslam.evaluation.metrics import evaluate
-from bslam.options import RunOptions
-from bslam.runs.rival import run_algorithm, setup_for
 from bslam.log import first_steps
+from bslam.options import RunOptions
+from bslam.runs import methods
+from bslam.runs.rival import run_algorithm, setup_for
 from bslam.world.simulate import load_scenario, simulate
 
 (METHOD,) = (one for one in methods.shipped_methods(25) if one.name == "mrpt")

@@ -10,10 +10,10 @@ from bslam.algorithms.causal_map import CausalMap
 from bslam.algorithms.noise import motion_covariance, range_sd_m
 from bslam.algorithms.smoother import _ARC_SD_M, _FIRST_RANGE_SD_M, Smoother, _Problem
 from bslam.core.slam import Slam
-from bslam.options import RunOptions
-from bslam.runs.rival import run_algorithm
 from bslam.log import first_steps
 from bslam.motion import move_on_arc
+from bslam.options import RunOptions
+from bslam.runs.rival import run_algorithm
 from bslam.world.simulate import load_scenario, simulate
 
 STEP_S = 0.04

@@ -22,7 +22,7 @@ REALS = pytest.mark.parametrize("real", ["float", "double"])
 
 
 def table_in_c() -> list[tuple[str, float, float, float, bool, str]]:
-    """The lines of BSLAM_PARAMS as they stand in the header: name, default, low, high, is it whole,
+    """The lines of BSLAM_SETTINGS as they stand in the header: name, default, low, high, is it whole,
     meaning."""
     text = Path(LIBRARY_DIR, "base", "params.h").read_text(encoding="utf-8").replace("\\\n", " ")
     line = re.compile(r'(REAL|INTEGER)\((\w+), ([-\w.]+), ([-\w.]+), ([-\w.]+),\s*"([^"]*)"\)')

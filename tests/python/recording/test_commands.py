@@ -7,10 +7,10 @@ import pytest
 
 import bslam
 from bslam.cli import main
-from bslam.runs import sources
 from bslam.log import first_steps, write_folder
 from bslam.recording import load
 from bslam.recording.entries import State
+from bslam.runs import sources
 from bslam.world.simulate import load_scenario, simulate
 
 NAME = "short"

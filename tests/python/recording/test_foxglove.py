@@ -8,10 +8,10 @@ from google.protobuf.descriptor import FieldDescriptor as Field
 from google.protobuf.json_format import ParseDict
 from mcap.reader import make_reader
 
-from bslam.options import RunOptions
-from bslam.runs.runner import run_log
 from bslam.log import first_steps
+from bslam.options import RunOptions
 from bslam.recording.schemas import SCHEMAS
+from bslam.runs.runner import run_log
 from bslam.world.simulate import load_scenario, simulate
 
 PUBLISHED = {

@@ -12,10 +12,8 @@ from mcap.reader import make_reader
 
 from bslam.core.slam import Account, Beacon, Slam
 from bslam.errors import BslamError
-from bslam.options import RunOptions
-from bslam.runs.rerun import options_of, rerun
-from bslam.runs.runner import run_log
 from bslam.log import first_steps, read_folder, write_folder
+from bslam.options import RunOptions
 from bslam.recording import Recorder, Recording, RecordingWriter, load
 from bslam.recording.aslog import as_log
 from bslam.recording.entries import (
@@ -31,6 +29,8 @@ from bslam.recording.entries import (
     TruePose,
 )
 from bslam.recording.schemas import SCHEMAS
+from bslam.runs.rerun import options_of, rerun
+from bslam.runs.runner import run_log
 from bslam.world.simulate import load_scenario, simulate
 
 floats = st.floats(allow_nan=False, allow_infinity=False)

@@ -8,10 +8,10 @@ import pytest
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.options import RunOptions
-from bslam.runs.runner import run_log
 from bslam.evaluation.trace import Trace
 from bslam.log import SIGNATURE_SIZE, Log, Sightings
+from bslam.options import RunOptions
+from bslam.runs.runner import run_log
 from bslam.world.simulate import load_scenario, simulate
 
 SVM = RunOptions(association="svm")

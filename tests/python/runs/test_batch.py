@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bslam.errors import BslamError
+from bslam.log import Log, write_folder
+from bslam.options import RunOptions
 from bslam.runs import batch
 from bslam.runs.batch import Job, make_jobs, run_batch, run_names
-from bslam.options import RunOptions
 from bslam.runs.sources import CameraSource, FolderSource, MrclamSource, ScenarioSource
-from bslam.log import Log, write_folder
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bslam.evaluation.bound import bound, has_bound, mean_bound_m
-from bslam.options import RunOptions
 from bslam.motion import move_on_arc
+from bslam.options import RunOptions
 
 DIRECTION = RunOptions(observation="direction")
 STEPS = 30

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bslam.errors import BslamError
 from bslam.calibration.calibrate import as_toml, calibrate
+from bslam.errors import BslamError
 from bslam.log import Odometry, Truth
 
 DT_S = 0.04

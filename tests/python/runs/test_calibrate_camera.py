@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import pytest
 
-from bslam.errors import BslamError
 from bslam.calibration import calibrate_camera
 from bslam.calibration.calibrate import Estimate
 from bslam.calibration.calibrate_camera import (
@@ -20,6 +19,7 @@ from bslam.calibration.calibrate_camera import (
     find_boards,
     find_mounting,
 )
+from bslam.errors import BslamError
 from bslam.rig import Lens, load_rig
 from runs import boards
 

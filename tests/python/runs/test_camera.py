@@ -10,12 +10,12 @@ import pytest
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, Seeing, Told, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
+from bslam.options import RunOptions
+from bslam.rig import Pan, load_rig
 from bslam.runs import camera
 from bslam.runs.camera import Aim, CameraStore, camera_log, covering_beacon, unseen_log
 from bslam.runs.eye import Eye
-from bslam.options import RunOptions
 from bslam.runs.runner import run_log
-from bslam.rig import Pan, load_rig
 from bslam.world.simulate import load_scenario, simulate, true_drive
 
 RIG = load_rig("three60")

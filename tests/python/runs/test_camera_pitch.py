@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bslam.errors import BslamError
 from bslam.calibration.camera_pitch import find_pitch, load_drive
+from bslam.errors import BslamError
 from bslam.rig import load_rig
 from bslam.world.camera import Renderer, make_world, walk
 

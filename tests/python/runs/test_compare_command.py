@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 
 from bslam.cli import main
-from bslam.runs.methods import shipped_methods
 from bslam.log import write_folder
+from bslam.runs.methods import shipped_methods
 
 STRANGERS = """
 import os, time

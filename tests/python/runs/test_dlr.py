@@ -8,11 +8,11 @@ import pytest
 from scipy.io import savemat
 
 from bslam.core.slam import Slam
-from bslam.errors import BslamError
 from bslam.datasets.dlr import STEP_US, load_dlr
-from bslam.runs.local_map import LocalMap
-from bslam.options import RunOptions, core_params
+from bslam.errors import BslamError
 from bslam.evaluation.truth import dead_reckoning
+from bslam.options import RunOptions, core_params
+from bslam.runs.local_map import LocalMap
 
 ODOMETRY_NOISE = "1e-5 0 1e-5 0 0 1e-4"
 

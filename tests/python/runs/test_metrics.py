@@ -7,10 +7,10 @@ import pytest
 
 from bslam.evaluation.align import Rigid
 from bslam.evaluation.metrics import evaluate, map_pairs, summarise
-from bslam.options import RunOptions
 from bslam.evaluation.trace import SightingCounts
 from bslam.evaluation.truth import step_times_us
 from bslam.log import Truth
+from bslam.options import RunOptions
 
 OPTIONS = RunOptions(filter="standard")
 STEPS = 3000  # 120 s

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from bslam.errors import BslamError
 from bslam.datasets.mrclam import STEP_US, best_truth, load_mrclam, robots_in
+from bslam.errors import BslamError
 
 T0 = 1_248_272_272.841
 T0_US = 1_248_272_272_841_000

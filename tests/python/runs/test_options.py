@@ -8,7 +8,7 @@ import pytest
 
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.runs import defaults
+from bslam.log import Odometry, Robot
 from bslam.options import (
     LEAST_BEARING_SD_RAD,
     LEAST_RANGE_SD_M,
@@ -18,8 +18,8 @@ from bslam.options import (
     parse_association,
     recovery_of,
 )
+from bslam.runs import defaults
 from bslam.runs.runner import run_log
-from bslam.log import Odometry, Robot
 
 
 def velocity(log):

@@ -10,9 +10,9 @@ import pytest
 
 from bslam.errors import BslamError
 from bslam.evaluation.metrics import evaluate
+from bslam.evaluation.truth import step_times_us
 from bslam.options import RunOptions
 from bslam.runs.output import finite, map_csv, tum, write_atomically, write_run, write_summary
-from bslam.evaluation.truth import step_times_us
 
 
 def refuse_constant(name):

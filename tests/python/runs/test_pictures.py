@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bslam.errors import BslamError
 from bslam.datasets.pictures import camera_for, load_picture
+from bslam.errors import BslamError
 from bslam.rig import load_rig
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bslam.datasets.datasets import data_root
-from bslam.evaluation.metrics import evaluate, summarise
 from bslam.datasets.mrclam import best_truth, load_mrclam
+from bslam.evaluation.metrics import evaluate, summarise
+from bslam.log import read_folder
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
-from bslam.log import read_folder
 
 ROOT = data_root()
 pytestmark = pytest.mark.skipif(

@@ -11,13 +11,13 @@ from bslam.algorithms import Landmark
 from bslam.algorithms.dead_reckoning import DeadReckoning
 from bslam.algorithms.ours import Bslam
 from bslam.errors import BslamError
-from bslam.runs.methods import load_method, own_method, shipped_methods
 from bslam.evaluation.metrics import summarise
-from bslam.options import RunOptions
-from bslam.runs.rival import AlgorithmError, run_algorithm, setup_for
-from bslam.runs.runner import run_log
 from bslam.evaluation.truth import dead_reckoning
 from bslam.log import first_steps
+from bslam.options import RunOptions
+from bslam.runs.methods import load_method, own_method, shipped_methods
+from bslam.runs.rival import AlgorithmError, run_algorithm, setup_for
+from bslam.runs.runner import run_log
 from bslam.world.simulate import load_scenario, simulate
 
 

@@ -10,9 +10,9 @@ from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.evaluation.metrics import evaluate, summarise
+from bslam.log import Odometry
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
-from bslam.log import Odometry
 
 DISTANCE = RunOptions()
 

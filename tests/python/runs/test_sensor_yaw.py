@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bslam.errors import BslamError
 from bslam.calibration.sensor_yaw import find_yaw
+from bslam.errors import BslamError
 
 
 def turned(log, yaw_rad):

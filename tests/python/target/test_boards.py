@@ -7,9 +7,9 @@ import subprocess
 import pytest
 
 from bslam.errors import BslamError
+from bslam.log import first_steps
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
-from bslam.log import first_steps
 from bslam.target.lines import ROOT, TargetError, boards_here, emulator_of, qemu_machines
 from bslam.world.simulate import load_scenario, simulate
 from tools.proofs import run_image, same_bits

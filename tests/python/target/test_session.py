@@ -11,13 +11,13 @@ from bslam.cli import main
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
-from bslam.options import RunOptions
-from bslam.runs.runner import run_log
 from bslam.link import messages
 from bslam.link.frames import Frame, encode
 from bslam.link.messages import Message
 from bslam.log import first_steps
+from bslam.options import RunOptions
 from bslam.recording import load
+from bslam.runs.runner import run_log
 from bslam.target import client
 from bslam.target.client import Client
 from bslam.target.film import write_film

@@ -23,7 +23,7 @@ def test_a_program_links_the_library(tmp_path):
     )
     (tmp_path / "main.c").write_text(
         '#include "bslam/bslam.h"\nstatic bslam_slam_t slam;\n'
-        "int main(void)\n{\n    bslam_params_t params;\n    int bad_id;\n    bslam_params_default(&params);\n"
+        "int main(void)\n{\n    bslam_settings_t params;\n    int bad_id;\n    bslam_settings_default(&params);\n"
         "    const bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);\n"
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )

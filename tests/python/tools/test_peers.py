@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bslam.evaluation.metrics import evaluate
+from bslam.log import first_steps
 from bslam.options import RunOptions
 from bslam.runs.runner import run_log
-from bslam.log import first_steps
 from tools.bench import bench
 from tools.bench.peers.drives import circle, simulated, text
 from tools.bench.peers.programs import CORE, PEERS, run

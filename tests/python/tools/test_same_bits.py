@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import pytest
 
 from bslam.errors import BslamError
-from bslam.options import RunOptions
 from bslam.log import Log
+from bslam.options import RunOptions
 from bslam.target.lines import TargetError
 from tools.proofs import same_bits
 

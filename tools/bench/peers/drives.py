@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.runs.sources import ScenarioSource
 from bslam.evaluation.truth import step_times_us, truth_at, wheel_travel
 from bslam.log import Log, Odometry, Robot, Sightings, Truth
+from bslam.runs.sources import ScenarioSource
 
 SPEED_MPS, RADIUS_M = 0.4, 3.0  # of the circle that the drive for timing is
 HALF_WIDTH_M, APART_M = 10.0, 0.3  # of the square in which its beacons stand; from one to the next at least

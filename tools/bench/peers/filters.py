@@ -10,9 +10,9 @@ from statistics import fmean, median
 
 from tqdm import tqdm
 
+from bslam.log import Log
 from bslam.options import RunOptions
 from bslam.runs.rival import run_algorithm
-from bslam.log import Log
 from tools.bench.peers.drives import circle, simulated, text
 from tools.bench.peers.programs import CORE, PEERS, Program, instructions, run
 from tools.checks.markdown import Row, table

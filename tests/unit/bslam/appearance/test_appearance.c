@@ -5,18 +5,18 @@
 #include "bslam/association/viewpoint.h"
 
 static bslam_appearance_t appearance;
-static bslam_params_t params;
+static bslam_settings_t settings;
 static uint32_t travelled_um;
 
 enum { SHARE = 3 };
 
 static int setup(void **state)
 {
-    params = unit_params();
-    params.appearance_samples = 3;
-    params.learn_travel_m = BSLAM_R(0.1);
-    params.share_value = BSLAM_R(0.3);
-    params.share_sightings = SHARE;
+    settings = unit_params();
+    settings.appearance_samples = 3;
+    settings.learn_travel_m = BSLAM_R(0.1);
+    settings.share_value = BSLAM_R(0.3);
+    settings.share_sightings = SHARE;
     travelled_um = 0;
     return bslam_appearance_init(&appearance, NULL, 0) == BSLAM_OK ? 0 : -1;
 }
@@ -42,7 +42,7 @@ static void show(int index, int count, const float *signature)
 {
     bslam_sighting_t sighting = unit_polar(0, 4, -1);
     sighting.signature = signature;
-    bslam_appearance_train(&appearance, &params, index, count, travelled_um, &sighting);
+    bslam_appearance_train(&appearance, &settings, index, count, travelled_um, &sighting);
 }
 
 /// A sure sighting of beacon `index` of `count`, which looks like an object, a good way after the last.
@@ -61,7 +61,7 @@ static double value_of(int index, int object, int view)
     bslam_sample_t sample;
     view_of(object, view, signature);
     assert_int_equal(bslam_sample_encode(signature, &sample), BSLAM_OK);
-    return (double)bslam_appearance_ask(&appearance, &params, index, &sample).value;
+    return (double)bslam_appearance_ask(&appearance, &settings, index, &sample).value;
 }
 
 static void test_each_beacon_learns_its_own_look(void **state)
@@ -83,7 +83,7 @@ static void test_each_beacon_learns_its_own_look(void **state)
 static void test_nothing_is_known_of_a_beacon_without_a_machine(void **state)
 {
     bslam_sample_t sample = {{0}};
-    const bslam_opinion_t opinion = bslam_appearance_ask(&appearance, &params, 0, &sample);
+    const bslam_opinion_t opinion = bslam_appearance_ask(&appearance, &settings, 0, &sample);
     assert_true(opinion.weight == 0.0f && opinion.value == 0.0f);
 }
 
@@ -94,7 +94,7 @@ static void test_weight_grows_with_the_samples(void **state)
         teach(1, 2, 1, view);
     }
     bslam_sample_t sample = {{0}};
-    assert_near(bslam_appearance_ask(&appearance, &params, 0, &sample).weight, 0.5, 1e-6);
+    assert_near(bslam_appearance_ask(&appearance, &settings, 0, &sample).weight, 0.5, 1e-6);
 }
 
 static void test_a_robot_that_stands_still_teaches_once(void **state)
@@ -123,7 +123,8 @@ static void test_a_new_beacon_that_looks_like_another_shares_its_machine(void **
 {
     learn_two(8);
     for (int view = 20; view < 20 + SHARE; view++) {
-        assert_int_equal(appearance.of[2].classifier, BSLAM_NO_CLASSIFIER);  // while that is open it learns nothing
+        assert_int_equal(appearance.of[2].classifier,
+                         BSLAM_NO_CLASSIFIER);  // while that is open it learns nothing
         teach(2, 3, 0, view);
     }
     assert_int_equal(appearance.of[2].classifier, appearance.of[0].classifier);
@@ -225,32 +226,32 @@ static void see_class(uint8_t beacon_class, int times)
     sighting.beacon_class = beacon_class;
     for (int i = 0; i < times; i++) {
         travelled_um += 150000;
-        bslam_appearance_train(&appearance, &params, 0, 1, travelled_um, &sighting);
+        bslam_appearance_train(&appearance, &settings, 0, 1, travelled_um, &sighting);
     }
 }
 
 static void test_class_odds_are_of_counts_with_a_little_doubt(void **state)
 {
-    params.class_doubt = BSLAM_R(0.5);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, 3), 0, 1e-6);
+    settings.class_doubt = BSLAM_R(0.5);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), 0, 1e-6);
     see_class(3, 6);
     see_class(7, 2);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, 3), log(8 * 6.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, 7), log(8 * 2.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, 1), log(8 * 0.5 / 12), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), log(8 * 6.5 / 12), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 7), log(8 * 2.5 / 12), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 1), log(8 * 0.5 / 12), 1e-5);
     see_class(BSLAM_CLASS_NONE, 3);
     see_class(BSLAM_APPEARANCE_CLASSES + 1, 3);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, 3), log(8 * 6.5 / 12), 1e-5);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, BSLAM_CLASS_NONE), 0, 0);
-    assert_near(bslam_appearance_class_odds(&appearance, &params, 0, BSLAM_APPEARANCE_CLASSES + 1), 0, 0);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, 3), log(8 * 6.5 / 12), 1e-5);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, BSLAM_CLASS_NONE), 0, 0);
+    assert_near(bslam_appearance_class_odds(&appearance, &settings, 0, BSLAM_APPEARANCE_CLASSES + 1), 0, 0);
 }
 
 static void test_a_class_seen_for_long_is_unlearned_again(void **state)
 {
     see_class(3, 300);
-    assert_true(bslam_appearance_class_odds(&appearance, &params, 0, 5) < -2);
+    assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) < -2);
     see_class(5, 40);
-    assert_true(bslam_appearance_class_odds(&appearance, &params, 0, 5) > 1);
+    assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) > 1);
 }
 
 static const double TURN_RAD = 6.283185307179586;
@@ -275,15 +276,15 @@ static void test_sectors_are_equal_parts_of_a_turn(void **state)
 
 static double viewpoint_odds(int sectors_on)
 {
-    return (double)bslam_appearance_viewpoint_odds(&appearance, &params, 0,
-                                         sector_at((7.5 + sectors_on) / BSLAM_APPEARANCE_SECTORS));
+    return (double)bslam_appearance_viewpoint_odds(&appearance, &settings, 0,
+                                                   sector_at((7.5 + sectors_on) / BSLAM_APPEARANCE_SECTORS));
 }
 
 /// A wall's beacon has a back; one that stands free is seen from all sides in time.
 static void test_side_odds_fall_with_the_angle_to_where_it_was_seen_from(void **state)
 {
-    params.viewpoint_low = 3;
-    params.viewpoint_high = 1;
+    settings.viewpoint_low = 3;
+    settings.viewpoint_high = 1;
     for (int k = -8; k <= 8; k++) {
         assert_near(viewpoint_odds(k), 0, 0);  // from nowhere yet
     }
@@ -302,7 +303,8 @@ static void test_side_odds_fall_with_the_angle_to_where_it_was_seen_from(void **
     for (int k = -8; k <= 8; k++) {
         assert_near(viewpoint_odds(k), 1, 0);
     }
-    assert_near(bslam_appearance_viewpoint_odds(&appearance, &params, 1, 0), 0, 0);  // each beacon has its own
+    assert_near(bslam_appearance_viewpoint_odds(&appearance, &settings, 1, 0), 0,
+                0);  // each beacon has its own
 }
 
 static void test_all_beacons_alike_end_with_one_machine(void **state)
@@ -351,23 +353,24 @@ static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)
 
 static void test_a_wait_lasts_from_its_first_moment_unless_it_paused_too_long(void **state)
 {
-    params.decision_delay_us = 1000000;
+    settings.decision_delay_us = 1000000;
     const int64_t start_us = ((int64_t)1 << 32) - 500000;  // the clock of the wait turns over within it
-    assert_false(bslam_appearance_is_due(&appearance, &params, 2, 0));
-    assert_false(bslam_appearance_is_due(&appearance, &params, 2, start_us));
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, 0));
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us));
     for (int64_t ago_us = 0; ago_us < 900000; ago_us += 300000) {
-        bslam_appearance_note_delay(&appearance, &params, 2, start_us + ago_us);
-        assert_false(bslam_appearance_is_due(&appearance, &params, 2, start_us + ago_us));
+        bslam_appearance_note_delay(&appearance, &settings, 2, start_us + ago_us);
+        assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + ago_us));
     }
-    assert_false(bslam_appearance_is_due(&appearance, &params, 2, start_us + 999998));
-    assert_true(bslam_appearance_is_due(&appearance, &params, 2, start_us + 1000000));
-    assert_true(bslam_appearance_is_due(&appearance, &params, 2, start_us + 1600000));
-    assert_false(bslam_appearance_is_due(&appearance, &params, 1, start_us + 1000000));
-    bslam_appearance_note_delay(&appearance, &params, 2, start_us + 1600001);  // the last was over a second before
-    assert_false(bslam_appearance_is_due(&appearance, &params, 2, start_us + 1600001));
-    assert_true(bslam_appearance_is_due(&appearance, &params, 2, start_us + 2600001));
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 999998));
+    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1000000));
+    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1600000));
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 1, start_us + 1000000));
+    bslam_appearance_note_delay(&appearance, &settings, 2,
+                                start_us + 1600001);  // the last was over a second before
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 1600001));
+    assert_true(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 2600001));
     bslam_appearance_forget(&appearance, 2, 3);
-    assert_false(bslam_appearance_is_due(&appearance, &params, 2, start_us + 2600001));
+    assert_false(bslam_appearance_is_due(&appearance, &settings, 2, start_us + 2600001));
 }
 
 static void test_clear_forgets_all(void **state)

@@ -24,49 +24,49 @@ static bslam_sighting_t seen_with(bslam_sighting_t sighting, const float *signat
     return sighting;
 }
 
-static bslam_params_t svm_params(void)
+static bslam_settings_t svm_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.association = BSLAM_ASSOCIATION_SVM;
-    params.candidate_d2 = 30;
-    params.new_per_m2 = BSLAM_R(0.02);
-    params.new_per_rad = BSLAM_R(0.3);
-    params.defer_score = 4;
-    params.competitor_lead = 2;
-    params.appearance_weight = 1;
-    params.appearance_samples = 3;
-    params.appearance_slope = 4;
-    params.appearance_offset = BSLAM_R(-0.5);
-    params.appearance_low = 8;
-    params.appearance_high = 4;
-    params.far_d2 = 300;
-    params.class_doubt = BSLAM_R(0.1);
-    params.learn_d2 = 9;
-    params.learn_lead = 4;
-    params.learn_margin = 0;
-    params.decision_delay_us = 1000000;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.association = BSLAM_ASSOCIATION_SVM;
+    settings.candidate_d2 = 30;
+    settings.new_per_m2 = BSLAM_R(0.02);
+    settings.new_per_rad = BSLAM_R(0.3);
+    settings.defer_score = 4;
+    settings.competitor_lead = 2;
+    settings.appearance_weight = 1;
+    settings.appearance_samples = 3;
+    settings.appearance_slope = 4;
+    settings.appearance_offset = BSLAM_R(-0.5);
+    settings.appearance_low = 8;
+    settings.appearance_high = 4;
+    settings.far_d2 = 300;
+    settings.class_doubt = BSLAM_R(0.1);
+    settings.learn_d2 = 9;
+    settings.learn_lead = 4;
+    settings.learn_margin = 0;
+    settings.decision_delay_us = 1000000;
+    return settings;
 }
 
 typedef struct decision {
     bslam_match_t matches[8];
 } decision_t;
 
-static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_params_t *params,
+static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                             const bslam_sighting_t *seen, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf,      params, &appearance, &bslam_appearance_answers,
-                                          &on_axle, seen,   count,  time_us};
+    const bslam_sighting_frame_t frame = {ekf,      settings, &appearance, &bslam_appearance_answers,
+                                          &on_axle, seen,     count,       time_us};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     bslam_associate_svm(&frame, decision.matches);
     return decision;
 }
 
-static decision_t decide(const bslam_ekf_t *ekf, const bslam_params_t *params, const bslam_sighting_t *seen,
-                         int count)
+static decision_t decide(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                         const bslam_sighting_t *seen, int count)
 {
-    return decide_at(0, ekf, params, seen, count);
+    return decide_at(0, ekf, settings, seen, count);
 }
 
 static int setup(void **state)
@@ -75,171 +75,176 @@ static int setup(void **state)
 }
 
 /// Equation (47) without looks, for a beacon straight ahead at (4, 0).
-static double position_score(const bslam_params_t *params, double range_m, double bearing_rad)
+static double position_score(const bslam_settings_t *settings, double range_m, double bearing_rad)
 {
     const bslam_sighting_t plain = unit_polar(0, 4, -1);
-    const double range_var = 0.01 + (double)bslam_range_variance_m2(params, &plain, 4);
-    const double bearing_var = 0.01 / 16 + (double)bslam_bearing_variance_rad2(params, &plain);
+    const double range_var = 0.01 + (double)bslam_range_variance_m2(settings, &plain, 4);
+    const double bearing_var = 0.01 / 16 + (double)bslam_bearing_variance_rad2(settings, &plain);
     const double range = range_m - 4;
     const double distance2 = range * range / range_var + bearing_rad * bearing_rad / bearing_var;
     const double two_pi = 6.283185307179586;
     return -0.5 * distance2 - log(two_pi * sqrt(range_var * bearing_var)) -
-           log((double)params->new_per_m2 * range_m);
+           log((double)settings->new_per_m2 * range_m);
 }
 
 static const double ahead[1][2] = {{4, 0}};
 
 static void test_score_is_equation_47_without_looks(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
-    assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01), 1e-4);
+    assert_near(d.matches[0].score, position_score(&settings, 4.1, 0.01), 1e-4);
 }
 
-static bslam_params_t again_params(void)
+static bslam_settings_t again_params(void)
 {
-    bslam_params_t params = svm_params();
-    params.again_odds = BSLAM_R(4.2);
-    params.again_us = 200000;
-    return params;
+    bslam_settings_t settings = svm_params();
+    settings.again_odds = BSLAM_R(4.2);
+    settings.again_us = 200000;
+    return settings;
 }
 
 static void test_score_adds_the_odds_of_being_seen_again(void **state)
 {
-    const bslam_params_t params = again_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = again_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     ekf.beacons[0].last_seen_us = 1000000;
     bslam_appearance_note_view(&appearance, 0, BSLAM_R(2.1));  // enough for all of them
     const int64_t times_us[] = {1000000, 1000001, 1200000, 1200001};
     const double odds[] = {0, 4.2, 4.2, 0};
     for (int i = 0; i < 4; i++) {
-        const decision_t d = decide_at(times_us[i], &ekf, &params, &seen, 1);
-        assert_near(d.matches[0].score, position_score(&params, 4.1, 0.01) + odds[i], 1e-4);
+        const decision_t d = decide_at(times_us[i], &ekf, &settings, &seen, 1);
+        assert_near(d.matches[0].score, position_score(&settings, 4.1, 0.01) + odds[i], 1e-4);
     }
 }
 
 /// That something was in view is no surer than the best that spoke for it.
 static void test_what_was_matched_with_little_is_hardly_held(void **state)
 {
-    const bslam_params_t params = again_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = again_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
-    const double alone = position_score(&params, 4.1, 0.01);
+    const double alone = position_score(&settings, 4.1, 0.01);
     ekf.beacons[0].last_seen_us = 1000000;
     const double views[] = {-3, 0, 0.5, 2, 50}, odds[] = {0, 0, 1, 4, 4.2};
     for (int i = 0; i < 5; i++) {
         bslam_appearance_note_view(&appearance, 0, real(views[i]));
-        const bslam_match_t just = decide_at(1100000, &ekf, &params, &seen, 1).matches[0];
+        const bslam_match_t just = decide_at(1100000, &ekf, &settings, &seen, 1).matches[0];
         assert_near(just.score, alone + odds[i], 1e-4);
         assert_near(just.view_score, views[i] > alone ? views[i] : alone, 1e-4);
     }
     // Out of view for longer than `decision_delay_us` it comes into view anew.
-    assert_near(decide_at(2000000, &ekf, &params, &seen, 1).matches[0].view_score, 50, 1e-4);
-    assert_near(decide_at(2000001, &ekf, &params, &seen, 1).matches[0].view_score, alone, 1e-4);
+    assert_near(decide_at(2000000, &ekf, &settings, &seen, 1).matches[0].view_score, 50, 1e-4);
+    assert_near(decide_at(2000001, &ekf, &settings, &seen, 1).matches[0].view_score, alone, 1e-4);
 }
 
 /// Called something else it is not seen again.
 static void test_another_class_has_no_odds_of_being_seen_again(void **state)
 {
-    const bslam_params_t params = again_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = again_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].beacon_class = 3;
-    bslam_appearance_note_view(&appearance, 0, params.again_odds);
+    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
     bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     seen.beacon_class = 3;
-    assert_near(decide_at(1000001, &ekf, &params, &seen, 1).matches[0].score,
-                position_score(&params, 4.1, 0.01) + 4.2, 1e-4);
+    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).matches[0].score,
+                position_score(&settings, 4.1, 0.01) + 4.2, 1e-4);
     seen.beacon_class = 4;
-    assert_near(decide_at(1000001, &ekf, &params, &seen, 1).matches[0].score,
-                position_score(&params, 4.1, 0.01), 1e-4);
+    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).matches[0].score,
+                position_score(&settings, 4.1, 0.01), 1e-4);
 }
 
 /// From afar position says little, and a beacon that waits each time is never learned.
 static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
 {
-    const bslam_params_t params = again_params();
+    const bslam_settings_t settings = again_params();
     const double far_away[1][2] = {{20, 0}};
-    bslam_ekf_t ekf = unit_map_of(&params, far_away, 1);
+    bslam_ekf_t ekf = unit_map_of(&settings, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].confirmed = true;
-    bslam_appearance_note_view(&appearance, 0, params.again_odds);
+    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
     seen.range_sd_m = 4;
-    const decision_t after_long = decide_at(9000000, &ekf, &params, &seen, 1);
+    const decision_t after_long = decide_at(9000000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&after_long.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
-    const decision_t again = decide_at(1040000, &ekf, &params, &seen, 1);
+    const decision_t again = decide_at(1040000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&again.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_score_adds_what_looks_say_as_samples_come(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 0.75, 3);
     // 3 of 3 + 3 samples: half of 4 * 0.75 - 0.5.
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 1.25, 0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 1.25,
+                0.01);
     appearance.learner.classifiers[0].samples = 12;
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 2.0, 0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 2.0,
+                0.01);
     signature[0] = -1.0f;  // 4 * -0.75 - 0.5 = -3.5
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 2.8, 0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) - 2.8,
+                0.01);
 }
 
 static void test_score_of_looks_is_clipped(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) + 2, 1e-3);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 2,
+                1e-3);
     signature[0] = -1.0f;
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0) - 4, 1e-3);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) - 4,
+                1e-3);
 }
 
 /// bslam_slam_sightings refuses it; whoever associates by himself gets a decision by position.
 static void test_a_signature_that_is_no_number_is_as_none(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f, NAN};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0), 1e-4);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0), 1e-4);
 }
 
 static void test_a_machine_without_rivals_says_nothing(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
     appearance.learner.classifiers[0].negatives = 0;
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, position_score(&params, 4, 0), 1e-4);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0), 1e-4);
 }
 
 static void test_between_match_and_new_a_sighting_waits(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const double waits_m = 4.72;
     const double is_new_m = 4.98;
-    assert_true(position_score(&params, waits_m, 0) < 0 && position_score(&params, waits_m, 0) > -4);
-    assert_true(position_score(&params, is_new_m, 0) < -4);
+    assert_true(position_score(&settings, waits_m, 0) < 0 && position_score(&settings, waits_m, 0) > -4);
+    assert_true(position_score(&settings, is_new_m, 0) < -4);
     const bslam_sighting_t seen[] = {unit_polar(0, waits_m, -1)};
     const bslam_sighting_t other[] = {unit_polar(0, is_new_m, -1)};
-    decision_t d = decide(&ekf, &params, seen, 1);
+    decision_t d = decide(&ekf, &settings, seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
-    d = decide(&ekf, &params, other, 1);
+    d = decide(&ekf, &settings, other, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
@@ -247,29 +252,29 @@ static void test_between_match_and_new_a_sighting_waits(void **state)
 /// new.
 static void test_what_is_nearly_an_old_beacon_that_does_not_count_is_new(void **state)
 {
-    const bslam_params_t params = svm_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     ekf.beacons[0].confirmed = false;
     bslam_sighting_t seen = unit_polar(0, 4.72, -1);
-    decision_t d = decide_at(params.decision_delay_us, &ekf, &params, &seen, 1);
+    decision_t d = decide_at(settings.decision_delay_us, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
-    d = decide_at(params.decision_delay_us + 1, &ekf, &params, &seen, 1);
+    d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     ekf.beacons[0].confirmed = true;
-    d = decide_at(params.decision_delay_us + 1, &ekf, &params, &seen, 1);
+    d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     ekf.beacons[0].confirmed = false;
     seen = unit_polar(0.11, 4, -1);
     seen.has_range = false;
-    d = decide_at(params.decision_delay_us + 1, &ekf, &params, &seen, 1);
+    d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 /// Nor is it what has a place and is called something else, however well the place fits.
 static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count_is_new(void **state)
 {
-    const bslam_params_t params = svm_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     ekf.beacons[0].beacon_class = 2;
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = 6;
@@ -277,7 +282,8 @@ static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count
         const bool is_long_ago = (k & 1) != 0, is_unconfirmed = (k & 2) != 0;
         seen.has_range = (k & 4) != 0;
         ekf.beacons[0].confirmed = !is_unconfirmed;
-        const decision_t d = decide_at(params.decision_delay_us + (is_long_ago ? 1 : 0), &ekf, &params, &seen, 1);
+        const decision_t d =
+            decide_at(settings.decision_delay_us + (is_long_ago ? 1 : 0), &ekf, &settings, &seen, 1);
         const bool is_new = is_long_ago && is_unconfirmed && seen.has_range;
         unit_assert_decided(&d.matches[0], is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH,
                             BSLAM_REASON_NONE, is_new ? -1 : 0);
@@ -286,36 +292,36 @@ static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count
 
 static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, 3, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_a_class_counts_as_its_log_odds_say(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     appearance.of[0].seen_as[2] = 10;
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = 3;
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score,
-                position_score(&params, 4, 0) + log(8 * 10.1 / 10.8), 1e-3);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score,
+                position_score(&settings, 4, 0) + log(8 * 10.1 / 10.8), 1e-3);
     seen.beacon_class = 4;
-    const decision_t d = decide(&ekf, &params, &seen, 1);
-    assert_near(d.matches[0].score, position_score(&params, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
+    assert_near(d.matches[0].score, position_score(&settings, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
 }
 
 /// What the side adds to the score of a beacon at (4, 0) that was seen from the origin and a little aside.
 static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bearing_rad)
 {
-    bslam_params_t params = svm_params();
-    params.candidate_d2 = 1000;
-    params.viewpoint_low = 3;
-    params.viewpoint_high = 1;
+    bslam_settings_t settings = svm_params();
+    settings.candidate_d2 = 1000;
+    settings.viewpoint_low = 3;
+    settings.viewpoint_high = 1;
     const int ahead_of_origin = bslam_viewpoint_sector(0);
     appearance.of[0].seen_from[ahead_of_origin] = 40;
     appearance.of[0].seen_from[ahead_of_origin - 1] = 40;
@@ -323,8 +329,8 @@ static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bea
     bslam_appearance_t *const known[] = {NULL, &appearance};
     double scores[2];
     for (int i = 0; i < 2; i++) {
-        const bslam_sighting_frame_t frame = {ekf,   &params, known[i], &bslam_appearance_answers,
-                                              mount, &seen,   1,        0};
+        const bslam_sighting_frame_t frame = {ekf,   &settings, known[i], &bslam_appearance_answers,
+                                              mount, &seen,     1,        0};
         bslam_match_t match;
         bslam_associate_svm(&frame, &match);
         scores[i] = (double)match.score;
@@ -335,13 +341,13 @@ static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bea
 /// The side from which a beacon is seen is one of the map, however the robot and its sensor are turned.
 static void test_score_adds_the_odds_of_the_side(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     const bslam_pose_t poses[] = {{0, 0, 0}, {0, 0, 1.5}, {8, 0, 3}};
     const bslam_pose_t mounts[] = {{0, 0, 0}, {0, 0, -1}};
     const double odds[] = {1, 1, -3};
     for (int k = 0; k < 6; k++) {
         const bslam_pose_t *pose = &poses[k / 2], *mount = &mounts[k % 2];
-        bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+        bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
         bslam_ekf_set_pose(&ekf, pose, BSLAM_R(1e-6), BSLAM_R(1e-6));
         const double direction = pose->x_m > 4 ? 3.14159265 : 0;
         const double bearing = direction - (double)pose->theta_rad - (double)mount->theta_rad;
@@ -352,9 +358,9 @@ static void test_score_adds_the_odds_of_the_side(void **state)
 /// A robot whose wheels have spun takes its place for another, and doubts it: by half a metre at four.
 static void test_in_doubt_of_its_place_a_robot_knows_no_side(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     const bslam_pose_t behind = {8, 0, BSLAM_R(3.14159265)};
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     bslam_ekf_set_pose(&ekf, &behind, BSLAM_R(0.12), BSLAM_R(1e-6));
     assert_near(side_score(&ekf, &on_axle, 0), -3, 1e-3);
     bslam_ekf_set_pose(&ekf, &behind, BSLAM_R(0.13), BSLAM_R(1e-6));
@@ -364,8 +370,8 @@ static void test_in_doubt_of_its_place_a_robot_knows_no_side(void **state)
 /// A beacon that was given stands in no state, and a ray in another one than a point.
 static void test_only_what_has_a_place_in_the_map_has_sides(void **state)
 {
-    const bslam_params_t params = svm_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     bslam_beacon_t *beacon = &ekf.beacons[0];
     assert_near(side_score(&ekf, &on_axle, 0), 1, 1e-3);
     beacon->kind = BSLAM_BEACON_KNOWN;
@@ -382,56 +388,56 @@ static void test_only_what_has_a_place_in_the_map_has_sides(void **state)
 /// direction, and a distance that may be anything from a third to three times of what it is.
 static void test_a_distance_by_another_class_is_not_held_against_it(void **state)
 {
-    const bslam_params_t params = svm_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     assert_true(bslam_ekf_give_scale(&ekf, 0, BSLAM_R(0.0036)));
     ekf.beacons[0].beacon_class = 3;
     bslam_sighting_t seen = unit_polar(0.01, 2, -1), direction = unit_direction(0.01, -1);
     seen.beacon_class = direction.beacon_class = 4;
-    const double score = (double)decide(&ekf, &params, &direction, 1).matches[0].score;
-    const double of_distance = log((double)params.new_per_rad) - log((double)params.new_per_m2 * 2);
-    assert_near(decide(&ekf, &params, &seen, 1).matches[0].score, score + of_distance - log(2 * log(9)),
+    const double score = (double)decide(&ekf, &settings, &direction, 1).matches[0].score;
+    const double of_distance = log((double)settings.new_per_rad) - log((double)settings.new_per_m2 * 2);
+    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, score + of_distance - log(2 * log(9)),
                 1e-3);
-    unit_assert_decided(&decide(&ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE,
+    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE,
                         0);
     seen.beacon_class = 3;
-    unit_assert_decided(&decide(&ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE,
+    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE,
                         -1);
 }
 
 static void test_far_but_clearly_alike_is_not_new(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     const bslam_sighting_t plain = seen_with(unit_polar(0.2, 4.4, -1), PLAIN);
     const bslam_sighting_t farther = seen_with(unit_polar(1.5, 4.4, -1), alike);
-    decision_t d = decide(&ekf, &params, &seen, 1);
+    decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
-    d = decide(&ekf, &params, &plain, 1);
+    d = decide(&ekf, &settings, &plain, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    d = decide(&ekf, &params, &farther, 1);
+    d = decide(&ekf, &settings, &farther, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     give_machine(0, 2, 2);
-    decision_t d = decide(&ekf, &params, &seen, 1);
+    decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     appearance.learner.classifiers[0].samples = 16;
     appearance.of[0].seen_as[2] = 10;
     seen.beacon_class = 3;
-    d = decide(&ekf, &params, &seen, 1);
+    d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     seen.beacon_class = 4;
-    d = decide(&ekf, &params, &seen, 1);
+    d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
@@ -439,44 +445,44 @@ static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_anot
 /// was seen where it should be.
 static void test_far_but_clearly_alike_is_new_after_a_while(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     const double two[2][2] = {{4, 0}, {0, 4}};
-    bslam_ekf_t ekf = unit_map_of(&params, two, 2);
+    bslam_ekf_t ekf = unit_map_of(&settings, two, 2);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     ekf.beacons[1].confirmed = true;
     ekf.beacons[1].last_seen_us = 9500000;
-    bslam_appearance_note_delay(&appearance, &params, 0, 9000000);
-    decision_t d = decide_at(9999998, &ekf, &params, &seen, 1);
+    bslam_appearance_note_delay(&appearance, &settings, 0, 9000000);
+    decision_t d = decide_at(9999998, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     assert_int_equal(d.matches[0].delayed_for, 0);
-    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    d = decide_at(10000000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     assert_int_equal(d.matches[0].delayed_for, -1);
     ekf.beacons[1].last_seen_us = 8900000;
-    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    d = decide_at(10000000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     ekf.beacons[0].confirmed = true;  // that one itself is no witness
     ekf.beacons[0].last_seen_us = 9500000;
-    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    d = decide_at(10000000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     ekf.beacons[1].last_seen_us = 9500000;
     ekf.beacons[1].confirmed = false;
-    d = decide_at(10000000, &ekf, &params, &seen, 1);
+    d = decide_at(10000000, &ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
 }
 
 /// From where the sensor is it has no direction.
 static void test_alike_but_where_the_robot_stands_is_new(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     const double here[1][2] = {{0, 0}};
-    const bslam_ekf_t ekf = unit_map_of(&params, here, 1);
+    const bslam_ekf_t ekf = unit_map_of(&settings, here, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
@@ -492,13 +498,14 @@ static bslam_sighting_t seen_aside(void)
 
 /// Where a match waits, and where nothing in the way of it does: a sighting in the beacon's place, or a
 /// little off it, 9 s after that was seen last, when a machine of so many samples has such a value.
-static void assert_waits(double value, int samples, int32_t decision_delay_us, bslam_sighting_t seen, bool waits)
+static void assert_waits(double value, int samples, int32_t decision_delay_us, bslam_sighting_t seen,
+                         bool waits)
 {
-    bslam_params_t params = svm_params();
-    params.decision_delay_us = decision_delay_us;
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_settings_t settings = svm_params();
+    settings.decision_delay_us = decision_delay_us;
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_machine(0, value, samples);
-    const decision_t d = decide_at(9000000, &ekf, &params, &seen, 1);
+    const decision_t d = decide_at(9000000, &ekf, &settings, &seen, 1);
     assert_int_equal(d.matches[0].delayed_for, waits ? 0 : -1);
     if (waits) {
         unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
@@ -519,85 +526,85 @@ static void test_a_match_waits_where_a_young_machine_is_against_it(void **state)
 
 static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
 {
-    const bslam_params_t params = svm_params();
-    bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_machine(0, -0.1, 2);
     const bslam_sighting_t seen = seen_aside();
     ekf.beacons[0].last_seen_us = 5000000;
     const int64_t times_us[] = {4900000, 5000000, 6000000, 6000001};
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(decide_at(times_us[i], &ekf, &params, &seen, 1).matches[0].delayed_for,
+        assert_int_equal(decide_at(times_us[i], &ekf, &settings, &seen, 1).matches[0].delayed_for,
                          i < 3 ? -1 : 0);
     }
 }
 
 static void test_a_match_that_has_waited_is_made(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_machine(0, -0.1, 2);
     const bslam_sighting_t seen = seen_aside();
-    bslam_appearance_note_delay(&appearance, &params, 0, 9000000);
-    unit_assert_decided(&decide_at(9999998, &ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_DEFER,
+    bslam_appearance_note_delay(&appearance, &settings, 0, 9000000);
+    unit_assert_decided(&decide_at(9999998, &ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_DEFER,
                         BSLAM_REASON_AMBIGUOUS, -1);
-    unit_assert_decided(&decide_at(10000000, &ekf, &params, &seen, 1).matches[0], BSLAM_VERDICT_MATCH,
+    unit_assert_decided(&decide_at(10000000, &ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_MATCH,
                         BSLAM_REASON_NONE, 0);
 }
 
 static void test_what_matches_no_beacon_waits_for_none(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_machine(0, -0.1, 2);
     const bslam_sighting_t near = seen_with(unit_polar(0.1, 4.4, -1), ALIKE);
-    assert_true(position_score(&params, 4.4, 0.1) < 0.0);
-    assert_int_equal(decide_at(9000000, &ekf, &params, &near, 1).matches[0].delayed_for, -1);
+    assert_true(position_score(&settings, 4.4, 0.1) < 0.0);
+    assert_int_equal(decide_at(9000000, &ekf, &settings, &near, 1).matches[0].delayed_for, -1);
 }
 
 /// A beacon that was not seen for long, and one elsewhere that was seen so long ago: whether a sighting waits
 /// for the first.
-static bool waits_beside(const bslam_params_t *params, int64_t other_ago_us, bool other_counts)
+static bool waits_beside(const bslam_settings_t *settings, int64_t other_ago_us, bool other_counts)
 {
     static const double places[2][2] = {{4, 0}, {-4, 3}};
     const int64_t time_us = 9000000;
-    bslam_ekf_t ekf = unit_map_of(params, places, 2);
+    bslam_ekf_t ekf = unit_map_of(settings, places, 2);
     ekf.beacons[1].confirmed = other_counts;
     ekf.beacons[1].last_seen_us = time_us - other_ago_us;
     const bslam_sighting_t seen = unit_polar(0.06, 4, -1);
-    return decide_at(time_us, &ekf, params, &seen, 1).matches[0].delayed_for == 0;
+    return decide_at(time_us, &ekf, settings, &seen, 1).matches[0].delayed_for == 0;
 }
 
 /// A robot that another beacon holds in its place loses nothing by waiting.
 static void test_a_match_that_little_speaks_for_waits_while_another_is_in_view(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.again_us = 200000;
-    const double score = position_score(&params, 4, 0.06);
-    assert_true(score > 0.1 && score < params.learn_lead);
-    params.decision_delay_score = real(score + 0.01);
-    assert_true(waits_beside(&params, 200000, true));
-    assert_false(waits_beside(&params, 200001, true));
-    assert_false(waits_beside(&params, 200000, false));
-    params.decision_delay_score = real(score - 0.01);
-    assert_false(waits_beside(&params, 200000, true));
-    params.decision_delay_score = real(score + 0.01);
-    bslam_appearance_note_delay(&appearance, &params, 0, 9000000 - params.decision_delay_us / 2);
-    assert_true(waits_beside(&params, 200000, true));
-    bslam_appearance_note_delay(&appearance, &params, 0, 9000000 - 1);
-    params.decision_delay_us /= 2;  // it has waited
-    assert_false(waits_beside(&params, 200000, true));
+    bslam_settings_t settings = svm_params();
+    settings.again_us = 200000;
+    const double score = position_score(&settings, 4, 0.06);
+    assert_true(score > 0.1 && score < settings.learn_lead);
+    settings.decision_delay_score = real(score + 0.01);
+    assert_true(waits_beside(&settings, 200000, true));
+    assert_false(waits_beside(&settings, 200001, true));
+    assert_false(waits_beside(&settings, 200000, false));
+    settings.decision_delay_score = real(score - 0.01);
+    assert_false(waits_beside(&settings, 200000, true));
+    settings.decision_delay_score = real(score + 0.01);
+    bslam_appearance_note_delay(&appearance, &settings, 0, 9000000 - settings.decision_delay_us / 2);
+    assert_true(waits_beside(&settings, 200000, true));
+    bslam_appearance_note_delay(&appearance, &settings, 0, 9000000 - 1);
+    settings.decision_delay_us /= 2;  // it has waited
+    assert_false(waits_beside(&settings, 200000, true));
 }
 
 /// What waits holds no beacon for itself.
 static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float other[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_machine(0, -1.5, 2);
     const bslam_sighting_t seen[] = {seen_with(unit_polar(0, 4, -1), ALIKE),
                                      seen_with(unit_polar(0.01, 4, -1), other)};
-    const decision_t d = decide_at(9000000, &ekf, &params, seen, 2);
+    const decision_t d = decide_at(9000000, &ekf, &settings, seen, 2);
     assert_int_not_equal(d.matches[0].verdict, BSLAM_VERDICT_MATCH);
     assert_int_equal(d.matches[0].delayed_for, -1);
     unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
@@ -609,110 +616,110 @@ static const double pair[2][2] = {{4, 0}, {4, 0.4}};
 
 static void test_one_to_one_the_clearest_choice_first(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, pair, 2);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, pair, 2);
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4.02, -1), unit_polar(0, 4, -1)};
-    const decision_t d = decide(&ekf, &params, seen, 2);
+    const decision_t d = decide(&ekf, &settings, seen, 2);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
     unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen[] = {unit_polar(0.05, 4.4, -1), unit_polar(0, 4, -1)};
-    assert_true(position_score(&params, 4.4, 0.05) > 0);
-    const decision_t d = decide(&ekf, &params, seen, 2);
+    assert_true(position_score(&settings, 4.4, 0.05) > 0);
+    const decision_t d = decide(&ekf, &settings, seen, 2);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
     unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4, -1), unit_polar(-0.02, 4, -1)};
-    const decision_t d = decide(&ekf, &params, seen, 2);
+    const decision_t d = decide(&ekf, &settings, seen, 2);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     unit_assert_decided(&d.matches[1], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 static void test_looks_decide_between_two_in_the_gate(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, pair, 2);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, pair, 2);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     give_machine(0, -1.5, 16);
     give_machine(1, 1.5, 16);
     // Half way between them, a little nearer to the first.
     const bslam_sighting_t seen = seen_with(unit_polar(0.045, 4, -1), signature);
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
     bslam_sighting_t blind = seen;
     blind.signature = NULL;
-    assert_int_equal(decide(&ekf, &params, &blind, 1).matches[0].beacon, 0);
+    assert_int_equal(decide(&ekf, &settings, &blind, 1).matches[0].beacon, 0);
 }
 
 static void test_sure_enough_to_learn_from(void **state)
 {
-    bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t near = seen_with(unit_polar(0, 4, -1), signature);
     const bslam_sighting_t far = seen_with(unit_polar(0.05, 4.4, -1), signature);
     // Young: position alone says so. The farther one does not lead enough.
-    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure == (position_score(&params, 4, 0) >= 4));
-    assert_false(decide(&ekf, &params, &far, 1).matches[0].sure);
+    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure == (position_score(&settings, 4, 0) >= 4));
+    assert_false(decide(&ekf, &settings, &far, 1).matches[0].sure);
     give_machine(0, 1, 16);
-    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure);
+    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure);
     // Grown up, and its machine says no.
     appearance.learner.classifiers[0].weights.unit = -appearance.learner.classifiers[0].weights.unit;
-    assert_false(decide(&ekf, &params, &near, 1).matches[0].sure);
+    assert_false(decide(&ekf, &settings, &near, 1).matches[0].sure);
     // Or says yes, but not enough, however much the beacon leads by what else is known of it.
-    params.learn_margin = BSLAM_R(0.5);
-    params.learn_lead = BSLAM_R(-20.0);
-    assert_false(decide(&ekf, &params, &near, 1).matches[0].sure);
-    params.learn_margin = BSLAM_R(-1.5);
-    assert_true(decide(&ekf, &params, &near, 1).matches[0].sure);
+    settings.learn_margin = BSLAM_R(0.5);
+    settings.learn_lead = BSLAM_R(-20.0);
+    assert_false(decide(&ekf, &settings, &near, 1).matches[0].sure);
+    settings.learn_margin = BSLAM_R(-1.5);
+    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure);
 }
 
 static void test_directions_alone_have_their_own_density_of_new(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_direction(0.01, -1);
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);
+    assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &on_axle, &seen, 0, &innovation), BSLAM_OK);
     const double variance = 0.01 / 16 + (double)innovation.bearing_var_rad2;
     const double expected =
         -0.5 * 0.01 * 0.01 / variance - 0.5 * log(6.283185307179586 * variance) - log(0.3);
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
     assert_near(d.matches[0].score, expected, 1e-4);
 }
 
 static void test_an_unmappable_sighting_is_rejected(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = BSLAM_CLASS_NOT_MAPPABLE;
-    const decision_t d = decide(&ekf, &params, &seen, 1);
+    const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
 }
 
 /// A heading that is 0.1 rad off displaces all sightings alike: given one, the other is where it should be.
 static void test_given_a_match_the_others_are_surer(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     static const double places[2][2] = {{4, 0}, {0, 4}};
-    bslam_ekf_t ekf = unit_map_of(&params, places, 2);
+    bslam_ekf_t ekf = unit_map_of(&settings, places, 2);
     bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1), unit_polar(1.570796 + 0.1, 4, -1)};
     bslam_innovation_t innovations[2];
     for (int i = 0; i < 2; i++) {
-        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen[i], i, &innovations[i]),
+        assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &on_axle, &seen[i], i, &innovations[i]),
                          BSLAM_OK);
     }
     static bslam_conditional_t conditional;
@@ -736,11 +743,11 @@ static void test_given_a_match_the_others_are_surer(void **state)
 
 static void test_given_takes_no_more_than_it_has_room_for(void **state)
 {
-    const bslam_params_t params = svm_params();
-    const bslam_ekf_t ekf = unit_map_of(&params, ahead, 1);
+    const bslam_settings_t settings = svm_params();
+    const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0, 4, -1);
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &on_axle, &seen, 0, &innovation), BSLAM_OK);
+    assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &on_axle, &seen, 0, &innovation), BSLAM_OK);
     static bslam_conditional_t conditional;
     bslam_conditional_init(&conditional);
     for (int i = 0; i < BSLAM_GIVEN_MAX; i++) {

@@ -12,10 +12,10 @@ typedef struct decision {
     bslam_match_t matches[8];
 } decision_t;
 
-static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_params_t *params,
+static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                          const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, params, NULL, NULL, mount, sightings, count, 0};
+    const bslam_sighting_frame_t frame = {ekf, settings, NULL, NULL, mount, sightings, count, 0};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     method(&frame, decision.matches);
@@ -45,15 +45,15 @@ static bslam_sighting_t of_class(bslam_sighting_t sighting, uint8_t beacon_class
 
 /// Robot at the origin, looking along x; beacons at (4, 0), (0, 3) and (4, 1), labelled 10, 11, 12, with
 /// deviations of 0.1 m in each coordinate.
-static bslam_ekf_t three_beacons(const bslam_params_t *params)
+static bslam_ekf_t three_beacons(const bslam_settings_t *settings)
 {
     static const double places[3][2] = {{4, 0}, {0, 3}, {4, 1}};
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, params);
+    bslam_ekf_init(&ekf, settings);
     for (int i = 0; i < 3; i++) {
         const bslam_sighting_t sighting = unit_polar(0, 1, 0);
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, params, &on_axle, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, settings, &on_axle, &sighting, &index), BSLAM_OK);
         bslam_beacon_t *beacon = &ekf.beacons[index];
         beacon->label = 10 + i;
         for (int k = 0; k < 2; k++) {
@@ -70,12 +70,12 @@ static bslam_ekf_t three_beacons(const bslam_params_t *params)
 
 static void test_known_label_of_the_map_is_a_match_and_another_is_new(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     // Where it is seen plays no part.
     const bslam_sighting_t seen[] = {unit_polar(2, 9, 11), unit_polar(0, 4, 7), unit_direction(1, 10),
                                      unit_polar(0, 4, INT32_MAX)};
-    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
     assert_match(&d.matches[0], 1);
     assert_new(&d.matches[1]);
     assert_match(&d.matches[2], 0);
@@ -84,20 +84,20 @@ static void test_known_label_of_the_map_is_a_match_and_another_is_new(void **sta
 
 static void test_known_sighting_without_a_label_is_rejected(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, BSLAM_LABEL_NONE)};
-    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, seen, 1);
+    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, 1);
     assert_rejected(&d.matches[0], BSLAM_REASON_NO_IDENTITY);
 }
 
 static void test_known_repeated_label_leaves_the_first(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, 10), unit_polar(0, 4, 10), unit_polar(0, 4, 7),
                                      unit_polar(0, 5, 7), unit_polar(0, 4, 10)};
-    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
     assert_match(&d.matches[0], 0);
     assert_rejected(&d.matches[1], BSLAM_REASON_DUPLICATE);
     assert_new(&d.matches[2]);
@@ -109,47 +109,48 @@ static void test_known_repeated_label_leaves_the_first(void **state)
 static void test_known_label_has_so_many_rivals_and_no_more(void **state)
 {
     enum { NEGATIVES = 8 };
-    bslam_params_t params = unit_params();
-    params.gate_d2 = BSLAM_R(13.8);
+    bslam_settings_t settings = unit_params();
+    settings.gate_d2 = BSLAM_R(13.8);
     static double places[NEGATIVES][2];
     for (int i = 0; i < NEGATIVES; i++) {
         places[i][0] = -4;
         places[i][1] = i;
     }
     for (int negatives = 1; negatives <= NEGATIVES; negatives++) {
-        bslam_ekf_t ekf = unit_map_of(&params, places, negatives);
+        bslam_ekf_t ekf = unit_map_of(&settings, places, negatives);
         for (int b = 0; b < negatives; b++) {
             ekf.beacons[b].label = 10;
             ekf.beacons[b].confirmed = false;
         }
         const bslam_sighting_t far = unit_polar(0, 4, 10);
-        const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, &far, 1);
-        assert_int_equal(d.matches[0].verdict, negatives < NEGATIVES ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH);
+        const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, &far, 1);
+        assert_int_equal(d.matches[0].verdict,
+                         negatives < NEGATIVES ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH);
     }
 }
 
 /// A rival where the robot stands has no direction, and so no distance to compare.
 static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     static const double places[2][2] = {{4, 0}, {0, 0}};
-    bslam_ekf_t ekf = unit_map_of(&params, places, 2);
+    bslam_ekf_t ekf = unit_map_of(&settings, places, 2);
     for (int b = 0; b < 2; b++) {
         ekf.beacons[b].label = 10;
         ekf.beacons[b].confirmed = false;
     }
     const bslam_sighting_t seen = unit_polar(0, 4.1, 10);
-    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, &seen, 1);
+    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, &seen, 1);
     assert_match(&d.matches[0], 0);
 }
 
 static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, 10), BSLAM_CLASS_NOT_MAPPABLE),
                                      unit_polar(0, 4, 10)};
-    const decision_t d = decide(bslam_associate_known, &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
     assert_rejected(&d.matches[0], BSLAM_REASON_CLASS);
     assert_match(&d.matches[1], 0);
 }
@@ -160,12 +161,12 @@ static const bslam_associate_fn by_distance[] = {bslam_associate_nearest, bslam_
 
 static void test_by_distance_empty_map_makes_everything_new(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_direction(0, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
         assert_new(&d.matches[0]);
         assert_new(&d.matches[1]);
     }
@@ -173,11 +174,11 @@ static void test_by_distance_empty_map_makes_everything_new(void **state)
 
 static void test_by_distance_not_mappable_sighting_is_rejected(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, -1), BSLAM_CLASS_NOT_MAPPABLE)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, 1);
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
         assert_rejected(&d.matches[0], BSLAM_REASON_CLASS);
         assert_true(d.matches[0].distance2 < 0);
     }
@@ -185,12 +186,12 @@ static void test_by_distance_not_mappable_sighting_is_rejected(void **state)
 
 static void test_by_distance_nearest_of_two_is_the_match(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     // Beacons 0 and 2 are 14 degrees apart.
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4.02, -1), unit_polar(0.23, 4.1, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
         assert_match(&d.matches[0], 0);
         assert_match(&d.matches[1], 2);
     }
@@ -198,12 +199,12 @@ static void test_by_distance_nearest_of_two_is_the_match(void **state)
 
 static void test_by_distance_of_several_sightings_the_nearest_keeps_the_beacon(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.60, 3, -1), unit_polar(1.571, 3, -1),
                                      unit_polar(1.58, 3, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
         assert_rejected(&d.matches[0], BSLAM_REASON_DUPLICATE);
         assert_match(&d.matches[1], 1);
         assert_rejected(&d.matches[2], BSLAM_REASON_DUPLICATE);
@@ -212,11 +213,11 @@ static void test_by_distance_of_several_sightings_the_nearest_keeps_the_beacon(v
 
 static void test_by_distance_of_equally_near_sightings_the_first_keeps_the_beacon(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.6, 3, -1), unit_polar(1.6, 3, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, COUNT_OF(seen));
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
         assert_match(&d.matches[0], 1);
         assert_rejected(&d.matches[1], BSLAM_REASON_DUPLICATE);
     }
@@ -224,32 +225,32 @@ static void test_by_distance_of_equally_near_sightings_the_first_keeps_the_beaco
 
 static void test_by_distance_other_class_is_never_the_match(void **state)
 {
-    const bslam_params_t params = unit_params();
-    bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    bslam_ekf_t ekf = three_beacons(&settings);
     ekf.beacons[1].beacon_class = 3;
     const bslam_sighting_t here = unit_polar(1.5708, 3, -1);
     const bslam_sighting_t seen[] = {of_class(here, 4)};
     const bslam_sighting_t same[] = {of_class(here, 3)};
     const bslam_sighting_t unknown[] = {of_class(here, BSLAM_CLASS_NONE)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t other = decide(by_distance[m], &ekf, &params, &on_axle, seen, 1);
+        const decision_t other = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
         assert_new(&other.matches[0]);
-        const decision_t match = decide(by_distance[m], &ekf, &params, &on_axle, same, 1);
+        const decision_t match = decide(by_distance[m], &ekf, &settings, &on_axle, same, 1);
         assert_match(&match.matches[0], 1);
-        const decision_t none = decide(by_distance[m], &ekf, &params, &on_axle, unknown, 1);
+        const decision_t none = decide(by_distance[m], &ekf, &settings, &on_axle, unknown, 1);
         assert_match(&none.matches[0], 1);
     }
 }
 
 static void test_by_distance_sensor_is_where_its_mount_says(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     // The sensor stands at (2, 1) and looks backwards: beacon 1, at (0, 3), is ahead to its right.
     const bslam_pose_t mount = {2, 1, real(3.14159265358979)};
     const bslam_sighting_t seen[] = {unit_polar(-0.785398, 2.828427, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &mount, seen, 1);
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &mount, seen, 1);
         assert_match(&d.matches[0], 1);
         // A few roundings of 3 m, squared, in units of a threshold or deviation of 0.02 at least.
         assert_near(d.matches[0].distance2, 0, 1e-6);
@@ -260,50 +261,50 @@ static void test_by_distance_sensor_is_where_its_mount_says(void **state)
 
 static void test_nearest_on_either_side_of_the_threshold(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.nearest_threshold_m = BSLAM_R(0.5);
-    const bslam_ekf_t ekf = three_beacons(&params);
+    bslam_settings_t settings = unit_params();
+    settings.nearest_threshold_m = BSLAM_R(0.5);
+    const bslam_ekf_t ekf = three_beacons(&settings);
     // Beyond beacon 1, straight on: 3 m + this much.
     const bslam_sighting_t near[] = {unit_polar(1.570796, 3.499, -1)};
     const bslam_sighting_t far[] = {unit_polar(1.570796, 3.501, -1)};
-    const decision_t d_near = decide(bslam_associate_nearest, &ekf, &params, &on_axle, near, 1);
+    const decision_t d_near = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, near, 1);
     assert_match(&d_near.matches[0], 1);
     assert_near(d_near.matches[0].distance2, 0.499 * 0.499 / 0.25, 1e-4);
-    const decision_t d_far = decide(bslam_associate_nearest, &ekf, &params, &on_axle, far, 1);
+    const decision_t d_far = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, far, 1);
     assert_new(&d_far.matches[0]);
 }
 
 static void test_nearest_direction_on_either_side_of_the_threshold(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.nearest_threshold_rad = BSLAM_R(0.1);
-    const bslam_ekf_t ekf = three_beacons(&params);
+    bslam_settings_t settings = unit_params();
+    settings.nearest_threshold_rad = BSLAM_R(0.1);
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t near[] = {unit_direction(-0.099, -1)};
     const bslam_sighting_t far[] = {unit_direction(-0.101, -1)};
-    const decision_t d_near = decide(bslam_associate_nearest, &ekf, &params, &on_axle, near, 1);
+    const decision_t d_near = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, near, 1);
     assert_match(&d_near.matches[0], 0);
-    const decision_t d_far = decide(bslam_associate_nearest, &ekf, &params, &on_axle, far, 1);
+    const decision_t d_far = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, far, 1);
     assert_new(&d_far.matches[0]);
 }
 
 static void test_nearest_direction_a_turn_further_is_the_same(void **state)
 {
-    const bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_direction(1.57 - 6.2831853, -1)};
-    const decision_t d = decide(bslam_associate_nearest, &ekf, &params, &on_axle, seen, 1);
+    const decision_t d = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, seen, 1);
     assert_match(&d.matches[0], 1);
 }
 
 static void test_nearest_known_beacon_is_one_of_the_map(void **state)
 {
-    const bslam_params_t params = unit_params();
-    bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    bslam_ekf_t ekf = three_beacons(&settings);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, -5, 0, &index), BSLAM_OK);
     const bslam_sighting_t seen[] = {unit_polar(3.1415, 5, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
-        const decision_t d = decide(by_distance[m], &ekf, &params, &on_axle, seen, 1);
+        const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
         assert_match(&d.matches[0], index);
     }
 }
@@ -311,77 +312,77 @@ static void test_nearest_known_beacon_is_one_of_the_map(void **state)
 // ---- Mahalanobis ------------------------------------------------------------------------------------------
 
 /// The squared distance of a sighting from a beacon, in the filter's own measure.
-static double distance2_to(const bslam_ekf_t *ekf, const bslam_params_t *params,
+static double distance2_to(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                            const bslam_sighting_t *sighting, int beacon)
 {
     bslam_innovation_t innovation;
     bslam_real_t distance2;
-    assert_int_equal(bslam_ekf_innovation(ekf, params, &on_axle, sighting, beacon, &innovation), BSLAM_OK);
+    assert_int_equal(bslam_ekf_innovation(ekf, settings, &on_axle, sighting, beacon, &innovation), BSLAM_OK);
     assert_int_equal(bslam_ekf_distance2(ekf, &innovation, &distance2), BSLAM_OK);
     return (double)distance2;
 }
 
 static void test_mahalanobis_match_ambiguous_and_new_by_the_two_thresholds(void **state)
 {
-    bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
+    bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.5708, 3.5, -1)};
-    const double d2 = distance2_to(&ekf, &params, &seen[0], 1);
+    const double d2 = distance2_to(&ekf, &settings, &seen[0], 1);
 
-    params.match_d2 = real(d2 * 1.001);
-    params.new_d2 = real(d2 * 2);
-    const decision_t match = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    settings.match_d2 = real(d2 * 1.001);
+    settings.new_d2 = real(d2 * 2);
+    const decision_t match = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_match(&match.matches[0], 1);
     assert_near(match.matches[0].distance2, d2, 0);
 
-    params.match_d2 = real(d2 * 0.999);
-    const decision_t between = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    settings.match_d2 = real(d2 * 0.999);
+    const decision_t between = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_rejected(&between.matches[0], BSLAM_REASON_AMBIGUOUS);
 
-    params.new_d2 = real(d2 * 0.9995);
-    const decision_t new = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    settings.new_d2 = real(d2 * 0.9995);
+    const decision_t new = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_new(&new.matches[0]);
 }
 
 static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one(void **state)
 {
-    const bslam_params_t params = unit_params();
-    bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    bslam_ekf_t ekf = three_beacons(&settings);
     for (int k = 0; k < 2; k++) {
         const int at = ekf.beacons[2].at + k;
         bslam_symmat_set(ekf.covariance, at, at, 4);
     }
     // 0.4 m from beacon 0, which is known to 0.1 m, and 0.6 m from beacon 2, known to 2 m.
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1)};
-    const decision_t nearest = decide(bslam_associate_nearest, &ekf, &params, &on_axle, seen, 1);
+    const decision_t nearest = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, seen, 1);
     assert_match(&nearest.matches[0], 0);
-    const decision_t mahalanobis = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    const decision_t mahalanobis = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_match(&mahalanobis.matches[0], 2);
 }
 
 static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     int index;
     // A beacon at the very sensor has no direction.
     assert_int_equal(bslam_ekf_add_known(&ekf, 0, 0, &index), BSLAM_OK);
     const bslam_sighting_t seen[] = {unit_polar(0, 1, -1)};
-    const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_new(&d.matches[0]);
 }
 
 static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void **state)
 {
-    const bslam_params_t params = unit_params();
-    bslam_ekf_t ekf = three_beacons(&params);
+    const bslam_settings_t settings = unit_params();
+    bslam_ekf_t ekf = three_beacons(&settings);
     for (int k = 0; k < 2; k++) {
         const int at = ekf.beacons[1].at + k;
         bslam_symmat_set(ekf.covariance, at, at, -1);
     }
     const bslam_sighting_t seen[] = {unit_polar(1.5708, 3, -1)};
-    const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &params, &on_axle, seen, 1);
+    const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_true(d.matches[0].beacon != 1);
 }
 
@@ -391,19 +392,19 @@ static void test_method_is_the_one_that_the_parameter_names(void **state)
 {
     static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
                                                  bslam_associate_mahalanobis};
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     for (int i = 0; i < COUNT_OF(methods); i++) {
-        params.association = i;
-        assert_true(bslam_associate_method(&params) == methods[i]);
+        settings.association = i;
+        assert_true(bslam_associate_method(&settings) == methods[i]);
     }
 }
 
 static void test_every_method_takes_an_empty_frame(void **state)
 {
-    bslam_params_t params = unit_params();
-    const bslam_ekf_t ekf = three_beacons(&params);
-    for (params.association = 0; params.association <= 2; params.association++) {
-        (void)decide(bslam_associate_method(&params), &ekf, &params, &on_axle, NULL, 0);
+    bslam_settings_t settings = unit_params();
+    const bslam_ekf_t ekf = three_beacons(&settings);
+    for (settings.association = 0; settings.association <= 2; settings.association++) {
+        (void)decide(bslam_associate_method(&settings), &ekf, &settings, &on_axle, NULL, 0);
     }
 }
 

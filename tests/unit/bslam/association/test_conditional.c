@@ -11,11 +11,11 @@ static bslam_conditional_t conditional;
 /// A robot with two beacons, and doubt about its pose.
 static int setup(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_sighting_t seen[] = {unit_polar(0.3, 2, 1), unit_polar(-0.4, 3, 2)};
     const bslam_pose_t origin = {0, 0, 0};
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     assert_int_equal(bslam_slam_sightings(&slam, 1000, seen, 2), BSLAM_OK);
     assert_int_equal(bslam_slam_set_pose(&slam, &origin, BSLAM_R(0.3), BSLAM_R(0.1)), BSLAM_OK);
     bslam_conditional_init(&conditional);
@@ -26,7 +26,7 @@ static bslam_innovation_t innovation_of(bslam_sighting_t sighting, int beacon)
 {
     const bslam_pose_t mount = {0, 0, 0};
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(&slam.ekf, &slam.params, &mount, &sighting, beacon, &innovation),
+    assert_int_equal(bslam_ekf_innovation(&slam.ekf, &slam.settings, &mount, &sighting, beacon, &innovation),
                      BSLAM_OK);
     return innovation;
 }
@@ -79,7 +79,8 @@ static void test_given_a_singular_innovation_is_refused_and_nothing_changes(void
     cases[2].bearing_var_rad2 = real(NAN);
     for (int i = 0; i < COUNT_OF(cases); i++) {
         bslam_weight_t weight = {77, 78};
-        assert_int_equal(bslam_conditional_weigh(&slam.ekf, &conditional, &cases[i], &weight), BSLAM_E_SINGULAR);
+        assert_int_equal(bslam_conditional_weigh(&slam.ekf, &conditional, &cases[i], &weight),
+                         BSLAM_E_SINGULAR);
         assert_near(weight.distance2, 77, 0);
         assert_false(bslam_conditional_add(&slam.ekf, &conditional, &cases[i]));
         assert_int_equal(conditional.count, 0);

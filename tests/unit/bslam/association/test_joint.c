@@ -10,19 +10,19 @@ static const bslam_pose_t on_axle = {0, 0, 0};
 
 enum { BEACONS = 4, SIGHTINGS = 4 };
 
-static bslam_params_t joint_params(void)
+static bslam_settings_t joint_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.association = BSLAM_ASSOCIATION_JOINT;
-    params.joint_sd = BSLAM_R(3.09);
-    params.joint_nodes = 100000;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.association = BSLAM_ASSOCIATION_JOINT;
+    settings.joint_sd = BSLAM_R(3.09);
+    settings.joint_nodes = 100000;
+    return settings;
 }
 
 /// Robot at the origin with a doubtful heading.
-static bslam_ekf_t map_of(const bslam_params_t *params, const double (*places)[2], int count)
+static bslam_ekf_t map_of(const bslam_settings_t *settings, const double (*places)[2], int count)
 {
-    bslam_ekf_t ekf = unit_map_of(params, places, count);
+    bslam_ekf_t ekf = unit_map_of(settings, places, count);
     bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
     return ekf;
 }
@@ -56,7 +56,7 @@ static double chi2_limit(int freedoms)
 }
 
 /// Tries every pairing, by counting in base BEACONS + 1. *close: a limit was missed or met by a hair.
-static pairing_t best_of_all(const bslam_ekf_t *ekf, const bslam_params_t *params,
+static pairing_t best_of_all(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                              const bslam_sighting_t *seen, bool *close)
 {
     pairing_t best = {{-1, -1, -1, -1}, 0, 0};
@@ -76,9 +76,11 @@ static pairing_t best_of_all(const bslam_ekf_t *ekf, const bslam_params_t *param
             }
             fits = (taken & 1u << b) == 0;
             taken |= 1u << b;
-            assert_int_equal(bslam_ekf_innovation(ekf, params, &on_axle, &seen[i], b, &innovation), BSLAM_OK);
+            assert_int_equal(bslam_ekf_innovation(ekf, settings, &on_axle, &seen[i], b, &innovation),
+                             BSLAM_OK);
             assert_int_equal(bslam_ekf_distance2(ekf, &innovation, &alone), BSLAM_OK);
-            fits = fits && alone <= params->match_d2 && bslam_conditional_add(ekf, &conditional, &innovation);
+            fits =
+                fits && alone <= settings->match_d2 && bslam_conditional_add(ekf, &conditional, &innovation);
             one.beacon[i] = b;
             one.pairs++;
             if (fits) {
@@ -97,7 +99,7 @@ static pairing_t best_of_all(const bslam_ekf_t *ekf, const bslam_params_t *param
 
 static void test_joint_finds_what_trying_all_pairings_finds(void **state)
 {
-    const bslam_params_t params = joint_params();
+    const bslam_settings_t settings = joint_params();
     unit_random_t random = {77};
     int compared = 0;
     int pairs = 0;
@@ -108,7 +110,7 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
             places[b][0] = unit_random(&random, 3, 4);
             places[b][1] = unit_random(&random, -1, 1);
         }
-        const bslam_ekf_t ekf = map_of(&params, places, BEACONS);
+        const bslam_ekf_t ekf = map_of(&settings, places, BEACONS);
         const double heading = unit_random(&random, -0.15, 0.15);
         for (int i = 0; i < SIGHTINGS; i++) {
             const double x = places[i][0] + unit_random(&random, -0.2, 0.2);
@@ -116,12 +118,12 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
             seen[i] = unit_polar(atan2(y, x) + heading, hypot(x, y), -1);
         }
         bool close = false;
-        const pairing_t expected = best_of_all(&ekf, &params, seen, &close);
+        const pairing_t expected = best_of_all(&ekf, &settings, seen, &close);
         if (close) {
             continue;
         }
         bslam_match_t matches[SIGHTINGS];
-        const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, SIGHTINGS, 0};
+        const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, SIGHTINGS, 0};
         bslam_associate_joint(&frame, matches);
         for (int i = 0; i < SIGHTINGS; i++) {
             assert_int_equal(matches[i].beacon, expected.beacon[i]);
@@ -136,15 +138,15 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
 /// Turned by 0.2 rad, each sighting is nearest to the wrong beacon; only together they fit.
 static void test_joint_sees_through_a_wrong_heading(void **state)
 {
-    const bslam_params_t params = joint_params();
+    const bslam_settings_t settings = joint_params();
     static const double places[3][2] = {{4, 0}, {3.92, 0.8}, {3.67, 1.6}};
-    const bslam_ekf_t ekf = map_of(&params, places, 3);
+    const bslam_ekf_t ekf = map_of(&settings, places, 3);
     bslam_sighting_t seen[3];
     for (int i = 0; i < 3; i++) {
         seen[i] = unit_polar(atan2(places[i][1], places[i][0]) + 0.15, hypot(places[i][0], places[i][1]), -1);
     }
     bslam_match_t matches[3];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 3, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 3, 0};
     bslam_associate_mahalanobis(&frame, matches);
     assert_int_not_equal(matches[0].beacon, 0);
     bslam_associate_joint(&frame, matches);
@@ -158,15 +160,15 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
 /// nobody.
 static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **state)
 {
-    const bslam_params_t params = joint_params();
+    const bslam_settings_t settings = joint_params();
     const double places[2][2] = {{4, 0}, {0, 4}};
-    bslam_ekf_t ekf = map_of(&params, places, 2);
+    bslam_ekf_t ekf = map_of(&settings, places, 2);
     for (int k = 0; k < 2; k++) {
         const int at = ekf.beacons[0].at + k;
         bslam_symmat_set(ekf.covariance, at, at, -1);
     }
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 2, 0};
     bslam_match_t matches[2];
     bslam_associate_joint(&frame, matches);
     unit_assert_decided(&matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -175,13 +177,13 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
 
 static void test_joint_out_of_nodes_still_decides_all(void **state)
 {
-    bslam_params_t params = joint_params();
-    params.joint_nodes = 1;
+    bslam_settings_t settings = joint_params();
+    settings.joint_nodes = 1;
     static const double places[1][2] = {{4, 0}};
-    const bslam_ekf_t ekf = map_of(&params, places, 1);
+    const bslam_ekf_t ekf = map_of(&settings, places, 1);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(2, 4, -1)};
     bslam_match_t matches[2];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 2, 0};
     bslam_associate_joint(&frame, matches);
     assert_int_equal(matches[0].verdict, BSLAM_VERDICT_REJECT);
     assert_int_equal(matches[0].reason, BSLAM_REASON_AMBIGUOUS);
@@ -190,7 +192,7 @@ static void test_joint_out_of_nodes_still_decides_all(void **state)
 
 static void test_joint_more_sightings_than_are_paired_together(void **state)
 {
-    const bslam_params_t params = joint_params();
+    const bslam_settings_t settings = joint_params();
     double places[8][2];
     bslam_sighting_t seen[8];
     for (int i = 0; i < 8; i++) {
@@ -199,9 +201,9 @@ static void test_joint_more_sightings_than_are_paired_together(void **state)
         seen[i] = unit_polar(remainder(0.7 * i, 6.283185307179586), 4, -1);
     }
     seen[6] = seen[2];  // the same beacon again, in the second group
-    const bslam_ekf_t ekf = map_of(&params, places, 8);
+    const bslam_ekf_t ekf = map_of(&settings, places, 8);
     bslam_match_t matches[8];
-    const bslam_sighting_frame_t frame = {&ekf, &params, NULL, NULL, &on_axle, seen, 8, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 8, 0};
     bslam_associate_joint(&frame, matches);
     for (int i = 0; i < 8; i++) {
         assert_int_equal(matches[i].beacon, i == 6 ? -1 : i);

@@ -7,7 +7,7 @@
 #include "base/trig.h"
 
 static bslam_appearance_t appearance;
-static bslam_params_t params;
+static bslam_settings_t settings;
 static bslam_ekf_t ekf;
 static int64_t now_us;
 static uint32_t travelled_um;
@@ -16,9 +16,9 @@ static const double places[2][2] = {{0, 0}, {0, 6}};
 
 static int setup(void **state)
 {
-    params = unit_params();
-    params.missed_views = 3;
-    ekf = unit_map_of(&params, places, 2);
+    settings = unit_params();
+    settings.missed_views = 3;
+    ekf = unit_map_of(&settings, places, 2);
     now_us = 0;
     travelled_um = 0;
     return bslam_appearance_init(&appearance, NULL, 0) == BSLAM_OK ? 0 : -1;
@@ -38,7 +38,7 @@ static int go(double angle_rad, double radius_m, bool sees_first, bool judges)
     if (sees_first) {
         ekf.beacons[0].last_seen_us = now_us;
     }
-    return bslam_missed_beacons_find(&appearance, &ekf, &params, now_us, travelled_um, judges);
+    return bslam_missed_beacons_find(&appearance, &ekf, &settings, now_us, travelled_um, judges);
 }
 
 /// Once round; how many frames said that beacon 0 has vanished.
@@ -81,8 +81,9 @@ static void test_a_doubtful_heading_says_nothing(void **state)
         const bslam_pose_t pose = bslam_ekf_pose(&ekf);
         bslam_ekf_set_pose(&ekf, &pose, BSLAM_R(1e-4), BSLAM_R(0.04));
         now_us += 40000;
-        assert_int_equal(bslam_missed_beacons_find(&appearance, &ekf, &params, now_us, travelled_um + 900000, true),
-                         BSLAM_NO_MISSED_BEACON);
+        assert_int_equal(
+            bslam_missed_beacons_find(&appearance, &ekf, &settings, now_us, travelled_um + 900000, true),
+            BSLAM_NO_MISSED_BEACON);
     }
 }
 
@@ -101,7 +102,7 @@ static void test_a_direction_that_a_corner_hides_speaks_once(void **state)
 
 static void test_switched_off_it_finds_nothing(void **state)
 {
-    params.missed_views = 0;
+    settings.missed_views = 0;
     assert_int_equal(go_round(4, true, true), 0);
     assert_int_equal(go_round(4, false, true), 0);
 }

@@ -11,12 +11,12 @@ static const bslam_pose_t mount = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.4)};
 
 /// A filter with two points and one ray, with velocity states so that more than the pose stands before the
 /// map.
-static bslam_ekf_t random_filter(bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t random_filter(bslam_settings_t *settings, unit_random_t *random)
 {
-    *params = unit_params();
-    params->velocity_states = 1;
+    *settings = unit_params();
+    settings->velocity_states = 1;
     bslam_ekf_t ekf;
-    twin_randomise(&ekf, params, random, 2, 1);
+    twin_randomise(&ekf, settings, random, 2, 1);
     return ekf;
 }
 
@@ -110,8 +110,8 @@ static void test_add_point_is_the_augment_step(void **state)
 {
     unit_random_t random = {1};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const double range_m = unit_random(&random, 0.5, 8);
         const double bearing = unit_random(&random, -3.14, 3.14);
         const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
@@ -120,7 +120,7 @@ static void test_add_point_is_the_augment_step(void **state)
         const twin_t expected = augmented(&ekf, new_point, 2, noise_var, 2, &adding);
         const bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(index, 3);
         assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_POINT);
         twin_assert(&ekf, &expected, TOLERANCE);
@@ -131,9 +131,9 @@ static void test_add_sized_is_the_augment_step(void **state)
 {
     unit_random_t random = {15};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = random_filter(&params, &random);
-        params.range_scale_sd = i % 4 == 3 ? 0 : BSLAM_R(0.07);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
+        settings.range_scale_sd = i % 4 == 3 ? 0 : BSLAM_R(0.07);
         const double range_m = unit_random(&random, 0.5, 8);
         const double bearing = unit_random(&random, -3.14, 3.14);
         const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
@@ -145,7 +145,7 @@ static void test_add_sized_is_the_augment_step(void **state)
         bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
         sighting.range_scale_sd = (bslam_real_t)own_sd;
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_SIZED);
         assert_int_equal(ekf.sized_count, 1);
         twin_assert(&ekf, &expected, TOLERANCE);
@@ -154,14 +154,14 @@ static void test_add_sized_is_the_augment_step(void **state)
 
 static void test_add_sized_beyond_their_room_are_points(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.range_scale_sd = BSLAM_R(0.07);
+    bslam_settings_t settings = unit_params();
+    settings.range_scale_sd = BSLAM_R(0.07);
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
     for (int i = 0; i < BSLAM_BEACONS_MAX; i++) {
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &polar, &index), BSLAM_OK);
         assert_int_equal(ekf.beacons[index].kind,
                          i < 2 * BSLAM_RAYS_MAX ? BSLAM_BEACON_SIZED : BSLAM_BEACON_POINT);
     }
@@ -170,18 +170,18 @@ static void test_add_sized_beyond_their_room_are_points(void **state)
 
 static void test_add_sized_where_rays_took_their_room_is_a_point(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.range_scale_sd = BSLAM_R(0.07);
+    bslam_settings_t settings = unit_params();
+    settings.range_scale_sd = BSLAM_R(0.07);
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     const bslam_sighting_t ray = unit_direction(0.3, 1);
     const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
     int index;
     for (int i = 0; i < BSLAM_RAYS_MAX && i < BSLAM_BEACONS_MAX - 1; i++) {
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &ray, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &ray, &index), BSLAM_OK);
     }
     const bool has_room = ekf.ray_count < BSLAM_RAYS_MAX;
-    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &polar, &index), BSLAM_OK);
     assert_int_equal(ekf.beacons[index].kind, has_room ? BSLAM_BEACON_SIZED : BSLAM_BEACON_POINT);
 }
 
@@ -189,8 +189,8 @@ static void test_add_ray_is_the_augment_step(void **state)
 {
     unit_random_t random = {2};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const double bearing = unit_random(&random, -3.14, 3.14);
         // Direction variance times 2 where no distance comes with it; inverse distance 0.2 with sd 0.1.
         const double noise_var[] = {2 * 0.02 * 0.02, 0.1 * 0.1};
@@ -198,7 +198,7 @@ static void test_add_ray_is_the_augment_step(void **state)
         const twin_t expected = augmented(&ekf, new_ray, 4, noise_var, 2, &adding);
         const bslam_sighting_t sighting = unit_direction(bearing, 7);
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_RAY);
         assert_int_equal(ekf.ray_count, 2);
         twin_assert(&ekf, &expected, TOLERANCE);
@@ -206,47 +206,47 @@ static void test_add_ray_is_the_augment_step(void **state)
 }
 
 /// Adds with add_one until the map is full; then another changes no byte and is refused.
-static void assert_fills_up(bslam_ekf_t *ekf, const bslam_params_t *params, bslam_sighting_t sighting,
+static void assert_fills_up(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_sighting_t sighting,
                             int room)
 {
     int index;
     for (int i = 0; i < room; i++) {
-        assert_int_equal(bslam_ekf_add(ekf, params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(ekf, settings, &mount, &sighting, &index), BSLAM_OK);
         assert_int_equal(ekf->beacons[index].uid, i);
     }
     bslam_ekf_t before;
     memcpy(&before, ekf, sizeof before);
-    assert_int_equal(bslam_ekf_add(ekf, params, &mount, &sighting, &index), BSLAM_E_MAP_FULL);
+    assert_int_equal(bslam_ekf_add(ekf, settings, &mount, &sighting, &index), BSLAM_E_MAP_FULL);
     assert_memory_equal(ekf, &before, sizeof before);
 }
 
 static void test_add_points_beyond_the_map_are_refused(void **state)
 {
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
-    assert_fills_up(&ekf, &params, unit_polar(0.3, 2, 1), BSLAM_BEACONS_MAX);
+    bslam_ekf_init(&ekf, &settings);
+    assert_fills_up(&ekf, &settings, unit_polar(0.3, 2, 1), BSLAM_BEACONS_MAX);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, 1, 2, &index), BSLAM_E_MAP_FULL);
 }
 
 static void test_add_rays_beyond_their_number_are_refused_but_points_are_not(void **state)
 {
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
-    assert_fills_up(&ekf, &params, unit_direction(0.3, 1), BSLAM_RAYS_MAX);
+    bslam_ekf_init(&ekf, &settings);
+    assert_fills_up(&ekf, &settings, unit_direction(0.3, 1), BSLAM_RAYS_MAX);
     const bslam_sighting_t polar = unit_polar(0.1, 3, 5);
     int index;
-    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index),
+    assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &polar, &index),
                      BSLAM_RAYS_MAX < BSLAM_BEACONS_MAX ? BSLAM_OK : BSLAM_E_MAP_FULL);
 }
 
 static void test_add_known_takes_no_room_in_the_state(void **state)
 {
     unit_random_t random = {3};
-    bslam_params_t params;
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t expected = twin_of(&ekf);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, 3, -4, &index), BSLAM_OK);
@@ -261,25 +261,25 @@ static void test_add_known_takes_no_room_in_the_state(void **state)
 // ---- removing ---------------------------------------------------------------------------------------------
 
 /// Points, rays and known beacons mixed: every second removal hits another kind.
-static bslam_ekf_t mixed_filter(bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t mixed_filter(bslam_settings_t *settings, unit_random_t *random)
 {
-    bslam_ekf_t ekf = random_filter(params, random);
+    bslam_ekf_t ekf = random_filter(settings, random);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, 3, -4, &index), BSLAM_OK);
     const bslam_sighting_t polar = unit_polar(0.5, 3, 9);
-    params->range_scale_sd = BSLAM_R(0.1);
-    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    settings->range_scale_sd = BSLAM_R(0.1);
+    assert_int_equal(bslam_ekf_add(&ekf, settings, &mount, &polar, &index), BSLAM_OK);
     assert_int_equal(ekf.beacons[index].kind, BSLAM_BEACON_SIZED);
-    params->range_scale_sd = 0;
-    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    settings->range_scale_sd = 0;
+    assert_int_equal(bslam_ekf_add(&ekf, settings, &mount, &polar, &index), BSLAM_OK);
     return ekf;
 }
 
 static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
 {
     unit_random_t random = {4};
-    bslam_params_t params;
-    const bslam_ekf_t full = mixed_filter(&params, &random);
+    bslam_settings_t settings;
+    const bslam_ekf_t full = mixed_filter(&settings, &random);
     for (int gone = 0; gone < full.beacon_count; gone++) {
         bslam_ekf_t ekf = full;
         const bslam_beacon_t *removed = &full.beacons[gone];
@@ -307,8 +307,8 @@ static void test_remove_any_beacon_leaves_the_others_to_the_bit(void **state)
 static void test_remove_then_add_again_is_as_if_it_had_never_been_there(void **state)
 {
     unit_random_t random = {5};
-    bslam_params_t params;
-    const bslam_ekf_t full = mixed_filter(&params, &random);
+    bslam_settings_t settings;
+    const bslam_ekf_t full = mixed_filter(&settings, &random);
     const bslam_sighting_t direction = unit_direction(-0.4, 3);
     // The last beacon is a point: in one filter it goes and comes back after the ray, in the other it never
     // was.
@@ -318,11 +318,11 @@ static void test_remove_then_add_again_is_as_if_it_had_never_been_there(void **s
     const bslam_sighting_t polar = unit_polar(0.7, 4, 9);
     int index;
     bslam_ekf_remove(&b, last);
-    assert_int_equal(bslam_ekf_add(&a, &params, &mount, &polar, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&a, &settings, &mount, &polar, &index), BSLAM_OK);
     bslam_ekf_remove(&a, index);
     bslam_ekf_remove(&a, last);
-    assert_int_equal(bslam_ekf_add(&a, &params, &mount, &direction, &index), BSLAM_OK);
-    assert_int_equal(bslam_ekf_add(&b, &params, &mount, &direction, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&a, &settings, &mount, &direction, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&b, &settings, &mount, &direction, &index), BSLAM_OK);
     const twin_t expected = twin_of(&b);
     twin_assert(&a, &expected, 0);
     // A number is never given twice.
@@ -332,8 +332,8 @@ static void test_remove_then_add_again_is_as_if_it_had_never_been_there(void **s
 static void test_remove_down_to_the_last_beacon_and_fill_again(void **state)
 {
     unit_random_t random = {6};
-    bslam_params_t params;
-    bslam_ekf_t ekf = mixed_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = mixed_filter(&settings, &random);
     const int base = ekf.base_dim;
     while (ekf.beacon_count > 0) {
         bslam_ekf_remove(&ekf, ekf.beacon_count / 2);
@@ -343,7 +343,7 @@ static void test_remove_down_to_the_last_beacon_and_fill_again(void **state)
     const bslam_sighting_t polar = unit_polar(0.3, 3, 1);
     for (int i = 0; i < BSLAM_BEACONS_MAX; i++) {
         int index;
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &polar, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &polar, &index), BSLAM_OK);
         assert_int_equal(index, i);
     }
     assert_true(bslam_ekf_is_sane(&ekf));
@@ -360,12 +360,12 @@ static void point_of_ray(const double *in, double *out, const void *context)
 }
 
 /// A filter whose ray, beacon 2 of 4, is so well known that it is a point.
-static bslam_ekf_t filter_with_settled_ray(bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t filter_with_settled_ray(bslam_settings_t *settings, unit_random_t *random)
 {
-    bslam_ekf_t ekf = random_filter(params, random);
+    bslam_ekf_t ekf = random_filter(settings, random);
     const bslam_sighting_t polar = unit_polar(0.5, 3, 9);
     int index;
-    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &polar, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&ekf, settings, &mount, &polar, &index), BSLAM_OK);
     const int inverse_at = ekf.beacons[2].at + 3;
     for (int i = 0; i < ekf.dim; i++) {
         // The same correlations with a deviation 300 times smaller.
@@ -379,8 +379,8 @@ static void test_settle_ray_becomes_its_point_with_the_covariance_of_the_change(
 {
     unit_random_t random = {7};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = filter_with_settled_ray(&settings, &random);
         const int at = ekf.beacons[2].at;
         // Append the point, take the ray out, and move the point to the ray's place.
         twin_t expected = augmented(&ekf, point_of_ray, 2, NULL, 0, &at);
@@ -392,7 +392,7 @@ static void test_settle_ray_becomes_its_point_with_the_covariance_of_the_change(
         }
         expected.mean = dense_product(&reorder, &expected.mean);
         expected.covariance = dense_sandwich(&reorder, &expected.covariance);
-        assert_true(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+        assert_true(bslam_ekf_settle_ray(&ekf, &settings, &mount, 2));
         assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_POINT);
         assert_int_equal(ekf.ray_count, 0);
         // The slope by the inverse distance is distance², up to 80.
@@ -422,27 +422,27 @@ static void test_settle_ray_happens_where_its_index_falls_below_the_limit(void *
 {
     unit_random_t random = {8};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        const bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_settings_t settings;
+        const bslam_ekf_t ekf = random_filter(&settings, &random);
         const double index = linearity_index(&ekf);
         bslam_ekf_t copy = ekf;
-        params.ray_linear_limit = real(index * 0.999);
-        assert_false(bslam_ekf_settle_ray(&copy, &params, &mount, 2));
+        settings.ray_linear_limit = real(index * 0.999);
+        assert_false(bslam_ekf_settle_ray(&copy, &settings, &mount, 2));
         assert_memory_equal(&copy, &ekf, sizeof copy);
-        params.ray_linear_limit = real(index * 1.001);
-        assert_true(bslam_ekf_settle_ray(&copy, &params, &mount, 2));
+        settings.ray_linear_limit = real(index * 1.001);
+        assert_true(bslam_ekf_settle_ray(&copy, &settings, &mount, 2));
     }
 }
 
 static void test_settle_ray_what_is_no_ray_stays(void **state)
 {
     unit_random_t random = {9};
-    bslam_params_t params;
-    bslam_ekf_t ekf = mixed_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = mixed_filter(&settings, &random);
     const bslam_ekf_t before = ekf;
     for (int b = 0; b < ekf.beacon_count; b++) {
         if (ekf.beacons[b].kind != BSLAM_BEACON_RAY) {
-            assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, b));
+            assert_false(bslam_ekf_settle_ray(&ekf, &settings, &mount, b));
         }
     }
     assert_memory_equal(&ekf, &before, sizeof ekf);
@@ -451,12 +451,12 @@ static void test_settle_ray_what_is_no_ray_stays(void **state)
 static void test_settle_ray_without_a_positive_variance_stays(void **state)
 {
     unit_random_t random = {15};
-    bslam_params_t params;
-    bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = filter_with_settled_ray(&settings, &random);
     const int at = ekf.beacons[2].at + 3;
     ekf.mean[at] = BSLAM_R(0.2);
     bslam_symmat_set(ekf.covariance, at, at, -1);
-    assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+    assert_false(bslam_ekf_settle_ray(&ekf, &settings, &mount, 2));
 }
 
 static void test_settle_ray_without_a_positive_inverse_distance_stays(void **state)
@@ -464,10 +464,10 @@ static void test_settle_ray_without_a_positive_inverse_distance_stays(void **sta
     static const double inverses[] = {0, -0.2, 1e-4, NAN};
     unit_random_t random = {10};
     for (int i = 0; i < COUNT_OF(inverses); i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = filter_with_settled_ray(&params, &random);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = filter_with_settled_ray(&settings, &random);
         ekf.mean[ekf.beacons[2].at + 3] = real(inverses[i]);
-        assert_false(bslam_ekf_settle_ray(&ekf, &params, &mount, 2));
+        assert_false(bslam_ekf_settle_ray(&ekf, &settings, &mount, 2));
         assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_RAY);
     }
 }
@@ -516,8 +516,8 @@ static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
     unit_random_t random = {21};
     int measured = 0;
     for (int i = 0; i < 60; i++) {
-        bslam_params_t params;
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_settings_t settings;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         double cosine;
         const double range_m = range_along_ray(&ekf, unit_random(&random, 1, 8), &cosine);
         if (cosine < 0.55) {
@@ -537,7 +537,7 @@ static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
         expected.mean = dense_product(&reorder, &expected.mean);
         expected.covariance = dense_sandwich(&reorder, &expected.covariance);
         const bslam_sighting_t sighting = unit_polar(3, range_m, 7);  // its direction is not asked for
-        assert_true(bslam_ekf_measure_ray(&ekf, &params, &mount, &sighting, 2, BSLAM_R(0.0081)));
+        assert_true(bslam_ekf_measure_ray(&ekf, &settings, &mount, &sighting, 2, BSLAM_R(0.0081)));
         assert_int_equal(ekf.beacons[2].kind, BSLAM_BEACON_SIZED);
         assert_int_equal(ekf.ray_count, 0);
         assert_int_equal(ekf.sized_count, 1);
@@ -549,8 +549,8 @@ static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
 static void test_measure_ray_that_the_distance_does_not_end_on_stays(void **state)
 {
     unit_random_t random = {22};
-    bslam_params_t params;
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     bslam_real_t *ray = &ekf.mean[ekf.beacons[2].at];
     ekf.mean[BSLAM_STATE_X] = 0;
     ekf.mean[BSLAM_STATE_Y] = 0;
@@ -562,15 +562,15 @@ static void test_measure_ray_that_the_distance_does_not_end_on_stays(void **stat
     static const double ranges_m[] = {1.9, 2.0, 2.2, 2.3};  // short of it, or too much across
     for (int i = 0; i < COUNT_OF(ranges_m); i++) {
         const bslam_sighting_t seen = unit_polar(0, ranges_m[i], 7);
-        assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+        assert_false(bslam_ekf_measure_ray(&ekf, &settings, &mount, &seen, 2, BSLAM_R(0.01)));
     }
     const bslam_sighting_t seen = unit_polar(0, 4, 7);
-    assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 0, BSLAM_R(0.01)));  // a point
+    assert_false(bslam_ekf_measure_ray(&ekf, &settings, &mount, &seen, 0, BSLAM_R(0.01)));  // a point
     assert_memory_equal(&ekf, &before, sizeof ekf);
     ray[0] = 6;  // begins behind where the distance ends
-    assert_false(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+    assert_false(bslam_ekf_measure_ray(&ekf, &settings, &mount, &seen, 2, BSLAM_R(0.01)));
     ray[0] = BSLAM_R(0.2);
-    assert_true(bslam_ekf_measure_ray(&ekf, &params, &mount, &seen, 2, BSLAM_R(0.01)));
+    assert_true(bslam_ekf_measure_ray(&ekf, &settings, &mount, &seen, 2, BSLAM_R(0.01)));
 }
 
 /// Noise: of the scale.
@@ -582,8 +582,8 @@ static void new_scale(const double *in, double *out, const void *context)
 static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **state)
 {
     unit_random_t random = {23};
-    bslam_params_t params;
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const int n = ekf.dim, at = ekf.beacons[0].at + 2;
     const double noise_var[] = {0.0049};
     twin_t expected = augmented(&ekf, new_scale, 1, noise_var, 1, &n);
@@ -609,14 +609,14 @@ static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **stat
 
 static void test_give_scale_beyond_their_room_is_not_done(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     int index;
     const bslam_sighting_t point = unit_polar(0.3, 3, 1), ray = unit_direction(0.1, 2);
-    assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &point, &index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &point, &index), BSLAM_OK);
     for (int i = 0; i < BSLAM_RAYS_MAX && ekf.beacon_count < BSLAM_BEACONS_MAX; i++) {
-        assert_int_equal(bslam_ekf_add(&ekf, &params, &mount, &ray, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, &settings, &mount, &ray, &index), BSLAM_OK);
     }
     if (ekf.ray_count < BSLAM_RAYS_MAX) {  // as many rays as beacons: they never take all the room
         ekf.ray_count = BSLAM_RAYS_MAX;
@@ -627,23 +627,23 @@ static void test_give_scale_beyond_their_room_is_not_done(void **state)
 }
 
 /// The filter with a sized beacon, whose scale was doubted so much at first.
-static bslam_ekf_t with_sized(bslam_params_t *params, double scale_sd, int *index)
+static bslam_ekf_t with_sized(bslam_settings_t *settings, double scale_sd, int *index)
 {
     unit_random_t random = {24};
-    bslam_ekf_t ekf = random_filter(params, &random);
+    bslam_ekf_t ekf = random_filter(settings, &random);
     bslam_sighting_t sighting = unit_polar(0.7, 4, 7);
     sighting.range_scale_sd = real(scale_sd);
-    assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &sighting, index), BSLAM_OK);
+    assert_int_equal(bslam_ekf_add(&ekf, settings, &mount, &sighting, index), BSLAM_OK);
     return ekf;
 }
 
 /// All else is then as if the scale had been so doubtful from the start, and is not known any more.
 static void test_renew_scale_leaves_what_hung_on_it_as_doubtful_as_it_would_have_been(void **state)
 {
-    bslam_params_t params;
+    bslam_settings_t settings;
     int index;
-    bslam_ekf_t ekf = with_sized(&params, 0.05, &index);
-    const bslam_ekf_t doubted = with_sized(&params, sqrt(0.0025 + 0.01), &index);
+    bslam_ekf_t ekf = with_sized(&settings, 0.05, &index);
+    const bslam_ekf_t doubted = with_sized(&settings, sqrt(0.0025 + 0.01), &index);
     const int at = ekf.beacons[index].at + 2;
     ekf.mean[at] = BSLAM_R(1.2);
     twin_t expected = twin_of(&ekf);
@@ -652,14 +652,14 @@ static void test_renew_scale_leaves_what_hung_on_it_as_doubtful_as_it_would_have
         expected.covariance.at[i][at] = expected.covariance.at[at][i] = i == at ? 0.0125 : 0;
     }
     expected.mean.at[at][0] = 1;
-    bslam_ekf_renew_scale(&ekf, &params, index, BSLAM_R(0.0025), BSLAM_R(0.01));
+    bslam_ekf_renew_scale(&ekf, &settings, index, BSLAM_R(0.0025), BSLAM_R(0.01));
     twin_assert(&ekf, &expected, TOLERANCE);
     assert_true(bslam_symmat_get(ekf.covariance, at - 2, at - 2) >
                 (bslam_real_t)1.1 *
-                    bslam_symmat_get(with_sized(&params, 0.05, &index).covariance, at - 2, at - 2));
+                    bslam_symmat_get(with_sized(&settings, 0.05, &index).covariance, at - 2, at - 2));
     const bslam_ekf_t before = ekf;
-    bslam_ekf_renew_scale(&ekf, &params, 0, BSLAM_R(0.01), BSLAM_R(0.01));  // a point
-    bslam_ekf_renew_scale(&ekf, &params, 2, BSLAM_R(0.01), BSLAM_R(0.01));  // a ray
+    bslam_ekf_renew_scale(&ekf, &settings, 0, BSLAM_R(0.01), BSLAM_R(0.01));  // a point
+    bslam_ekf_renew_scale(&ekf, &settings, 2, BSLAM_R(0.01), BSLAM_R(0.01));  // a ray
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 
@@ -668,11 +668,11 @@ static void test_renew_scale_never_takes_doubt_away(void **state)
 {
     static const double scale_vars[] = {0, 1e-8, 1e-4, 0.0025, 0.2};
     for (size_t i = 0; i < sizeof scale_vars / sizeof scale_vars[0]; i++) {
-        bslam_params_t params;
+        bslam_settings_t settings;
         int index;
-        bslam_ekf_t ekf = with_sized(&params, 0.05, &index);
+        bslam_ekf_t ekf = with_sized(&settings, 0.05, &index);
         const bslam_ekf_t before = ekf;
-        bslam_ekf_renew_scale(&ekf, &params, index, real(scale_vars[i]), BSLAM_R(0.01));
+        bslam_ekf_renew_scale(&ekf, &settings, index, real(scale_vars[i]), BSLAM_R(0.01));
         for (int k = 0; k < ekf.dim; k++) {
             const bool is_scale = k == ekf.beacons[index].at + 2;
             const double was = is_scale ? scale_vars[i] : bslam_symmat_get(before.covariance, k, k);
@@ -689,8 +689,8 @@ static void test_beacon_position_and_covariance_of_a_ray_are_those_of_its_point(
 {
     unit_random_t random = {11};
     for (int i = 0; i < 20; i++) {
-        bslam_params_t params;
-        const bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_settings_t settings;
+        const bslam_ekf_t ekf = random_filter(&settings, &random);
         const int at = ekf.beacons[2].at;
         const twin_t expected = augmented(&ekf, point_of_ray, 2, NULL, 0, &at);
         const int n = ekf.dim;
@@ -710,8 +710,8 @@ static void test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it(vo
 {
     static const double inverses[] = {0, -1, 1e-9};
     unit_random_t random = {12};
-    bslam_params_t params;
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_settings_t settings;
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const int at = ekf.beacons[2].at;
     for (int i = 0; i < COUNT_OF(inverses); i++) {
         ekf.mean[at + 3] = real(inverses[i]);
@@ -726,8 +726,8 @@ static void test_beacon_position_of_a_ray_at_infinity_is_a_kilometre_along_it(vo
 static void test_beacon_covariance_of_a_point_is_its_block(void **state)
 {
     unit_random_t random = {13};
-    bslam_params_t params;
-    const bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_settings_t settings;
+    const bslam_ekf_t ekf = random_filter(&settings, &random);
     const int at = ekf.beacons[1].at;
     const bslam_sym2_t covariance = bslam_ekf_beacon_covariance(&ekf, 1);
     assert_true(covariance.xx == bslam_symmat_get(ekf.covariance, at, at));
@@ -739,8 +739,8 @@ static void test_is_sane_finds_every_bad_value(void **state)
 {
     static const double bad[] = {NAN, INFINITY, -INFINITY};
     unit_random_t random = {14};
-    bslam_params_t params;
-    const bslam_ekf_t good = random_filter(&params, &random);
+    bslam_settings_t settings;
+    const bslam_ekf_t good = random_filter(&settings, &random);
     assert_true(bslam_ekf_is_sane(&good));
     for (int at = 0; at < good.dim; at++) {
         for (int i = 0; i < COUNT_OF(bad); i++) {

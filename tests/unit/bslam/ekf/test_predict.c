@@ -25,7 +25,7 @@ static const bslam_motion_t motion = {
 enum { X, Y, THETA, FORWARD, TURN, FORWARD_ERROR, TURN_ERROR, ARGUMENTS };
 
 typedef struct step {
-    const bslam_params_t *params;
+    const bslam_settings_t *settings;
     double forward_m;
     double turn_rad;
     double dt_s;
@@ -34,12 +34,12 @@ typedef struct step {
 static void move(const double *in, double *out, const void *context)
 {
     const step_t *step = context;
-    double forward = step->forward_m * (double)step->params->forward_scale;
-    double turn = step->turn_rad * (double)step->params->turn_scale;
-    if (step->params->velocity_states != 0) {
+    double forward = step->forward_m * (double)step->settings->forward_scale;
+    double turn = step->turn_rad * (double)step->settings->turn_scale;
+    if (step->settings->velocity_states != 0) {
         forward = in[FORWARD] * step->dt_s;
         turn = in[TURN] * step->dt_s;
-    } else if (step->params->scale_states != 0) {
+    } else if (step->settings->scale_states != 0) {
         forward = in[FORWARD] * step->forward_m;
         turn = in[TURN] * step->turn_rad;
     }
@@ -47,7 +47,7 @@ static void move(const double *in, double *out, const void *context)
     turn += in[TURN_ERROR];
     double c = cos(in[THETA]);
     double s = sin(in[THETA]);
-    if (step->params->motion == BSLAM_MOTION_ARC) {
+    if (step->settings->motion == BSLAM_MOTION_ARC) {
         unit_mean_direction(in[THETA], turn, &c, &s);
     }
     out[X] = in[X] + forward * c;
@@ -57,8 +57,8 @@ static void move(const double *in, double *out, const void *context)
 
 /// Where the filter should arrive by equations (4) and (5), with Jacobians by finite differences. extra_var:
 /// what the two further states walk by before the step; keep: what they keep of themselves.
-static twin_t moved_by_textbook(const bslam_ekf_t *ekf, const bslam_params_t *params, const double keep[2],
-                                const double extra_var[2])
+static twin_t moved_by_textbook(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                const double keep[2], const double extra_var[2])
 {
     twin_t twin = twin_of(ekf);
     dense_t f = dense_identity(ekf->dim);
@@ -72,7 +72,7 @@ static twin_t moved_by_textbook(const bslam_ekf_t *ekf, const bslam_params_t *pa
             twin.covariance.at[FORWARD + k][FORWARD + k] += extra_var[k];
         }
     }
-    const step_t step = {params, (double)motion.forward_m, (double)motion.turn_rad, (double)motion.dt_s};
+    const step_t step = {settings, (double)motion.forward_m, (double)motion.turn_rad, (double)motion.dt_s};
     double in[ARGUMENTS] = {0};
     for (int i = 0; i < ekf->base_dim; i++) {
         in[i] = twin.mean.at[i][0];
@@ -90,7 +90,7 @@ static twin_t moved_by_textbook(const bslam_ekf_t *ekf, const bslam_params_t *pa
         twin.mean.at[i][0] = pose[i];
     }
     twin.covariance = dense_sandwich(&f, &twin.covariance);
-    if (params->velocity_states == 0) {
+    if (settings->velocity_states == 0) {
         dense_t q = dense_zero(2, 2);
         q.at[0][0] = (double)motion.forward_var_m2;
         q.at[1][1] = (double)motion.turn_var_rad2;
@@ -102,40 +102,40 @@ static twin_t moved_by_textbook(const bslam_ekf_t *ekf, const bslam_params_t *pa
 }
 
 /// The speedometers as measurements of the two further states.
-static void measure_velocity(const bslam_ekf_t *ekf, const bslam_params_t *params, twin_t *twin)
+static void measure_velocity(const bslam_ekf_t *ekf, const bslam_settings_t *settings, twin_t *twin)
 {
     const double dt = (double)motion.dt_s;
     dense_t h = dense_zero(2, ekf->dim);
     dense_t y = dense_zero(2, 1);
     dense_t r = dense_zero(2, 2);
     h.at[0][FORWARD] = h.at[1][TURN] = 1;
-    const double v = (double)motion.forward_m * (double)params->forward_scale / dt;
-    const double omega = (double)motion.turn_rad * (double)params->turn_scale / dt;
+    const double v = (double)motion.forward_m * (double)settings->forward_scale / dt;
+    const double omega = (double)motion.turn_rad * (double)settings->turn_scale / dt;
     y.at[0][0] = v - twin->mean.at[FORWARD][0];
     y.at[1][0] = omega - twin->mean.at[TURN][0];
     r.at[0][0] = (double)motion.forward_var_m2 / (dt * dt);
     r.at[1][1] = (double)motion.turn_var_rad2 / (dt * dt);
     r.at[0][1] = r.at[1][0] = (double)motion.forward_turn_cov_mrad / (dt * dt);
-    twin_update(ekf, params->filter, &h, &y, &r, twin);
+    twin_update(ekf, settings->filter, &h, &y, &r, twin);
 }
 
-static bslam_ekf_t random_filter(const bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t random_filter(const bslam_settings_t *settings, unit_random_t *random)
 {
     bslam_ekf_t ekf;
-    twin_randomise(&ekf, params, random, 3, 2);
+    twin_randomise(&ekf, settings, random, 3, 2);
     return ekf;
 }
 
 /// Both motion models and both filters, from several random states, `steps` in a row.
-static void for_every_kind(bslam_params_t params, void (*check)(bslam_ekf_t *, const bslam_params_t *))
+static void for_every_kind(bslam_settings_t settings, void (*check)(bslam_ekf_t *, const bslam_settings_t *))
 {
     unit_random_t random = {1};
-    for (params.motion = 0; params.motion <= 1; params.motion++) {
-        for (params.filter = 0; params.filter <= 1; params.filter++) {
+    for (settings.motion = 0; settings.motion <= 1; settings.motion++) {
+        for (settings.filter = 0; settings.filter <= 1; settings.filter++) {
             for (int round = 0; round < 5; round++) {
-                bslam_ekf_t ekf = random_filter(&params, &random);
+                bslam_ekf_t ekf = random_filter(&settings, &random);
                 for (int i = 0; i < 3; i++) {
-                    check(&ekf, &params);
+                    check(&ekf, &settings);
                 }
             }
         }
@@ -143,13 +143,13 @@ static void for_every_kind(bslam_params_t params, void (*check)(bslam_ekf_t *, c
 }
 
 /// Predicts, and the robot alone too: it must arrive where it does with the map.
-static bslam_motion_t predict(bslam_ekf_t *ekf, const bslam_params_t *params)
+static bslam_motion_t predict(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     bslam_robot_t robot = bslam_ekf_robot(ekf);
     bslam_motion_t moved;
     bslam_motion_t moved_alone;
-    bslam_ekf_predict(ekf, params, &motion, &moved);
-    bslam_robot_predict(&robot, params, &motion, &moved_alone);
+    bslam_ekf_predict(ekf, settings, &motion, &moved);
+    bslam_robot_predict(&robot, settings, &motion, &moved_alone);
     const double rounding = 64 * UNIT_ROUNDING;
     assert_int_equal(robot.dim, ekf->base_dim);
     for (int i = 0; i < robot.dim; i++) {
@@ -170,14 +170,14 @@ static bslam_motion_t predict(bslam_ekf_t *ekf, const bslam_params_t *params)
 
 // ---- plain ------------------------------------------------------------------------------------------------
 
-static void check_plain(bslam_ekf_t *ekf, const bslam_params_t *params)
+static void check_plain(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     const double none[2] = {1, 0};
-    const twin_t expected = moved_by_textbook(ekf, params, none, none);
-    const bslam_motion_t moved = predict(ekf, params);
+    const twin_t expected = moved_by_textbook(ekf, settings, none, none);
+    const bslam_motion_t moved = predict(ekf, settings);
     twin_assert(ekf, &expected, TOLERANCE);
-    assert_near(moved.forward_m, (double)motion.forward_m * (double)params->forward_scale, UNIT_ROUNDING);
-    assert_near(moved.turn_rad, (double)motion.turn_rad * (double)params->turn_scale, UNIT_ROUNDING);
+    assert_near(moved.forward_m, (double)motion.forward_m * (double)settings->forward_scale, UNIT_ROUNDING);
+    assert_near(moved.turn_rad, (double)motion.turn_rad * (double)settings->turn_scale, UNIT_ROUNDING);
     assert_true(moved.dt_s == motion.dt_s);
 }
 
@@ -188,30 +188,30 @@ static void test_predict_is_the_textbook_prediction(void **state)
 
 static void test_predict_with_constant_scales_is_the_textbook_prediction(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.forward_scale = BSLAM_R(1.1);
-    params.turn_scale = BSLAM_R(0.8);
-    for_every_kind(params, check_plain);
+    bslam_settings_t settings = unit_params();
+    settings.forward_scale = BSLAM_R(1.1);
+    settings.turn_scale = BSLAM_R(0.8);
+    for_every_kind(settings, check_plain);
 }
 
 static void test_speeds_that_are_no_states_are_not_measured(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 0;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 0;
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     const bslam_ekf_t before = ekf;
-    bslam_ekf_measure_speeds(&ekf, &params, &motion);
+    bslam_ekf_measure_speeds(&ekf, &settings, &motion);
     assert_memory_equal(&ekf, &before, sizeof ekf);
 }
 
 static void test_predict_moves_no_beacon(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     unit_random_t random = {2};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const bslam_ekf_t before = ekf;
-    (void)predict(&ekf, &params);
+    (void)predict(&ekf, &settings);
     for (int i = 3; i < ekf.dim; i++) {
         assert_true(ekf.mean[i] == before.mean[i]);
         for (int j = 3; j <= i; j++) {
@@ -223,26 +223,26 @@ static void test_predict_moves_no_beacon(void **state)
 static void test_predict_without_motion_and_noise_changes_no_value(void **state)
 {
     const bslam_motion_t rest = {.dt_s = BSLAM_R(0.04)};
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     unit_random_t random = {3};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t expected = twin_of(&ekf);
     bslam_motion_t moved;
-    bslam_ekf_predict(&ekf, &params, &rest, &moved);
+    bslam_ekf_predict(&ekf, &settings, &rest, &moved);
     twin_assert(&ekf, &expected, 0);
 }
 
 // ---- scale states -----------------------------------------------------------------------------------------
 
-static void check_scales(bslam_ekf_t *ekf, const bslam_params_t *params)
+static void check_scales(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     const double keep[2] = {1, 1};
     const double walk = 0.002 * 0.002 * (double)motion.dt_s;
     const double extra_var[2] = {walk, walk};
-    const twin_t expected = moved_by_textbook(ekf, params, keep, extra_var);
+    const twin_t expected = moved_by_textbook(ekf, settings, keep, extra_var);
     const double forward_scale = (double)ekf->mean[FORWARD];
     const double turn_scale = (double)ekf->mean[TURN];
-    const bslam_motion_t moved = predict(ekf, params);
+    const bslam_motion_t moved = predict(ekf, settings);
     twin_assert(ekf, &expected, TOLERANCE);
     assert_near(moved.forward_m, (double)motion.forward_m * forward_scale, UNIT_ROUNDING);
     assert_near(moved.turn_rad, (double)motion.turn_rad * turn_scale, UNIT_ROUNDING);
@@ -250,22 +250,22 @@ static void check_scales(bslam_ekf_t *ekf, const bslam_params_t *params)
 
 static void test_predict_with_scale_states_is_the_textbook_prediction(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.scale_states = 1;
-    for_every_kind(params, check_scales);
+    bslam_settings_t settings = unit_params();
+    settings.scale_states = 1;
+    for_every_kind(settings, check_scales);
 }
 
 // ---- velocity states --------------------------------------------------------------------------------------
 
-static void check_velocity(bslam_ekf_t *ekf, const bslam_params_t *params)
+static void check_velocity(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
     const double dt = (double)motion.dt_s;
-    const double keep[2] = {1 / (1 + dt / (double)params->velocity_decay_s),
-                            1 / (1 + dt / (double)params->turn_rate_decay_s)};
+    const double keep[2] = {1 / (1 + dt / (double)settings->velocity_decay_s),
+                            1 / (1 + dt / (double)settings->turn_rate_decay_s)};
     const double extra_var[2] = {0.2 * 0.2 * dt, 0.7 * 0.7 * dt};
-    twin_t expected = moved_by_textbook(ekf, params, keep, extra_var);
-    measure_velocity(ekf, params, &expected);
-    const bslam_motion_t moved = predict(ekf, params);
+    twin_t expected = moved_by_textbook(ekf, settings, keep, extra_var);
+    measure_velocity(ekf, settings, &expected);
+    const bslam_motion_t moved = predict(ekf, settings);
     twin_assert(ekf, &expected, TOLERANCE);
     assert_near(moved.forward_m, expected.mean.at[FORWARD][0] * dt, TOLERANCE);
     assert_near(moved.turn_rad, expected.mean.at[TURN][0] * dt, TOLERANCE);
@@ -273,99 +273,99 @@ static void check_velocity(bslam_ekf_t *ekf, const bslam_params_t *params)
 
 static void test_predict_with_velocity_states_predicts_then_measures(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
-    for_every_kind(params, check_velocity);
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
+    for_every_kind(settings, check_velocity);
 }
 
 static void test_predict_with_velocity_states_and_constant_scales_measures_the_scaled_reading(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
-    params.forward_scale = BSLAM_R(1.1);
-    params.turn_scale = BSLAM_R(0.8);
-    for_every_kind(params, check_velocity);
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
+    settings.forward_scale = BSLAM_R(1.1);
+    settings.turn_scale = BSLAM_R(0.8);
+    for_every_kind(settings, check_velocity);
 }
 
 static void test_predict_with_velocity_states_that_never_decay_keeps_them(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
-    params.velocity_decay_s = BSLAM_R(1e6);
-    params.turn_rate_decay_s = BSLAM_R(1e6);
-    for_every_kind(params, check_velocity);
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
+    settings.velocity_decay_s = BSLAM_R(1e6);
+    settings.turn_rate_decay_s = BSLAM_R(1e6);
+    for_every_kind(settings, check_velocity);
 }
 
 static void
 test_predict_with_velocity_states_and_indefinite_noise_is_refused_or_measures_nothing(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
     unit_random_t random = {4};
     bslam_motion_t bad[3] = {motion, motion, motion};
     bad[0].forward_var_m2 = 0;
     bad[1].turn_var_rad2 = 0;
     bad[2].forward_turn_cov_mrad = 1;
-    assert_int_equal(bslam_ekf_check_motion(&params, &motion), BSLAM_OK);
+    assert_int_equal(bslam_ekf_check_motion(&settings, &motion), BSLAM_OK);
     const double dt = (double)motion.dt_s;
-    const double keep[2] = {1 / (1 + dt / (double)params.velocity_decay_s),
-                            1 / (1 + dt / (double)params.turn_rate_decay_s)};
+    const double keep[2] = {1 / (1 + dt / (double)settings.velocity_decay_s),
+                            1 / (1 + dt / (double)settings.turn_rate_decay_s)};
     const double extra_var[2] = {0.2 * 0.2 * dt, 0.7 * 0.7 * dt};
     for (int i = 0; i < COUNT_OF(bad); i++) {
-        assert_int_equal(bslam_ekf_check_motion(&params, &bad[i]), BSLAM_E_SINGULAR);
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        assert_int_equal(bslam_ekf_check_motion(&settings, &bad[i]), BSLAM_E_SINGULAR);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         bslam_robot_t robot = bslam_ekf_robot(&ekf);
-        const twin_t expected = moved_by_textbook(&ekf, &params, keep, extra_var);
+        const twin_t expected = moved_by_textbook(&ekf, &settings, keep, extra_var);
         bslam_motion_t moved;
-        bslam_ekf_predict(&ekf, &params, &bad[i], &moved);
+        bslam_ekf_predict(&ekf, &settings, &bad[i], &moved);
         twin_assert(&ekf, &expected, TOLERANCE);
         assert_near(moved.forward_m, expected.mean.at[FORWARD][0] * dt, TOLERANCE);
-        bslam_robot_predict(&robot, &params, &bad[i], &moved);
+        bslam_robot_predict(&robot, &settings, &bad[i], &moved);
         assert_true(robot.mean[X] == ekf.mean[X] && robot.mean[FORWARD] == ekf.mean[FORWARD]);
     }
-    params.velocity_states = 0;
-    assert_int_equal(bslam_ekf_check_motion(&params, &bad[0]), BSLAM_OK);
+    settings.velocity_states = 0;
+    assert_int_equal(bslam_ekf_check_motion(&settings, &bad[0]), BSLAM_OK);
 }
 
 // ---- interruptions ----------------------------------------------------------------------------------------
 
 static void test_resume_adds_the_doubt_to_the_pose_alone(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     unit_random_t random = {5};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     twin_t expected = twin_of(&ekf);
     expected.covariance.at[X][X] += 4;
     expected.covariance.at[Y][Y] += 4;
     expected.covariance.at[THETA][THETA] += 0.25;
-    bslam_ekf_resume(&ekf, &params, 4, BSLAM_R(0.25));
+    bslam_ekf_resume(&ekf, &settings, 4, BSLAM_R(0.25));
     twin_assert(&ekf, &expected, 8 * UNIT_ROUNDING * 4);
 }
 
 static void test_resume_time_and_again_does_not_add_up_beyond_lost(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     unit_random_t random = {6};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     twin_t expected = twin_of(&ekf);
     for (int i = 0; i < 1000; i++) {
-        bslam_ekf_resume(&ekf, &params, 900, 10);
+        bslam_ekf_resume(&ekf, &settings, 900, 10);
     }
     expected.covariance.at[X][X] = expected.covariance.at[Y][Y] = 30 * 30;
     expected.covariance.at[THETA][THETA] = 3.2 * 3.2;
     twin_assert(&ekf, &expected, 8 * UNIT_ROUNDING * 900);
     // What is more doubtful than that already stays so.
     bslam_symmat_set(ekf.covariance, X, X, 1000);
-    bslam_ekf_resume(&ekf, &params, 900, 10);
+    bslam_ekf_resume(&ekf, &settings, 900, 10);
     assert_true(bslam_symmat_get(ekf.covariance, X, X) == 1000);
 }
 
 static void test_resume_with_velocity_states_stands_still_as_at_the_start(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
     unit_random_t random = {7};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     twin_t expected = twin_of(&ekf);
     for (int k = FORWARD; k <= TURN; k++) {
         expected.mean.at[k][0] = 0;
@@ -375,18 +375,18 @@ static void test_resume_with_velocity_states_stands_still_as_at_the_start(void *
     }
     expected.covariance.at[FORWARD][FORWARD] = 0.4 * 0.4;
     expected.covariance.at[TURN][TURN] = 0.5 * 0.5;
-    bslam_ekf_resume(&ekf, &params, 0, 0);
+    bslam_ekf_resume(&ekf, &settings, 0, 0);
     twin_assert(&ekf, &expected, 4 * UNIT_ROUNDING);
 }
 
 static void test_resume_with_scale_states_keeps_them(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.scale_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.scale_states = 1;
     unit_random_t random = {8};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t expected = twin_of(&ekf);
-    bslam_ekf_resume(&ekf, &params, 0, 0);
+    bslam_ekf_resume(&ekf, &settings, 0, 0);
     twin_assert(&ekf, &expected, 0);
 }
 
@@ -394,10 +394,10 @@ static void test_resume_with_scale_states_keeps_them(void **state)
 
 static void test_init_knows_its_pose_exactly_and_has_no_beacons(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_ekf_t ekf;
     memset(&ekf, 0xff, sizeof ekf);
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     const twin_t expected = {.mean = dense_zero(3, 1), .covariance = dense_zero(3, 3)};
     twin_assert(&ekf, &expected, 0);
     assert_int_equal(ekf.beacon_count, 0);
@@ -406,10 +406,10 @@ static void test_init_knows_its_pose_exactly_and_has_no_beacons(void **state)
 
 static void test_init_with_velocity_states_stands_still_within_their_deviations(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     twin_t expected = {.mean = dense_zero(5, 1), .covariance = dense_zero(5, 5)};
     expected.covariance.at[FORWARD][FORWARD] = 0.4 * 0.4;
     expected.covariance.at[TURN][TURN] = 0.5 * 0.5;
@@ -418,12 +418,12 @@ static void test_init_with_velocity_states_stands_still_within_their_deviations(
 
 static void test_init_with_scale_states_starts_at_the_given_scales(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.scale_states = 1;
-    params.forward_scale = BSLAM_R(1.5);
-    params.turn_scale = BSLAM_R(0.75);
+    bslam_settings_t settings = unit_params();
+    settings.scale_states = 1;
+    settings.forward_scale = BSLAM_R(1.5);
+    settings.turn_scale = BSLAM_R(0.75);
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     twin_t expected = {.mean = dense_zero(5, 1), .covariance = dense_zero(5, 5)};
     expected.mean.at[FORWARD][0] = 1.5;
     expected.mean.at[TURN][0] = 0.75;

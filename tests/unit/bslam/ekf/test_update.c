@@ -60,7 +60,7 @@ static void append(measurement_t *m, const dense_t *rows, int row, double y, dou
 }
 
 /// Adds a sighting's rows. `weight` divides its noise.
-static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const plan_t *plan,
+static void measure(const bslam_ekf_t *ekf, const bslam_settings_t *settings, const plan_t *plan,
                     const bslam_sighting_t *sighting, double weight, measurement_t *m)
 {
     const dense_t rows = twin_rows(ekf, &mount, plan->beacon);
@@ -69,16 +69,16 @@ static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const 
     double bearing_rad;
     twin_values(ekf, state);
     twin_observe(ekf, &mount, plan->beacon, state, &range_m, &bearing_rad);
-    const double bearing_sd = (double)params->bearing_sd_rad;
-    const double factor = plan->has_range ? 1 : (double)params->bearing_only_variance_factor;
+    const double bearing_sd = (double)settings->bearing_sd_rad;
+    const double factor = plan->has_range ? 1 : (double)settings->bearing_only_variance_factor;
     append(m, &rows, 1, unit_angle_between((double)sighting->bearing_rad, bearing_rad),
            bearing_sd * bearing_sd * factor / weight);
     if (plan->has_range) {
-        const double floor_m = (double)params->range_sd_floor_m;
-        const double fraction_m = (double)params->range_sd_fraction * range_m;
-        const double quadratic_m = (double)params->range_sd_per_m * range_m * range_m;
+        const double floor_m = (double)settings->range_sd_floor_m;
+        const double fraction_m = (double)settings->range_sd_fraction * range_m;
+        const double quadratic_m = (double)settings->range_sd_per_m * range_m * range_m;
         const bool is_sized = ekf->beacons[plan->beacon].kind == BSLAM_BEACON_SIZED;
-        const double common_m = is_sized ? 0 : (double)params->range_scale_sd * range_m;
+        const double common_m = is_sized ? 0 : (double)settings->range_scale_sd * range_m;
         append(
             m, &rows, 0, (double)sighting->range_m - range_m,
             (floor_m * floor_m + fraction_m * fraction_m + quadratic_m * quadratic_m + common_m * common_m) /
@@ -86,56 +86,56 @@ static void measure(const bslam_ekf_t *ekf, const bslam_params_t *params, const 
     }
 }
 
-static bslam_innovation_t innovation_of(const bslam_ekf_t *ekf, const bslam_params_t *params, int beacon,
+static bslam_innovation_t innovation_of(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int beacon,
                                         const bslam_sighting_t *sighting)
 {
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(ekf, params, &mount, sighting, beacon, &innovation), BSLAM_OK);
+    assert_int_equal(bslam_ekf_innovation(ekf, settings, &mount, sighting, beacon, &innovation), BSLAM_OK);
     return innovation;
 }
 
-static bslam_status_t fuse(bslam_ekf_t *ekf, const bslam_params_t *params, int beacon,
+static bslam_status_t fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings, int beacon,
                            const bslam_sighting_t *sighting, bslam_fusion_t *fusion)
 {
-    const bslam_innovation_t innovation = innovation_of(ekf, params, beacon, sighting);
-    return bslam_ekf_fuse(ekf, params, &innovation, fusion);
+    const bslam_innovation_t innovation = innovation_of(ekf, settings, beacon, sighting);
+    return bslam_ekf_fuse(ekf, settings, &innovation, fusion);
 }
 
 /// Fuses all plans in one frame, in C and as one batch of the textbook, and compares.
-static void assert_frame_is_the_textbooks(bslam_ekf_t *ekf, const bslam_params_t *params, const plan_t *plans,
-                                          int count)
+static void assert_frame_is_the_textbooks(bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                          const plan_t *plans, int count)
 {
     measurement_t m = {0};
     bslam_sighting_t sightings[SIGHTINGS_MAX];
     for (int i = 0; i < count; i++) {
         sightings[i] = sighting_of(ekf, &plans[i]);
-        measure(ekf, params, &plans[i], &sightings[i], 1, &m);
+        measure(ekf, settings, &plans[i], &sightings[i], 1, &m);
     }
     twin_t expected = twin_of(ekf);
-    twin_update(ekf, params->filter, &m.h, &m.y, &m.r, &expected);
+    twin_update(ekf, settings->filter, &m.h, &m.y, &m.r, &expected);
     for (int i = 0; i < count; i++) {
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(ekf, params, plans[i].beacon, &sightings[i], &fusion), BSLAM_OK);
+        assert_int_equal(fuse(ekf, settings, plans[i].beacon, &sightings[i], &fusion), BSLAM_OK);
         assert_true(fusion.weight == 1);
     }
-    bslam_ekf_correct(ekf, params);
+    bslam_ekf_correct(ekf, settings);
     twin_assert(ekf, &expected, TOLERANCE);
 }
 
 /// A random filter with three points and two rays.
-static bslam_ekf_t random_filter(const bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t random_filter(const bslam_settings_t *settings, unit_random_t *random)
 {
     bslam_ekf_t ekf;
-    twin_randomise(&ekf, params, random, 3, 2);
+    twin_randomise(&ekf, settings, random, 3, 2);
     return ekf;
 }
 
-static bslam_params_t params_of(int filter, bool velocity)
+static bslam_settings_t params_of(int filter, bool velocity)
 {
-    bslam_params_t params = unit_params();
-    params.filter = filter;
-    params.velocity_states = velocity ? 1 : 0;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.filter = filter;
+    settings.velocity_states = velocity ? 1 : 0;
+    return settings;
 }
 
 // ---- one frame --------------------------------------------------------------------------------------------
@@ -144,16 +144,16 @@ static void assert_every_count_is_the_textbooks(int filter, bool velocity)
 {
     // From 1 to 7 sightings, 1 to 11 scalars wait: below, at and beyond what one pass over the triangle
     // takes.
-    const bslam_params_t params = params_of(filter, velocity);
+    const bslam_settings_t settings = params_of(filter, velocity);
     unit_random_t random = {1};
     for (int round = 0; round < 5; round++) {
         for (int count = 1; count <= 7; count++) {
-            bslam_ekf_t ekf = random_filter(&params, &random);
+            bslam_ekf_t ekf = random_filter(&settings, &random);
             plan_t plans[SIGHTINGS_MAX];
             for (int i = 0; i < count; i++) {
                 plans[i] = random_plan(&random, i % 5, i % 5 < 3 && (i + round) % 3 != 0);
             }
-            assert_frame_is_the_textbooks(&ekf, &params, plans, count);
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, count);
         }
     }
 }
@@ -181,26 +181,26 @@ static void test_fuse_invariant_with_velocity_states_is_the_batch_update(void **
 static void test_fuse_distance_of_a_ray_is_the_batch_update(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        const bslam_params_t params = params_of(filter, false);
+        const bslam_settings_t settings = params_of(filter, false);
         unit_random_t random = {2};
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const plan_t plans[] = {random_plan(&random, 3, true), random_plan(&random, 4, true)};
-        assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+        assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
     }
 }
 
 static void test_fuse_sized_beacons_among_rays_is_the_batch_update(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_params_t params = params_of(filter, true);
-        params.range_scale_sd = BSLAM_R(0.1);
+        bslam_settings_t settings = params_of(filter, true);
+        settings.range_scale_sd = BSLAM_R(0.1);
         unit_random_t random = {2};
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         assert_int_equal(ekf.beacons[1].kind, BSLAM_BEACON_SIZED);
         for (int frame = 0; frame < 5; frame++) {
             const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, false),
                                     random_plan(&random, 2, true), random_plan(&random, 3, true)};
-            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
         }
     }
 }
@@ -208,21 +208,21 @@ static void test_fuse_sized_beacons_among_rays_is_the_batch_update(void **state)
 static void test_fuse_frames_in_a_row_are_the_textbooks(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        const bslam_params_t params = params_of(filter, true);
+        const bslam_settings_t settings = params_of(filter, true);
         unit_random_t random = {3};
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         for (int frame = 0; frame < 10; frame++) {
             const plan_t plans[] = {random_plan(&random, frame % 3, true), random_plan(&random, 3, false)};
-            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
         }
     }
 }
 
 static void test_fuse_order_within_a_frame_does_not_matter(void **state)
 {
-    const bslam_params_t params = params_of(1, true);
+    const bslam_settings_t settings = params_of(1, true);
     unit_random_t random = {4};
-    bslam_ekf_t forwards = random_filter(&params, &random);
+    bslam_ekf_t forwards = random_filter(&settings, &random);
     bslam_ekf_t backwards = forwards;
     bslam_sighting_t sightings[5];
     for (int i = 0; i < 5; i++) {
@@ -231,11 +231,11 @@ static void test_fuse_order_within_a_frame_does_not_matter(void **state)
     }
     for (int i = 0; i < 5; i++) {
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(&forwards, &params, i, &sightings[i], &fusion), BSLAM_OK);
-        assert_int_equal(fuse(&backwards, &params, 4 - i, &sightings[4 - i], &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&forwards, &settings, i, &sightings[i], &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&backwards, &settings, 4 - i, &sightings[4 - i], &fusion), BSLAM_OK);
     }
-    bslam_ekf_correct(&forwards, &params);
-    bslam_ekf_correct(&backwards, &params);
+    bslam_ekf_correct(&forwards, &settings);
+    bslam_ekf_correct(&backwards, &settings);
     const twin_t expected = twin_of(&forwards);
     twin_assert(&backwards, &expected, BSLAM_REAL_DOUBLE ? 1e-12 : 3e-4);
 }
@@ -243,17 +243,17 @@ static void test_fuse_order_within_a_frame_does_not_matter(void **state)
 static void test_fuse_known_beacon_corrects_the_robot_and_stays(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        const bslam_params_t params = params_of(filter, false);
+        const bslam_settings_t settings = params_of(filter, false);
         unit_random_t random = {5};
         bslam_ekf_t ekf;
-        twin_randomise(&ekf, &params, &random, 2, 0);
+        twin_randomise(&ekf, &settings, &random, 2, 0);
         int index;
         const bslam_real_t x = ekf.mean[BSLAM_STATE_X] + 4;
         const bslam_real_t y = ekf.mean[BSLAM_STATE_Y] - 3;
         assert_int_equal(bslam_ekf_add_known(&ekf, x, y, &index), BSLAM_OK);
         for (int frame = 0; frame < 5; frame++) {
             const plan_t plans[] = {random_plan(&random, index, true), random_plan(&random, 0, true)};
-            assert_frame_is_the_textbooks(&ekf, &params, plans, COUNT_OF(plans));
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
         }
         bslam_real_t known_x;
         bslam_real_t known_y;
@@ -266,16 +266,16 @@ static void test_fuse_known_beacon_corrects_the_robot_and_stays(void **state)
 
 static void test_fuse_leaves_mean_alone_until_correct(void **state)
 {
-    const bslam_params_t params = params_of(1, true);
+    const bslam_settings_t settings = params_of(1, true);
     unit_random_t random = {6};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     bslam_real_t before[BSLAM_STATE_PADDED];
     memcpy(before, ekf.mean, sizeof before);
     const plan_t plan = random_plan(&random, 0, true);
     const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
     for (int i = 0; i < 6; i++) {
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&ekf, &settings, 0, &sighting, &fusion), BSLAM_OK);
         assert_memory_equal(before, ekf.mean, sizeof before);
     }
 }
@@ -283,12 +283,12 @@ static void test_fuse_leaves_mean_alone_until_correct(void **state)
 static void test_correct_without_a_sighting_changes_no_bit(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        const bslam_params_t params = params_of(filter, true);
+        const bslam_settings_t settings = params_of(filter, true);
         unit_random_t random = {7};
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         bslam_ekf_t before;
         memcpy(&before, &ekf, sizeof ekf);
-        bslam_ekf_correct(&ekf, &params);
+        bslam_ekf_correct(&ekf, &settings);
         assert_memory_equal(&ekf, &before, sizeof ekf);
     }
 }
@@ -307,15 +307,15 @@ static double distance2_of(const measurement_t *m, const dense_t *covariance)
 
 static void test_distance2_is_the_textbooks(void **state)
 {
-    const bslam_params_t params = params_of(0, true);
+    const bslam_settings_t settings = params_of(0, true);
     unit_random_t random = {8};
     for (int i = 0; i < 50; i++) {
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const plan_t plan = random_plan(&random, i % 5, i % 2 == 0);
         const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
         measurement_t m = {0};
-        measure(&ekf, &params, &plan, &sighting, 1, &m);
-        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        measure(&ekf, &settings, &plan, &sighting, 1, &m);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &settings, plan.beacon, &sighting);
         bslam_real_t distance2;
         assert_int_equal(bslam_ekf_distance2(&ekf, &innovation, &distance2), BSLAM_OK);
         const twin_t twin = twin_of(&ekf);
@@ -326,22 +326,22 @@ static void test_distance2_is_the_textbooks(void **state)
 
 static void test_fuse_distance2_is_given_what_was_fused_before(void **state)
 {
-    const bslam_params_t params = params_of(0, false);
+    const bslam_settings_t settings = params_of(0, false);
     unit_random_t random = {9};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, true)};
     const bslam_sighting_t sightings[] = {sighting_of(&ekf, &plans[0]), sighting_of(&ekf, &plans[1])};
     measurement_t first = {0};
     measurement_t both = {0};
-    measure(&ekf, &params, &plans[0], &sightings[0], 1, &first);
-    measure(&ekf, &params, &plans[0], &sightings[0], 1, &both);
-    measure(&ekf, &params, &plans[1], &sightings[1], 1, &both);
+    measure(&ekf, &settings, &plans[0], &sightings[0], 1, &first);
+    measure(&ekf, &settings, &plans[0], &sightings[0], 1, &both);
+    measure(&ekf, &settings, &plans[1], &sightings[1], 1, &both);
     const twin_t twin = twin_of(&ekf);
     bslam_fusion_t fusion;
-    assert_int_equal(fuse(&ekf, &params, 0, &sightings[0], &fusion), BSLAM_OK);
+    assert_int_equal(fuse(&ekf, &settings, 0, &sightings[0], &fusion), BSLAM_OK);
     const double first_d2 = distance2_of(&first, &twin.covariance);
     assert_near(fusion.distance2, first_d2, TOLERANCE * (1 + first_d2));
-    assert_int_equal(fuse(&ekf, &params, 1, &sightings[1], &fusion), BSLAM_OK);
+    assert_int_equal(fuse(&ekf, &settings, 1, &sightings[1], &fusion), BSLAM_OK);
     // The chain rule: d2 of both = d2 of the first + d2 of the second given the first.
     const double both_d2 = distance2_of(&both, &twin.covariance);
     assert_near(fusion.distance2, both_d2 - first_d2, TOLERANCE * (1 + both_d2));
@@ -349,43 +349,43 @@ static void test_fuse_distance2_is_given_what_was_fused_before(void **state)
 
 static void test_fuse_distance2_without_a_distance_is_that_of_the_direction(void **state)
 {
-    const bslam_params_t params = params_of(0, false);
+    const bslam_settings_t settings = params_of(0, false);
     unit_random_t random = {19};
     for (int i = 0; i < 10; i++) {
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const plan_t plan = random_plan(&random, i % 5, false);
         const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
         measurement_t m = {0};
-        measure(&ekf, &params, &plan, &sighting, 1, &m);
+        measure(&ekf, &settings, &plan, &sighting, 1, &m);
         const twin_t twin = twin_of(&ekf);
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(&ekf, &params, plan.beacon, &sighting, &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&ekf, &settings, plan.beacon, &sighting, &fusion), BSLAM_OK);
         assert_near(fusion.distance2, distance2_of(&m, &twin.covariance), TOLERANCE);
     }
 }
 
 static void test_fuse_just_inside_and_outside_the_gate(void **state)
 {
-    bslam_params_t params = params_of(1, false);
+    bslam_settings_t settings = params_of(1, false);
     unit_random_t random = {10};
-    const bslam_ekf_t ekf = random_filter(&params, &random);
+    const bslam_ekf_t ekf = random_filter(&settings, &random);
     const plan_t plan = random_plan(&random, 0, true);
     const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
     bslam_ekf_t copy = ekf;
     bslam_fusion_t fusion;
-    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_OK);
+    assert_int_equal(fuse(&copy, &settings, 0, &sighting, &fusion), BSLAM_OK);
     const bslam_real_t distance2 = fusion.distance2;
 
     copy = ekf;
-    params.gate_d2 = distance2;
-    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_OK);
+    settings.gate_d2 = distance2;
+    assert_int_equal(fuse(&copy, &settings, 0, &sighting, &fusion), BSLAM_OK);
     assert_true(fusion.weight == 1);
 
     copy = ekf;
-    params.gate_d2 = distance2 * real(0.999);
-    assert_int_equal(fuse(&copy, &params, 0, &sighting, &fusion), BSLAM_E_RANGE);
+    settings.gate_d2 = distance2 * real(0.999);
+    assert_int_equal(fuse(&copy, &settings, 0, &sighting, &fusion), BSLAM_E_RANGE);
     assert_true(fusion.weight == 0 && fusion.distance2 == distance2);
-    bslam_ekf_correct(&copy, &params);
+    bslam_ekf_correct(&copy, &settings);
     assert_memory_equal(copy.mean, ekf.mean, sizeof ekf.mean);
     assert_memory_equal(copy.covariance, ekf.covariance, sizeof ekf.covariance);
 }
@@ -395,9 +395,9 @@ static void test_fuse_gated_sighting_between_others_has_no_effect(void **state)
     for (int filter = 0; filter <= 1; filter++) {
         // However many columns wait when it comes.
         for (int before = 1; before <= 4; before++) {
-            bslam_params_t params = params_of(filter, false);
+            bslam_settings_t settings = params_of(filter, false);
             unit_random_t random = {11};
-            bslam_ekf_t ekf = random_filter(&params, &random);
+            bslam_ekf_t ekf = random_filter(&settings, &random);
             bslam_ekf_t without = ekf;
             const plan_t outlier = {0, true, 3, 0.5};
             const bslam_sighting_t wrong = sighting_of(&ekf, &outlier);
@@ -405,13 +405,13 @@ static void test_fuse_gated_sighting_between_others_has_no_effect(void **state)
             for (int i = 0; i < before; i++) {
                 const plan_t plan = {i, i < 3, 0.01, 0.001};
                 const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
-                assert_int_equal(fuse(&ekf, &params, i, &sighting, &fusion), BSLAM_OK);
-                assert_int_equal(fuse(&without, &params, i, &sighting, &fusion), BSLAM_OK);
+                assert_int_equal(fuse(&ekf, &settings, i, &sighting, &fusion), BSLAM_OK);
+                assert_int_equal(fuse(&without, &settings, i, &sighting, &fusion), BSLAM_OK);
             }
-            params.gate_d2 = 9;
-            assert_int_equal(fuse(&ekf, &params, 0, &wrong, &fusion), BSLAM_E_RANGE);
-            bslam_ekf_correct(&ekf, &params);
-            bslam_ekf_correct(&without, &params);
+            settings.gate_d2 = 9;
+            assert_int_equal(fuse(&ekf, &settings, 0, &wrong, &fusion), BSLAM_E_RANGE);
+            bslam_ekf_correct(&ekf, &settings);
+            bslam_ekf_correct(&without, &settings);
             const twin_t expected = twin_of(&without);
             // Whether the down-dates were flushed before or after changes the last bits.
             twin_assert(&ekf, &expected, 16 * UNIT_ROUNDING * 8);
@@ -422,39 +422,39 @@ static void test_fuse_gated_sighting_between_others_has_no_effect(void **state)
 static void test_fuse_beyond_huber_counts_less(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_params_t params = params_of(filter, false);
+        bslam_settings_t settings = params_of(filter, false);
         unit_random_t random = {12};
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         const plan_t plan = {0, true, 0.4, 0.1};
         const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
         measurement_t plain = {0};
-        measure(&ekf, &params, &plan, &sighting, 1, &plain);
+        measure(&ekf, &settings, &plan, &sighting, 1, &plain);
         twin_t expected = twin_of(&ekf);
         const double d = sqrt(distance2_of(&plain, &expected.covariance));
 
-        params.huber_d = real(d / 4);
+        settings.huber_d = real(d / 4);
         measurement_t weighted = {0};
-        measure(&ekf, &params, &plan, &sighting, 0.25, &weighted);
+        measure(&ekf, &settings, &plan, &sighting, 0.25, &weighted);
         twin_update(&ekf, filter, &weighted.h, &weighted.y, &weighted.r, &expected);
         bslam_fusion_t fusion;
-        assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+        assert_int_equal(fuse(&ekf, &settings, 0, &sighting, &fusion), BSLAM_OK);
         assert_near(fusion.weight, 0.25, TOLERANCE);
         assert_near(fusion.distance2, d * d, TOLERANCE * (1 + d * d));
-        bslam_ekf_correct(&ekf, &params);
+        bslam_ekf_correct(&ekf, &settings);
         twin_assert(&ekf, &expected, TOLERANCE);
     }
 }
 
 static void test_fuse_within_huber_has_full_weight(void **state)
 {
-    bslam_params_t params = params_of(0, false);
+    bslam_settings_t settings = params_of(0, false);
     unit_random_t random = {13};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const plan_t plan = {0, true, 0.4, 0.1};
     const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
-    params.huber_d = 1000;
+    settings.huber_d = 1000;
     bslam_fusion_t fusion;
-    assert_int_equal(fuse(&ekf, &params, 0, &sighting, &fusion), BSLAM_OK);
+    assert_int_equal(fuse(&ekf, &settings, 0, &sighting, &fusion), BSLAM_OK);
     assert_true(fusion.weight == 1);
 }
 
@@ -497,15 +497,15 @@ static void forget_heading(bslam_ekf_t *ekf)
 static void test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model(void **state)
 {
     // With the heading known: where it is not, the bend depends on the coordinates of the error.
-    bslam_params_t params = params_of(0, false);
-    params.bearing_only_curvature_factor = 3;
+    bslam_settings_t settings = params_of(0, false);
+    settings.bearing_only_curvature_factor = 3;
     unit_random_t random = {16};
     for (int i = 0; i < 20; i++) {
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         forget_heading(&ekf);
         const plan_t plan = random_plan(&random, i % 3, false);
         const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
-        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &settings, plan.beacon, &sighting);
         const double expected = 0.02 * 0.02 * 2 + 3 * bend_by_hessian(&ekf, plan.beacon);
         // Differences of gradients: step² in double; in float the mean's own rounding over the step.
         assert_near(innovation.bearing_var_rad2, expected, expected * (BSLAM_REAL_DOUBLE ? 1e-4 : 1e-2));
@@ -517,15 +517,15 @@ static void test_innovation_in_direction_only_grows_with_doubt_of_length_and_dir
     // MATH "Bearing-only": e P eᵀ b P bᵀ + (e P bᵀ)², where b is the direction's row of H and e the
     // gradient of the log of the length: a point's distance, a ray's |g|, g = inverse (anchor - sensor) +
     // direction.
-    bslam_params_t params = params_of(0, false);
-    params.bearing_only_curvature_factor = 3;
+    bslam_settings_t settings = params_of(0, false);
+    settings.bearing_only_curvature_factor = 3;
     unit_random_t random = {17};
     for (int i = 0; i < 50; i++) {
-        const bslam_ekf_t ekf = random_filter(&params, &random);
+        const bslam_ekf_t ekf = random_filter(&settings, &random);
         const int beacon = i % 5;
         const plan_t plan = random_plan(&random, beacon, false);
         const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
-        const bslam_innovation_t innovation = innovation_of(&ekf, &params, beacon, &sighting);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &settings, beacon, &sighting);
         double values[DENSE_MAX];
         double range_m;
         double bearing_rad;
@@ -548,13 +548,13 @@ static void test_innovation_in_direction_only_grows_with_doubt_of_length_and_dir
 
 static void test_innovation_with_a_distance_has_no_bend(void **state)
 {
-    bslam_params_t params = params_of(0, false);
-    params.bearing_only_curvature_factor = 3;
+    bslam_settings_t settings = params_of(0, false);
+    settings.bearing_only_curvature_factor = 3;
     unit_random_t random = {18};
-    const bslam_ekf_t ekf = random_filter(&params, &random);
+    const bslam_ekf_t ekf = random_filter(&settings, &random);
     const plan_t plan = random_plan(&random, 0, true);
     const bslam_sighting_t sighting = sighting_of(&ekf, &plan);
-    const bslam_innovation_t innovation = innovation_of(&ekf, &params, 0, &sighting);
+    const bslam_innovation_t innovation = innovation_of(&ekf, &settings, 0, &sighting);
     assert_near(innovation.bearing_var_rad2, 0.02 * 0.02, UNIT_ROUNDING * 1e-3);
 }
 
@@ -562,39 +562,39 @@ static void test_innovation_with_a_distance_has_no_bend(void **state)
 
 static void test_innovation_of_a_beacon_at_the_sensor_is_singular(void **state)
 {
-    const bslam_params_t params = params_of(0, false);
+    const bslam_settings_t settings = params_of(0, false);
     const bslam_pose_t at_origin = {0, 0, 0};
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, &params);
+    bslam_ekf_init(&ekf, &settings);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, 0, 0, &index), BSLAM_OK);
     const bslam_sighting_t sighting = unit_polar(0, 1, 0);
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(&ekf, &params, &at_origin, &sighting, index, &innovation),
+    assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &at_origin, &sighting, index, &innovation),
                      BSLAM_E_SINGULAR);
 }
 
 static void test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular(void **state)
 {
-    const bslam_params_t params = params_of(0, false);
+    const bslam_settings_t settings = params_of(0, false);
     unit_random_t random = {14};
-    bslam_ekf_t ekf = random_filter(&params, &random);
+    bslam_ekf_t ekf = random_filter(&settings, &random);
     const bslam_sighting_t direction = unit_direction(0.1, 0);
     const bslam_sighting_t polar = unit_polar(0.1, 3, 0);
     static const double inverses[] = {0, -0.1};
     for (int i = 0; i < COUNT_OF(inverses); i++) {
         ekf.mean[ekf.beacons[3].at + 3] = real(inverses[i]);
         bslam_innovation_t innovation;
-        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &mount, &direction, 3, &innovation), BSLAM_OK);
-        assert_int_equal(bslam_ekf_innovation(&ekf, &params, &mount, &polar, 3, &innovation),
+        assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &mount, &direction, 3, &innovation), BSLAM_OK);
+        assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &mount, &polar, 3, &innovation),
                          BSLAM_E_SINGULAR);
     }
 }
 
 /// A filter whose S is not positive definite for beacon 0.
-static bslam_ekf_t broken_filter(const bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t broken_filter(const bslam_settings_t *settings, unit_random_t *random)
 {
-    bslam_ekf_t ekf = random_filter(params, random);
+    bslam_ekf_t ekf = random_filter(settings, random);
     for (int i = 0; i < ekf.dim; i++) {
         bslam_symmat_set(ekf.covariance, i, i, -1);
     }
@@ -603,19 +603,19 @@ static bslam_ekf_t broken_filter(const bslam_params_t *params, unit_random_t *ra
 
 static void test_fuse_and_distance2_of_an_indefinite_state_are_singular(void **state)
 {
-    const bslam_params_t params = params_of(1, false);
+    const bslam_settings_t settings = params_of(1, false);
     unit_random_t random = {15};
     const plan_t plans[] = {{0, true, 0, 0}, {0, false, 0, 0}};
     for (int i = 0; i < COUNT_OF(plans); i++) {
-        bslam_ekf_t ekf = broken_filter(&params, &random);
+        bslam_ekf_t ekf = broken_filter(&settings, &random);
         const bslam_ekf_t before = ekf;
         const bslam_sighting_t sighting = sighting_of(&ekf, &plans[i]);
-        const bslam_innovation_t innovation = innovation_of(&ekf, &params, 0, &sighting);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &settings, 0, &sighting);
         bslam_real_t distance2;
         bslam_fusion_t fusion;
         assert_int_equal(bslam_ekf_distance2(&ekf, &innovation, &distance2), BSLAM_E_SINGULAR);
-        assert_int_equal(bslam_ekf_fuse(&ekf, &params, &innovation, &fusion), BSLAM_E_SINGULAR);
-        bslam_ekf_correct(&ekf, &params);
+        assert_int_equal(bslam_ekf_fuse(&ekf, &settings, &innovation, &fusion), BSLAM_E_SINGULAR);
+        bslam_ekf_correct(&ekf, &settings);
         assert_memory_equal(ekf.mean, before.mean, sizeof before.mean);
         assert_memory_equal(ekf.covariance, before.covariance, sizeof before.covariance);
     }
@@ -642,12 +642,12 @@ static double largest_correlation(const bslam_ekf_t *ekf)
 static void assert_one_accurate_sighting_leaves_correlations_possible(int filter, double range_sd_m,
                                                                       double bearing_sd_rad)
 {
-    const bslam_params_t params = params_of(filter, false);
+    const bslam_settings_t settings = params_of(filter, false);
     unit_random_t random = {21};
     for (int round = 0; round < 2000; round++) {
-        bslam_ekf_t ekf = random_filter(&params, &random);
+        bslam_ekf_t ekf = random_filter(&settings, &random);
         if (round % 2 == 0) {
-            bslam_ekf_resume(&ekf, &params, 400, BSLAM_R(0.01));
+            bslam_ekf_resume(&ekf, &settings, 400, BSLAM_R(0.01));
         } else {
             const bslam_pose_t pose = bslam_ekf_pose(&ekf);
             bslam_ekf_set_pose(&ekf, &pose, 400, BSLAM_R(0.01));
@@ -656,10 +656,10 @@ static void assert_one_accurate_sighting_leaves_correlations_possible(int filter
         bslam_sighting_t sighting = sighting_of(&ekf, &plan);
         sighting.range_sd_m = (bslam_real_t)range_sd_m;
         sighting.bearing_sd_rad = (bslam_real_t)bearing_sd_rad;
-        const bslam_innovation_t innovation = innovation_of(&ekf, &params, plan.beacon, &sighting);
+        const bslam_innovation_t innovation = innovation_of(&ekf, &settings, plan.beacon, &sighting);
         bslam_fusion_t fusion;
-        assert_int_equal(bslam_ekf_fuse(&ekf, &params, &innovation, &fusion), BSLAM_OK);
-        bslam_ekf_correct(&ekf, &params);
+        assert_int_equal(bslam_ekf_fuse(&ekf, &settings, &innovation, &fusion), BSLAM_OK);
+        bslam_ekf_correct(&ekf, &settings);
         assert_true(bslam_ekf_is_sane(&ekf));
         assert_true(largest_correlation(&ekf) <= 1);
     }
@@ -675,17 +675,17 @@ static void test_fuse_after_a_doubt_of_20_m_leaves_correlations_possible(void **
 
 /// A robot in great doubt of where it is starts two beacons a few millimetres from its sensor and moves by as
 /// much: of what the rows look at, each value is in doubt by metres, and all have the same doubt.
-static bslam_ekf_t filter_close_by(const bslam_params_t *params, unit_random_t *random)
+static bslam_ekf_t filter_close_by(const bslam_settings_t *settings, unit_random_t *random)
 {
     bslam_ekf_t ekf;
-    bslam_ekf_init(&ekf, params);
+    bslam_ekf_init(&ekf, settings);
     const bslam_real_t doubt_m2 = (bslam_real_t)unit_random(random, 1, 400);
-    bslam_ekf_resume(&ekf, params, doubt_m2, (bslam_real_t)unit_random(random, 0.01, 10));
+    bslam_ekf_resume(&ekf, settings, doubt_m2, (bslam_real_t)unit_random(random, 0.01, 10));
     for (int b = 0; b < 2; b++) {
         int index;
         const double range_m = unit_random(random, 0.001, 0.01);
         const bslam_sighting_t sighting = unit_polar(unit_random(random, -3, 3), range_m, b);
-        assert_int_equal(bslam_ekf_add(&ekf, params, &mount, &sighting, &index), BSLAM_OK);
+        assert_int_equal(bslam_ekf_add(&ekf, settings, &mount, &sighting, &index), BSLAM_OK);
     }
     const bslam_motion_t motion = {.forward_m = (bslam_real_t)unit_random(random, -0.005, 0.005),
                                    .turn_rad = (bslam_real_t)unit_random(random, -0.02, 0.02),
@@ -693,7 +693,7 @@ static bslam_ekf_t filter_close_by(const bslam_params_t *params, unit_random_t *
                                    .turn_var_rad2 = BSLAM_R(1e-4),
                                    .dt_s = BSLAM_R(0.04)};
     bslam_motion_t moved;
-    bslam_ekf_predict(&ekf, params, &motion, &moved);
+    bslam_ekf_predict(&ekf, settings, &motion, &moved);
     return ekf;
 }
 
@@ -716,7 +716,7 @@ static double largest_excess(const bslam_ekf_t *ekf, const bslam_ekf_t *before)
 
 /// Fuses sightings of the first `count` beacons, those whose direction and distance float can still tell.
 /// Returns how many.
-static int see_close_by(bslam_ekf_t *ekf, const bslam_params_t *params, int count, bool has_range)
+static int see_close_by(bslam_ekf_t *ekf, const bslam_settings_t *settings, int count, bool has_range)
 {
     int fused = 0;
     for (int b = 0; b < count; b++) {
@@ -724,29 +724,29 @@ static int see_close_by(bslam_ekf_t *ekf, const bslam_params_t *params, int coun
         const bslam_sighting_t sighting = sighting_of(ekf, &plan);
         bslam_innovation_t innovation;
         bslam_fusion_t fusion;
-        if (bslam_ekf_innovation(ekf, params, &mount, &sighting, b, &innovation) == BSLAM_OK &&
-            bslam_ekf_fuse(ekf, params, &innovation, &fusion) == BSLAM_OK) {
+        if (bslam_ekf_innovation(ekf, settings, &mount, &sighting, b, &innovation) == BSLAM_OK &&
+            bslam_ekf_fuse(ekf, settings, &innovation, &fusion) == BSLAM_OK) {
             fused++;
         }
     }
-    bslam_ekf_correct(ekf, params);
+    bslam_ekf_correct(ekf, settings);
     return fused;
 }
 
 /// set_pose: in between the robot is put where it is for sure, and the beacons alone share the doubt.
 static void assert_close_by_leaves_correlations_possible(int filter, bool velocity, bool set_pose)
 {
-    const bslam_params_t params = params_of(filter, velocity);
+    const bslam_settings_t settings = params_of(filter, velocity);
     unit_random_t random = {22};
     int fused = 0;
     for (int round = 0; round < 2000; round++) {
-        bslam_ekf_t ekf = filter_close_by(&params, &random);
+        bslam_ekf_t ekf = filter_close_by(&settings, &random);
         if (set_pose) {
             const bslam_pose_t pose = bslam_ekf_pose(&ekf);
             bslam_ekf_set_pose(&ekf, &pose, BSLAM_R(1e-6), BSLAM_R(1e-6));
         }
         const bslam_ekf_t before = ekf;
-        fused += see_close_by(&ekf, &params, 1 + round % 2, round % 3 != 0);
+        fused += see_close_by(&ekf, &settings, 1 + round % 2, round % 3 != 0);
         assert_true(bslam_ekf_is_sane(&ekf));
         assert_true(largest_excess(&ekf, &before) <= 2 * (double)BSLAM_REAL_EPSILON);  // four roundings
     }

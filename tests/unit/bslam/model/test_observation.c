@@ -383,73 +383,73 @@ static void test_locate_point_undoes_observe_point(void **state)
 
 static void test_range_variance_is_the_sum_of_its_three_parts(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.range_sd_floor_m = BSLAM_R(0.5);
-    params.range_sd_fraction = BSLAM_R(0.25);
-    params.range_sd_per_m = BSLAM_R(0.125);
+    bslam_settings_t settings = unit_params();
+    settings.range_sd_floor_m = BSLAM_R(0.5);
+    settings.range_sd_fraction = BSLAM_R(0.25);
+    settings.range_sd_per_m = BSLAM_R(0.125);
     const bslam_sighting_t sighting = {.range_m = 4, .has_range = true};
     // At 4 m: 0.25 + 1 + 4.
-    assert_near(bslam_range_variance_m2(&params, &sighting, 4), 5.25, 16 * UNIT_ROUNDING);
-    assert_near(bslam_range_variance_m2(&params, &sighting, 0), 0.25, UNIT_ROUNDING);
+    assert_near(bslam_range_variance_m2(&settings, &sighting, 4), 5.25, 16 * UNIT_ROUNDING);
+    assert_near(bslam_range_variance_m2(&settings, &sighting, 0), 0.25, UNIT_ROUNDING);
 }
 
 static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_sighting_t sighting = {.range_m = 4, .has_range = true, .range_sd_m = BSLAM_R(0.5)};
-    assert_near(bslam_range_variance_m2(&params, &sighting, 4), 0.25, 0);
-    assert_near(bslam_range_variance_m2(&params, &sighting, 8), 1, 0);
+    assert_near(bslam_range_variance_m2(&settings, &sighting, 4), 0.25, 0);
+    assert_near(bslam_range_variance_m2(&settings, &sighting, 8), 1, 0);
 }
 
 static void test_unknown_scale_is_the_detector_s_or_the_parameter_s(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.range_scale_sd = BSLAM_R(0.5);
+    bslam_settings_t settings = unit_params();
+    settings.range_scale_sd = BSLAM_R(0.5);
     bslam_sighting_t sighting = {.range_m = 4, .has_range = true};
-    assert_near(bslam_unknown_scale_var(&params, &sighting), 0.25, 0);
+    assert_near(bslam_unknown_scale_var(&settings, &sighting), 0.25, 0);
     sighting.range_scale_sd = BSLAM_R(0.125);
-    assert_near(bslam_unknown_scale_var(&params, &sighting), 0.015625, 0);
+    assert_near(bslam_unknown_scale_var(&settings, &sighting), 0.015625, 0);
 }
 
 static void test_correlation_factor_without_a_length_is_one(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.correlation_m = 0;
-    assert_near(bslam_correlation_factor(&params, 0), 1, 0);
-    assert_near(bslam_correlation_factor(&params, 5), 1, 0);
+    bslam_settings_t settings = unit_params();
+    settings.correlation_m = 0;
+    assert_near(bslam_correlation_factor(&settings, 0), 1, 0);
+    assert_near(bslam_correlation_factor(&settings, 5), 1, 0);
 }
 
 /// Of errors e_k with correlation rho from one to the next, a sighting adds (1 - rho) / (1 + rho) of its
 /// information: that is tanh(way / (2 length)), which the factor follows within 9 %.
 static void test_correlation_factor_is_that_of_a_first_order_process(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.correlation_m = BSLAM_R(0.5);
+    bslam_settings_t settings = unit_params();
+    settings.correlation_m = BSLAM_R(0.5);
     for (double travelled_m = 0.02; travelled_m < 5; travelled_m *= 1.3) {
         const double rho = exp(-travelled_m / 0.5);
         const double exact = (1 + rho) / (1 - rho);
-        assert_near(bslam_correlation_factor(&params, (bslam_real_t)travelled_m) / exact, 1, 0.09);
+        assert_near(bslam_correlation_factor(&settings, (bslam_real_t)travelled_m) / exact, 1, 0.09);
     }
 }
 
 static void test_correlation_factor_at_a_standstill_is_bounded(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.correlation_m = BSLAM_R(0.5);
-    assert_near(bslam_correlation_factor(&params, 0), 100.005, 1e-3);
+    bslam_settings_t settings = unit_params();
+    settings.correlation_m = BSLAM_R(0.5);
+    assert_near(bslam_correlation_factor(&settings, 0), 100.005, 1e-3);
 }
 
 static void test_bearing_variance_grows_by_its_factor_without_a_distance(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.bearing_sd_rad = BSLAM_R(0.5);
-    params.bearing_only_variance_factor = 3;
+    bslam_settings_t settings = unit_params();
+    settings.bearing_sd_rad = BSLAM_R(0.5);
+    settings.bearing_only_variance_factor = 3;
     bslam_sighting_t sighting = {.has_range = true};
-    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 0.25, 0);
+    assert_near(bslam_bearing_variance_rad2(&settings, &sighting), 0.25, 0);
     sighting.has_range = false;
-    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 0.75, 0);
+    assert_near(bslam_bearing_variance_rad2(&settings, &sighting), 0.75, 0);
     sighting.bearing_sd_rad = 1;
-    assert_near(bslam_bearing_variance_rad2(&params, &sighting), 3, 0);
+    assert_near(bslam_bearing_variance_rad2(&settings, &sighting), 3, 0);
 }
 
 int main(void)

@@ -58,33 +58,33 @@ static bslam_odometry_t started(void)
 }
 
 /// One whose tick reference is set too, at START_US.
-static bslam_odometry_t started_at_ticks(const bslam_params_t *params, uint32_t left, uint32_t right)
+static bslam_odometry_t started_at_ticks(const bslam_settings_t *settings, uint32_t left, uint32_t right)
 {
     bslam_odometry_t odometry;
     bslam_odometry_init(&odometry);
     const bslam_odometry_reading_t first = ticks(START_US, left, right);
     bslam_motion_t motion;
-    assert_int_equal(bslam_odometry_read(&odometry, params, &first, &motion), BSLAM_OK);
+    assert_int_equal(bslam_odometry_read(&odometry, settings, &first, &motion), BSLAM_OK);
     return odometry;
 }
 
-static bslam_motion_t read_ok(bslam_odometry_t *odometry, const bslam_params_t *params,
+static bslam_motion_t read_ok(bslam_odometry_t *odometry, const bslam_settings_t *settings,
                               bslam_odometry_reading_t reading)
 {
     bslam_motion_t motion;
-    assert_int_equal(bslam_odometry_read(odometry, params, &reading, &motion), BSLAM_OK);
+    assert_int_equal(bslam_odometry_read(odometry, settings, &reading, &motion), BSLAM_OK);
     return motion;
 }
 
 /// The reading is refused with this status, and neither the instance nor the output changes.
-static void assert_refused(const bslam_odometry_t *odometry, const bslam_params_t *params,
+static void assert_refused(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
                            bslam_odometry_reading_t reading, bslam_status_t expected)
 {
     bslam_odometry_t after;
     memcpy(&after, odometry, sizeof after);
     bslam_motion_t motion = {1, 2, 3, 4, 5, 6};
     const bslam_motion_t before = motion;
-    assert_int_equal(bslam_odometry_read(&after, params, &reading, &motion), expected);
+    assert_int_equal(bslam_odometry_read(&after, settings, &reading, &motion), expected);
     assert_memory_equal(&after, odometry, sizeof after);
     assert_memory_equal(&motion, &before, sizeof motion);
 }
@@ -132,13 +132,13 @@ static void test_tick_difference_of_32_bits_at_its_extremes_is_exact(void **stat
 
 static void test_read_first_reading_without_a_clock_has_no_interval(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_reading_t first[] = {wheels(START_US, 5, 7), ticks(START_US, 10, 20),
                                               velocity(START_US, 3, 4), wheels(0, 1, 1)};
     for (int i = 0; i < COUNT_OF(first); i++) {
         bslam_odometry_t odometry;
         bslam_odometry_init(&odometry);
-        const bslam_motion_t motion = read_ok(&odometry, &params, first[i]);
+        const bslam_motion_t motion = read_ok(&odometry, &settings, first[i]);
         const bslam_motion_t nothing = {0};
         assert_memory_equal(&motion, &nothing, sizeof motion);
         assert_true(odometry.has_time && odometry.time_us == first[i].time_us);
@@ -147,57 +147,57 @@ static void test_read_first_reading_without_a_clock_has_no_interval(void **state
 
 static void test_start_clock_counts_from_there_and_starts_once(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t odometry = started();
     bslam_odometry_start(&odometry, START_US + 7);
-    const bslam_motion_t motion = read_ok(&odometry, &params, wheels(START_US + STEP_US, 0.01, 0.01));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + STEP_US, 0.01, 0.01));
     assert_near(motion.dt_s, STEP_S, rounding_of(STEP_S));
 }
 
 static void test_read_interval_is_exact_however_late_the_clock(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const int64_t late_us = INT64_MAX / 2 - 1;
     bslam_odometry_t odometry;
     bslam_odometry_init(&odometry);
-    (void)read_ok(&odometry, &params, wheels(late_us, 0, 0));
-    const bslam_motion_t motion = read_ok(&odometry, &params, wheels(late_us + 1, 0, 0));
+    (void)read_ok(&odometry, &settings, wheels(late_us, 0, 0));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(late_us + 1, 0, 0));
     assert_near(motion.dt_s, 1e-6, rounding_of(1e-6));
 }
 
 static void test_read_time_that_does_not_advance_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
     static const int64_t times[] = {START_US, START_US - 1, 0, -1, INT64_MIN, INT64_MIN / 2};
     for (int i = 0; i < COUNT_OF(times); i++) {
-        assert_refused(&odometry, &params, wheels(times[i], 0, 0), BSLAM_E_TIME);
+        assert_refused(&odometry, &settings, wheels(times[i], 0, 0), BSLAM_E_TIME);
     }
 }
 
 static void test_read_time_too_far_ahead_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
     const int64_t limit_us = INT64_C(4000000);
     static const int64_t beyond_us[] = {1, 1000, INT64_MAX / 4};
     for (int i = 0; i < COUNT_OF(beyond_us); i++) {
-        assert_refused(&odometry, &params, wheels(START_US + limit_us + beyond_us[i], 0, 0), BSLAM_E_TIME);
+        assert_refused(&odometry, &settings, wheels(START_US + limit_us + beyond_us[i], 0, 0), BSLAM_E_TIME);
     }
-    assert_refused(&odometry, &params, wheels(INT64_MAX, 0, 0), BSLAM_E_TIME);
+    assert_refused(&odometry, &settings, wheels(INT64_MAX, 0, 0), BSLAM_E_TIME);
     bslam_odometry_t copy = odometry;
-    (void)read_ok(&copy, &params, wheels(START_US + limit_us, 0, 0));
+    (void)read_ok(&copy, &settings, wheels(START_US + limit_us, 0, 0));
 }
 
 static void test_read_first_time_out_of_range_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t odometry;
     memset(&odometry, 0, sizeof odometry);
     bslam_odometry_init(&odometry);
     static const int64_t times[] = {-1, INT64_MIN, INT64_MAX, INT64_MAX / 2 + 1};
     for (int i = 0; i < COUNT_OF(times); i++) {
-        assert_refused(&odometry, &params, wheels(times[i], 0, 0), BSLAM_E_TIME);
+        assert_refused(&odometry, &settings, wheels(times[i], 0, 0), BSLAM_E_TIME);
     }
 }
 
@@ -205,12 +205,12 @@ static void test_read_first_time_out_of_range_is_refused(void **state)
 
 static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.travel_sd_per_sqrt_m = BSLAM_R(0.1);
+    bslam_settings_t settings = unit_params();
+    settings.travel_sd_per_sqrt_m = BSLAM_R(0.1);
     bslam_odometry_t odometry = started();
     const double left = 0.02;
     const double right = -0.01;
-    const bslam_motion_t motion = read_ok(&odometry, &params, wheels(START_US + STEP_US, left, right));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + STEP_US, left, right));
     const double base = 0.4;
     const double left_var = 0.3 * STEP_S * 0.3 * STEP_S + 0.01 * 0.02;
     const double right_var = 0.2 * STEP_S * 0.2 * STEP_S + 0.01 * 0.01;
@@ -225,37 +225,37 @@ static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
 
 static void test_read_noise_of_the_body_grows_with_time_way_and_turn(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.left_speed_sd_mps = 0;
-    params.right_speed_sd_mps = 0;
-    params.forward_sd_per_sqrt_s = BSLAM_R(0.1);
-    params.forward_sd_per_sqrt_m = BSLAM_R(0.2);
-    params.turn_sd_per_sqrt_s = BSLAM_R(0.3);
-    params.turn_sd_per_sqrt_m = BSLAM_R(0.4);
-    params.turn_sd_per_sqrt_rad = BSLAM_R(0.5);
+    bslam_settings_t settings = unit_params();
+    settings.left_speed_sd_mps = 0;
+    settings.right_speed_sd_mps = 0;
+    settings.forward_sd_per_sqrt_s = BSLAM_R(0.1);
+    settings.forward_sd_per_sqrt_m = BSLAM_R(0.2);
+    settings.turn_sd_per_sqrt_s = BSLAM_R(0.3);
+    settings.turn_sd_per_sqrt_m = BSLAM_R(0.4);
+    settings.turn_sd_per_sqrt_rad = BSLAM_R(0.5);
     bslam_odometry_t odometry = started();
     // 3 m/s backwards and 2.5 rad/s to the right: signs must not matter.
-    const bslam_motion_t moving = read_ok(&odometry, &params, velocity(START_US + STEP_US, -3, -2.5));
+    const bslam_motion_t moving = read_ok(&odometry, &settings, velocity(START_US + STEP_US, -3, -2.5));
     const double way = 3 * STEP_S;
     const double turn = 2.5 * STEP_S;
     assert_near(moving.forward_var_m2, 0.01 * STEP_S + 0.04 * way, rounding_of(0.01));
     assert_near(moving.turn_var_rad2, 0.09 * STEP_S + 0.16 * way + 0.25 * turn, rounding_of(0.1));
     assert_near(moving.forward_turn_cov_mrad, 0, 0);
-    const bslam_motion_t standing = read_ok(&odometry, &params, velocity(START_US + 2 * STEP_US, 0, 0));
+    const bslam_motion_t standing = read_ok(&odometry, &settings, velocity(START_US + 2 * STEP_US, 0, 0));
     assert_near(standing.forward_var_m2, 0, 0);
     assert_near(standing.turn_var_rad2, 0, 0);
 }
 
 static void test_read_velocity_is_the_motion_of_its_wheels(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t by_velocity = started();
     bslam_odometry_t by_wheels = started();
     const double v = 0.7;
     const double omega = -1.3;
-    const bslam_motion_t a = read_ok(&by_velocity, &params, velocity(START_US + STEP_US, v, omega));
+    const bslam_motion_t a = read_ok(&by_velocity, &settings, velocity(START_US + STEP_US, v, omega));
     const bslam_motion_t b =
-        read_ok(&by_wheels, &params,
+        read_ok(&by_wheels, &settings,
                 wheels(START_US + STEP_US, (v - omega * 0.4 / 2) * STEP_S, (v + omega * 0.4 / 2) * STEP_S));
     assert_near(a.forward_m, v * STEP_S, rounding_of(0.04));
     assert_near(a.turn_rad, omega * STEP_S, rounding_of(0.1));
@@ -267,11 +267,11 @@ static void test_read_velocity_is_the_motion_of_its_wheels(void **state)
 
 static void test_read_ticks_motion_is_that_of_the_wheels(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.left_radius_m = BSLAM_R(0.05);
-    params.right_radius_m = BSLAM_R(0.06);
-    bslam_odometry_t odometry = started_at_ticks(&params, 500, 600);
-    const bslam_motion_t motion = read_ok(&odometry, &params, ticks(START_US + STEP_US, 540, 590));
+    bslam_settings_t settings = unit_params();
+    settings.left_radius_m = BSLAM_R(0.05);
+    settings.right_radius_m = BSLAM_R(0.06);
+    bslam_odometry_t odometry = started_at_ticks(&settings, 500, 600);
+    const bslam_motion_t motion = read_ok(&odometry, &settings, ticks(START_US + STEP_US, 540, 590));
     const double left = 40 * TURN / 1000 * 0.05;
     const double right = -10 * TURN / 1000 * 0.06;
     assert_near(motion.forward_m, (left + right) / 2, rounding_of(0.01));
@@ -282,16 +282,16 @@ static void test_read_ticks_across_the_roll_over_at_any_width_go_on(void **state
 {
     static const int widths[] = {2, 8, 16, 24, 32};
     for (int i = 0; i < COUNT_OF(widths); i++) {
-        bslam_params_t params = unit_params();
-        params.counter_bits = widths[i];
+        bslam_settings_t settings = unit_params();
+        settings.counter_bits = widths[i];
         const uint32_t top = UINT32_MAX >> (32 - widths[i]);
-        bslam_odometry_t odometry = started_at_ticks(&params, top, 0);
+        bslam_odometry_t odometry = started_at_ticks(&settings, top, 0);
         // One tick up across the top on the left, one down across zero on the right, and back.
         const double per_tick = TURN / 1000 * 0.05;
-        const bslam_motion_t there = read_ok(&odometry, &params, ticks(START_US + STEP_US, 0, top));
+        const bslam_motion_t there = read_ok(&odometry, &settings, ticks(START_US + STEP_US, 0, top));
         assert_near(there.forward_m, 0, 0);
         assert_near(there.turn_rad, -2 * per_tick / 0.4, rounding_of(per_tick));
-        const bslam_motion_t back = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, top, 0));
+        const bslam_motion_t back = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, top, 0));
         assert_near(back.turn_rad, 2 * per_tick / 0.4, rounding_of(per_tick));
     }
 }
@@ -300,61 +300,61 @@ static void test_read_ticks_beyond_the_counters_width_are_refused(void **state)
 {
     static const int widths[] = {2, 8, 16, 31};
     for (int i = 0; i < COUNT_OF(widths); i++) {
-        bslam_params_t params = unit_params();
-        params.counter_bits = widths[i];
-        const bslam_odometry_t odometry = started_at_ticks(&params, 1, 1);
+        bslam_settings_t settings = unit_params();
+        settings.counter_bits = widths[i];
+        const bslam_odometry_t odometry = started_at_ticks(&settings, 1, 1);
         const uint32_t beyond[] = {1u << widths[i], UINT32_MAX};
         for (int k = 0; k < COUNT_OF(beyond); k++) {
-            assert_refused(&odometry, &params, ticks(START_US + STEP_US, beyond[k], 1), BSLAM_E_RANGE);
-            assert_refused(&odometry, &params, ticks(START_US + STEP_US, 1, beyond[k]), BSLAM_E_RANGE);
+            assert_refused(&odometry, &settings, ticks(START_US + STEP_US, beyond[k], 1), BSLAM_E_RANGE);
+            assert_refused(&odometry, &settings, ticks(START_US + STEP_US, 1, beyond[k]), BSLAM_E_RANGE);
         }
     }
 }
 
 static void test_read_unknown_source_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
     bslam_odometry_reading_t reading = wheels(START_US + STEP_US, 0, 0);
     const int unknown = 17;
     memcpy(&reading.source, &unknown, sizeof reading.source);
-    assert_refused(&odometry, &params, reading, BSLAM_E_RANGE);
+    assert_refused(&odometry, &settings, reading, BSLAM_E_RANGE);
 }
 
 static void test_read_value_that_is_no_number_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
     static const double bad[] = {NAN, INFINITY, -INFINITY, 1e13, -1e13};
     const int64_t time_us = START_US + STEP_US;
     for (int i = 0; i < COUNT_OF(bad); i++) {
-        assert_refused(&odometry, &params, wheels(time_us, bad[i], 0), BSLAM_E_NOT_FINITE);
-        assert_refused(&odometry, &params, wheels(time_us, 0, bad[i]), BSLAM_E_NOT_FINITE);
-        assert_refused(&odometry, &params, with_gyro(wheels(time_us, 0, 0), bad[i]), BSLAM_E_NOT_FINITE);
+        assert_refused(&odometry, &settings, wheels(time_us, bad[i], 0), BSLAM_E_NOT_FINITE);
+        assert_refused(&odometry, &settings, wheels(time_us, 0, bad[i]), BSLAM_E_NOT_FINITE);
+        assert_refused(&odometry, &settings, with_gyro(wheels(time_us, 0, 0), bad[i]), BSLAM_E_NOT_FINITE);
     }
     // Velocities count times the interval, so that 1e13 m/s is a jump; what is not finite stays so.
     for (int i = 0; i < 3; i++) {
-        assert_refused(&odometry, &params, velocity(time_us, bad[i], 0), BSLAM_E_NOT_FINITE);
-        assert_refused(&odometry, &params, velocity(time_us, 0, bad[i]), BSLAM_E_NOT_FINITE);
+        assert_refused(&odometry, &settings, velocity(time_us, bad[i], 0), BSLAM_E_NOT_FINITE);
+        assert_refused(&odometry, &settings, velocity(time_us, 0, bad[i]), BSLAM_E_NOT_FINITE);
     }
 }
 
 static void test_read_looks_only_at_its_sources_fields(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t odometry = started();
     bslam_odometry_reading_t reading = wheels(START_US + STEP_US, 0.01, 0.01);
     reading.v_mps = reading.omega_radps = reading.gyro_radps = (bslam_real_t)NAN;
     reading.left_ticks = reading.right_ticks = UINT32_MAX;
-    (void)read_ok(&odometry, &params, reading);
+    (void)read_ok(&odometry, &settings, reading);
 }
 
 static void test_read_denormal_travel_is_a_motion_like_any_other(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t odometry = started();
     const double tiny = BSLAM_REAL_DOUBLE ? 1e-310 : 1e-40;
-    const bslam_motion_t motion = read_ok(&odometry, &params, wheels(START_US + STEP_US, tiny, tiny));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + STEP_US, tiny, tiny));
     assert_near(motion.forward_m, tiny, tiny / 100);
     assert_near(motion.turn_rad, 0, 0);
 }
@@ -363,42 +363,42 @@ static void test_read_denormal_travel_is_a_motion_like_any_other(void **state)
 
 static void test_read_wheel_faster_than_possible_is_a_jump(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.speed_max_mps = 2;
+    bslam_settings_t settings = unit_params();
+    settings.speed_max_mps = 2;
     const bslam_odometry_t odometry = started();
     const double limit = 2 * STEP_S;
     static const double factors[] = {1.001, -1.001, 1e3, -1e9};
     for (int i = 0; i < COUNT_OF(factors); i++) {
         const double far = limit * factors[i];
-        assert_refused(&odometry, &params, wheels(START_US + STEP_US, far, 0), BSLAM_E_JUMP);
-        assert_refused(&odometry, &params, wheels(START_US + STEP_US, 0, far), BSLAM_E_JUMP);
-        assert_refused(&odometry, &params, velocity(START_US + STEP_US, 2 * factors[i], 0), BSLAM_E_JUMP);
+        assert_refused(&odometry, &settings, wheels(START_US + STEP_US, far, 0), BSLAM_E_JUMP);
+        assert_refused(&odometry, &settings, wheels(START_US + STEP_US, 0, far), BSLAM_E_JUMP);
+        assert_refused(&odometry, &settings, velocity(START_US + STEP_US, 2 * factors[i], 0), BSLAM_E_JUMP);
     }
     bslam_odometry_t copy = odometry;
-    (void)read_ok(&copy, &params, wheels(START_US + STEP_US, limit * 0.999, -limit * 0.999));
+    (void)read_ok(&copy, &settings, wheels(START_US + STEP_US, limit * 0.999, -limit * 0.999));
 }
 
 static void test_read_turn_of_many_revolutions_is_a_jump(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.speed_max_mps = 1000;
-    params.wheelbase_m = BSLAM_R(1e-3);
+    bslam_settings_t settings = unit_params();
+    settings.speed_max_mps = 1000;
+    settings.wheelbase_m = BSLAM_R(1e-3);
     const bslam_odometry_t odometry = started();
     // Four seconds at 750 m/s with opposite wheels: 6e6 rad, beyond any angle function.
-    assert_refused(&odometry, &params, wheels(START_US + INT64_C(4000000), -3e3, 3e3), BSLAM_E_JUMP);
+    assert_refused(&odometry, &settings, wheels(START_US + INT64_C(4000000), -3e3, 3e3), BSLAM_E_JUMP);
 }
 
 static void test_read_gyro_turn_of_many_revolutions_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
-    assert_refused(&odometry, &params, with_gyro(wheels(START_US + STEP_US, 0, 0), 1e12), BSLAM_E_RANGE);
-    assert_refused(&odometry, &params, with_gyro(wheels(START_US + STEP_US, 0, 0), -1e12), BSLAM_E_RANGE);
+    assert_refused(&odometry, &settings, with_gyro(wheels(START_US + STEP_US, 0, 0), 1e12), BSLAM_E_RANGE);
+    assert_refused(&odometry, &settings, with_gyro(wheels(START_US + STEP_US, 0, 0), -1e12), BSLAM_E_RANGE);
 }
 
 static void test_read_gyro_noise_that_is_none_is_refused(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     const bslam_odometry_t odometry = started();
     static const struct {
         double sd_radps;
@@ -411,62 +411,62 @@ static void test_read_gyro_noise_that_is_none_is_refused(void **state)
     for (int i = 0; i < COUNT_OF(bad); i++) {
         bslam_odometry_reading_t reading = with_gyro(wheels(START_US + STEP_US, 0, 0), 0.1);
         reading.gyro_sd_radps = real(bad[i].sd_radps);
-        assert_refused(&odometry, &params, reading, bad[i].expected);
+        assert_refused(&odometry, &settings, reading, bad[i].expected);
         reading.has_gyro = false;
         bslam_odometry_t fine = odometry;
-        (void)read_ok(&fine, &params, reading);  // nobody reads it
+        (void)read_ok(&fine, &settings, reading);  // nobody reads it
     }
 }
 
 static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.speed_max_mps = 2;
-    bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
+    bslam_settings_t settings = unit_params();
+    settings.speed_max_mps = 2;
+    bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     bslam_motion_t untouched;
     const bslam_odometry_reading_t reset = ticks(START_US + STEP_US, 0, 0);
-    assert_int_equal(bslam_odometry_read(&odometry, &params, &reset, &untouched), BSLAM_E_JUMP);
+    assert_int_equal(bslam_odometry_read(&odometry, &settings, &reset, &untouched), BSLAM_E_JUMP);
 
     // The jump is not waited out: the next reading is the new reference, and all the time is a gap.
-    const bslam_motion_t blind = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 5, 5));
+    const bslam_motion_t blind = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 5, 5));
     assert_near(blind.forward_m, 0, 0);
     const double dt = 2 * STEP_S;
     assert_near(blind.forward_var_m2, (0.09 + 0.04) * dt * dt / 4 + 0.04 * dt * dt, rounding_of(0.01));
-    const bslam_motion_t after = read_ok(&odometry, &params, ticks(START_US + 3 * STEP_US, 15, 15));
+    const bslam_motion_t after = read_ok(&odometry, &settings, ticks(START_US + 3 * STEP_US, 15, 15));
     assert_near(after.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
 }
 
 static void test_read_jump_of_another_source_leaves_the_tick_reference(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.speed_max_mps = 2;
-    bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
+    bslam_settings_t settings = unit_params();
+    settings.speed_max_mps = 2;
+    bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     const bslam_odometry_reading_t jump = wheels(START_US + STEP_US, 5, 5);
     bslam_motion_t motion;
-    assert_int_equal(bslam_odometry_read(&odometry, &params, &jump, &motion), BSLAM_E_JUMP);
-    motion = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 20010, 20010));
+    assert_int_equal(bslam_odometry_read(&odometry, &settings, &jump, &motion), BSLAM_E_JUMP);
+    motion = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 20010, 20010));
     assert_near(motion.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
 }
 
 static void test_restart_starts_clock_and_ticks_anew(void **state)
 {
-    bslam_params_t params = unit_params();
-    bslam_odometry_t odometry = started_at_ticks(&params, 20000, 20000);
+    bslam_settings_t settings = unit_params();
+    bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     bslam_odometry_restart(&odometry);
-    const bslam_motion_t first = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 0, 0));
+    const bslam_motion_t first = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 0, 0));
     assert_near(first.dt_s, 0, 0);
 
-    const bslam_motion_t next = read_ok(&odometry, &params, ticks(START_US + 3 * STEP_US, 10, 10));
+    const bslam_motion_t next = read_ok(&odometry, &settings, ticks(START_US + 3 * STEP_US, 10, 10));
     assert_near(next.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
     assert_near(next.forward_var_m2, (0.09 + 0.04) * STEP_S * STEP_S / 4, rounding_of(1e-4));
 }
 
 static void test_read_first_ticks_after_the_clock_started_leave_the_interval_open(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     bslam_odometry_t odometry = started();
     const double dt = 2 * STEP_S;
-    const bslam_motion_t motion = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 70, 80));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 70, 80));
     assert_near(motion.forward_m, 0, 0);
     assert_near(motion.turn_rad, 0, 0);
     // The robot may have moved unseen for the whole interval: the wheels' noise, and the gap's.
@@ -477,11 +477,11 @@ static void test_read_first_ticks_after_the_clock_started_leave_the_interval_ope
 
 static void test_read_ticks_after_another_source_start_afresh(void **state)
 {
-    const bslam_params_t params = unit_params();
-    bslam_odometry_t odometry = started_at_ticks(&params, 100, 100);
-    (void)read_ok(&odometry, &params, wheels(START_US + STEP_US, 0.01, 0.01));
+    const bslam_settings_t settings = unit_params();
+    bslam_odometry_t odometry = started_at_ticks(&settings, 100, 100);
+    (void)read_ok(&odometry, &settings, wheels(START_US + STEP_US, 0.01, 0.01));
     // The counters saw the same way: counting it twice would be wrong.
-    const bslam_motion_t motion = read_ok(&odometry, &params, ticks(START_US + 2 * STEP_US, 132, 132));
+    const bslam_motion_t motion = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 132, 132));
     assert_near(motion.forward_m, 0, 0);
 }
 
@@ -489,14 +489,14 @@ static void test_read_ticks_after_another_source_start_afresh(void **state)
 
 static void test_read_gap_inflates_by_the_part_beyond_its_limit(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.left_speed_sd_mps = 0;
-    params.right_speed_sd_mps = 0;
+    bslam_settings_t settings = unit_params();
+    settings.left_speed_sd_mps = 0;
+    settings.right_speed_sd_mps = 0;
     static const double gaps_s[] = {0, 0.5, 2};
     for (int i = 0; i < COUNT_OF(gaps_s); i++) {
         bslam_odometry_t odometry = started();
         const int64_t dt_us = 2000000 + (int64_t)(gaps_s[i] * 1e6);
-        const bslam_motion_t motion = read_ok(&odometry, &params, wheels(START_US + dt_us, 0.1, 0.1));
+        const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + dt_us, 0.1, 0.1));
         const double gap2 = gaps_s[i] * gaps_s[i];
         // dt - gap_us loses digits where they are close.
         const double tolerance = rounding_of(1 + 4 * gap2);
@@ -537,13 +537,13 @@ static void test_read_gyro_is_fused_as_the_information_form_has_it(void **state)
 {
     static const double sds[] = {0.001, 0.02, 1, 50};
     for (int i = 0; i < COUNT_OF(sds); i++) {
-        bslam_params_t params = unit_params();
-        params.gyro_sd_radps = real(sds[i]);
+        bslam_settings_t settings = unit_params();
+        settings.gyro_sd_radps = real(sds[i]);
         bslam_odometry_t without = started();
         bslam_odometry_t with = started();
         const bslam_odometry_reading_t reading = wheels(START_US + STEP_US, 0.01, 0.03);
-        const bslam_motion_t wheels_only = read_ok(&without, &params, reading);
-        const bslam_motion_t fused = read_ok(&with, &params, with_gyro(reading, 0.8));
+        const bslam_motion_t wheels_only = read_ok(&without, &settings, reading);
+        const bslam_motion_t fused = read_ok(&with, &settings, with_gyro(reading, 0.8));
         const bslam_motion_t expected =
             fused_by_information(&wheels_only, 0.8 * STEP_S, sds[i] * sds[i] * STEP_S * STEP_S);
         assert_near(fused.forward_m, expected.forward_m, rounding_of(0.05));
@@ -553,23 +553,23 @@ static void test_read_gyro_is_fused_as_the_information_form_has_it(void **state)
         assert_near(fused.forward_turn_cov_mrad, expected.forward_turn_cov_mrad, rounding_of(1e-4));
         assert_near(fused.turn_var_rad2, expected.turn_var_rad2, rounding_of(1e-3));
         assert_true(fused.turn_var_rad2 > 0);
-        params.gyro_sd_radps = 7;  // a reading's own noise goes before
+        settings.gyro_sd_radps = 7;  // a reading's own noise goes before
         bslam_odometry_t own = started();
         bslam_odometry_reading_t with_noise = with_gyro(reading, 0.8);
         with_noise.gyro_sd_radps = real(sds[i]);
-        const bslam_motion_t same = read_ok(&own, &params, with_noise);
+        const bslam_motion_t same = read_ok(&own, &settings, with_noise);
         assert_memory_equal(&same, &fused, sizeof same);
     }
 }
 
 static void test_read_gyro_beside_noiseless_wheels_changes_nothing(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.left_speed_sd_mps = 0;
-    params.right_speed_sd_mps = 0;
+    bslam_settings_t settings = unit_params();
+    settings.left_speed_sd_mps = 0;
+    settings.right_speed_sd_mps = 0;
     bslam_odometry_t odometry = started();
     const bslam_motion_t motion =
-        read_ok(&odometry, &params, with_gyro(wheels(START_US + STEP_US, 0.01, 0.03), 5));
+        read_ok(&odometry, &settings, with_gyro(wheels(START_US + STEP_US, 0.01, 0.03), 5));
     assert_near(motion.turn_rad, 0.02 / 0.4, rounding_of(0.1));
     assert_near(motion.turn_var_rad2, 0, 0);
 }

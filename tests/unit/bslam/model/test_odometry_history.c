@@ -41,11 +41,11 @@ static void take_until(bslam_history_t *history, int64_t until_us)
     }
 }
 
-static bslam_params_t arc_params(void)
+static bslam_settings_t arc_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.motion = 1;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.motion = 1;
+    return settings;
 }
 
 /// A point `steps` along the circle that the arc drives, behind (negative) or ahead of the robot.
@@ -120,7 +120,7 @@ static void test_is_full_when_no_more_may_wait(void **state)
 static void test_look_back_from_the_filter_is_on_the_arc(void **state)
 {
     const int steps = BSLAM_HISTORY_MAX;
-    const bslam_params_t params = arc_params();
+    const bslam_settings_t settings = arc_params();
     // The filter at the newest end, and within a step.
     static const int64_t untils_us[] = {0, STEP_US / 4, 2 * STEP_US};
     for (int i = 0; i < COUNT_OF(untils_us); i++) {
@@ -129,18 +129,18 @@ static void test_look_back_from_the_filter_is_on_the_arc(void **state)
         const int64_t reach_us = (int64_t)steps * STEP_US - untils_us[i];
         for (int64_t back_us = STEP_US / 8; back_us <= reach_us; back_us += STEP_US / 8) {
             bslam_pose_t pose;
-            assert_int_equal(bslam_history_look_back(&history, &params, back_us, &pose), BSLAM_OK);
+            assert_int_equal(bslam_history_look_back(&history, &settings, back_us, &pose), BSLAM_OK);
             assert_on_circle(&pose, -(double)back_us / STEP_US);
         }
         bslam_pose_t pose = {1, 2, 3};
-        assert_int_equal(bslam_history_look_back(&history, &params, reach_us + 1, &pose), BSLAM_E_TIME);
+        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &pose), BSLAM_E_TIME);
         assert_true(pose.x_m == 1 && pose.y_m == 2 && pose.theta_rad == 3);
     }
 }
 
 static void test_look_back_goes_the_way_that_the_filter_took(void **state)
 {
-    const bslam_params_t params = arc_params();
+    const bslam_settings_t settings = arc_params();
     bslam_history_t history = waiting_arc(2);
     // Odometry says 2 cm; the filter took 1 cm for the first quarter, 5 cm for the rest, straight on.
     const bslam_motion_t quarter = {.dt_s = BSLAM_R(0.01), .forward_m = BSLAM_R(0.01)};
@@ -149,11 +149,11 @@ static void test_look_back_goes_the_way_that_the_filter_took(void **state)
     (void)bslam_history_walk(&history, &place, STEP_US + 30000);
     bslam_history_take(&history, &place, &quarter);
     bslam_pose_t pose;
-    assert_int_equal(bslam_history_look_back(&history, &params, 5000, &pose), BSLAM_OK);
+    assert_int_equal(bslam_history_look_back(&history, &settings, 5000, &pose), BSLAM_OK);
     assert_near(pose.x_m, -0.005, WAY_ERROR);
     (void)bslam_history_walk(&history, &place, 0);
     bslam_history_take(&history, &place, &rest);
-    assert_int_equal(bslam_history_look_back(&history, &params, STEP_US, &pose), BSLAM_OK);
+    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &pose), BSLAM_OK);
     assert_near(pose.x_m, -0.06, WAY_ERROR);
     assert_near(pose.theta_rad, 0, WAY_ERROR);
 }
@@ -164,27 +164,27 @@ static void test_look_back_before_the_history_is_refused(void **state)
     bslam_history_t history = waiting_arc(BSLAM_HISTORY_MAX);
     take_until(&history, 0);
     bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
-    const bslam_params_t params = arc_params();
+    const bslam_settings_t settings = arc_params();
     const int64_t reach_us = (int64_t)(BSLAM_HISTORY_MAX - 1) * STEP_US;
     bslam_pose_t pose;
-    assert_int_equal(bslam_history_look_back(&history, &params, reach_us + 1, &pose), BSLAM_E_TIME);
+    assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &pose), BSLAM_E_TIME);
     if (reach_us > 0) {
-        assert_int_equal(bslam_history_look_back(&history, &params, reach_us, &pose), BSLAM_OK);
+        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us, &pose), BSLAM_OK);
     }
 }
 
 static void test_look_ahead_goes_on_as_in_the_newest_motion(void **state)
 {
-    const bslam_params_t params = arc_params();
+    const bslam_settings_t settings = arc_params();
     bslam_history_t history = waiting_arc(2);
     take_until(&history, 0);
     const bslam_motion_t last = bslam_history_newest(&history);
-    const bslam_pose_t pose = bslam_history_look_ahead(&params, &last, STEP_US / 2);
+    const bslam_pose_t pose = bslam_history_look_ahead(&settings, &last, STEP_US / 2);
     assert_on_circle(&pose, 0.5);
     // Nothing is known of a robot that has not moved yet.
     bslam_history_clear(&history);
     const bslam_motion_t none = bslam_history_newest(&history);
-    const bslam_pose_t still = bslam_history_look_ahead(&params, &none, STEP_US / 2);
+    const bslam_pose_t still = bslam_history_look_ahead(&settings, &none, STEP_US / 2);
     assert_true(still.x_m == 0 && still.y_m == 0 && still.theta_rad == 0);
 }
 
@@ -193,14 +193,14 @@ static void test_clear_forgets_all(void **state)
     bslam_history_t history = waiting_arc(3);
     take_until(&history, STEP_US / 2);
     bslam_history_clear(&history);
-    const bslam_params_t params = arc_params();
+    const bslam_settings_t settings = arc_params();
     bslam_pose_t pose;
     assert_int_equal(history.filter.behind_us, 0);
-    assert_int_equal(bslam_history_look_back(&history, &params, 1, &pose), BSLAM_E_TIME);
+    assert_int_equal(bslam_history_look_back(&history, &settings, 1, &pose), BSLAM_E_TIME);
     // Nothing of the step that was cut short is left in the next one.
     bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     take_until(&history, 0);
-    assert_int_equal(bslam_history_look_back(&history, &params, STEP_US, &pose), BSLAM_OK);
+    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &pose), BSLAM_OK);
     assert_on_circle(&pose, -1);
 }
 

@@ -16,12 +16,12 @@ static bslam_appearance_t appearance;
 /// All confirmed, with the labels 10, 11, 12; without looks.
 static int setup(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.appearance_samples = 3;
+    bslam_settings_t settings = unit_params();
+    settings.appearance_samples = 3;
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
-    slam.ekf = unit_map_of(&params, places, BEACONS);
+    slam.ekf = unit_map_of(&settings, places, BEACONS);
     for (int b = 0; b < BEACONS; b++) {
         slam.ekf.beacons[b].label = 10 + b;
         slam.ekf.beacons[b].confirmed = true;
@@ -33,7 +33,7 @@ static int setup(void **state)
 static int setup_looks(void **state)
 {
     setup(state);
-    slam.params.association = BSLAM_ASSOCIATION_SVM;
+    slam.settings.association = BSLAM_ASSOCIATION_SVM;
     bslam_slam_attach_appearance(&slam, &appearance);
     unit_give_machine(&appearance, 0, 1, GROWN);
     unit_give_machine(&appearance, 1, -1, GROWN);

@@ -18,11 +18,11 @@ static int cut = -1;        // the beacon that is seen in direction only
 
 static int setup(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.left_speed_sd_mps = BSLAM_R(0.01);
-    params.right_speed_sd_mps = BSLAM_R(0.01);
+    bslam_settings_t settings = unit_params();
+    settings.left_speed_sd_mps = BSLAM_R(0.01);
+    settings.right_speed_sd_mps = BSLAM_R(0.01);
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_recovery_init(&recovery);
     now_us = 0;
     return 0;
@@ -120,7 +120,7 @@ static void test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_k
 
 static void test_recovery_goes_by_the_beacons_own_scales(void **state)
 {
-    slam.params.range_scale_sd = BSLAM_R(0.1);
+    slam.settings.range_scale_sd = BSLAM_R(0.1);
     look_on(50, 0, 0, 0, BEACONS);
     for (int b = 0; b < BEACONS; b++) {
         assert_int_equal(slam.ekf.beacons[b].kind, BSLAM_BEACON_SIZED);
@@ -265,7 +265,7 @@ static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
 /// The beacon is provisional, and its time is up with the next frame.
 static void end_time_of(bslam_beacon_t *beacon)
 {
-    slam.params.confirm_window_us = (int32_t)now_us;
+    slam.settings.confirm_window_us = (int32_t)now_us;
     beacon->first_seen_us = 0;
     beacon->confirmed = false;
     beacon->gated = 1;
@@ -278,7 +278,7 @@ static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
     static bslam_smoother_t smoother;
     static bslam_slam_t unseeing;
     static bslam_smoother_t its_smoother;
-    slam.params.filter = BSLAM_FILTER_SMOOTHER;
+    slam.settings.filter = BSLAM_FILTER_SMOOTHER;
     bslam_slam_attach_smoother(&slam, &smoother);
     look_on(40, 0, 0, 0, BEACONS);
     end_time_of(&slam.ekf.beacons[2]);
@@ -321,8 +321,8 @@ static void go_by_looks(void)
 {
     look_on(50, 0, 0, 0, BEACONS);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
-    slam.params.association = BSLAM_ASSOCIATION_SVM;
-    slam.params.appearance_samples = 3;
+    slam.settings.association = BSLAM_ASSOCIATION_SVM;
+    slam.settings.appearance_samples = 3;
     bslam_slam_attach_appearance(&slam, &appearance);
     unit_give_machine(&appearance, 0, 1, 16);
     unit_give_machine(&appearance, 1, -1, 16);
@@ -378,9 +378,9 @@ static void go_by_own_looks(void)
 {
     look_on(50, 0, 0, 0, BEACONS);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
-    slam.params.association = BSLAM_ASSOCIATION_SVM;
-    slam.params.appearance_samples = 3;
-    slam.params.learn_budget = 0;
+    slam.settings.association = BSLAM_ASSOCIATION_SVM;
+    slam.settings.appearance_samples = 3;
+    slam.settings.learn_budget = 0;
     bslam_slam_attach_appearance(&slam, &appearance);
     for (int b = 0; b < BEACONS; b++) {
         float weights[BSLAM_SAMPLE_SIZE] = {0};
@@ -481,7 +481,7 @@ static void test_recovery_in_a_map_that_grows_a_doubt_ends_where_the_robot_is_fo
 static void test_recovery_in_a_map_that_has_settled_one_beacon_is_enough(void **state)
 {
     go_by_own_looks();
-    slam.params.settled_us = 0;
+    slam.settings.settled_us = 0;
     for (int k = 0; k < 25; k++) {
         assert_int_equal(recovery.counters.lost, 0);
         look_alike_from(1, 2, 2.5, 1);

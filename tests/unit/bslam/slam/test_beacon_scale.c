@@ -13,14 +13,14 @@ static int64_t now_us;
 
 static int setup(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.gate_d2 = BSLAM_R(13.8);
-    params.ray_linear_limit = BSLAM_R(1e-4);  // rays stay rays
-    params.left_speed_sd_mps = 0;
-    params.right_speed_sd_mps = 0;
+    bslam_settings_t settings = unit_params();
+    settings.gate_d2 = BSLAM_R(13.8);
+    settings.ray_linear_limit = BSLAM_R(1e-4);  // rays stay rays
+    settings.left_speed_sd_mps = 0;
+    settings.right_speed_sd_mps = 0;
     int bad_id;
     memset(&slam, 0, sizeof slam);
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     now_us = 0;
     return 0;
 }
@@ -288,10 +288,10 @@ static void test_known_beacon_is_what_it_was_given_as(void **state)
 static void test_with_a_smoother_no_beacon_changes_its_kind(void **state)
 {
     static bslam_smoother_t smoother;
-    bslam_params_t params = slam.params;
-    params.filter = BSLAM_FILTER_SMOOTHER;
+    bslam_settings_t settings = slam.settings;
+    settings.filter = BSLAM_FILTER_SMOOTHER;
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     see(cut_off(DOOR));
     const bslam_beacon_kind_t kind = beacon()->kind;

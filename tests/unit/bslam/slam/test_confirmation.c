@@ -12,17 +12,17 @@ static int64_t now_us;
 
 static void start(int32_t association)
 {
-    bslam_params_t params = unit_params();
-    params.association = association;
-    params.existence_score = BSLAM_R(0.5);
-    params.existence_sum = 4;
-    params.existence_first_sum = 2;
-    params.existence_beacons = 0;
-    params.confirm_sightings = 3;
-    params.confirm_window_us = 0;
+    bslam_settings_t settings = unit_params();
+    settings.association = association;
+    settings.existence_score = BSLAM_R(0.5);
+    settings.existence_sum = 4;
+    settings.existence_first_sum = 2;
+    settings.existence_beacons = 0;
+    settings.confirm_sightings = 3;
+    settings.confirm_window_us = 0;
     int bad_id;
     memset(&slam, 0, sizeof slam);
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     now_us = 0;
 }
 
@@ -37,7 +37,7 @@ static bslam_account_t see_at(double bearing_rad, double score)
 {
     const bslam_odometry_reading_t still = {.source = BSLAM_ODOMETRY_WHEELS, .time_us = now_us + STEP_US};
     bslam_sighting_t seen =
-        unit_polar(bearing_rad, 4, slam.params.association == BSLAM_ASSOCIATION_KNOWN ? 1 : -1);
+        unit_polar(bearing_rad, 4, slam.settings.association == BSLAM_ASSOCIATION_KNOWN ? 1 : -1);
     seen.score = real(score);
     now_us += STEP_US;
     assert_int_equal(bslam_slam_odometry(&slam, &still), BSLAM_OK);
@@ -167,13 +167,13 @@ static void test_a_sighting_without_a_score_does_not_end_a_trial(void **state)
 
 static void test_a_beacon_on_trial_has_no_time_to_be_confirmed_in(void **state)
 {
-    slam.params.confirm_window_us = STEP_US;
+    slam.settings.confirm_window_us = STEP_US;
     (void)see(1.0);
     for (int i = 0; i < 4; i++) {
         assert_int_equal(see(0.6).reason, BSLAM_REASON_TENTATIVE);
     }
     start(BSLAM_ASSOCIATION_SVM);
-    slam.params.confirm_window_us = STEP_US;
+    slam.settings.confirm_window_us = STEP_US;
     (void)see(0);
     (void)see_at(1.5, 0);
     (void)see_at(1.5, 0);
@@ -182,7 +182,7 @@ static void test_a_beacon_on_trial_has_no_time_to_be_confirmed_in(void **state)
 
 static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
 {
-    slam.params.gate_d2 = BSLAM_R(0.5);
+    slam.settings.gate_d2 = BSLAM_R(0.5);
     (void)see(1.5);
     const bslam_account_t account = see_at(0.27, 1.5);
     assert_int_equal(account.outcome, BSLAM_OUTCOME_REJECTED);
@@ -194,7 +194,7 @@ static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)
 /// One that becomes confirmed in a frame does not change what becomes of the others in it.
 static void test_the_order_of_a_frame_does_not_matter(void **state)
 {
-    slam.params.existence_beacons = 1;
+    slam.settings.existence_beacons = 1;
     for (int i = 0; i < 3; i++) {
         (void)see(1.5);
     }
@@ -222,7 +222,7 @@ static void test_views_do_not_run_over_while_scores_are_missing(void **state)
 
 static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **state)
 {
-    slam.params.confirm_sightings = 9;
+    slam.settings.confirm_sightings = 9;
     for (int i = 0; i < 8; i++) {
         (void)see(3);
         assert_false(is_confirmed(0));
@@ -234,7 +234,7 @@ static void test_what_is_seen_surely_from_few_places_is_not_confirmed(void **sta
 /// A robot that knows no place yet is content with less: two sightings of 1, and not four.
 static void test_while_few_are_confirmed_less_is_believed(void **state)
 {
-    slam.params.existence_beacons = 1;
+    slam.settings.existence_beacons = 1;
     assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_NEW);
     assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_DEFERRED);
     assert_int_equal(see(1.5).outcome, BSLAM_OUTCOME_MATCHED);
@@ -284,10 +284,10 @@ static void test_a_distance_later_in_the_frame_counts_as_much(void **state)
 
 static void test_a_new_start_knows_of_no_distances(void **state)
 {
-    const bslam_params_t params = slam.params;
+    const bslam_settings_t settings = slam.settings;
     int bad_id;
     (void)see(1.5);
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     now_us = 0;
     see_direction(1.5);
     assert_near(slam.ekf.beacons[0].score_sum, 1, 1e-6);

@@ -7,10 +7,10 @@ static bslam_slam_t slam;
 /// A robot that has seen two beacons.
 static int start(void **state)
 {
-    const bslam_params_t params = unit_params();
+    const bslam_settings_t settings = unit_params();
     int bad_id = -1;
     const bslam_sighting_t seen[] = {unit_polar(0.3, 2, 1), unit_polar(-0.4, 3, 2)};
-    if (bslam_slam_init(&slam, &params, &bad_id) != BSLAM_OK) {
+    if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         return 1;
     }
     return bslam_slam_sightings(&slam, 1000, seen, 2) == BSLAM_OK ? 0 : 1;

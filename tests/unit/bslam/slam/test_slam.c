@@ -13,11 +13,11 @@
 
 // ---- the unit under test ----------------------------------------------------------------------------------
 
-static bslam_slam_t started(bslam_params_t params)
+static bslam_slam_t started(bslam_settings_t settings)
 {
     bslam_slam_t slam;
     int bad_id = -1;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     return slam;
 }
 
@@ -123,20 +123,20 @@ static void assert_odometry_refused(bslam_slam_t *slam, bslam_odometry_reading_t
 }
 
 /// Parameters of a refusal's test: of the filter that its state names, or of the one that needs none.
-static bslam_params_t refusing_params(void **state)
+static bslam_settings_t refusing_params(void **state)
 {
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     if (*state != NULL) {
-        params.filter = *(const int32_t *)*state;
-        params.velocity_states = 1;
+        settings.filter = *(const int32_t *)*state;
+        settings.velocity_states = 1;
     }
-    return params;
+    return settings;
 }
 
 /// A robot that has driven and mapped a little, at 400 ms.
-static bslam_slam_t running(bslam_params_t params)
+static bslam_slam_t running(bslam_settings_t settings)
 {
-    bslam_slam_t slam = started(params);
+    bslam_slam_t slam = started(settings);
     const bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(-0.8, 3, 2), unit_direction(1.2, 3)};
     see(&slam, 0, seen, COUNT_OF(seen));
     drive_circle(&slam, STEP_US, 10);
@@ -150,11 +150,11 @@ static void test_init_bad_parameter_is_refused_and_changes_nothing(void **state)
     bslam_slam_t before;
     memset(&slam, 0x33, sizeof slam);
     memcpy(&before, &slam, sizeof slam);
-    bslam_params_t params = unit_params();
-    params.wheelbase_m = -1;
+    bslam_settings_t settings = unit_params();
+    settings.wheelbase_m = -1;
     int bad_id = -1;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_E_PARAMETER);
-    assert_string_equal(bslam_params_info(bad_id)->name, "wheelbase_m");
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_E_PARAMETER);
+    assert_string_equal(bslam_settings_info(bad_id)->name, "wheelbase_m");
     assert_memory_equal(&slam, &before, sizeof slam);
 }
 
@@ -182,11 +182,11 @@ static void test_odometry_every_refusal_changes_nothing(void **state)
 
 static void test_odometry_without_noise_for_velocity_states_is_refused_and_changes_nothing(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
     // Positive, so it passes the check; its square is zero.
-    params.left_speed_sd_mps = params.right_speed_sd_mps = real(BSLAM_REAL_DOUBLE ? 1e-200 : 1e-30);
-    bslam_slam_t slam = started(params);
+    settings.left_speed_sd_mps = settings.right_speed_sd_mps = real(BSLAM_REAL_DOUBLE ? 1e-200 : 1e-30);
+    bslam_slam_t slam = started(settings);
     drive(&slam, 0, 0, 0);
     assert_odometry_refused(&slam, wheels(STEP_US, 0.01, 0.01), BSLAM_E_SINGULAR);
 }
@@ -208,9 +208,9 @@ static void test_sightings_wrong_count_is_refused_and_changes_nothing(void **sta
 
 static void test_sightings_wrong_time_is_refused_and_changes_nothing(void **state)
 {
-    bslam_params_t params = refusing_params(state);
-    params.ahead_max_us = 200000;
-    bslam_slam_t slam = running(params);
+    bslam_settings_t settings = refusing_params(state);
+    settings.ahead_max_us = 200000;
+    bslam_slam_t slam = running(settings);
     const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
     const int64_t now_us = 10 * STEP_US;
     static const int64_t outside_us[] = {-1, INT64_MIN, INT64_MAX, INT64_MAX / 2 + 1, 0, 9 * STEP_US};
@@ -379,9 +379,9 @@ static void test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothin
 
 static void test_sightings_new_and_matched_are_accounted_for(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.gate_d2 = 25;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.gate_d2 = 25;
+    bslam_slam_t slam = started(settings);
     const bslam_sighting_t seen[] = {unit_polar(0.3, 4, 7), unit_polar(-0.8, 3, 8)};
     see(&slam, 0, seen, 2);
     for (int i = 0; i < 2; i++) {
@@ -451,11 +451,11 @@ static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **st
 
 static void test_sightings_ambiguous_are_rejected(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.association = 2;
-    params.match_d2 = BSLAM_R(1e-3);
-    params.new_d2 = BSLAM_R(1e6);
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.association = 2;
+    settings.match_d2 = BSLAM_R(1e-3);
+    settings.new_d2 = BSLAM_R(1e6);
+    bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, -1));
     drive(&slam, STEP_US, 0, 0);
     see_one(&slam, STEP_US, unit_polar(0.3, 5, -1));
@@ -465,10 +465,10 @@ static void test_sightings_ambiguous_are_rejected(void **state)
 
 static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_ratio(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.gate_d2 = 9;
-    params.confirm_sightings = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.gate_d2 = 9;
+    settings.confirm_sightings = 1;
+    bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     drive(&slam, STEP_US, 0, 0);
     const bslam_pose_t before = bslam_slam_pose(&slam);
@@ -485,9 +485,9 @@ static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_r
 
 static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.huber_d = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.huber_d = 1;
+    bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     drive(&slam, STEP_US, 0, 0);
     see_one(&slam, STEP_US, unit_polar(0.3, 5, 1));
@@ -498,11 +498,11 @@ static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
 
 static void test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is_not_used(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.range_scale_sd = BSLAM_R(0.1);
+    bslam_settings_t settings = unit_params();
+    settings.range_scale_sd = BSLAM_R(0.1);
     bslam_sighting_t as_first = unit_polar(0.3, 4, 9);
     as_first.beacon_class = 3;
-    bslam_slam_t with_distance = running(params);
+    bslam_slam_t with_distance = running(settings);
     see_one(&with_distance, 11 * STEP_US, as_first);
     drive(&with_distance, 11 * STEP_US, 0.02, 0.03);
     bslam_slam_t direction_only = with_distance;
@@ -569,11 +569,11 @@ static void test_sightings_empty_frame_is_a_frame(void **state)
 static void test_sightings_order_within_a_frame_does_not_matter(void **state)
 {
     // Directions whose variance depends on the state, so that it shows if the state has moved on in between.
-    bslam_params_t params = unit_params();
-    params.filter = 1;
-    params.bearing_only_curvature_factor = 50;
-    bslam_slam_t forwards = started(params);
-    bslam_slam_t backwards = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.filter = 1;
+    settings.bearing_only_curvature_factor = 50;
+    bslam_slam_t forwards = started(settings);
+    bslam_slam_t backwards = started(settings);
     bslam_sighting_t seen[6];
     bslam_sighting_t reversed[6];
     for (int frame = 0; frame < 30; frame++) {
@@ -603,9 +603,9 @@ static void test_sightings_order_within_a_frame_does_not_matter(void **state)
 
 static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_sightings = 3;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_sightings = 3;
+    bslam_slam_t slam = started(settings);
     for (int i = 0; i < 4; i++) {
         see_one(&slam, (int64_t)i * STEP_US, unit_polar(0.3, 4, 1));
         assert_int_equal(beacon(&slam, 0).sightings, i + 1);
@@ -616,10 +616,10 @@ static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void *
 
 static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_sightings = 3;
-    params.confirm_travel_m = BSLAM_R(0.1);
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_sightings = 3;
+    settings.confirm_travel_m = BSLAM_R(0.1);
+    bslam_slam_t slam = started(settings);
     const bslam_sighting_t seen = unit_polar(0, 4, 0);
     int64_t time_us = 0;
     for (int i = 0; i < 10; i++, time_us += STEP_US) {
@@ -642,10 +642,10 @@ static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_
 
 static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_sightings = 3;
-    params.confirm_d2 = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_sightings = 3;
+    settings.confirm_d2 = 1;
+    bslam_slam_t slam = started(settings);
     const bslam_real_t seen_m[] = {4, 4, BSLAM_R(4.5), BSLAM_R(4.1)};
     int64_t time_us = 0;
     for (int i = 0; i < 4; i++, time_us += STEP_US) {  // for, for, against, for: two
@@ -663,9 +663,9 @@ static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_b
 
 static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_d2 = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_d2 = 1;
+    bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0, 4, 1));
     drive(&slam, STEP_US, 0, 0);
     see_one(&slam, STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
@@ -678,20 +678,20 @@ static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_fo
 
 static void test_sightings_one_sighting_confirms_where_that_is_asked(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_sightings = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_sightings = 1;
+    bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     assert_true(beacon(&slam, 0).confirmed);
 }
 
 static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.association = 2;
-    params.confirm_sightings = 2;
-    params.confirm_window_us = 10 * STEP_US;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.association = 2;
+    settings.confirm_sightings = 2;
+    settings.confirm_window_us = 10 * STEP_US;
+    bslam_slam_t slam = started(settings);
     // The first once, the second twice; far apart, so that neither is taken for the other.
     const bslam_sighting_t seen[] = {unit_polar(1.3, 4, BSLAM_LABEL_NONE),
                                      unit_polar(-1.3, 4, BSLAM_LABEL_NONE)};
@@ -716,10 +716,10 @@ static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
 
 static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_window_us = 2 * STEP_US;
-    params.gate_d2 = 9;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_window_us = 2 * STEP_US;
+    settings.gate_d2 = 9;
+    bslam_slam_t slam = started(settings);
     // Beacons 0 and 1 once; then label 1 shows where no beacon 1 can be.
     const bslam_sighting_t seen[] = {unit_polar(1.3, 4, 0), unit_polar(-1.3, 4, 1)};
     see(&slam, 0, seen, 2);
@@ -740,10 +740,10 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
 static void
 test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.confirm_sightings = 4;
-    params.gate_d2 = 9;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.confirm_sightings = 4;
+    settings.gate_d2 = 9;
+    bslam_slam_t slam = started(settings);
     // Every other sighting is a false one, and no two of these agree.
     for (int i = 0; i < 8; i++) {
         drive(&slam, i * (int64_t)STEP_US, 0, 0);
@@ -765,10 +765,10 @@ test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_c
 
 static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.association = 2;
-    params.confirm_window_us = 2 * STEP_US;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.association = 2;
+    settings.confirm_window_us = 2 * STEP_US;
+    bslam_slam_t slam = started(settings);
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 9, -5, 0), BSLAM_OK);
     see_one(&slam, 0, unit_direction(0.5, BSLAM_LABEL_NONE));
     assert_int_equal(beacon(&slam, 1).kind, BSLAM_BEACON_RAY);
@@ -796,11 +796,11 @@ static void test_remove_beacon_then_its_label_is_new_again(void **state)
 
 static void test_sightings_ray_seen_from_aside_settles_into_a_point(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.motion = 1;
-    params.left_speed_sd_mps = BSLAM_R(0.001);
-    params.right_speed_sd_mps = BSLAM_R(0.001);
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.motion = 1;
+    settings.left_speed_sd_mps = BSLAM_R(0.001);
+    settings.right_speed_sd_mps = BSLAM_R(0.001);
+    bslam_slam_t slam = started(settings);
     const double x_m = 2;
     const double y_m = 3;
     for (int i = 0; i < 200; i++) {
@@ -846,9 +846,9 @@ static void test_sightings_ahead_of_a_clock_without_odometry_are_seen_from_the_s
 static void test_pose_at_a_past_time_is_where_the_robot_was(void **state)
 {
     for (int motion = 0; motion <= 1; motion++) {
-        bslam_params_t params = unit_params();
-        params.motion = motion;
-        bslam_slam_t slam = started(params);
+        bslam_settings_t settings = unit_params();
+        settings.motion = motion;
+        bslam_slam_t slam = started(settings);
         const int steps = BSLAM_HISTORY_MAX + 7;
         bslam_pose_t poses[BSLAM_HISTORY_MAX + 7];
         for (int i = 0; i < steps; i++) {
@@ -870,9 +870,9 @@ static void test_pose_at_a_past_time_is_where_the_robot_was(void **state)
 
 static void test_pose_at_within_a_step_is_on_the_arc(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.motion = 1;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.motion = 1;
+    bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 10);
     // Radius 0.5 m, 1 rad/s, from the origin along x.
     for (int k = 0; k <= 90; k++) {
@@ -887,10 +887,10 @@ static void test_pose_at_within_a_step_is_on_the_arc(void **state)
 
 static void test_pose_at_ahead_goes_on_as_before_up_to_its_limit(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.motion = 1;
-    params.ahead_max_us = 100000;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.motion = 1;
+    settings.ahead_max_us = 100000;
+    bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 10);
     const double angle = 9 * STEP_S + 0.1;
     bslam_pose_t pose;
@@ -906,13 +906,13 @@ static void test_pose_at_ahead_goes_on_as_before_up_to_its_limit(void **state)
 
 /// A frame stamped time_us, taken by a sensor that is off the axle: its new beacon must stand where the robot
 /// at shown_us saw it.
-static void assert_beacon_is_placed_from(bslam_params_t params, int64_t time_us, int64_t shown_us)
+static void assert_beacon_is_placed_from(bslam_settings_t settings, int64_t time_us, int64_t shown_us)
 {
-    params.motion = 1;
-    params.mount_x_m = BSLAM_R(0.2);
-    params.mount_y_m = BSLAM_R(0.1);
-    params.mount_yaw_rad = BSLAM_R(0.5);
-    bslam_slam_t slam = started(params);
+    settings.motion = 1;
+    settings.mount_x_m = BSLAM_R(0.2);
+    settings.mount_y_m = BSLAM_R(0.1);
+    settings.mount_yaw_rad = BSLAM_R(0.5);
+    bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 10);
     bslam_pose_t pose;
     assert_int_equal(bslam_slam_pose_at(&slam, shown_us, &pose), BSLAM_OK);
@@ -926,44 +926,44 @@ static void assert_beacon_is_placed_from(bslam_params_t params, int64_t time_us,
 
 static void test_sightings_are_placed_from_where_the_robot_was(void **state)
 {
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     static const int64_t times_us[] = {0,           3 * STEP_US,        200000, 9 * STEP_US - 1,
                                        9 * STEP_US, 9 * STEP_US + 50000};
     for (int i = 0; i < COUNT_OF(times_us); i++) {
-        assert_beacon_is_placed_from(params, times_us[i], times_us[i]);
+        assert_beacon_is_placed_from(settings, times_us[i], times_us[i]);
     }
 }
 
 static void test_sightings_delay_shifts_where_they_are_placed_from(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.sighting_delay_us = 150000;
-    assert_beacon_is_placed_from(params, 9 * STEP_US, 9 * STEP_US - 150000);
-    assert_beacon_is_placed_from(params, 9 * STEP_US + 120000, 9 * STEP_US - 30000);
-    params.sighting_delay_us = -150000;
-    assert_beacon_is_placed_from(params, 3 * STEP_US, 3 * STEP_US + 150000);
-    assert_beacon_is_placed_from(params, 9 * STEP_US - 100000, 9 * STEP_US + 50000);
+    bslam_settings_t settings = unit_params();
+    settings.sighting_delay_us = 150000;
+    assert_beacon_is_placed_from(settings, 9 * STEP_US, 9 * STEP_US - 150000);
+    assert_beacon_is_placed_from(settings, 9 * STEP_US + 120000, 9 * STEP_US - 30000);
+    settings.sighting_delay_us = -150000;
+    assert_beacon_is_placed_from(settings, 3 * STEP_US, 3 * STEP_US + 150000);
+    assert_beacon_is_placed_from(settings, 9 * STEP_US - 100000, 9 * STEP_US + 50000);
 }
 
 static void test_sightings_of_a_delayed_frame_before_the_clock_are_refused(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.sighting_delay_us = 10000000;
-    bslam_slam_t slam = started(params);
+    bslam_settings_t settings = unit_params();
+    settings.sighting_delay_us = 10000000;
+    bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 5);
     const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
     assert_frame_refused(&slam, 0, &seen, 1, BSLAM_E_TIME, -1);
 }
 
 /// Every form of the filter: 0 to 5.
-static bslam_params_t form(int kind)
+static bslam_settings_t form(int kind)
 {
-    bslam_params_t params = unit_params();
-    params.motion = 1;
-    params.filter = kind % 2;
-    params.velocity_states = kind / 2 == 1;
-    params.scale_states = kind / 2 == 2;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.motion = 1;
+    settings.filter = kind % 2;
+    settings.velocity_states = kind / 2 == 1;
+    settings.scale_states = kind / 2 == 2;
+    return settings;
 }
 
 static void assert_same_estimate(const bslam_slam_t *a, const bslam_slam_t *b)
@@ -984,7 +984,7 @@ static void test_sightings_that_come_late_count_as_if_they_had_come_in_time(void
             bslam_slam_t in_time = started(form(kind));
             bslam_slam_t late = started(form(kind));
             bslam_slam_t with_delay = started(form(kind));
-            with_delay.params.sighting_delay_us = 100000;
+            with_delay.settings.sighting_delay_us = 100000;
             const bslam_sighting_t first = unit_polar(0.5, 4, 1);
             const bslam_sighting_t second[] = {unit_polar(0.2, 3.8, 1), unit_direction(1, 2)};
             see_one(&in_time, 0, first);
@@ -1048,9 +1048,9 @@ static void test_odometry_beyond_the_room_to_wait_is_predicted_in_order(void **s
 static void test_odometry_largest_motion_does_not_overflow_the_way(void **state)
 {
     for (int kind = 0; kind < 6; kind++) {
-        bslam_params_t params = form(kind);
-        params.speed_max_mps = 1000;
-        bslam_slam_t slam = running(params);
+        bslam_settings_t settings = form(kind);
+        settings.speed_max_mps = 1000;
+        bslam_slam_t slam = running(settings);
         for (int i = 1; i <= 4; i++) {
             const int64_t time_us = 10 * STEP_US + (int64_t)i * 4000000;
             const bslam_odometry_reading_t reading = {
@@ -1129,10 +1129,10 @@ static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map
 {
     static const double places[3][2] = {{4, 1}, {-2, 3}, {1, -4}};
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_params_t params = unit_params();
-        params.filter = filter;
-        params.gate_d2 = 25;
-        bslam_slam_t slam = started(params);
+        bslam_settings_t settings = unit_params();
+        settings.filter = filter;
+        settings.gate_d2 = 25;
+        bslam_slam_t slam = started(settings);
         bslam_pose_t truth = {0, 0, 0};
         for (int step = 0; step < 100; step++) {
             if (step == 50) {
@@ -1170,13 +1170,13 @@ static void test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing
 
 static void test_resume_odometry_with_velocity_states_forgets_the_speed(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
     // A ponderous robot: were the speed from before still believed, it would take seconds to learn otherwise.
-    params.velocity_walk_mps_sqrt_s = BSLAM_R(0.02);
-    params.velocity_decay_s = BSLAM_R(1e6);
-    params.right_speed_sd_mps = params.left_speed_sd_mps;
-    bslam_slam_t slam = started(params);
+    settings.velocity_walk_mps_sqrt_s = BSLAM_R(0.02);
+    settings.velocity_decay_s = BSLAM_R(1e6);
+    settings.right_speed_sd_mps = settings.left_speed_sd_mps;
+    bslam_slam_t slam = started(settings);
     for (int i = 0; i < 100; i++) {
         drive(&slam, (int64_t)i * STEP_US, 0.5 * STEP_S, 0.5 * STEP_S);
     }
@@ -1200,10 +1200,10 @@ static void test_sightings_of_known_beacons_localise_and_never_move_them(void **
 {
     static const double places[3][2] = {{4, 1}, {-2, 3}, {1, -4}};
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_params_t params = unit_params();
-        params.filter = filter;
-        params.motion = 1;
-        bslam_slam_t slam = started(params);
+        bslam_settings_t settings = unit_params();
+        settings.filter = filter;
+        settings.motion = 1;
+        bslam_slam_t slam = started(settings);
         for (int i = 0; i < 3; i++) {
             assert_int_equal(bslam_slam_add_known_beacon(&slam, i, real(places[i][0]), real(places[i][1])),
                              BSLAM_OK);
@@ -1251,9 +1251,9 @@ static void test_init_starts_at_the_origin_with_an_empty_map(void **state)
 {
     bslam_slam_t slam;
     memset(&slam, 0xee, sizeof slam);
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     int bad_id = -1;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     const bslam_pose_t origin = {0, 0, 0};
     const bslam_pose_t pose = bslam_slam_pose(&slam);
     assert_memory_equal(&pose, &origin, sizeof pose);

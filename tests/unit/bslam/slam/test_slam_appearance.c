@@ -11,29 +11,29 @@ static bslam_slam_t slam;
 static bslam_appearance_t appearance;
 static int64_t now_us;
 
-static void start(bslam_params_t params)
+static void start(bslam_settings_t settings)
 {
     int bad_id;
     memset(&slam, 0, sizeof slam);
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     assert_int_equal(bslam_appearance_init(&appearance, NULL, 0), BSLAM_OK);
     bslam_slam_attach_appearance(&slam, &appearance);
     now_us = 0;
 }
 
-static bslam_params_t svm_params(void)
+static bslam_settings_t svm_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.association = BSLAM_ASSOCIATION_SVM;
-    params.left_speed_sd_mps = BSLAM_R(1e-3);
-    params.right_speed_sd_mps = BSLAM_R(1e-3);
-    params.learn_travel_m = 0;
-    params.learn_budget = 2000;
-    params.doubt_sightings = 5;
-    params.duplicate_m = 1;
-    params.duplicate_sd_m = BSLAM_R(0.2);
-    params.duplicate_d2 = 9;
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.association = BSLAM_ASSOCIATION_SVM;
+    settings.left_speed_sd_mps = BSLAM_R(1e-3);
+    settings.right_speed_sd_mps = BSLAM_R(1e-3);
+    settings.learn_travel_m = 0;
+    settings.learn_budget = 2000;
+    settings.doubt_sightings = 5;
+    settings.duplicate_m = 1;
+    settings.duplicate_sd_m = BSLAM_R(0.2);
+    settings.duplicate_d2 = 9;
+    return settings;
 }
 
 static int setup(void **state)
@@ -143,9 +143,9 @@ static void test_what_is_surely_matched_is_learned(void **state)
 
 static void test_other_methods_leave_looks_alone(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.association = BSLAM_ASSOCIATION_MAHALANOBIS;
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.association = BSLAM_ASSOCIATION_MAHALANOBIS;
+    start(settings);
     see_two(10);
     assert_int_equal(appearance.counters.taught + appearance.counters.unsure, 0);
 }
@@ -169,7 +169,7 @@ static void test_attaching_again_forgets(void **state)
 
 static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **state)
 {
-    slam.params.learn_budget = 3;  // training is always under way
+    slam.settings.learn_budget = 3;  // training is always under way
     see_two(8);
     bslam_beacon_view_t view;
     assert_int_equal(bslam_slam_beacon(&slam, 0, &view), BSLAM_OK);
@@ -206,7 +206,7 @@ static bool is_in_map(uint32_t uid)
 static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void **state)
 {
     see_two(20);
-    drive_on(slam.params.decision_delay_us);
+    drive_on(slam.settings.decision_delay_us);
     see_another_in_its_place(1);
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
     assert_int_equal(appearance.of[0].ousted, 1);
@@ -216,7 +216,7 @@ static void test_what_keeps_being_replaced_is_gone_itself(void **state)
 {
     see_two(20);
     const uint32_t first_uid = slam.ekf.beacons[0].uid;
-    drive_on(slam.params.decision_delay_us);
+    drive_on(slam.settings.decision_delay_us);
     see_another_in_its_place(3);
     assert_false(is_in_map(first_uid));
 }
@@ -293,9 +293,9 @@ static void test_what_stands_apart_or_was_seen_often_is_not_retired(void **state
 /// Two directions alone have begun a beacon each, and one of the two is all that is seen from then on.
 static void test_a_ray_in_the_direction_of_another_is_retired(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.again_odds = 0;
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.again_odds = 0;
+    start(settings);
     float signatures[2][BSLAM_SAMPLE_FEATURES];
     bslam_sighting_t seen[] = {unit_polar(0.5, 4, -1), unit_polar(0.55, 4, -1)};
     for (int k = 0; k < 2; k++) {
@@ -306,7 +306,7 @@ static void test_a_ray_in_the_direction_of_another_is_retired(void **state)
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
     assert_int_equal(slam.ekf.beacons[0].kind, BSLAM_BEACON_RAY);
     const uint32_t seen_uid = slam.ekf.beacons[1].uid;
-    for (int view = 0; view < slam.params.doubt_sightings; view++) {
+    for (int view = 0; view < slam.settings.doubt_sightings; view++) {
         assert_int_equal(appearance.counters.retired, 0);
         see_away(3, view, 0.55, 4);
     }
@@ -361,12 +361,12 @@ static uint32_t waits_of_another(int frames)
 /// it does not settle which of them is seen.
 static void start_to_wait(void)
 {
-    bslam_params_t params = svm_params();
-    params.appearance_samples = 10;
-    params.decision_delay_us = 1000000;
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.appearance_samples = 10;
+    settings.decision_delay_us = 1000000;
+    start(settings);
     see_two(6);
-    slam.params.learn_lead = 100;
+    slam.settings.learn_lead = 100;
     for (int i = 0; i < 50; i++) {
         see(NULL, 0);
     }
@@ -419,11 +419,11 @@ static void pass_by(double from_m, double step_m, bool sees_the_gone, double tri
 /// A frame with something on trial in it is as clear as one without.
 static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.missed_views = 3;
-    params.existence_beacons = 0;
-    params.existence_sum = 1000;
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.missed_views = 3;
+    settings.existence_beacons = 0;
+    settings.existence_sum = 1000;
+    start(settings);
     pass_by(0, 0.1, true, 1.0);
     pass_by(4, -0.1, true, 1.0);
     assert_int_equal(bslam_slam_beacon_count(&slam), THINGS);
@@ -439,10 +439,10 @@ static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **s
 /// it knows.
 static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while(void **state)
 {
-    bslam_params_t params = svm_params();
-    params.gate_d2 = 9;
-    params.decision_delay_score = 0;
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.gate_d2 = 9;
+    settings.decision_delay_score = 0;
+    start(settings);
     see_two(40);
     const double off_rad = 0.085;
     see_object(0, 50, off_rad);
@@ -450,7 +450,7 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
     assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
     const double distance2 = 9 * (double)slam.accounts[0].test_ratio;
     assert_true(distance2 > 12 && distance2 < 25);
-    drive_on(params.decision_delay_us - 2 * STEP_US);
+    drive_on(settings.decision_delay_us - 2 * STEP_US);
     see_object(0, 51, off_rad);
     assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
     see_object(0, 52, off_rad);
@@ -462,11 +462,12 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
 
 /// Two beacons that were seen with distances, out of view for so long, and a heading of so much doubt: what
 /// becomes of the first as it is seen then.
-static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_range, double decision_delay_score)
+static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_range,
+                                 double decision_delay_score)
 {
-    bslam_params_t params = svm_params();
-    params.decision_delay_score = real(decision_delay_score);
-    start(params);
+    bslam_settings_t settings = svm_params();
+    settings.decision_delay_score = real(decision_delay_score);
+    start(settings);
     see_two(20);
     drive_on(us);
     const bslam_pose_t pose = bslam_ekf_pose(&slam.ekf);
@@ -509,13 +510,13 @@ static void test_where_little_speaks_for_its_beacon_a_direction_alone_waits(void
 /// What has just begun is itself; what comes into view again is what its match says.
 static void test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view(void **state)
 {
-    const bslam_params_t params = svm_params();
+    const bslam_settings_t settings = svm_params();
     see_two(6);
-    assert_true(appearance.of[0].view_score >= params.again_odds);
+    assert_true(appearance.of[0].view_score >= settings.again_odds);
     see_object(0, 6, 0.06);
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
-    assert_true(appearance.of[0].view_score >= params.again_odds);
-    drive_on(params.decision_delay_us);
+    assert_true(appearance.of[0].view_score >= settings.again_odds);
+    drive_on(settings.decision_delay_us);
     see_object(0, 7, 0.06);
     const bslam_real_t anew = slam.matches[0].score;
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);

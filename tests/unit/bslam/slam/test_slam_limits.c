@@ -23,12 +23,12 @@ typedef struct drive {
     bslam_pose_t truth;
 } drive_t;
 
-static void start(drive_t *drive, bslam_params_t params, uint64_t seed)
+static void start(drive_t *drive, bslam_settings_t settings, uint64_t seed)
 {
     memset(drive, 0, sizeof *drive);
     drive->random.state = seed;
     int bad_id = -1;
-    assert_int_equal(bslam_slam_init(&drive->slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&drive->slam, &settings, &bad_id), BSLAM_OK);
 }
 
 static void move(drive_t *drive)
@@ -118,18 +118,18 @@ static void assert_accounts_add_up(const bslam_slam_t *slam)
 }
 
 /// Filter, motion and further states in every combination that is allowed: 0 to 11.
-static bslam_params_t params_of(int kind)
+static bslam_settings_t params_of(int kind)
 {
-    bslam_params_t params = unit_params();
-    params.filter = kind % 2;
-    params.motion = kind / 2 % 2;
-    params.velocity_states = kind / 4 == 1;
-    params.scale_states = kind / 4 == 2;
-    params.gate_d2 = 25;
+    bslam_settings_t settings = unit_params();
+    settings.filter = kind % 2;
+    settings.motion = kind / 2 % 2;
+    settings.velocity_states = kind / 4 == 1;
+    settings.scale_states = kind / 4 == 2;
+    settings.gate_d2 = 25;
     // Half of them show the robot within the last step.
-    params.sighting_delay_us = kind % 4 < 2 ? 0 : 30000;
-    params.mount_x_m = BSLAM_R(0.05);
-    return params;
+    settings.sighting_delay_us = kind % 4 < 2 ? 0 : 30000;
+    settings.mount_x_m = BSLAM_R(0.05);
+    return settings;
 }
 
 static void run_full(bool directions_only)
@@ -187,11 +187,11 @@ static void test_directions_fill_the_room_for_rays_and_no_more(void **state)
 static void test_every_method_of_association_at_full_size_stays_sound(void **state)
 {
     for (int method = 0; method <= 4; method++) {
-        bslam_params_t params = params_of(5);
-        params.association = method;
-        params.nearest_threshold_m = BSLAM_R(0.2);
+        bslam_settings_t settings = params_of(5);
+        settings.association = method;
+        settings.nearest_threshold_m = BSLAM_R(0.2);
         static drive_t drive;
-        start(&drive, params, 6);
+        start(&drive, settings, 6);
         for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
             // Directions and distances in turn.
             drive.directions_only = i % 2 == 1;
@@ -226,12 +226,12 @@ static void test_removing_at_random_between_frames_stays_sound(void **state)
 
 static void test_window_removes_and_gives_the_room_back(void **state)
 {
-    bslam_params_t params = params_of(5);
-    params.confirm_sightings = 1000;
-    params.confirm_window_us = 3 * STEP_US;
-    params.association = 2;
+    bslam_settings_t settings = params_of(5);
+    settings.confirm_sightings = 1000;
+    settings.confirm_window_us = 3 * STEP_US;
+    settings.association = 2;
     static drive_t drive;
-    start(&drive, params, 8);
+    start(&drive, settings, 8);
     for (int i = 0; i < UNIT_LIMITS_STEPS; i++) {
         drive.directions_only = i % 2 == 1;
         see(&drive);

@@ -77,11 +77,11 @@ static void take_step(bslam_slam_t *slam, const vector_step_t *step, const vecto
     assert_int_equal(bslam_slam_sightings(slam, step->time_us, seen, step->sighting_count), BSLAM_OK);
 }
 
-static void assert_run(const bslam_params_t *params, run_t run)
+static void assert_run(const bslam_settings_t *settings, run_t run)
 {
     bslam_slam_t slam;
     int bad_id = -1;
-    assert_int_equal(bslam_slam_init(&slam, params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, settings, &bad_id), BSLAM_OK);
     for (int k = 0; k < run.step_count; k++) {
         const vector_step_t *step = &run.steps[k];
         take_step(&slam, step, run.sightings);
@@ -101,16 +101,16 @@ static void assert_run(const bslam_params_t *params, run_t run)
 
 static void test_run_standard_euler_is_the_references(void **state)
 {
-    bslam_params_t params;
-    standard_params(&params);
-    assert_run(&params, RUN(standard));
+    bslam_settings_t settings;
+    standard_params(&settings);
+    assert_run(&settings, RUN(standard));
 }
 
 static void test_run_invariant_arc_velocity_is_the_references(void **state)
 {
-    bslam_params_t params;
-    invariant_params(&params);
-    assert_run(&params, RUN(invariant));
+    bslam_settings_t settings;
+    invariant_params(&settings);
+    assert_run(&settings, RUN(invariant));
 }
 
 int main(void)

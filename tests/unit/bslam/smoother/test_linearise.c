@@ -13,14 +13,14 @@ static bslam_smoother_t smoother;
 static void start(double x_m, double y_m, double sd_m)
 {
     static bslam_ekf_t filter;
-    bslam_params_t params = unit_params();
+    bslam_settings_t settings = unit_params();
     int index;
-    params.filter = BSLAM_FILTER_SMOOTHER;
-    params.velocity_states = 1;
-    bslam_ekf_init(&filter, &params);
+    settings.filter = BSLAM_FILTER_SMOOTHER;
+    settings.velocity_states = 1;
+    bslam_ekf_init(&filter, &settings);
     assert_int_equal(bslam_ekf_add_guess(&filter, real(x_m), real(y_m), real(sd_m), &index), BSLAM_OK);
     memset(&smoother, 0, sizeof smoother);
-    bslam_smoother_restart(&smoother, &params, &filter);
+    bslam_smoother_restart(&smoother, &settings, &filter);
 }
 
 /// What the base holds of the beacon, about another place.

@@ -17,7 +17,7 @@ enum { BEACONS = 3, BASE = 5, WALKS = 2, STEP = WALKS + 2, DIM = BASE + 2 * BEAC
 
 static bslam_smoother_t smoother;
 static bslam_ekf_t filter;
-static bslam_params_t params;
+static bslam_settings_t settings;
 
 // ---- the models from their definitions --------------------------------------------------------------------
 
@@ -31,8 +31,8 @@ static void step(const double *in, double *out, const void *context)
     const bslam_bend_t bend = bslam_smoother_bend(node);
     double c;
     double s;
-    out[V] = in[V] / (1 + dt_s / (double)params.velocity_decay_s) + in[V_WALK];
-    out[OMEGA] = in[OMEGA] / (1 + dt_s / (double)params.turn_rate_decay_s) + in[OMEGA_WALK];
+    out[V] = in[V] / (1 + dt_s / (double)settings.velocity_decay_s) + in[V_WALK];
+    out[OMEGA] = in[OMEGA] / (1 + dt_s / (double)settings.turn_rate_decay_s) + in[OMEGA_WALK];
     unit_mean_direction(in[BSLAM_STATE_THETA] + (double)bend.turned_rad, out[OMEGA] * dt_s, &c, &s);
     out[BSLAM_STATE_X] = in[BSLAM_STATE_X] + out[V] * dt_s * (double)bend.stretch * c;
     out[BSLAM_STATE_Y] = in[BSLAM_STATE_Y] + out[V] * dt_s * (double)bend.stretch * s;
@@ -90,7 +90,7 @@ static void start_batch(double v_walk)
             batch.information.at[i][j] = inverse.at[i][j];
         }
     }
-    const double turn_walk = (double)params.turn_rate_walk_radps_sqrt_s;
+    const double turn_walk = (double)settings.turn_rate_walk_radps_sqrt_s;
     for (int k = 0; k < batch.nodes; k++) {
         const double dt_s = (double)bslam_smoother_node(&smoother, k)->motion.dt_s;
         const int at = DIM + STEP * k;
@@ -170,7 +170,7 @@ static void add_speeds(int k)
 static void add_seen(int k, int first_seen, bool map_is_known)
 {
     const bslam_smoother_node_t *node = bslam_smoother_node(&smoother, k);
-    const bslam_pose_t mount = {params.mount_x_m, params.mount_y_m, params.mount_yaw_rad};
+    const bslam_pose_t mount = {settings.mount_x_m, settings.mount_y_m, settings.mount_yaw_rad};
     static bslam_ekf_t there;  // for the twin: a filter that stands where node k is linearised
     double values[DENSE_MAX];
     there = smoother.base;
@@ -257,14 +257,14 @@ static void move(unit_random_t *random)
                                    .turn_var_rad2 = BSLAM_R(1e-4),
                                    .forward_turn_cov_mrad = BSLAM_R(1e-5)};
     bslam_motion_t moved;
-    bslam_ekf_predict(&filter, &params, &motion, &moved);
+    bslam_ekf_predict(&filter, &settings, &motion, &moved);
     bslam_smoother_move(&smoother, &filter, &motion);
 }
 
 /// Shows each beacon where a robot of the true pose sees it.
 static void see(unit_random_t *random, const double *map)
 {
-    const bslam_pose_t mount = {params.mount_x_m, params.mount_y_m, params.mount_yaw_rad};
+    const bslam_pose_t mount = {settings.mount_x_m, settings.mount_y_m, settings.mount_yaw_rad};
     double values[DENSE_MAX] = {true_pose[0], true_pose[1], true_pose[2]};
     memcpy(&values[BASE], &map[BASE], 2 * BEACONS * sizeof *map);
     for (int b = 0; b < BEACONS; b++) {
@@ -274,12 +274,12 @@ static void see(unit_random_t *random, const double *map)
         const bslam_sighting_t seen = unit_direction(bearing_rad + unit_random(random, -0.01, 0.01), b);
         bslam_smoother_see(&smoother, &seen, b);
     }
-    bslam_smoother_frame(&smoother, &params, &filter);
+    bslam_smoother_frame(&smoother, &settings, &filter);
 }
 
-static bslam_params_t smoother_params(void)
+static bslam_settings_t smoother_params(void)
 {
-    bslam_params_t p = unit_params();
+    bslam_settings_t p = unit_params();
     p.filter = BSLAM_FILTER_SMOOTHER;
     p.motion = BSLAM_MOTION_ARC;
     p.velocity_states = 1;
@@ -296,12 +296,12 @@ static void make_window(uint64_t seed, int nodes)
 {
     unit_random_t random = {seed};
     double map[DENSE_MAX];
-    params = smoother_params();
-    twin_randomise(&filter, &params, &random, BEACONS, 0);
+    settings = smoother_params();
+    twin_randomise(&filter, &settings, &random, BEACONS, 0);
     twin_values(&filter, map);
     memcpy(true_pose, map, sizeof true_pose);
     memset(&smoother, 0, sizeof smoother);
-    bslam_smoother_restart(&smoother, &params, &filter);
+    bslam_smoother_restart(&smoother, &settings, &filter);
     while (smoother.node_count < nodes) {
         move(&random);
         see(&random, map);
@@ -339,7 +339,7 @@ static void assert_forth_is_the_batch(uint64_t seed, int nodes)
     for (int i = 0; i < DIM; i++) {
         point[i] = (double)(i < BASE ? bslam_smoother_node(&smoother, nodes - 1)->at[i] : smoother.place[i]);
     }
-    const twin_t z = solve_batch((double)params.velocity_walk_mps_sqrt_s, false);
+    const twin_t z = solve_batch((double)settings.velocity_walk_mps_sqrt_s, false);
     const dense_t covariance = dense_sandwich(&batch.rows[nodes], &z.covariance);
     go_forth();
     for (int i = 0; i < DIM; i++) {
@@ -368,7 +368,7 @@ static void assert_back_is_the_batch(uint64_t seed, int nodes)
 {
     make_window(seed, nodes);
     go_forth();
-    const twin_t z = solve_batch((double)params.path_walk_mps_sqrt_s, true);
+    const twin_t z = solve_batch((double)settings.path_walk_mps_sqrt_s, true);
     double before[64][BASE];
     for (int k = 0; k < nodes; k++) {
         for (int i = 0; i < BASE; i++) {
@@ -433,7 +433,7 @@ static void go_forth_over_a_beacon(uint16_t direction)
     make_window(10, 5);
     const bslam_real_t *at = bslam_smoother_node(&smoother, 2)->at;
     const double theta = (double)at[BSLAM_STATE_THETA];
-    const double mount[2] = {(double)params.mount_x_m, (double)params.mount_y_m};
+    const double mount[2] = {(double)settings.mount_x_m, (double)settings.mount_y_m};
     bslam_real_t *place = &smoother.place[smoother.base.beacons[1].at];
     place[0] = at[BSLAM_STATE_X] + real(cos(theta) * mount[0] - sin(theta) * mount[1]);
     place[1] = at[BSLAM_STATE_Y] + real(sin(theta) * mount[0] + cos(theta) * mount[1]);

@@ -16,26 +16,26 @@ static unit_random_t noise;
 static double pose[3];
 static int step;
 
-static bslam_params_t smoother_params(void)
+static bslam_settings_t smoother_params(void)
 {
-    bslam_params_t params = unit_params();
-    params.filter = BSLAM_FILTER_SMOOTHER;
-    params.velocity_states = 1;
-    params.velocity_walk_mps_sqrt_s = 30;
-    params.turn_rate_walk_radps_sqrt_s = 1;
-    params.turn_rate_decay_s = 1;
-    params.left_speed_sd_mps = BSLAM_R(0.1);
-    params.right_speed_sd_mps = BSLAM_R(0.1);
-    params.bearing_sd_rad = BSLAM_R(0.01);
-    return params;
+    bslam_settings_t settings = unit_params();
+    settings.filter = BSLAM_FILTER_SMOOTHER;
+    settings.velocity_states = 1;
+    settings.velocity_walk_mps_sqrt_s = 30;
+    settings.turn_rate_walk_radps_sqrt_s = 1;
+    settings.turn_rate_decay_s = 1;
+    settings.left_speed_sd_mps = BSLAM_R(0.1);
+    settings.right_speed_sd_mps = BSLAM_R(0.1);
+    settings.bearing_sd_rad = BSLAM_R(0.01);
+    return settings;
 }
 
 static int setup(void **state)
 {
-    const bslam_params_t params = smoother_params();
+    const bslam_settings_t settings = smoother_params();
     int bad_id;
     memset(&smoother, 0, sizeof smoother);
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     memset(pose, 0, sizeof pose);
     noise.state = 5;
@@ -139,7 +139,7 @@ static void test_node_is_the_line_through_its_bearings(void **state)
     const double omega = -0.3;
     assert_in_range(BSLAM_SMOOTHER_FRAMES, 1, COUNT_OF(bearing));
     drive_curve(3);
-    bslam_smoother_restart(&smoother, &slam.params, &slam.ekf);
+    bslam_smoother_restart(&smoother, &slam.settings, &slam.ekf);
     smoother.anchors_to_come = 0;
     bslam_ekf_t filter = slam.ekf;
     filter.mean[BSLAM_STATE_TURN] = real(omega);
@@ -160,7 +160,7 @@ static void test_node_is_the_line_through_its_bearings(void **state)
         a[2] += w;
         b[0] += w * after * bearing[k];
         b[1] += w * bearing[k];
-        bslam_smoother_frame(&smoother, &slam.params, &filter);
+        bslam_smoother_frame(&smoother, &slam.settings, &filter);
     }
     assert_int_equal(smoother.node_count, 1);
     assert_int_equal(smoother.seen_count, 1);
@@ -275,10 +275,10 @@ static void test_where_nothing_is_seen_cycles_end_too(void **state)
 
 static void test_ways_of_odometry_alone_make_longer_nodes(void **state)
 {
-    bslam_params_t params = smoother_params();
-    params.velocity_states = 0;
+    bslam_settings_t settings = smoother_params();
+    settings.velocity_states = 0;
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     drive_curve(60);
     const int nodes = nodes_of_unseen_s(20);
@@ -338,7 +338,7 @@ static void refuse_all(void)
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 9, real(NAN), 1), BSLAM_E_NOT_FINITE);
     assert_int_equal(bslam_slam_remove_beacon(&slam, 999), BSLAM_E_NO_BEACON);
     assert_int_equal(bslam_slam_beacon(&slam, LABELS, NULL), BSLAM_E_NO_BEACON);
-    assert_int_equal(bslam_slam_init(&slam, &(bslam_params_t){0}, &index), BSLAM_E_PARAMETER);
+    assert_int_equal(bslam_slam_init(&slam, &(bslam_settings_t){0}, &index), BSLAM_E_PARAMETER);
 }
 
 static void test_refusals_leave_smoother_and_filter_as_they_are_in_any_phase(void **state)
@@ -448,14 +448,14 @@ static void test_estimate_that_is_not_finite_is_not_taken(void **state)
 
 static void test_without_the_parameter_it_is_not_attached(void **state)
 {
-    bslam_params_t params = smoother_params();
+    bslam_settings_t settings = smoother_params();
     int bad_id;
-    params.filter = BSLAM_FILTER_INVARIANT;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    settings.filter = BSLAM_FILTER_INVARIANT;
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     assert_null(slam.smoother);
-    params.filter = BSLAM_FILTER_SMOOTHER;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    settings.filter = BSLAM_FILTER_SMOOTHER;
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     bslam_slam_attach_smoother(&slam, &smoother);
     assert_ptr_equal(slam.smoother, &smoother);
     bslam_slam_attach_smoother(&slam, NULL);

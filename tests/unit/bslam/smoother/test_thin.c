@@ -21,7 +21,7 @@ static bslam_observation_t observed(int k, int beacon)
 {
     const bslam_real_t *at = bslam_smoother_node(&smoother, k)->at;
     const bslam_pose_t pose = {at[0], at[1], at[2]};
-    const bslam_params_t *model = &smoother.model;
+    const bslam_settings_t *model = &smoother.model;
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
     bslam_observation_t seen;
     assert_int_equal(
@@ -61,17 +61,17 @@ static void show(int k, bslam_smoother_seen_t seen)
 /// The third beacon is seen from every second node, and its distance from every fourth.
 static void fill(int nodes)
 {
-    bslam_params_t params = unit_params();
-    params.filter = BSLAM_FILTER_SMOOTHER;
-    params.velocity_states = 1;
-    bslam_ekf_init(&filter, &params);
+    bslam_settings_t settings = unit_params();
+    settings.filter = BSLAM_FILTER_SMOOTHER;
+    settings.velocity_states = 1;
+    bslam_ekf_init(&filter, &settings);
     for (int b = 0; b < BEACONS; b++) {
         int index;
         assert_int_equal(bslam_ekf_add_guess(&filter, real(places[b][0]), real(places[b][1]), 1, &index),
                          BSLAM_OK);
     }
     memset(&smoother, 0, sizeof smoother);
-    bslam_smoother_restart(&smoother, &params, &filter);
+    bslam_smoother_restart(&smoother, &settings, &filter);
     assert_true(nodes <= BSLAM_SMOOTHER_NODES_MAX);
     bslam_pose_t pose = {0, 0, 0};
     for (int k = 0; k < nodes; k++) {

@@ -138,8 +138,8 @@ static void test_map_load_living_gives_beacons_covariance_and_looks_back(void **
         bslam_sample_t sample;
         assert_int_equal(bslam_sample_encode(kept_signature(object, 50, signature), &sample), BSLAM_OK);
         for (int b = 0; b < 4; b++) {
-            const bslam_opinion_t was = bslam_appearance_ask(&appearance, &slam.params, b, &sample);
-            const bslam_opinion_t is = bslam_appearance_ask(&other_looks, &other.params, b, &sample);
+            const bslam_opinion_t was = bslam_appearance_ask(&appearance, &slam.settings, b, &sample);
+            const bslam_opinion_t is = bslam_appearance_ask(&other_looks, &other.settings, b, &sample);
             assert_near(is.value, was.value, BSLAM_SAMPLE_FLOAT ? 0.02 : 0);
             assert_near(is.weight, was.weight, 0);
         }
@@ -219,30 +219,31 @@ static void test_map_load_gives_the_counts_of_classes_back(void **state)
         kept_empty(&other, &other_looks);
         load((bslam_map_mode_t)mode);
         for (int b = 0; b < 4; b++) {
-            assert_memory_equal(other_looks.of[b].seen_as, appearance.of[b].seen_as, sizeof appearance.of[b].seen_as);
+            assert_memory_equal(other_looks.of[b].seen_as, appearance.of[b].seen_as,
+                                sizeof appearance.of[b].seen_as);
         }
     }
 }
 
 static void test_map_load_frozen_keeps_the_scale_of_a_sized_beacon(void **state)
 {
-    bslam_params_t params = kept_params();
-    params.range_scale_sd = BSLAM_R(0.2);
-    params.confirm_sightings = 1;
+    bslam_settings_t settings = kept_params();
+    settings.range_scale_sd = BSLAM_R(0.2);
+    settings.confirm_sightings = 1;
     int bad_id;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     const bslam_sighting_t seen = unit_polar(0.5, 4, -1);
     assert_int_equal(bslam_slam_sightings(&slam, 0, &seen, 1), BSLAM_OK);
     slam.ekf.mean[slam.ekf.beacons[0].at + 2] = BSLAM_R(1.25);  // its distances come out a quarter too long
     size = kept_write(&slam, bytes);
-    other.params.range_scale_sd = params.range_scale_sd;
+    other.settings.range_scale_sd = settings.range_scale_sd;
     load(BSLAM_MAP_FROZEN);
     const bslam_pose_t mount = {0, 0, 0};
     bslam_innovation_t innovation;
-    assert_int_equal(bslam_ekf_innovation(&other.ekf, &other.params, &mount, &seen, 0, &innovation),
+    assert_int_equal(bslam_ekf_innovation(&other.ekf, &other.settings, &mount, &seen, 0, &innovation),
                      BSLAM_OK);
     assert_near(innovation.range_m, 4 - 5, 1e-5);
-    assert_near(innovation.range_var_m2, bslam_range_variance_m2(&params, &seen, 5), 1e-6);
+    assert_near(innovation.range_var_m2, bslam_range_variance_m2(&settings, &seen, 5), 1e-6);
     static uint8_t again[KEPT_BYTES_MAX];
     const uint32_t second = kept_write(&other, again);
     const bslam_map_source_t source = bslam_map_from_memory(again, second);
@@ -459,12 +460,12 @@ static void test_map_load_of_a_value_without_variance_asks_that_it_goes_with_no_
 /// Twenty beacons, six of them with four values each: more than the robot's memory holds twice.
 static void make_largest_map(void)
 {
-    bslam_params_t params = kept_params();
-    params.association = 0;
-    params.confirm_sightings = 1;
+    bslam_settings_t settings = kept_params();
+    settings.association = 0;
+    settings.confirm_sightings = 1;
     int bad_id;
     slam.appearance = NULL;
-    assert_int_equal(bslam_slam_init(&slam, &params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
         const double bearing_rad = -3 + 6.0 * b / BSLAM_BEACONS_MAX;
         const bslam_sighting_t seen =

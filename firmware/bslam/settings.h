@@ -1,7 +1,7 @@
 /// Every run-time parameter: name, default, range and meaning stand once, in the table below. C, the Python
-/// package and `bslam params` read the same line.
-#ifndef BSLAM_PARAMS_H
-#define BSLAM_PARAMS_H
+/// package and `bslam settings` read the same line.
+#ifndef BSLAM_SETTINGS_H
+#define BSLAM_SETTINGS_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -12,7 +12,7 @@
 
 // clang-format off
 /// REAL(name, default, low, high, meaning) and INTEGER(the same).
-#define BSLAM_PARAMS(REAL, INTEGER) \
+#define BSLAM_SETTINGS(REAL, INTEGER) \
     /* estimator */ \
     INTEGER(filter, 1, 0, 2, "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 smoother") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
@@ -163,43 +163,43 @@
 /// Values of `filter`.
 enum { BSLAM_FILTER_STANDARD = 0, BSLAM_FILTER_INVARIANT = 1, BSLAM_FILTER_SMOOTHER = 2 };
 
-#define BSLAM_PARAMS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;
-#define BSLAM_PARAMS_FIELD_INTEGER(name, value, low, high, meaning) int32_t name;
+#define BSLAM_SETTINGS_FIELD_REAL(name, value, low, high, meaning) bslam_real_t name;
+#define BSLAM_SETTINGS_FIELD_INTEGER(name, value, low, high, meaning) int32_t name;
 
 /// The values, one field for each line of the table.
 typedef struct bslam_params {
-    BSLAM_PARAMS(BSLAM_PARAMS_FIELD_REAL, BSLAM_PARAMS_FIELD_INTEGER)
-} bslam_params_t;
+    BSLAM_SETTINGS(BSLAM_SETTINGS_FIELD_REAL, BSLAM_SETTINGS_FIELD_INTEGER)
+} bslam_settings_t;
 
 /// One line of the table, for tools and parameter servers.
-typedef struct bslam_param_info {
+typedef struct bslam_setting_info {
     const char *name;
-    const char *meaning;  ///< empty without BSLAM_PARAM_MEANINGS
+    const char *meaning;  ///< empty without BSLAM_SETTING_MEANINGS
     bslam_real_t initial;
     bslam_real_t low;
     bslam_real_t high;
     bool is_integer;
-} bslam_param_info_t;
+} bslam_setting_info_t;
 
 /// Number of parameters.
-int bslam_params_count(void);
+int bslam_settings_count(void);
 
-/// Line 0 <= id < bslam_params_count() of the table, else NULL.
-const bslam_param_info_t *bslam_params_info(int id);
+/// Line 0 <= id < bslam_settings_count() of the table, else NULL.
+const bslam_setting_info_t *bslam_settings_info(int id);
 
 /// Every field to its default.
-void bslam_params_default(bslam_params_t *params);
+void bslam_settings_default(bslam_settings_t *settings);
 
 /// BSLAM_OK, or BSLAM_E_PARAMETER with *bad_id the first field that is outside its range (NaN is), or that
 /// contradicts another (velocity_states needs a positive speed noise of both wheels, and excludes
 /// scale_states).
-BSLAM_MUST_CHECK bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id);
+BSLAM_MUST_CHECK bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id);
 
 /// Field id as a number, an integer rounded to the scalar type. 0 for an id that does not exist.
-bslam_real_t bslam_params_get(const bslam_params_t *params, int id);
+bslam_real_t bslam_settings_get(const bslam_settings_t *settings, int id);
 
 /// Sets field id. BSLAM_E_PARAMETER, and no change, if there is no such field, the value is outside its
 /// range, or an integer is asked for and the value has a fraction.
-BSLAM_MUST_CHECK bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value);
+BSLAM_MUST_CHECK bslam_status_t bslam_settings_set(bslam_settings_t *settings, int id, bslam_real_t value);
 
 #endif

@@ -1,8 +1,8 @@
-#include "bslam/params.h"
+#include "bslam/settings.h"
 
 #include <stddef.h>
 
-#if BSLAM_PARAM_MEANINGS
+#if BSLAM_SETTING_MEANINGS
 #define MEANING(text) text
 #else
 #define MEANING(text) ""
@@ -11,7 +11,7 @@
     {#name, MEANING(meaning), BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), false},
 #define INFO_INTEGER(name, value, low, high, meaning) \
     {#name, MEANING(meaning), (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
-static const bslam_param_info_t infos[] = {BSLAM_PARAMS(INFO_REAL, INFO_INTEGER)};
+static const bslam_setting_info_t infos[] = {BSLAM_SETTINGS(INFO_REAL, INFO_INTEGER)};
 
 /// What checking needs: tables of their own, so that a linker drops the names where nobody asks for them.
 /// Limits are a few numbers again and again, so each stands once, and a limit is a byte: its place among
@@ -35,10 +35,10 @@ typedef struct limits {
 } limits_t;
 #define LIMITS_REAL(name, value, low, high, meaning) {BOUND_AT(BSLAM_R(low)), BOUND_AT(BSLAM_R(high))},
 #define LIMITS_INTEGER(name, value, low, high, meaning) {BOUND_AT(low), BOUND_AT(high)},
-static const limits_t limits[] = {BSLAM_PARAMS(LIMITS_REAL, LIMITS_INTEGER)};
-#define PLACE_REAL(name, value, low, high, meaning) (uint16_t)offsetof(bslam_params_t, name),
-#define PLACE_INTEGER(name, value, low, high, meaning) (uint16_t)(offsetof(bslam_params_t, name) + 1),
-static const uint16_t places[] = {BSLAM_PARAMS(PLACE_REAL, PLACE_INTEGER)};
+static const limits_t limits[] = {BSLAM_SETTINGS(LIMITS_REAL, LIMITS_INTEGER)};
+#define PLACE_REAL(name, value, low, high, meaning) (uint16_t)offsetof(bslam_settings_t, name),
+#define PLACE_INTEGER(name, value, low, high, meaning) (uint16_t)(offsetof(bslam_settings_t, name) + 1),
+static const uint16_t places[] = {BSLAM_SETTINGS(PLACE_REAL, PLACE_INTEGER)};
 
 static bool is_integer(int id)
 {
@@ -62,47 +62,47 @@ static bslam_real_t high_of(int id)
 
 #define PARAMS_COUNT ((int)(sizeof limits / sizeof limits[0]))
 
-int bslam_params_count(void)
+int bslam_settings_count(void)
 {
     return PARAMS_COUNT;
 }
 
-const bslam_param_info_t *bslam_params_info(int id)
+const bslam_setting_info_t *bslam_settings_info(int id)
 {
     return id >= 0 && id < PARAMS_COUNT ? &infos[id] : NULL;
 }
 
-void bslam_params_default(bslam_params_t *params)
+void bslam_settings_default(bslam_settings_t *settings)
 {
 #define DEFAULT_INTEGER(name, value, low, high, meaning) .name = (value),
 #define DEFAULT_REAL(name, value, low, high, meaning) .name = BSLAM_R(value),
-    static const bslam_params_t defaults = {BSLAM_PARAMS(DEFAULT_REAL, DEFAULT_INTEGER)};
-    *params = defaults;
+    static const bslam_settings_t defaults = {BSLAM_SETTINGS(DEFAULT_REAL, DEFAULT_INTEGER)};
+    *settings = defaults;
 }
 
 /// The field at a table line, as bytes of the struct.
-static const void *field(const bslam_params_t *params, int id)
+static const void *field(const bslam_settings_t *settings, int id)
 {
-    return (const unsigned char *)params + offset_of(id);
+    return (const unsigned char *)settings + offset_of(id);
 }
 
-bslam_real_t bslam_params_get(const bslam_params_t *params, int id)
+bslam_real_t bslam_settings_get(const bslam_settings_t *settings, int id)
 {
     if (id < 0 || id >= PARAMS_COUNT) {
         return 0;
     }
     if (is_integer(id)) {
-        return (bslam_real_t) * (const int32_t *)field(params, id);
+        return (bslam_real_t) * (const int32_t *)field(settings, id);
     }
-    return *(const bslam_real_t *)field(params, id);
+    return *(const bslam_real_t *)field(settings, id);
 }
 
-bslam_status_t bslam_params_set(bslam_params_t *params, int id, bslam_real_t value)
+bslam_status_t bslam_settings_set(bslam_settings_t *settings, int id, bslam_real_t value)
 {
     if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, low_of(id), high_of(id))) {
         return BSLAM_E_PARAMETER;
     }
-    void *target = (unsigned char *)params + offset_of(id);
+    void *target = (unsigned char *)settings + offset_of(id);
     if (!is_integer(id)) {
         *(bslam_real_t *)target = value;
         return BSLAM_OK;
@@ -125,36 +125,36 @@ static int id_at(size_t offset)
     return id;
 }
 
-static bool is_allowed(const bslam_params_t *params, int id)
+static bool is_allowed(const bslam_settings_t *settings, int id)
 {
     const bslam_real_t low = low_of(id), high = high_of(id);
     if (is_integer(id)) {
         // As integers: a float does not hold every int32_t.
-        const int32_t value = *(const int32_t *)field(params, id);
+        const int32_t value = *(const int32_t *)field(settings, id);
         return value >= (int32_t)low && value <= (int32_t)high;
     }
-    return bslam_in_range(*(const bslam_real_t *)field(params, id), low, high);
+    return bslam_in_range(*(const bslam_real_t *)field(settings, id), low, high);
 }
 
-bslam_status_t bslam_params_check(const bslam_params_t *params, int *bad_id)
+bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id)
 {
     for (int id = 0; id < PARAMS_COUNT; id++) {
-        if (!is_allowed(params, id)) {
+        if (!is_allowed(settings, id)) {
             *bad_id = id;
             return BSLAM_E_PARAMETER;
         }
     }
-    if (params->velocity_states != 0) {
-        if (params->scale_states != 0) {
-            *bad_id = id_at(offsetof(bslam_params_t, scale_states));
+    if (settings->velocity_states != 0) {
+        if (settings->scale_states != 0) {
+            *bad_id = id_at(offsetof(bslam_settings_t, scale_states));
             return BSLAM_E_PARAMETER;
         }
-        if (!(params->left_speed_sd_mps > 0)) {
-            *bad_id = id_at(offsetof(bslam_params_t, left_speed_sd_mps));
+        if (!(settings->left_speed_sd_mps > 0)) {
+            *bad_id = id_at(offsetof(bslam_settings_t, left_speed_sd_mps));
             return BSLAM_E_PARAMETER;
         }
-        if (!(params->right_speed_sd_mps > 0)) {
-            *bad_id = id_at(offsetof(bslam_params_t, right_speed_sd_mps));
+        if (!(settings->right_speed_sd_mps > 0)) {
+            *bad_id = id_at(offsetof(bslam_settings_t, right_speed_sd_mps));
             return BSLAM_E_PARAMETER;
         }
     }

@@ -5,8 +5,8 @@
 /// The table line of a name; fails if there is none.
 static int id_of(const char *name)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        if (strcmp(bslam_params_info(id)->name, name) == 0) {
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        if (strcmp(bslam_settings_info(id)->name, name) == 0) {
             return id;
         }
     }
@@ -24,10 +24,10 @@ static bslam_real_t neighbour(bslam_real_t x, bool up)
 #endif
 }
 
-static void assert_check_blames(const bslam_params_t *params, const char *name)
+static void assert_check_blames(const bslam_settings_t *settings, const char *name)
 {
     int bad_id = -1;
-    assert_int_equal(bslam_params_check(params, &bad_id), BSLAM_E_PARAMETER);
+    assert_int_equal(bslam_settings_check(settings, &bad_id), BSLAM_E_PARAMETER);
     assert_int_equal(bad_id, id_of(name));
 }
 
@@ -35,9 +35,9 @@ static void assert_check_blames(const bslam_params_t *params, const char *name)
 
 static void test_info_every_line_has_name_meaning_and_default_in_range(void **state)
 {
-    assert_true(bslam_params_count() > 0);
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const bslam_param_info_t *info = bslam_params_info(id);
+    assert_true(bslam_settings_count() > 0);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const bslam_setting_info_t *info = bslam_settings_info(id);
         assert_non_null(info);
         assert_true(strlen(info->name) > 0);
         assert_true(strlen(info->meaning) > 0);
@@ -48,29 +48,29 @@ static void test_info_every_line_has_name_meaning_and_default_in_range(void **st
 
 static void test_info_names_are_unique(void **state)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        assert_int_equal(id_of(bslam_params_info(id)->name), id);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        assert_int_equal(id_of(bslam_settings_info(id)->name), id);
     }
 }
 
 static void test_info_outside_the_table_is_null(void **state)
 {
-    assert_null(bslam_params_info(-1));
-    assert_null(bslam_params_info(bslam_params_count()));
-    assert_null(bslam_params_info(INT32_MAX));
-    assert_null(bslam_params_info(INT32_MIN));
+    assert_null(bslam_settings_info(-1));
+    assert_null(bslam_settings_info(bslam_settings_count()));
+    assert_null(bslam_settings_info(INT32_MAX));
+    assert_null(bslam_settings_info(INT32_MIN));
 }
 
 static void test_default_every_field_is_the_tables_and_passes_the_check(void **state)
 {
-    bslam_params_t params;
-    memset(&params, 0xa5, sizeof params);
-    bslam_params_default(&params);
+    bslam_settings_t settings;
+    memset(&settings, 0xa5, sizeof settings);
+    bslam_settings_default(&settings);
 #define ASSERT_DEFAULT(field, value, low, high, meaning) \
-    assert_near(params.field, value, UNIT_ROUNDING *fabs((double)(value)));
-    BSLAM_PARAMS(ASSERT_DEFAULT, ASSERT_DEFAULT)
+    assert_near(settings.field, value, UNIT_ROUNDING *fabs((double)(value)));
+    BSLAM_SETTINGS(ASSERT_DEFAULT, ASSERT_DEFAULT)
     int bad_id = 7;
-    assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
     assert_int_equal(bad_id, 7);
 }
 
@@ -78,49 +78,49 @@ static void test_default_every_field_is_the_tables_and_passes_the_check(void **s
 
 static void test_get_every_field_is_the_structs(void **state)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
     int id = 0;
 #define ASSERT_GET(field, value, low, high, meaning) \
-    params.field = (high); \
-    assert_true(bslam_params_get(&params, id) == params.field); \
+    settings.field = (high); \
+    assert_true(bslam_settings_get(&settings, id) == settings.field); \
     id++;
 #define ASSERT_GET_REAL(field, value, low, high, meaning) \
     ASSERT_GET(field, value, low, BSLAM_R(high), meaning)
-    BSLAM_PARAMS(ASSERT_GET_REAL, ASSERT_GET)
-    assert_int_equal(id, bslam_params_count());
+    BSLAM_SETTINGS(ASSERT_GET_REAL, ASSERT_GET)
+    assert_int_equal(id, bslam_settings_count());
 }
 
 static void test_get_no_such_field_is_zero(void **state)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
-    assert_true(bslam_params_get(&params, -1) == 0);
-    assert_true(bslam_params_get(&params, bslam_params_count()) == 0);
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
+    assert_true(bslam_settings_get(&settings, -1) == 0);
+    assert_true(bslam_settings_get(&settings, bslam_settings_count()) == 0);
 }
 
 static void test_set_both_limits_are_taken_and_read_back(void **state)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const bslam_param_info_t *info = bslam_params_info(id);
-        assert_int_equal(bslam_params_set(&params, id, info->low), BSLAM_OK);
-        assert_true(bslam_params_get(&params, id) == info->low);
-        assert_int_equal(bslam_params_set(&params, id, info->high), BSLAM_OK);
-        assert_true(bslam_params_get(&params, id) == info->high);
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const bslam_setting_info_t *info = bslam_settings_info(id);
+        assert_int_equal(bslam_settings_set(&settings, id, info->low), BSLAM_OK);
+        assert_true(bslam_settings_get(&settings, id) == info->low);
+        assert_int_equal(bslam_settings_set(&settings, id, info->high), BSLAM_OK);
+        assert_true(bslam_settings_get(&settings, id) == info->high);
     }
 }
 
 static void test_set_touches_no_other_field(void **state)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        bslam_params_t params;
-        bslam_params_default(&params);
-        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->high), BSLAM_OK);
-        for (int other = 0; other < bslam_params_count(); other++) {
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        bslam_settings_t settings;
+        bslam_settings_default(&settings);
+        assert_int_equal(bslam_settings_set(&settings, id, bslam_settings_info(id)->high), BSLAM_OK);
+        for (int other = 0; other < bslam_settings_count(); other++) {
             if (other != id) {
-                assert_true(bslam_params_get(&params, other) == bslam_params_info(other)->initial);
+                assert_true(bslam_settings_get(&settings, other) == bslam_settings_info(other)->initial);
             }
         }
     }
@@ -128,41 +128,41 @@ static void test_set_touches_no_other_field(void **state)
 
 static void test_set_outside_the_range_is_refused_and_changes_nothing(void **state)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const bslam_param_info_t *info = bslam_params_info(id);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const bslam_setting_info_t *info = bslam_settings_info(id);
         const bslam_real_t wrong[] = {neighbour(info->low, false), neighbour(info->high, true), NAN, INFINITY,
                                       -INFINITY};
         for (int i = 0; i < COUNT_OF(wrong); i++) {
-            bslam_params_t params;
-            bslam_params_t before;
-            memset(&params, 0, sizeof params);
-            bslam_params_default(&params);
-            memcpy(&before, &params, sizeof params);
-            assert_int_equal(bslam_params_set(&params, id, wrong[i]), BSLAM_E_PARAMETER);
-            assert_memory_equal(&params, &before, sizeof params);
+            bslam_settings_t settings;
+            bslam_settings_t before;
+            memset(&settings, 0, sizeof settings);
+            bslam_settings_default(&settings);
+            memcpy(&before, &settings, sizeof settings);
+            assert_int_equal(bslam_settings_set(&settings, id, wrong[i]), BSLAM_E_PARAMETER);
+            assert_memory_equal(&settings, &before, sizeof settings);
         }
     }
 }
 
 static void test_set_fraction_for_an_integer_is_refused(void **state)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
-    for (int id = 0; id < bslam_params_count(); id++) {
-        const bslam_param_info_t *info = bslam_params_info(id);
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        const bslam_setting_info_t *info = bslam_settings_info(id);
         if (info->is_integer) {
-            assert_int_equal(bslam_params_set(&params, id, info->low + BSLAM_R(0.5)), BSLAM_E_PARAMETER);
-            assert_true(bslam_params_get(&params, id) == info->initial);
+            assert_int_equal(bslam_settings_set(&settings, id, info->low + BSLAM_R(0.5)), BSLAM_E_PARAMETER);
+            assert_true(bslam_settings_get(&settings, id) == info->initial);
         }
     }
 }
 
 static void test_set_no_such_field_is_refused(void **state)
 {
-    bslam_params_t params;
-    bslam_params_default(&params);
-    assert_int_equal(bslam_params_set(&params, -1, 0), BSLAM_E_PARAMETER);
-    assert_int_equal(bslam_params_set(&params, bslam_params_count(), 0), BSLAM_E_PARAMETER);
+    bslam_settings_t settings;
+    bslam_settings_default(&settings);
+    assert_int_equal(bslam_settings_set(&settings, -1, 0), BSLAM_E_PARAMETER);
+    assert_int_equal(bslam_settings_set(&settings, bslam_settings_count(), 0), BSLAM_E_PARAMETER);
 }
 
 // ---- check ------------------------------------------------------------------------------------------------
@@ -170,9 +170,9 @@ static void test_set_no_such_field_is_refused(void **state)
 /// One field of otherwise good parameters is set to `value`: the check must blame it.
 #define ASSERT_BLAMED(field, value) \
     do { \
-        bslam_params_t params = unit_params(); \
-        params.field = (value); \
-        assert_check_blames(&params, #field); \
+        bslam_settings_t settings = unit_params(); \
+        settings.field = (value); \
+        assert_check_blames(&settings, #field); \
     } while (0)
 
 static void test_check_every_real_field_outside_its_range_is_blamed(void **state)
@@ -183,7 +183,7 @@ static void test_check_every_real_field_outside_its_range_is_blamed(void **state
     ASSERT_BLAMED(field, (bslam_real_t)NAN); \
     ASSERT_BLAMED(field, (bslam_real_t)INFINITY);
 #define IGNORE(field, value, low, high, meaning)
-    BSLAM_PARAMS(ASSERT_BLAMED_REAL, IGNORE)
+    BSLAM_SETTINGS(ASSERT_BLAMED_REAL, IGNORE)
 }
 
 static void test_check_every_integer_field_outside_its_range_is_blamed(void **state)
@@ -193,45 +193,45 @@ static void test_check_every_integer_field_outside_its_range_is_blamed(void **st
     ASSERT_BLAMED(field, (high) + 1); \
     ASSERT_BLAMED(field, INT32_MAX); \
     ASSERT_BLAMED(field, INT32_MIN);
-    BSLAM_PARAMS(IGNORE, ASSERT_BLAMED_INTEGER)
+    BSLAM_SETTINGS(IGNORE, ASSERT_BLAMED_INTEGER)
 }
 
 static void test_check_both_limits_of_every_field_are_taken(void **state)
 {
-    for (int id = 0; id < bslam_params_count(); id++) {
-        bslam_params_t params = unit_params();
+    for (int id = 0; id < bslam_settings_count(); id++) {
+        bslam_settings_t settings = unit_params();
         // A field that the contradictions below are about keeps its value.
-        if (strstr(bslam_params_info(id)->name, "_states") != NULL) {
+        if (strstr(bslam_settings_info(id)->name, "_states") != NULL) {
             continue;
         }
         int bad_id = -1;
-        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->low), BSLAM_OK);
-        assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
-        assert_int_equal(bslam_params_set(&params, id, bslam_params_info(id)->high), BSLAM_OK);
-        assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+        assert_int_equal(bslam_settings_set(&settings, id, bslam_settings_info(id)->low), BSLAM_OK);
+        assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
+        assert_int_equal(bslam_settings_set(&settings, id, bslam_settings_info(id)->high), BSLAM_OK);
+        assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
     }
 }
 
 static void test_check_velocity_and_scale_states_together_are_refused(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
-    params.scale_states = 1;
-    assert_check_blames(&params, "scale_states");
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
+    settings.scale_states = 1;
+    assert_check_blames(&settings, "scale_states");
 }
 
 static void test_check_velocity_states_need_noise_of_both_wheels(void **state)
 {
-    bslam_params_t params = unit_params();
-    params.velocity_states = 1;
-    params.left_speed_sd_mps = 0;
-    assert_check_blames(&params, "left_speed_sd_mps");
-    params.left_speed_sd_mps = 1;
-    params.right_speed_sd_mps = 0;
-    assert_check_blames(&params, "right_speed_sd_mps");
-    params.right_speed_sd_mps = 1;
+    bslam_settings_t settings = unit_params();
+    settings.velocity_states = 1;
+    settings.left_speed_sd_mps = 0;
+    assert_check_blames(&settings, "left_speed_sd_mps");
+    settings.left_speed_sd_mps = 1;
+    settings.right_speed_sd_mps = 0;
+    assert_check_blames(&settings, "right_speed_sd_mps");
+    settings.right_speed_sd_mps = 1;
     int bad_id = -1;
-    assert_int_equal(bslam_params_check(&params, &bad_id), BSLAM_OK);
+    assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
 }
 
 int main(void)
