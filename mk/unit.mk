@@ -16,8 +16,10 @@ SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recov
 UNIT_WARNINGS := $(C_WARNINGS) -Wno-unused-parameter
 
 UNIT_REALS := float double
-UNIT_FLAGS_float := -DBSLAM_REAL_DOUBLE=0
-UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1 -DBSLAM_SAMPLE_FLOAT=1
+# Everything that may be left out is in.
+UNIT_SWITCHES := -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2
+UNIT_FLAGS_float := -DBSLAM_REAL_DOUBLE=0 $(UNIT_SWITCHES)
+UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1 $(UNIT_SWITCHES)
 UNIT_CORE_WARNINGS_float := $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 UNIT_CORE_WARNINGS_double := $(C_WARNINGS)
 

@@ -1,5 +1,7 @@
 #include "base/logarithm.h"
 
+#include <math.h>
+
 static const bslam_real_t LN_2 = BSLAM_R(0.69314718055994530942);
 static const bslam_real_t SQRT_HALF = BSLAM_R(0.70710678118654752440);
 

@@ -2,49 +2,26 @@
 #ifndef BSLAM_BASE_REAL_H
 #define BSLAM_BASE_REAL_H
 
-#include <float.h>
-#include <math.h>
+#include <limits.h>
 #include <stdbool.h>
 
-#include "config.h"
+#include "base/config.h"
+
+#if INT_MAX < 2147483647
+#error "bslam needs an int of 32 bits: shorter ones overflow where times and indices are computed"
+#endif
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error \
+    "bslam refuses what is no number, which -ffast-math and -ffinite-math-only assume away: do without them"
+#endif
 
 #if BSLAM_REAL_DOUBLE
 typedef double bslam_real_t;
 /// A literal of the scalar type: BSLAM_R(0.5).
 #define BSLAM_R(literal) literal
-/// From one to the next number.
-#define BSLAM_REAL_EPSILON DBL_EPSILON
 #else
 typedef float bslam_real_t;
 #define BSLAM_R(literal) literal##f
-#define BSLAM_REAL_EPSILON FLT_EPSILON
 #endif
-
-/// Square root, correctly rounded by IEEE 754 and so the same bits everywhere. The argument is not negative.
-static inline bslam_real_t bslam_sqrt(bslam_real_t x)
-{
-#if BSLAM_REAL_DOUBLE
-    return sqrt(x);
-#else
-    return sqrtf(x);
-#endif
-}
-
-static inline bslam_real_t bslam_abs(bslam_real_t x)
-{
-    return x < 0 ? -x : x;
-}
-
-/// True for a number in [low, high]; false outside and for NaN.
-static inline bool bslam_in_range(bslam_real_t x, bslam_real_t low, bslam_real_t high)
-{
-    return x >= low && x <= high;
-}
-
-/// True for a number that a measurement may be: finite, and small enough that its square is finite too.
-static inline bool bslam_is_number(bslam_real_t x)
-{
-    return bslam_in_range(x, BSLAM_R(-1e12), BSLAM_R(1e12));
-}
 
 #endif

@@ -16,6 +16,7 @@ const char *bslam_status_name(bslam_status_t status)
         [BSLAM_E_SINGULAR] = "BSLAM_E_SINGULAR",
         [BSLAM_E_MAP] = "BSLAM_E_MAP",
         [BSLAM_E_STATE] = "BSLAM_E_STATE",
+        [BSLAM_E_SIZE] = "BSLAM_E_SIZE",
     };
     if ((unsigned)status >= (unsigned)BSLAM_STATUS_COUNT) {
         return "unknown status";

@@ -3,6 +3,10 @@
 #ifndef BSLAM_BASE_STATUS_H
 #define BSLAM_BASE_STATUS_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum bslam_status {
     BSLAM_OK = 0,
     BSLAM_E_NOT_FINITE,  ///< an input is NaN, infinite or beyond 1e12
@@ -17,6 +21,7 @@ typedef enum bslam_status {
     BSLAM_E_SINGULAR,    ///< a covariance is not positive definite where it must be
     BSLAM_E_MAP,         ///< a stored map is refused, or cannot be stored: the fault beside it says why
     BSLAM_E_STATE,       ///< the pipeline's memory is not as it was sealed (store/guard.h)
+    BSLAM_E_SIZE,        ///< library and application were compiled with other sizes
     BSLAM_STATUS_COUNT
 } bslam_status_t;
 
@@ -25,5 +30,9 @@ const char *bslam_status_name(bslam_status_t status);
 
 /// The caller must look at the result.
 #define BSLAM_MUST_CHECK __attribute__((warn_unused_result))
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,4 +1,5 @@
 #include "base/trig.h"
+#include "base/scalar.h"
 
 #include <stdint.h>
 

@@ -13,6 +13,13 @@ typedef struct bslam_pose {
     bslam_real_t theta_rad;
 } bslam_pose_t;
 
+/// A symmetric matrix [[xx, xy], [xy, yy]].
+typedef struct bslam_sym2 {
+    bslam_real_t xx;
+    bslam_real_t xy;
+    bslam_real_t yy;
+} bslam_sym2_t;
+
 /// What odometry says of one interval: how far the robot went along its path and how far it turned, with
 /// covariance.
 typedef struct bslam_motion {

@@ -1,9 +1,10 @@
 /// What the parts of a step cost on this board, in ticks of port_ticks: one line each, "name size ticks", the
 /// mean of several calls. tools/checks/sizes_doc.py runs it and knows what a tick is.
 #include "bench/measure.h"
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 #include "base/trig.h"
 #include "port/port.h"
+#include "base/scalar.h"
 
 #define STEP_US 40000
 #define STEPS 8
@@ -143,7 +144,7 @@ static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
             seen[i] = see((k * SEEN + i) % beacons);
         }
         const bslam_sighting_frame_t frame = {
-            &slam.ekf, &slam.settings, &appearance, &bslam_appearance_answers, &mount, seen, SEEN, 0};
+            &slam.ekf, &slam.settings, &appearance, &mount, seen, SEEN, 0};
         const uint32_t began = port_ticks();
         associate(&frame, matches);
         ticks += port_ticks() - began;
@@ -181,7 +182,7 @@ static uint32_t train_ticks(int classifiers)
 
 static void measure_filter(int beacons, int velocity_states)
 {
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.velocity_states = velocity_states;
     settings.confirm_window_us = 0;
     start(beacons, 0);

@@ -2,7 +2,7 @@
 /// window is full: "mean beacons ticks" and "worst beacons ticks", over some seconds. And "state beacons
 /// number", by which the estimate after all of it may be compared with another machine's.
 #include "bench/measure.h"
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 #include "base/trig.h"
 #include "bslam/slam/fingerprint.h"
 
@@ -28,7 +28,7 @@ static void start(void)
 {
     bslam_settings_t settings;
     int bad_id = 0;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.filter = BSLAM_FILTER_SMOOTHER;
     settings.velocity_walk_mps_sqrt_s = 30;
     settings.turn_rate_walk_radps_sqrt_s = 1;

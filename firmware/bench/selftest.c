@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "bench/text.h"
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 #include "link/crc16.h"
 #include "port/port.h"
 
@@ -30,6 +30,7 @@ typedef struct vector_sighting {
 #pragma GCC diagnostic ignored "-Wunsuffixed-float-constants"
 #define double float
 #include "../../tests/vectors/filter_runs.h"
+#include "base/scalar.h"
 #undef double
 #pragma GCC diagnostic pop
 

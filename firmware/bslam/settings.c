@@ -1,109 +1,63 @@
 #include "bslam/settings.h"
 
-#include <stddef.h>
+#include "base/scalar.h"
+#include "bslam/settings_internal.h"
 
 #if BSLAM_SETTING_MEANINGS
 #define MEANING(text) text
 #else
 #define MEANING(text) ""
 #endif
-#define INFO_REAL(name, value, low, high, meaning) \
-    {#name, MEANING(meaning), BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), false},
-#define INFO_INTEGER(name, value, low, high, meaning) \
-    {#name, MEANING(meaning), (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), true},
-static const bslam_setting_info_t infos[] = {BSLAM_SETTINGS(INFO_REAL, INFO_INTEGER)};
+#define PLACE(name) (uint16_t)offsetof(bslam_settings_t, name)
+#define INFO(group, name, value, low, high, meaning, is_integer) \
+    {#name, MEANING(meaning), group, value, low, high, is_integer, PLACE(name)},
+#define REAL_IN(group, name, value, low, high, meaning) \
+    INFO(group, name, BSLAM_R(value), BSLAM_R(low), BSLAM_R(high), meaning, false)
+#define INTEGER_IN(group, name, value, low, high, meaning) \
+    INFO(group, name, (bslam_real_t)(value), (bslam_real_t)(low), (bslam_real_t)(high), meaning, true)
+#define SETTINGS_REAL(...) REAL_IN("settings", __VA_ARGS__)
+#define SETTINGS_INTEGER(...) INTEGER_IN("settings", __VA_ARGS__)
+#define EXPERT_REAL(...) REAL_IN("expert", __VA_ARGS__)
+#define EXPERT_INTEGER(...) INTEGER_IN("expert", __VA_ARGS__)
+#define TUNING_REAL(...) REAL_IN("tuning", __VA_ARGS__)
+#define TUNING_INTEGER(...) INTEGER_IN("tuning", __VA_ARGS__)
+static const bslam_setting_info_t infos[] = {BSLAM_SETTINGS(SETTINGS_REAL, SETTINGS_INTEGER)  //
+                                             BSLAM_EXPERT(EXPERT_REAL, EXPERT_INTEGER)        //
+                                             BSLAM_TUNING(TUNING_REAL, TUNING_INTEGER)};
 
-/// What checking needs: tables of their own, so that a linker drops the names where nobody asks for them.
-/// Limits are a few numbers again and again, so each stands once, and a limit is a byte: its place among
-/// them, which the compiler finds. Where a field stands in the struct is a multiple of 4: an odd number for
-/// an integer.
-// clang-format off
-#define BOUNDS(BOUND, x) \
-    BOUND(x, 0, 0.0) BOUND(x, 1, 1.0) BOUND(x, 2, 2.0) BOUND(x, 3, 4.0) BOUND(x, 4, 32.0) \
-    BOUND(x, 5, 1e-9) BOUND(x, 6, 1e-6) BOUND(x, 7, 1e-4) BOUND(x, 8, 1e-3) BOUND(x, 9, 0.1) \
-    BOUND(x, 10, 3.2) BOUND(x, 11, -3.2) BOUND(x, 12, 10.0) BOUND(x, 13, 100.0) BOUND(x, 14, -100.0) \
-    BOUND(x, 15, 250.0) BOUND(x, 16, 1e3) BOUND(x, 17, 1024.0) BOUND(x, 18, 1e6) BOUND(x, 19, -1e6) \
-    BOUND(x, 20, 4e6) BOUND(x, 21, 1e7) BOUND(x, 22, 1e9) BOUND(x, 23, 3.0)
-// clang-format on
-#define NUMBER(x, place, bound) [place] = BSLAM_R(bound),
-#define PLACE_IF(x, place, bound) (bslam_real_t)(x) == (bslam_real_t)BSLAM_R(bound) ? (place):
-static const bslam_real_t bounds[] = {BOUNDS(NUMBER, )};
-#define BOUND_AT(x) (uint8_t)(BOUNDS(PLACE_IF, x) UINT8_MAX)
-
-typedef struct limits {
-    uint8_t low, high;
-} limits_t;
-#define LIMITS_REAL(name, value, low, high, meaning) {BOUND_AT(BSLAM_R(low)), BOUND_AT(BSLAM_R(high))},
-#define LIMITS_INTEGER(name, value, low, high, meaning) {BOUND_AT(low), BOUND_AT(high)},
-static const limits_t limits[] = {BSLAM_SETTINGS(LIMITS_REAL, LIMITS_INTEGER)};
-#define PLACE_REAL(name, value, low, high, meaning) (uint16_t)offsetof(bslam_settings_t, name),
-#define PLACE_INTEGER(name, value, low, high, meaning) (uint16_t)(offsetof(bslam_settings_t, name) + 1),
-static const uint16_t places[] = {BSLAM_SETTINGS(PLACE_REAL, PLACE_INTEGER)};
-
-static bool is_integer(int id)
-{
-    return places[id] % 2 != 0;
-}
-
-static size_t offset_of(int id)
-{
-    return places[id] / 2 * (size_t)2;
-}
-
-static bslam_real_t low_of(int id)
-{
-    return bounds[limits[id].low];
-}
-
-static bslam_real_t high_of(int id)
-{
-    return bounds[limits[id].high];
-}
-
-#define PARAMS_COUNT ((int)(sizeof limits / sizeof limits[0]))
-
-int bslam_settings_count(void)
-{
-    return PARAMS_COUNT;
-}
+#define COUNT ((int)(sizeof infos / sizeof infos[0]))
 
 const bslam_setting_info_t *bslam_settings_info(int id)
 {
-    return id >= 0 && id < PARAMS_COUNT ? &infos[id] : NULL;
+    return id >= 0 && id < COUNT ? &infos[id] : NULL;
 }
 
-void bslam_settings_default(bslam_settings_t *settings)
+int bslam_settings_count(void)
 {
-#define DEFAULT_INTEGER(name, value, low, high, meaning) .name = (value),
-#define DEFAULT_REAL(name, value, low, high, meaning) .name = BSLAM_R(value),
-    static const bslam_settings_t defaults = {BSLAM_SETTINGS(DEFAULT_REAL, DEFAULT_INTEGER)};
-    *settings = defaults;
+    return COUNT;
 }
 
-/// The field at a table line, as bytes of the struct.
 static const void *field(const bslam_settings_t *settings, int id)
 {
-    return (const unsigned char *)settings + offset_of(id);
+    return (const unsigned char *)settings + infos[id].offset;
 }
 
 bslam_real_t bslam_settings_get(const bslam_settings_t *settings, int id)
 {
-    if (id < 0 || id >= PARAMS_COUNT) {
+    if (id < 0 || id >= COUNT) {
         return 0;
     }
-    if (is_integer(id)) {
-        return (bslam_real_t) * (const int32_t *)field(settings, id);
-    }
-    return *(const bslam_real_t *)field(settings, id);
+    return infos[id].is_integer ? (bslam_real_t) * (const int32_t *)field(settings, id)
+                                : *(const bslam_real_t *)field(settings, id);
 }
 
 bslam_status_t bslam_settings_set(bslam_settings_t *settings, int id, bslam_real_t value)
 {
-    if (id < 0 || id >= PARAMS_COUNT || !bslam_in_range(value, low_of(id), high_of(id))) {
+    if (id < 0 || id >= COUNT || !bslam_in_range(value, infos[id].low, infos[id].high)) {
         return BSLAM_E_PARAMETER;
     }
-    void *target = (unsigned char *)settings + offset_of(id);
-    if (!is_integer(id)) {
+    void *target = (unsigned char *)settings + infos[id].offset;
+    if (!infos[id].is_integer) {
         *(bslam_real_t *)target = value;
         return BSLAM_OK;
     }
@@ -115,48 +69,121 @@ bslam_status_t bslam_settings_set(bslam_settings_t *settings, int id, bslam_real
     return BSLAM_OK;
 }
 
-/// The table line of a field.
-static int id_at(size_t offset)
+// ---- presets ----------------------------------------------------------------------------------------------
+
+static void set_defaults(bslam_settings_t *settings)
+{
+#define DEFAULT_INTEGER(name, value, low, high, meaning) .name = (value),
+#define DEFAULT_REAL(name, value, low, high, meaning) .name = BSLAM_R(value),
+    static const bslam_settings_t defaults = {BSLAM_SETTINGS(DEFAULT_REAL, DEFAULT_INTEGER)  //
+                                              BSLAM_EXPERT(DEFAULT_REAL, DEFAULT_INTEGER)    //
+                                              BSLAM_TUNING(DEFAULT_REAL, DEFAULT_INTEGER)};
+    *settings = defaults;
+}
+
+/// Equation (2) of the paper reads speeds, and its Section V lets the reading err.
+static void set_paper(bslam_settings_t *settings)
+{
+    set_defaults(settings);
+    settings->velocity_states = 1;
+    settings->left_speed_sd_mps = BSLAM_R(0.3);
+    settings->right_speed_sd_mps = BSLAM_R(0.3);
+}
+
+/// What stands half hidden is measured as if it were whole, so a few sightings in a hundred err by many times
+/// what the front end says. Distances are so doubtful that position alone fits too much: appearance counts
+/// twice, new beacons are expected less, and the viewpoint tells nothing.
+static void set_camera(bslam_settings_t *settings)
+{
+    settings->huber_d = 1;
+    settings->gate_d2 = 9;
+    settings->appearance_weight = 2;
+    settings->new_per_m2 = BSLAM_R(0.003);
+    settings->viewpoint_low = 0;
+    settings->viewpoint_high = 0;
+    if (settings->association != BSLAM_ASSOCIATION_KNOWN) {
+        // The detector believes in things that are no beacon, mostly for a few metres of travel: a beacon
+        // counts once it was seen from ten places, and nothing is thrown away.
+        settings->confirm_sightings = 10;
+        settings->confirm_travel_m = BSLAM_R(0.1);
+        settings->confirm_window_us = 0;
+        settings->duplicate_sd_m = BSLAM_R(0.3);
+    }
+}
+
+/// A prior on the forward speed would tell the scale, which directions do not; one on the turn rate is free
+/// of it. The smoother corrects what a pass has learned wrong, so a direction counts in full.
+static void set_bearing_only(bslam_settings_t *settings)
+{
+    if (settings->filter == BSLAM_FILTER_SMOOTHER) {
+        settings->velocity_walk_mps_sqrt_s = 30;
+        settings->turn_rate_walk_radps_sqrt_s = 1;
+        settings->turn_rate_decay_s = 1;
+        settings->bearing_only_variance_factor = 1;
+    }
+}
+
+void bslam_settings_preset(bslam_settings_t *settings, bslam_preset_t preset)
+{
+    static void (*const sets[BSLAM_PRESET_COUNT])(bslam_settings_t *) = {
+        [BSLAM_PRESET_REAL_WHEELS] = set_defaults,
+        [BSLAM_PRESET_PAPER] = set_paper,
+        [BSLAM_PRESET_CAMERA] = set_camera,
+        [BSLAM_PRESET_BEARING_ONLY] = set_bearing_only,
+    };
+    sets[preset < BSLAM_PRESET_COUNT ? preset : BSLAM_PRESET_REAL_WHEELS](settings);
+}
+
+// ---- checking ---------------------------------------------------------------------------------------------
+
+static bool is_allowed(const bslam_settings_t *settings, int id)
+{
+    if (infos[id].is_integer) {
+        // As integers: a float does not hold every int32_t.
+        const int32_t value = *(const int32_t *)field(settings, id);
+        return value >= (int32_t)infos[id].low && value <= (int32_t)infos[id].high;
+    }
+    return bslam_in_range(*(const bslam_real_t *)field(settings, id), infos[id].low, infos[id].high);
+}
+
+int bslam_settings_at(size_t offset)
 {
     int id = 0;
-    while (offset_of(id) != offset) {
+    while (infos[id].offset != offset) {
         id++;
     }
     return id;
 }
 
-static bool is_allowed(const bslam_settings_t *settings, int id)
+/// The field that contradicts velocity states; negative: none does.
+static int contradiction(const bslam_settings_t *settings)
 {
-    const bslam_real_t low = low_of(id), high = high_of(id);
-    if (is_integer(id)) {
-        // As integers: a float does not hold every int32_t.
-        const int32_t value = *(const int32_t *)field(settings, id);
-        return value >= (int32_t)low && value <= (int32_t)high;
+    if (settings->velocity_states == 0) {
+        return -1;
     }
-    return bslam_in_range(*(const bslam_real_t *)field(settings, id), low, high);
+    if (settings->scale_states != 0) {
+        return bslam_settings_at(offsetof(bslam_settings_t, scale_states));
+    }
+    if (!(settings->left_speed_sd_mps > 0)) {
+        return bslam_settings_at(offsetof(bslam_settings_t, left_speed_sd_mps));
+    }
+    return settings->right_speed_sd_mps > 0
+               ? -1
+               : bslam_settings_at(offsetof(bslam_settings_t, right_speed_sd_mps));
 }
 
 bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id)
 {
-    for (int id = 0; id < PARAMS_COUNT; id++) {
+    for (int id = 0; id < COUNT; id++) {
         if (!is_allowed(settings, id)) {
             *bad_id = id;
             return BSLAM_E_PARAMETER;
         }
     }
-    if (settings->velocity_states != 0) {
-        if (settings->scale_states != 0) {
-            *bad_id = id_at(offsetof(bslam_settings_t, scale_states));
-            return BSLAM_E_PARAMETER;
-        }
-        if (!(settings->left_speed_sd_mps > 0)) {
-            *bad_id = id_at(offsetof(bslam_settings_t, left_speed_sd_mps));
-            return BSLAM_E_PARAMETER;
-        }
-        if (!(settings->right_speed_sd_mps > 0)) {
-            *bad_id = id_at(offsetof(bslam_settings_t, right_speed_sd_mps));
-            return BSLAM_E_PARAMETER;
-        }
+    const int bad = contradiction(settings);
+    if (bad >= 0) {
+        *bad_id = bad;
+        return BSLAM_E_PARAMETER;
     }
     return BSLAM_OK;
 }

@@ -1,4 +1,5 @@
 #include "robot/gyro_wait.h"
+#include "base/scalar.h"
 
 #if SESSION_TURNS
 

@@ -52,7 +52,7 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         } else {
             session->uses_appearance = (flags & FLAG_LOOKS) != 0;
             health_init(&session->watch, (flags & FLAG_RECOVERY) != 0, (flags & FLAG_GUARD) != 0);
-            bslam_settings_default(&session->settings);
+            bslam_settings_preset(&session->settings, BSLAM_PRESET_PAPER);
         }
         forget_seeds(session);
         keep(session, BSLAM_OK);

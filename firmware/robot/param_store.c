@@ -64,7 +64,7 @@ bool param_store_params_load(bslam_settings_t *settings)
     const size_t size = param_store_size();
     uint16_t names = 0;
     uint16_t crc = 0;
-    bslam_settings_default(settings);
+    bslam_settings_preset(settings, BSLAM_PRESET_PAPER);
     if (size > sizeof bytes || !port_load(bytes, size)) {
         return false;
     }
@@ -77,7 +77,7 @@ bool param_store_params_load(bslam_settings_t *settings)
         good = bslam_settings_set(settings, id, value) == BSLAM_OK;
     }
     if (!good) {
-        bslam_settings_default(settings);
+        bslam_settings_preset(settings, BSLAM_PRESET_PAPER);
     }
     return good;
 }

@@ -168,7 +168,7 @@ static uint8_t start_with_params(session_t *session, bool has_eyes)
         if (status == BSLAM_OK) {
             return status;
         }
-        bslam_settings_default(&session->settings);  // they contradict each other
+        bslam_settings_preset(&session->settings, BSLAM_PRESET_PAPER);  // they contradict each other
     }
     if (has_eyes) {
         session->settings.association =

@@ -2,7 +2,7 @@
 #ifndef BSLAM_VISION_CONFIG_H
 #define BSLAM_VISION_CONFIG_H
 
-#include "config.h"
+#include "base/config.h"
 
 /// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: an
 /// instance takes about 117 KB for QVGA and four cameras, 107 KB for one, 46 KB for QQVGA and one. A camera

@@ -1,6 +1,6 @@
 #include "vision/sighting.h"
 
-#include "base/real.h"
+#include "base/scalar.h"
 #include "base/bounds.h"
 
 // What a thing's directions have in common for a whole drive and no front end can know; and the same of its

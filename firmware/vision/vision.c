@@ -12,6 +12,7 @@
 #include "vision/detection/prefilter.h"
 #include "vision/detection/vertical_edges.h"
 #include "vision/classifiers/recogniser.h"
+#include "base/scalar.h"
 
 _Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
 

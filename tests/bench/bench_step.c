@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 #include "base/trig.h"
 
 #define STEP_US 40000
@@ -55,7 +55,7 @@ int main(int argc, char **argv)
 {
     bslam_settings_t settings;
     int bad_id = -1;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.velocity_states = argc > 1 && strcmp(argv[1], "velocity") == 0 ? 1 : 0;
     if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         return 1;

@@ -1,6 +1,6 @@
 // A robot without a camera, for sizes_doc.py to link: what of the library the calls of its loop take.
 // WITH_LOOKS 1: it learns what beacons look like, too.
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 
 int main(void);
 
@@ -37,7 +37,7 @@ static bslam_status_t robot_step(void)
 int main(void)
 {
     int bad_id;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     bslam_status_t status = bslam_slam_init(&slam, &settings, &bad_id);
 #if WITH_LOOKS
     if (status == BSLAM_OK) {

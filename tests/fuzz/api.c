@@ -7,6 +7,8 @@
 #include "bslam/recovery/recovery.h"
 #include "bslam/store/guard.h"
 #include "bslam/store/map.h"
+#include "base/scalar.h"
+#include "bslam/settings_internal.h"
 
 enum { CALLS_MAX = 40, BLOB_MAX = 4096 };
 
@@ -205,7 +207,7 @@ static void start(fuzz_input_t *input)
     if (!is_made) {
         bslam_settings_t settings;
         int bad_id;
-        bslam_settings_default(&settings);
+        bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
         settings.learn_budget = 50;
         fuzz_require(bslam_slam_init(&fresh.slam, &settings, &bad_id) == BSLAM_OK);
         fuzz_require(bslam_appearance_init(&fresh.appearance, NULL, 0) == BSLAM_OK);

@@ -9,6 +9,7 @@
 
 #include "base/trig.h"
 #include "bslam/recovery/recovery.h"
+#include "base/scalar.h"
 
 enum { BEACONS = 5, FRAMES_MAX = 48, STEP_US = 40000 };
 
@@ -204,7 +205,7 @@ static void prepare(robot_t *start, world_t *world, unsigned how)
     if (stands[how].now_us == 0) {
         bslam_settings_t settings;
         int bad_id;
-        bslam_settings_default(&settings);
+        bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
         settings.association = (how & 1u) != 0 ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_KNOWN;
         settings.filter = (how & 4u) != 0 ? BSLAM_FILTER_SMOOTHER : BSLAM_FILTER_INVARIANT;
         settings.learn_travel_m = 0;

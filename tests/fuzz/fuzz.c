@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 /// The covariance is rounded: a number of it may be wrong by so much of the largest variance that the input
 /// has made so far, from which it came down. Below the other its square is 0 in float.
@@ -114,7 +115,7 @@ void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
     bslam_settings_t settings;
     int bad_id;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.association = BSLAM_ASSOCIATION_SVM;
     settings.learn_travel_m = 0;
     settings.left_speed_sd_mps = BSLAM_R(1e-3);

@@ -7,6 +7,7 @@
 
 #include "models/beacons.h"
 #include "picture.h"
+#include "base/scalar.h"
 
 enum { FRAMES_MAX = 3 };
 

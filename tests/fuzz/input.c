@@ -1,5 +1,6 @@
 // Values out of an input. By itself, so that the fastest target does not have the filter in it.
 #include "fuzz.h"
+#include "base/scalar.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 bslam_camera_t fuzz_camera(bslam_lens_kind_t lens)
 {

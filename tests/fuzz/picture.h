@@ -4,6 +4,7 @@
 
 #include "vision/vision.h"
 #include "fuzz.h"
+#include "base/scalar.h"
 
 /// A row of RGB888 or RGB565, as many bytes as the format takes.
 #define FUZZ_ROW_BYTES (3 * BSLAM_IMAGE_WIDTH_MAX)

@@ -151,7 +151,7 @@ static int look(world_t *world, bslam_sighting_t seen[BEACONS])
 static bslam_settings_t filter_params(void)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.wheelbase_m = measured(WHEELBASE_M);
     settings.left_speed_sd_mps = measured(WHEEL_SD_MPS);
     settings.right_speed_sd_mps = measured(WHEEL_SD_MPS);

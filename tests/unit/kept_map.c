@@ -1,10 +1,11 @@
 #include "kept_map.h"
+#include "plain_settings.h"
 
 enum { STEP_US = 40000 };
 
 bslam_settings_t kept_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = 3;
     settings.left_speed_sd_mps = BSLAM_R(1e-3);
     settings.right_speed_sd_mps = BSLAM_R(1e-3);

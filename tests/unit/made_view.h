@@ -3,6 +3,7 @@
 #define UNIT_MADE_VIEW_H
 
 #include "vision/detection/features.h"
+#include "base/scalar.h"
 
 enum {
     MADE_COLUMNS = 80,

@@ -5,6 +5,7 @@
 
 #include "vision/frame.h"
 #include "vision/camera/lens.h"
+#include "base/scalar.h"
 
 #define UNIT_PICTURE_WIDTH 320
 #define UNIT_PICTURE_HEIGHT 240

@@ -1,5 +1,4 @@
-/// What the unit tests share: comparison with a tolerance, repeatable random numbers, and parameters that do
-/// not change when a default is tuned.
+/// What the unit tests share: comparison with a tolerance, repeatable random numbers, sightings.
 #ifndef UNIT_SUPPORT_H
 #define UNIT_SUPPORT_H
 
@@ -13,8 +12,8 @@
 
 #include <cmocka.h>
 
-#include "bslam/settings.h"
 #include "base/types.h"
+#include "base/scalar.h"
 
 /// Half the distance from 1 to the next number of bslam_real_t: the relative error of one rounding.
 #define UNIT_ROUNDING (BSLAM_REAL_DOUBLE ? 1.12e-16 : 5.97e-8)
@@ -64,11 +63,6 @@ void unit_mean_direction(double start, double turn, double *cosine, double *sine
 
 /// The angle from b to a, in [-pi, pi]: how far two directions differ.
 double unit_angle_between(double a, double b);
-
-/// Parameters for tests that compare with numbers: every value a test may rely on is set, whatever its
-/// default. Standard EKF, Euler step, no velocity or scale states, known identity, no gate, no Huber, no
-/// delay, sensor on the axle.
-bslam_settings_t unit_params(void);
 
 /// A sighting with a distance, or in direction only.
 bslam_sighting_t unit_polar(double bearing_rad, double range_m, int32_t label);

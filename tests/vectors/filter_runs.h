@@ -3,7 +3,7 @@
 
 static void standard_params(bslam_settings_t *p)
 {
-    bslam_settings_default(p);
+    bslam_settings_preset(p, BSLAM_PRESET_PAPER);
     p->filter = 0;
     p->motion = 0;
     p->velocity_states = 0;
@@ -430,7 +430,7 @@ static const double standard_covariances[] = {
 
 static void invariant_params(bslam_settings_t *p)
 {
-    bslam_settings_default(p);
+    bslam_settings_preset(p, BSLAM_PRESET_PAPER);
     p->filter = 1;
     p->motion = 1;
     p->velocity_states = 1;

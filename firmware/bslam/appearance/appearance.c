@@ -7,10 +7,6 @@
 static const bslam_beacon_look_t BLANK = {.classifier = BSLAM_NO_CLASSIFIER, .twin = BSLAM_NO_CLASSIFIER};
 static const uint32_t MICROMETRES_PER_M = 1000000;
 
-const bslam_appearance_answers_t bslam_appearance_answers = {
-    bslam_appearance_ask, bslam_appearance_class_odds, bslam_appearance_viewpoint_odds,
-    bslam_appearance_is_due};
-
 enum { SEEN_AS_MAX = 32 };
 enum { SECTORS = BSLAM_APPEARANCE_SECTORS };
 // Turned by one sector a beacon looks and stands as before; by four, a right angle, a wall's is out of sight.

@@ -17,17 +17,6 @@
 /// Sectors around a beacon from which it may be seen; outlook.h says which is which.
 #define BSLAM_APPEARANCE_SECTORS 16
 
-/// What happened since init. Never decreases.
-typedef struct bslam_appearance_counters {
-    uint32_t taught;    ///< sightings that a machine was shown
-    uint32_t unsure;    ///< matches that none was shown, because they may be wrong
-    uint32_t shared;    ///< times that a beacon was found to look like another and took its machine
-    uint32_t retired;   ///< beacons taken out because another was in the same place
-    uint32_t vanished;  ///< beacons taken out because they were seen no longer from where they had been
-    uint32_t parted;    ///< times that a beacon got a machine of its own again
-    uint32_t no_slot;   ///< beacons that got no machine when they were first seen, because none was free
-} bslam_appearance_counters_t;
-
 /// What is known of a beacon's looks. Private.
 typedef struct bslam_beacon_look {
     int16_t classifier;
@@ -63,21 +52,6 @@ typedef struct bslam_appearance {
     bslam_real_t right_rad;                     ///< and to the right, below 0
     bslam_learner_t learner;
 } bslam_appearance_t;
-
-/// What association asks: functions below. It reaches them by this alone, so that a linker leaves looks out
-/// where none are attached.
-typedef struct bslam_appearance_answers {
-    bslam_opinion_t (*ask)(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
-                           const bslam_sample_t *sample);
-    bslam_real_t (*class_odds)(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
-                               int index, uint8_t beacon_class);
-    bslam_real_t (*viewpoint_odds)(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
-                                   int index, int sector);
-    bool (*has_waited)(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
-                       int64_t time_us);
-} bslam_appearance_answers_t;
-
-extern const bslam_appearance_answers_t bslam_appearance_answers;
 
 /// Nothing known. Seeds and errors as bslam_learner_init has them.
 BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance,

@@ -18,26 +18,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "bslam/bslam.h"
 #include "bslam/config.h"
 #include "base/status.h"
 #include "bslam/appearance/sample.h"
 #include "bslam/appearance/solver.h"
-
-/// Most seeds.
-#define BSLAM_SEEDS_MAX 128
-
-/// What happened since init. Never decreases.
-typedef struct bslam_learner_counters {
-    uint32_t kept;         ///< samples
-    uint32_t dropped;      ///< samples that the full store of a machine has no use for
-    uint32_t updates;      ///< trainings finished
-    uint32_t steps;        ///< dual steps
-    uint32_t capped;       ///< of them: ended by BSLAM_LEARNER_STEPS_MAX
-    uint32_t interrupted;  ///< trainings put off because a sample they use changed, or a rival came
-    uint32_t refused_not_finite;
-    uint32_t refused_no_machine;
-    uint32_t refused_full;
-} bslam_learner_counters_t;
 
 /// One machine. Private.
 typedef struct bslam_classifier {

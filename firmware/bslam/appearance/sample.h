@@ -9,27 +9,14 @@
 
 #include <stdint.h>
 
-#include "bslam/config.h"
+#include "bslam/settings.h"
 #include "base/status.h"
 
-/// Features of a sample: the values of a signature (vision/measurement/signature.h).
-#define BSLAM_SAMPLE_FEATURES 71
-/// Features and the constant: 72, a multiple of 8, as loops over a sample take it.
-#define BSLAM_SAMPLE_SIZE (BSLAM_SAMPLE_FEATURES + 1)
-
 #if BSLAM_SAMPLE_FLOAT
-typedef float bslam_stored_t;
 typedef float bslam_stored_weight_t;
-#define BSLAM_SAMPLE_UNIT 1.0f
 #else
-typedef int8_t bslam_stored_t;
 typedef int16_t bslam_stored_weight_t;
-#define BSLAM_SAMPLE_UNIT (1.0f / 127.0f)
 #endif
-
-typedef struct bslam_sample {
-    bslam_stored_t q[BSLAM_SAMPLE_SIZE];
-} bslam_sample_t;
 
 /// Weights to decide by, as small as samples allow: w = unit * weight.
 typedef struct bslam_weights {

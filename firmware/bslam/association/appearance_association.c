@@ -50,8 +50,8 @@ static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_
                                int beacon)
 {
     return frame->appearance == NULL ? 0
-                                     : frame->answers->class_odds(frame->appearance, frame->settings, beacon,
-                                                                  sighting->beacon_class);
+                                     : bslam_appearance_class_odds(frame->appearance, frame->settings, beacon,
+                                                                   sighting->beacon_class);
 }
 
 /// What the side from which the robot sees a beacon adds to the score, where it is known.
@@ -62,7 +62,7 @@ static bslam_real_t viewpoint_odds(const bslam_sighting_frame_t *frame, int beac
     }
     const bslam_viewpoint_t outlook = bslam_viewpoint_of(frame->ekf, beacon);
     return outlook.is_sure
-               ? frame->answers->viewpoint_odds(frame->appearance, frame->settings, beacon, outlook.sector)
+               ? bslam_appearance_viewpoint_odds(frame->appearance, frame->settings, beacon, outlook.sector)
                : 0;
 }
 
@@ -133,7 +133,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     found->distance2 = weight.distance2;
     found->opinion = (bslam_opinion_t){0.0f, 0.0f};
     if (sample != NULL) {
-        found->opinion = frame->answers->ask(frame->appearance, frame->settings, beacon, sample);
+        found->opinion = bslam_appearance_ask(frame->appearance, frame->settings, beacon, sample);
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->settings, sighting) +
                    looks_score(frame->settings, &found->opinion) + class_odds(frame, sighting, beacon);
@@ -195,7 +195,7 @@ static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const c
 {
     return best->score > 0 && seen_ago_us(frame, beacon) > frame->settings->decision_delay_us &&
            (is_doubted(frame, best) || can_wait(frame, beacon, best)) &&
-           !frame->answers->has_waited(frame->appearance, frame->settings, beacon, frame->time_us);
+           !bslam_appearance_is_due(frame->appearance, frame->settings, beacon, frame->time_us);
 }
 
 /// Finds the best beacon of a sighting among those that are not taken.
@@ -328,7 +328,7 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditi
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->settings, &one.opinion) >= 0.5f * frame->settings->appearance_high &&
             !(bslam_is_placed(frame->ekf, frame->settings->decision_delay_us, b, frame->time_us) &&
-              frame->answers->has_waited(frame->appearance, frame->settings, b, frame->time_us))) {
+              bslam_appearance_is_due(frame->appearance, frame->settings, b, frame->time_us))) {
             return b;
         }
     }

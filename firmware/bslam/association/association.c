@@ -202,8 +202,12 @@ void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_matc
 
 bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings)
 {
-    static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
-                                                 bslam_associate_mahalanobis, bslam_associate_svm,
-                                                 bslam_associate_joint};
+    static const bslam_associate_fn methods[] = {
+        [BSLAM_ASSOCIATION_KNOWN] = bslam_associate_known,
+        [BSLAM_ASSOCIATION_NEAREST] = bslam_associate_nearest,
+        [BSLAM_ASSOCIATION_MAHALANOBIS] = bslam_associate_mahalanobis,
+        [BSLAM_ASSOCIATION_SVM] = BSLAM_APPEARANCE ? bslam_associate_svm : NULL,  // which bslam_init refuses
+        [BSLAM_ASSOCIATION_JOINT] = bslam_associate_joint,
+    };
     return methods[settings->association];
 }

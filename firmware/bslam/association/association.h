@@ -6,32 +6,6 @@
 #include "bslam/appearance/appearance.h"
 #include "bslam/ekf/ekf.h"
 
-/// Values of the parameter `association`.
-enum {
-    BSLAM_ASSOCIATION_KNOWN = 0,
-    BSLAM_ASSOCIATION_NEAREST = 1,
-    BSLAM_ASSOCIATION_MAHALANOBIS = 2,
-    BSLAM_ASSOCIATION_SVM = 3,
-    BSLAM_ASSOCIATION_JOINT = 4
-};
-
-/// Why a sighting was not used.
-typedef enum bslam_reason {
-    BSLAM_REASON_NONE = 0,
-    BSLAM_REASON_CLASS,        ///< its class is BSLAM_CLASS_NOT_MAPPABLE
-    BSLAM_REASON_NO_IDENTITY,  ///< known identity: it has no label
-    BSLAM_REASON_DUPLICATE,    ///< a better sighting of this frame shows the same beacon
-    BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or waits
-    BSLAM_REASON_APPEARANCE,   ///< too far from any beacon to match, but it looks like one that may be here
-    BSLAM_REASON_GATE,         ///< its innovation is outside the hard gate
-    BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
-    BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
-    BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
-    BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
-    BSLAM_REASON_TENTATIVE,    ///< it shows a beacon that may be none, as far as the detector's scores tell
-    BSLAM_REASON_COUNT
-} bslam_reason_t;
-
 /// What a method decides.
 typedef enum bslam_verdict {
     BSLAM_VERDICT_REJECT = 0,
@@ -59,9 +33,8 @@ typedef struct bslam_match {
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
     const bslam_settings_t *settings;
-    const bslam_appearance_t *appearance;       ///< what the beacons look like; NULL: nobody knows
-    const bslam_appearance_answers_t *answers;  ///< how looks are asked
-    const bslam_pose_t *mount;                  ///< the sensor relative to the robot's present pose
+    const bslam_appearance_t *appearance;  ///< what the beacons look like; NULL: nobody knows
+    const bslam_pose_t *mount;             ///< the sensor relative to the robot's present pose
     const bslam_sighting_t *sightings;
     int count;
     int64_t time_us;

@@ -1,6 +1,7 @@
 #include "bslam/association/conditional.h"
 
 #include "base/logarithm.h"
+#include "base/scalar.h"
 
 static const bslam_real_t LN_TWO_PI = BSLAM_R(1.83787706640934548356);
 // Variances below it would divide by what rounding leaves.

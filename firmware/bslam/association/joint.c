@@ -5,6 +5,7 @@
 #include "bslam/association/association.h"
 #include "bslam/association/conditional.h"
 #include "bslam/association/association_internal.h"
+#include "base/scalar.h"
 
 /// A search through the pairings of up to BSLAM_GIVEN_MAX sightings: level i chooses for the i-th of them.
 typedef struct search {

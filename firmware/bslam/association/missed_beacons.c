@@ -2,6 +2,7 @@
 
 #include "bslam/association/viewpoint.h"
 #include "bslam/linalg/symmat.h"
+#include "base/scalar.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t STEPS_PER_M = BSLAM_R(10.0);  // of a kept distance

@@ -2,6 +2,7 @@
 
 #include "bslam/linalg/symmat.h"
 #include "base/trig.h"
+#include "base/scalar.h"
 
 static const bslam_real_t POSITION_SD_MAX = BSLAM_R(0.125);  // of the distance: seven degrees aside
 

@@ -6,6 +6,7 @@
 #include "bslam/ekf/ekf_internal.h"
 #include "base/trig.h"
 #include "bslam/model/noise.h"
+#include "base/scalar.h"
 
 /// A distance tells where on a ray a point is unless it lies more across the ray than this, as a cosine.
 static const bslam_real_t ALONG_MIN = BSLAM_R(0.5);

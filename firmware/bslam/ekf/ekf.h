@@ -10,7 +10,7 @@
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
-#include "bslam/settings.h"
+#include "bslam/bslam.h"
 #include "base/status.h"
 #include "base/types.h"
 #include "bslam/linalg/smallmat.h"
@@ -34,13 +34,6 @@ enum {
     BSLAM_STATE_FORWARD = 3,  ///< v, or the scale factor of forward motion
     BSLAM_STATE_TURN = 4      ///< omega, or the scale factor of turns
 };
-
-typedef enum bslam_beacon_kind {
-    BSLAM_BEACON_POINT = 0,  ///< 2 state values: x, y in the map
-    BSLAM_BEACON_RAY = 1,    ///< 4 state values: anchor x, y, direction, inverse distance
-    BSLAM_BEACON_KNOWN = 2,  ///< no state value: its position is given and never changes, paper equation (12)
-    BSLAM_BEACON_SIZED = 3   ///< 3 state values: x, y, and its scale, by which its distances are too long
-} bslam_beacon_kind_t;
 
 /// How many state values a beacon of this kind has.
 static inline int32_t bslam_beacon_dim(bslam_beacon_kind_t kind)

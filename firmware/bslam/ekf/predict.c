@@ -7,6 +7,7 @@
 #include "base/trig.h"
 #include "bslam/model/motion.h"
 #include "bslam/model/pose.h"
+#include "base/scalar.h"
 
 /// A state that moves: that of the filter, or the robot's own part of it. The robot's values come first.
 typedef struct moving {

@@ -1,6 +1,7 @@
 // The state as it begins, and what is read of it.
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "base/scalar.h"
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {

@@ -6,6 +6,7 @@
 #include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
+#include "base/scalar.h"
 
 /// Sixteen roundings of one: what the sums of an update may be off by, as part of their largest term.
 static const bslam_real_t ROUNDINGS = 8 * BSLAM_REAL_EPSILON;

@@ -1,4 +1,5 @@
 #include "bslam/linalg/smallmat.h"
+#include "base/scalar.h"
 
 bslam_status_t bslam_sym2_cholesky(const bslam_sym2_t *m, bslam_lower2_t *l)
 {

@@ -3,15 +3,8 @@
 #ifndef BSLAM_LINALG_SMALLMAT_H
 #define BSLAM_LINALG_SMALLMAT_H
 
-#include "base/real.h"
 #include "base/status.h"
-
-/// [[xx, xy], [xy, yy]].
-typedef struct bslam_sym2 {
-    bslam_real_t xx;
-    bslam_real_t xy;
-    bslam_real_t yy;
-} bslam_sym2_t;
+#include "base/types.h"
 
 /// [[xx, 0], [yx, yy]].
 typedef struct bslam_lower2 {

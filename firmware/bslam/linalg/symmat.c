@@ -1,4 +1,5 @@
 #include "bslam/linalg/symmat.h"
+#include "base/scalar.h"
 
 #include <string.h>
 

@@ -1,6 +1,7 @@
 #include "bslam/model/motion.h"
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 /// sin(h)/h and its derivative.
 static void sinc(bslam_real_t h, bslam_real_t *value, bslam_real_t *slope)

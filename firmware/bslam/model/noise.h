@@ -4,6 +4,7 @@
 
 #include "bslam/settings.h"
 #include "base/types.h"
+#include "base/scalar.h"
 
 /// Variance of a measured distance to a beacon predicted at range_m: floor² + (fraction r)² + (per_m r²)².
 /// The detector's own is in proportion to the distance: what is measured too short must not count as more

@@ -1,6 +1,7 @@
 #include "bslam/model/observation.h"
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 static const bslam_real_t DISTANCE_MIN_M = BSLAM_R(1e-3);
 

@@ -1,6 +1,7 @@
 #include "bslam/model/odometry.h"
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const int64_t TIME_MAX_US = INT64_MAX / 2;

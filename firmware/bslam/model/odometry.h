@@ -5,29 +5,8 @@
 #ifndef BSLAM_MODEL_ODOMETRY_H
 #define BSLAM_MODEL_ODOMETRY_H
 
-#include "bslam/settings.h"
+#include "bslam/bslam.h"
 #include "base/types.h"
-
-typedef enum bslam_odometry_source {
-    BSLAM_ODOMETRY_WHEELS = 0,  ///< left_m, right_m: travel of each wheel since the reading before
-    BSLAM_ODOMETRY_TICKS,       ///< left_ticks, right_ticks: the counters, which roll over at counter_bits
-    BSLAM_ODOMETRY_VELOCITY     ///< v_mps, omega_radps: held over the interval that ends at time_us
-} bslam_odometry_source_t;
-
-/// One reading. Only the source's own fields are read.
-typedef struct bslam_odometry_reading {
-    int64_t time_us;  ///< end of the interval
-    bslam_odometry_source_t source;
-    uint32_t left_ticks;
-    uint32_t right_ticks;
-    bslam_real_t left_m;
-    bslam_real_t right_m;
-    bslam_real_t v_mps;
-    bslam_real_t omega_radps;
-    bool has_gyro;
-    bslam_real_t gyro_radps;     ///< mean turn rate over the interval; read only if has_gyro
-    bslam_real_t gyro_sd_radps;  ///< noise of this one, as that is; 0: the parameter gyro_sd_radps
-} bslam_odometry_reading_t;
 
 /// What the next reading is compared with.
 typedef struct bslam_odometry {

@@ -1,6 +1,7 @@
 #include "bslam/model/pose.h"
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 bslam_pose_t bslam_pose_compose(const bslam_pose_t *a, const bslam_pose_t *b)
 {

@@ -47,7 +47,7 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
 static int find_looks(const bslam_slam_t *slam, const float *signature)
 {
     bslam_sample_t sample;
-    if (slam->appearance == NULL || signature == NULL ||
+    if (!bslam_slam_learns(slam) || signature == NULL ||
         bslam_sample_encode(signature, &sample) != BSLAM_OK) {
         return BSLAM_NOBODY;
     }
@@ -92,7 +92,7 @@ void bslam_identify(const bslam_slam_t *slam, const bslam_sighting_t *sightings,
 
 bool bslam_may_be(const bslam_slam_t *slam, int who, int beacon)
 {
-    const bool by_looks = slam->settings.association != BSLAM_ASSOCIATION_KNOWN && slam->appearance != NULL;
+    const bool by_looks = slam->settings.association != BSLAM_ASSOCIATION_KNOWN && bslam_slam_learns(slam);
     return beacon == who ||
            (by_looks && slam->ekf.beacons[beacon].confirmed && looks_alike(slam, beacon, who));
 }
@@ -101,7 +101,7 @@ static bool is_known(const bslam_slam_t *slam, int beacon)
 {
     static const bslam_sample_t ANY = {{0}};
     return slam->settings.association == BSLAM_ASSOCIATION_KNOWN ||
-           (slam->appearance != NULL &&
+           (bslam_slam_learns(slam) &&
             bslam_appearance_ask(slam->appearance, &slam->settings, beacon, &ANY).weight >= RECOGNISE_WEIGHT);
 }
 

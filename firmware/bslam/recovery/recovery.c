@@ -6,6 +6,7 @@
 #include "bslam/model/pose.h"
 #include "bslam/recovery/identity.h"
 #include "bslam/slam/slam_internal.h"
+#include "base/scalar.h"
 
 // A sighting of a recognised beacon contradicts the pose beyond this squared distance. Rightly recognised
 // ones are there once in 10^6.
@@ -42,6 +43,11 @@ enum {
 void bslam_recovery_init(bslam_recovery_t *recovery)
 {
     *recovery = (bslam_recovery_t){0};
+}
+
+void bslam_recovery_restart(bslam_recovery_t *recovery)
+{
+    *recovery = (bslam_recovery_t){.counters = recovery->counters};
 }
 
 bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, const bslam_slam_t *slam)

@@ -19,22 +19,9 @@
 #ifndef BSLAM_RECOVERY_RECOVERY_H
 #define BSLAM_RECOVERY_RECOVERY_H
 
+#include "bslam/bslam.h"
 #include "bslam/recovery/resection.h"
 #include "bslam/slam/slam.h"
-
-typedef enum bslam_recovery_state {
-    BSLAM_RECOVERY_FOLLOWING = 0,  ///< all is well
-    BSLAM_RECOVERY_DOUBTING,       ///< sightings contradict the pose
-    BSLAM_RECOVERY_LOST            ///< the pose is unknown
-} bslam_recovery_state_t;
-
-/// Never-decreasing counts of what happened.
-typedef struct bslam_recovery_counters {
-    uint32_t contradicting;  ///< sightings
-    uint32_t withheld;       ///< frames that were not used
-    uint32_t lost;           ///< times
-    uint32_t found;          ///< times
-} bslam_recovery_counters_t;
 
 /// A recognised beacon, when and from where it was seen last, with a distance or without. Private.
 typedef struct bslam_memory {
@@ -70,6 +57,9 @@ typedef struct bslam_recovery {
 
 /// Nothing is known against the pose.
 void bslam_recovery_init(bslam_recovery_t *recovery);
+
+/// The filter starts over: what is known against its pose is forgotten, counts stay.
+void bslam_recovery_restart(bslam_recovery_t *recovery);
 
 /// bslam_slam_sightings with a look at whether the robot is where the filter has it. Sightings of a frame
 /// that is not used have the account "deferred", reason "lost". The same statuses; of what is refused nothing

@@ -4,6 +4,7 @@
 #include "base/trig.h"
 #include "bslam/model/observation.h"
 #include "bslam/model/pose.h"
+#include "base/scalar.h"
 
 // A clue agrees with a pose up to this squared distance: of two values one in 3000 does not.
 static const bslam_real_t AGREE_D2 = BSLAM_R(16.0);

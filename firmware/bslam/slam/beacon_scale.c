@@ -10,8 +10,9 @@ static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
 /// filter, whose beacons have none.
 static bslam_real_t scale_variance(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
-    return sighting->has_range && slam->smoother == NULL ? bslam_unknown_scale_var(&slam->settings, sighting)
-                                                         : 0;
+    return sighting->has_range && !bslam_slam_smooths(slam)
+               ? bslam_unknown_scale_var(&slam->settings, sighting)
+               : 0;
 }
 
 /// Whether a sighting, or its direction alone, passes a beacon's gate.

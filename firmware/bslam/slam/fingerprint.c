@@ -68,8 +68,8 @@ static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
 uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
 {
     uint64_t hash = add_state(before, &slam->ekf);
-    if (slam->smoother != NULL) {
+    if (bslam_slam_smooths(slam)) {
         hash = add_smoother(hash, slam->smoother);
     }
-    return slam->appearance != NULL ? add_machines(hash, &slam->appearance->learner) : hash;
+    return bslam_slam_learns(slam) ? add_machines(hash, &slam->appearance->learner) : hash;
 }

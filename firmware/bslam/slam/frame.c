@@ -98,9 +98,9 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     account->test_ratio = test_ratio(innovation->gate_d2, fusion.distance2);
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
-    if (slam->smoother != NULL) {
+    if (bslam_slam_smooths(slam)) {
         const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, sighting);
-        slam->smoothing->see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
+        bslam_smoother_see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
     }
     beacon->travelled_um = slam->travelled_um;
     note_match(slam, time_us, sighting, beacon, fusion.distance2);
@@ -123,8 +123,8 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
 {
     int index;
     const bslam_status_t status =
-        slam->smoother != NULL ? slam->smoothing->add(slam->smoother, &slam->ekf, mount, sighting, &index)
-                               : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, &index);
+        bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, sighting, &index)
+                                 : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, &index);
     if (status != BSLAM_OK) {
         reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;
@@ -139,8 +139,8 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->travelled_um = slam->travelled_um;
     bslam_slam_confirm_new(slam, beacon, sighting);
     note_rivals(slam, index);
-    if (slam->smoother != NULL) {
-        slam->smoothing->see(slam->smoother, sighting, index);
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_see(slam->smoother, sighting, index);
     }
     fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;
@@ -361,7 +361,7 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
 
 static void count_accounts(bslam_slam_t *slam, int count)
 {
-    bslam_counters_t *counters = &slam->counters;
+    bslam_slam_counters_t *counters = &slam->counters;
     counters->frames++;
     counters->sightings += (uint32_t)count;
     for (int i = 0; i < count; i++) {
@@ -402,14 +402,13 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
                             const bslam_pose_t *mount, bool use)
 {
     if (use && !slam->is_lost) {
-        const bslam_appearance_answers_t *answers = slam->appearance != NULL ? slam->learning->answers : NULL;
-        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, answers, mount,
+        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, mount,
                                               sightings,  count,           time_us};
         const bslam_associate_fn associate = bslam_associate_method(&slam->settings);
         associate(&frame, slam->matches);
         use_matches(slam, time_us, mount, sightings, count);
-        if (slam->appearance != NULL && slam->settings.association == BSLAM_ASSOCIATION_SVM) {
-            slam->learning->learn(slam, time_us, sightings, count);
+        if (bslam_slam_learns(slam) && slam->settings.association == BSLAM_ASSOCIATION_SVM) {
+            bslam_slam_learn_appearance(slam, time_us, sightings, count);
         }
     } else {
         for (int i = 0; i < count; i++) {
@@ -419,8 +418,8 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
     if (!slam->is_lost) {  // time passes in a withheld frame, too: it leaves what one without sightings does
         tidy_map(slam, time_us, mount);
     }
-    if (slam->smoother != NULL) {
-        slam->smoothing->frame(slam->smoother, &slam->settings, &slam->ekf);
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_frame(slam->smoother, &slam->settings, &slam->ekf);
     }
     slam->last_frame_us = time_us;
     slam->has_frame = true;

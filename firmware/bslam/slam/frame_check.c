@@ -2,6 +2,7 @@
 
 #include "base/trig.h"
 #include "bslam/slam/slam_internal.h"
+#include "base/scalar.h"
 
 static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 static const bslam_real_t RANGE_MAX_M = BSLAM_R(1e4);

@@ -1,5 +1,6 @@
 #include "bslam/model/pose.h"
 #include "bslam/slam/slam_internal.h"
+#include "base/scalar.h"
 
 static const bslam_real_t WAY_MAX_M = BSLAM_R(1000.0);
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
@@ -20,8 +21,8 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
     bslam_ekf_predict(&slam->ekf, &slam->settings, &motion, &moved);
-    if (slam->smoother != NULL) {
-        slam->smoothing->move(slam->smoother, &slam->ekf, &motion);
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_move(slam->smoother, &slam->ekf, &motion);
     }
     bslam_history_take(&slam->history, &place, &moved);
     slam->travelled_um += whole_micrometres(moved.forward_m);
@@ -62,8 +63,8 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
             return status;
         }
         queue_motion(slam, (int32_t)(odometry.time_us - slam->odometry.time_us), &motion);
-        if (slam->smoother != NULL) {
-            slam->smoothing->rest(slam->smoother, &slam->settings, &slam->ekf, motion.dt_s);
+        if (bslam_slam_smooths(slam)) {
+            bslam_smoother_rest(slam->smoother, &slam->settings, &slam->ekf, motion.dt_s);
         }
     }
     slam->odometry = odometry;

@@ -3,6 +3,8 @@
 #include "base/trig.h"
 #include "bslam/model/pose.h"
 #include "bslam/slam/slam_internal.h"
+#include "bslam/settings_internal.h"
+#include "base/scalar.h"
 
 static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
 static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
@@ -24,8 +26,8 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *setti
 
 void bslam_slam_restart_smoother(bslam_slam_t *slam)
 {
-    if (slam->smoother != NULL) {
-        slam->smoothing->restart(slam->smoother, &slam->settings, &slam->ekf);
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_restart(slam->smoother, &slam->settings, &slam->ekf);
     }
 }
 
@@ -80,20 +82,13 @@ void bslam_slam_lose_pose(bslam_slam_t *slam)
 
 void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
 {
-    static const bslam_smoothing_t smoothing = {
-        bslam_smoother_restart, bslam_smoother_move,   bslam_smoother_rest, bslam_smoother_see,
-        bslam_smoother_add,     bslam_smoother_remove, bslam_smoother_frame};
-    slam->smoothing = &smoothing;
     slam->smoother = slam->settings.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
     bslam_slam_restart_smoother(slam);
 }
 
 void bslam_slam_attach_appearance(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    static const bslam_learning_t learning = {bslam_appearance_clear, bslam_appearance_forget,
-                                              bslam_slam_learn_appearance, &bslam_appearance_answers};
     slam->appearance = appearance;
-    slam->learning = &learning;
     if (appearance != NULL) {
         bslam_appearance_clear(appearance);
     }
@@ -113,11 +108,11 @@ int bslam_slam_find_beacon(const bslam_slam_t *slam, uint32_t uid)
 
 void bslam_slam_drop_beacon(bslam_slam_t *slam, int index)
 {
-    if (slam->appearance != NULL) {
-        slam->learning->forget(slam->appearance, index, slam->ekf.beacon_count);
+    if (bslam_slam_learns(slam)) {
+        bslam_appearance_forget(slam->appearance, index, slam->ekf.beacon_count);
     }
-    if (slam->smoother != NULL) {
-        slam->smoothing->remove(slam->smoother, index);
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_remove(slam->smoother, index);
     }
     bslam_ekf_remove(&slam->ekf, index);
 }
@@ -147,8 +142,8 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
 
 void bslam_slam_forget_map(bslam_slam_t *slam)
 {
-    if (slam->appearance != NULL) {
-        slam->learning->clear(slam->appearance);
+    if (bslam_slam_learns(slam)) {
+        bslam_appearance_clear(slam->appearance);
     }
     bslam_ekf_forget_map(&slam->ekf);
     bslam_slam_restart_smoother(slam);
@@ -230,7 +225,7 @@ int bslam_slam_bad_sighting(const bslam_slam_t *slam)
     return slam->bad_sighting;
 }
 
-const bslam_counters_t *bslam_slam_counters(const bslam_slam_t *slam)
+const bslam_slam_counters_t *bslam_slam_counters(const bslam_slam_t *slam)
 {
     return &slam->counters;
 }

@@ -22,72 +22,6 @@
 #include "bslam/model/odometry_history.h"
 #include "bslam/smoother/smoother.h"
 
-/// Never-decreasing counts of what happened.
-typedef struct bslam_counters {
-    uint32_t odometry;          ///< readings taken
-    uint32_t odometry_refused;  ///< readings refused, any status
-    uint32_t jumps;             ///< of these, BSLAM_E_JUMP
-    uint32_t frames;            ///< frames taken
-    uint32_t frames_refused;    ///< frames refused, any status
-    uint32_t sightings;         ///< in the frames taken
-    uint32_t matched;           ///< fused with a beacon of the map
-    uint32_t down_weighted;     ///< of these, with less than full weight (Huber)
-    uint32_t added;             ///< started a beacon
-    uint32_t rejected;          ///< not used, any reason
-    uint32_t gated;             ///< of these, outside the hard gate
-    uint32_t map_full;          ///< of these, new without room
-    uint32_t duplicates;        ///< of these, a second sighting of one beacon in a frame
-    uint32_t unidentified;      ///< of these, without a label where identity is told
-    uint32_t unmappable;        ///< of these, of a class that is not mappable
-    uint32_t deferred;          ///< left undecided, or of a beacon on trial
-    uint32_t removed;           ///< provisional beacons taken out
-    uint32_t settled;           ///< rays that became points
-    uint32_t frozen;            ///< of the rejected, new in a frozen map
-    uint32_t insane;  ///< times the state was found not finite or with a negative variance: must stay 0
-} bslam_counters_t;
-
-typedef enum bslam_outcome {
-    BSLAM_OUTCOME_REJECTED = 0,
-    BSLAM_OUTCOME_MATCHED,
-    BSLAM_OUTCOME_NEW,
-    BSLAM_OUTCOME_DEFERRED
-} bslam_outcome_t;
-
-/// What became of a sighting, and why.
-typedef struct bslam_account {
-    bslam_outcome_t outcome;
-    bslam_reason_t reason;  ///< BSLAM_REASON_NONE if it was used
-    bool has_beacon;  ///< beacon_uid is set: of the one it was matched with (on trial or not), or started, or
-                      ///< was gated against
-    uint32_t beacon_uid;
-    bslam_real_t test_ratio;  ///< squared Mahalanobis distance over the gate's; negative: not computed
-    bslam_real_t weight;      ///< 1 for full weight, 0 for not used
-} bslam_account_t;
-
-/// What an attached smoother needs of the library: smoother/smoother.h. Private, reached by this alone as
-/// below.
-typedef struct bslam_smoothing {
-    void (*restart)(bslam_smoother_t *smoother, const bslam_settings_t *settings, const bslam_ekf_t *ekf);
-    void (*move)(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
-    void (*rest)(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
-                 bslam_real_t dt_s);
-    void (*see)(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
-    bslam_status_t (*add)(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_pose_t *mount,
-                          const bslam_sighting_t *sighting, int *index);
-    void (*remove)(bslam_smoother_t *smoother, int index);
-    void (*frame)(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf);
-} bslam_smoothing_t;
-
-/// What attached looks need of the library. Private: reached by this alone, so that a linker leaves learning
-/// out where no looks are attached.
-struct bslam_slam;
-typedef struct bslam_learning {
-    void (*clear)(bslam_appearance_t *appearance);
-    void (*forget)(bslam_appearance_t *appearance, int beacon, int count);
-    void (*learn)(struct bslam_slam *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
-    const bslam_appearance_answers_t *answers;
-} bslam_learning_t;
-
 /// All members are the pipeline's own; read them through the functions below.
 typedef struct bslam_slam {
     bslam_settings_t settings;
@@ -97,15 +31,13 @@ typedef struct bslam_slam {
     uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
     int64_t last_frame_us;
     bool has_frame;
-    bool confirmed_now;                  ///< within a frame: it has confirmed a beacon
-    bool measures_distance;              ///< some sighting had one
-    bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
-    bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
-    bslam_appearance_t *appearance;      ///< the caller's; NULL: none attached
-    const bslam_learning_t *learning;    ///< theirs
-    bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
-    const bslam_smoothing_t *smoothing;  ///< theirs
-    bslam_counters_t counters;
+    bool confirmed_now;              ///< within a frame: it has confirmed a beacon
+    bool measures_distance;          ///< some sighting had one
+    bool is_lost;                    ///< the pose is what odometry makes of one that is unknown
+    bool is_frozen;                  ///< the map: no beacon is added, learned or taken out by itself
+    bslam_appearance_t *appearance;  ///< the caller's; NULL: none attached
+    bslam_smoother_t *smoother;      ///< the caller's; NULL: none attached
+    bslam_slam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;
     int32_t bad_sighting;  ///< place of the sighting for which the last frame was refused, else -1
@@ -113,6 +45,18 @@ typedef struct bslam_slam {
     bslam_match_t matches[BSLAM_SIGHTINGS_MAX];
     bslam_innovation_t innovations[BSLAM_SIGHTINGS_MAX];
 } bslam_slam_t;
+
+/// Whether it learns appearance, and whether a smoother leads it: constants of the build where it has none,
+/// so that a linker leaves out what is never called.
+static inline bool bslam_slam_learns(const bslam_slam_t *slam)
+{
+    return BSLAM_APPEARANCE != 0 && slam->appearance != NULL;
+}
+
+static inline bool bslam_slam_smooths(const bslam_slam_t *slam)
+{
+    return BSLAM_SMOOTHER != 0 && slam->smoother != NULL;
+}
 
 /// Robot at the origin, empty map. settings is copied. BSLAM_E_PARAMETER with *bad_id, see
 /// bslam_settings_check: then *slam is unchanged.
@@ -195,22 +139,7 @@ const bslam_account_t *bslam_slam_accounts(const bslam_slam_t *slam, int *count)
 /// Which sighting the last refused frame was refused for; -1: none in particular.
 int bslam_slam_bad_sighting(const bslam_slam_t *slam);
 
-const bslam_counters_t *bslam_slam_counters(const bslam_slam_t *slam);
-
-/// A beacon as the map has it since the last frame.
-typedef struct bslam_beacon_view {
-    uint32_t uid;
-    int32_t label;
-    bslam_beacon_kind_t kind;
-    bool confirmed;
-    uint8_t beacon_class;
-    uint32_t sightings;
-    bslam_real_t x_m;
-    bslam_real_t y_m;
-    bslam_sym2_t covariance_m2;
-    bslam_real_t range_m;  ///< polar, from the start, as the paper's state vector has it
-    bslam_real_t phi_rad;
-} bslam_beacon_view_t;
+const bslam_slam_counters_t *bslam_slam_counters(const bslam_slam_t *slam);
 
 /// Beacons in the map, provisional ones included.
 int bslam_slam_beacon_count(const bslam_slam_t *slam);

@@ -5,6 +5,7 @@
 #include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "base/scalar.h"
 
 #define ROBOT BSLAM_ROBOT_DIM_MAX
 

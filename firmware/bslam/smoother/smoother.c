@@ -5,6 +5,7 @@
 #include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "base/scalar.h"
 
 /// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
 /// last moment before nothing is in view.

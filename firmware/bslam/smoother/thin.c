@@ -5,6 +5,7 @@
 #include "bslam/model/motion.h"
 #include "bslam/model/observation.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "base/scalar.h"
 
 /// No way is bent by more: beyond that it has no direction to speak of.
 static const bslam_real_t TURNED_MAX_RAD = BSLAM_R(1.0);

@@ -19,12 +19,6 @@
 
 #include "bslam/slam/slam.h"
 
-/// Never-decreasing counts of what happened.
-typedef struct bslam_guard_counters {
-    uint32_t corrupt;   ///< checks that found the state changed
-    uint32_t restored;  ///< times that the copy took its place
-} bslam_guard_counters_t;
-
 /// Private but for the counters.
 typedef struct bslam_guard {
     bslam_guard_counters_t counters;

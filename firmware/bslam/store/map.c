@@ -5,6 +5,7 @@
 #include "bslam/store/crc32.h"
 #include "bslam/store/classifiers.h"
 #include "bslam/store/codec.h"
+#include "base/scalar.h"
 
 #define MAGIC 0x4d4c5342u  // "BSLM"
 #define ORDER 0x0102u
@@ -178,7 +179,7 @@ static void take_record(const target_t *target, const record_t *record)
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
     ekf->dim += bslam_beacon_dim(beacon->kind);
-    if (target->slam->appearance != NULL) {
+    if (bslam_slam_learns(target->slam)) {
         bslam_beacon_look_t *look = &target->slam->appearance->of[index];
         look->classifier =
             record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
@@ -349,7 +350,7 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
             header.values += (uint32_t)bslam_beacon_dim(ekf->beacons[b].kind);
         }
     }
-    for (int32_t slot = 0; slam->appearance != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
+    for (int32_t slot = 0; bslam_slam_learns(slam) && slot < BSLAM_LEARNER_SLOTS; slot++) {
         header.classifiers += bslam_map_owns(slam, slot) ? 1u : 0u;
     }
     move_header(codec, &header);
@@ -357,7 +358,7 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
         if (bslam_map_saves(ekf, b)) {
             record_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
             record.scale = scale_of(ekf, &ekf->beacons[b]);
-            if (slam->appearance != NULL) {
+            if (bslam_slam_learns(slam)) {
                 const bslam_beacon_look_t *look = &slam->appearance->of[b];
                 record.classifier = bslam_map_classifier_number(slam, look->classifier);
                 memcpy(record.seen_as, look->seen_as, sizeof record.seen_as);
@@ -367,7 +368,7 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
         }
     }
     write_values(codec, ekf);
-    for (int32_t slot = 0; slam->appearance != NULL && slot < BSLAM_LEARNER_SLOTS; slot++) {
+    for (int32_t slot = 0; bslam_slam_learns(slam) && slot < BSLAM_LEARNER_SLOTS; slot++) {
         if (bslam_map_owns(slam, slot)) {
             bslam_map_write_classifier(codec, slam, slot);
         }
@@ -400,7 +401,7 @@ static void read_all(bslam_codec_t *codec, const target_t *target, const room_t 
     }
     read_beacons(codec, &header, target);
     read_values(codec, &header, target, room);
-    const bool learns = target != NULL && target->slam->appearance != NULL;
+    const bool learns = target != NULL && bslam_slam_learns(target->slam);
     bslam_map_read_classifiers(codec, header.classifiers, learns ? &target->slam->appearance->learner : NULL);
     const uint32_t body = codec->at;
     (void)bslam_codec_whole(codec, 0, CRC_BYTES);

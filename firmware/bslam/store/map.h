@@ -8,45 +8,14 @@
 #ifndef BSLAM_STORE_MAP_H
 #define BSLAM_STORE_MAP_H
 
+#include "bslam/bslam.h"
 #include "bslam/slam/slam.h"
 
 /// What is written. Version 1, without class counts and scales, is read, too.
 #define BSLAM_MAP_VERSION 2
 
-/// Why a blob is refused.
-typedef enum bslam_map_fault {
-    BSLAM_MAP_FINE = 0,
-    BSLAM_MAP_TRUNCATED,   ///< fewer bytes than it says of itself, or than a header has
-    BSLAM_MAP_TOO_LONG,    ///< more bytes than it says of itself
-    BSLAM_MAP_NO_MAP,      ///< it does not begin as a map does
-    BSLAM_MAP_BYTE_ORDER,  ///< written high byte first
-    BSLAM_MAP_OTHER_VERSION,
-    BSLAM_MAP_BAD_CRC,
-    BSLAM_MAP_BEACONS,      ///< more beacons, or rays, than this build holds
-    BSLAM_MAP_CLASSIFIERS,  ///< machines, samples or rivals beyond what this build holds; other signatures
-    BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
-    BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range
-    BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1, values that cannot be so together
-    BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, the sink cannot be written
-    BSLAM_MAP_NO_ROOM,     ///< to look at its covariance beside the robot's own map: forget that first
-    BSLAM_MAP_FAULT_COUNT
-} bslam_map_fault_t;
-
 /// The name of a fault, "bad crc" say. Never NULL.
 const char *bslam_map_fault_name(bslam_map_fault_t fault);
-
-/// Where bytes come from: a function that copies `count` bytes from place `at` on. False: it cannot.
-typedef struct bslam_map_source {
-    bool (*read)(const void *context, uint32_t at, void *bytes, uint32_t count);
-    const void *context;
-    uint32_t size;  ///< bytes there are
-} bslam_map_source_t;
-
-/// Where bytes go, one piece after the other. False: it cannot.
-typedef struct bslam_map_sink {
-    bool (*write)(void *context, const void *bytes, uint32_t count);
-    void *context;
-} bslam_map_sink_t;
 
 /// Bytes in memory to be written to, of which `count` are.
 typedef struct bslam_map_memory {

@@ -9,18 +9,6 @@
 #include "bslam/store/map.h"
 
 #define BSLAM_SLOTS 2
-/// Bytes are written in pieces of so many, at places that are multiples of it: what the flash programs at
-/// once must divide it.
-#define BSLAM_FLASH_PIECE 16
-
-/// What a board gives: two areas that are erased each as a whole (bytes become 0xff). False: it failed.
-typedef struct bslam_flash {
-    bool (*erase)(void *context, int slot);
-    bool (*write)(void *context, int slot, uint32_t at, const void *bytes, uint32_t count);
-    bool (*read)(void *context, int slot, uint32_t at, void *bytes, uint32_t count);
-    void *context;
-    uint32_t slot_bytes;  ///< of each area; a map takes BSLAM_FLASH_PIECE more than bslam_map_size
-} bslam_flash_t;
 
 /// Saves the map. BSLAM_E_MAP: *fault is BSLAM_MAP_UNREADABLE if the flash failed or the map is larger than a
 /// slot, else what is wrong with what was read back; the map saved before is still there. Which slot is whole

@@ -1,6 +1,7 @@
 #include "vision/camera/lens.h"
 
 #include "base/trig.h"
+#include "base/scalar.h"
 
 static const bslam_real_t FOCAL_MIN_PX = 1;
 static const bslam_real_t FOCAL_MAX_PX = BSLAM_R(1e5);

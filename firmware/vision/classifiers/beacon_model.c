@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "base/real.h"
+#include "base/scalar.h"
 #include "vision/frame.h"
 
 /// A machine of one row. A quadratic one has more weights than who asks for a linear one would give it.

@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "base/real.h"
+#include "base/scalar.h"
 
 bslam_status_t bslam_recogniser_check(const bslam_recogniser_t *recogniser)
 {

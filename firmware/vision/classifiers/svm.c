@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "base/real.h"
+#include "base/scalar.h"
 
 static int32_t weights_in_row(const bslam_svm_t *svm)
 {

@@ -1,5 +1,7 @@
 #include "vision/detection/detector.h"
 
+#include <math.h>
+
 #include <stddef.h>
 #include <string.h>
 

@@ -4,6 +4,7 @@
 
 #include "base/bounds.h"
 #include "vision/detection/box_sums.h"
+#include "base/scalar.h"
 
 #define CONTRAST_FEATURES 6
 

@@ -5,6 +5,7 @@
 
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"
+#include "base/scalar.h"
 
 /// What is looked for: foot, middle and top are so high above the floor, and it is at least and at most so
 /// wide as it appears, slanted by up to 60 degrees.

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/bounds.h"
+#include "base/scalar.h"
 
 enum {
     BANDS = BSLAM_TURN_BANDS,

@@ -5,6 +5,7 @@
 #include "base/bounds.h"
 #include "base/trig.h"
 #include "vision/gyro/column_shift.h"
+#include "base/scalar.h"
 
 enum { BANDS = BSLAM_TURN_BANDS };
 

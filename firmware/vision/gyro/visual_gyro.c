@@ -1,4 +1,5 @@
 #include "vision/gyro/visual_gyro.h"
+#include "base/scalar.h"
 
 #include <string.h>
 

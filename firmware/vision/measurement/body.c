@@ -1,6 +1,7 @@
 #include "vision/measurement/body.h"
 
 #include "vision/measurement/orientation.h"
+#include "base/scalar.h"
 
 // A flank's width depends on where its near corner is: rounds.
 enum { CORNER_STEPS = 3 };

@@ -1,6 +1,7 @@
 #include "vision/measurement/distance.h"
 
 #include "vision/measurement/body.h"
+#include "base/scalar.h"
 
 // How well an edge is found where it is sure which edge (pixels), and how much of the outline's doubts about
 // which edge it is counts. Fitted as measure.c's are.

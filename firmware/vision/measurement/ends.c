@@ -4,6 +4,7 @@
 #include "base/trig.h"
 #include "vision/measurement/body.h"
 #include "vision/measurement/shade.h"
+#include "base/scalar.h"
 
 // Places that a side may move to, from so many steps outwards to as many inwards; and how many steps are
 // looked along at first.

@@ -8,6 +8,7 @@
 #include "vision/measurement/ends.h"
 #include "vision/measurement/partial_view.h"
 #include "vision/measurement/signature.h"
+#include "base/scalar.h"
 
 enum {
     SIDEWAYS = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT,

@@ -2,6 +2,7 @@
 
 #include "base/logarithm.h"
 #include "vision/measurement/side_face.h"
+#include "base/scalar.h"
 
 // Turns tried to either side.
 enum { TURNS_MAX = 5 };

@@ -2,6 +2,7 @@
 
 #include "base/trig.h"
 #include "vision/measurement/body.h"
+#include "base/scalar.h"
 
 // A body's front and its turn determine each other: rounds.
 enum { FRONT_STEPS = 3 };

@@ -1,4 +1,5 @@
 #include "vision/measurement/shade.h"
+#include "base/scalar.h"
 
 // So many upright lines in a strip, and points on each.
 enum { LINES = 3, POINTS = 6 };

@@ -6,6 +6,7 @@
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"
 #include "base/logarithm.h"
+#include "base/scalar.h"
 
 enum { CHANNELS = 3, PLACES = BSLAM_SIDE_PLACES, REACH_OUT = BSLAM_SIDE_REACH_OUT };
 // Places for a side that does not turn away from the rough box.

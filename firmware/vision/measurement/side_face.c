@@ -2,6 +2,7 @@
 
 #include "base/logarithm.h"
 #include "vision/measurement/shade.h"
+#include "base/scalar.h"
 
 // A flank that is narrower is not told from the front, whole-frame pixels. The score of an edge between them
 // that speaks neither for a stance nor against it.

@@ -1,4 +1,5 @@
 #include "vision/measurement/signature.h"
+#include "base/scalar.h"
 
 #include <string.h>
 

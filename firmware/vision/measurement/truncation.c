@@ -6,6 +6,7 @@
 #include "vision/measurement/distance.h"
 #include "vision/measurement/body.h"
 #include "vision/measurement/partial_view.h"
+#include "base/scalar.h"
 
 // What comes this close to the frame's edge may go on outside: the detector's boxes end at cells of 4 pixels,
 // or at some line of the object short of the edge.

@@ -5,6 +5,7 @@
 #include "base/bounds.h"
 #include "vision/pixels/spread.h"
 #include "vision/pixels/bytes.h"
+#include "base/scalar.h"
 
 /// 32 log2((v + 4) / 4), rounded: the 4 keeps the noise of dark pixels from growing without bound.
 static const uint8_t tone_log[256] = {

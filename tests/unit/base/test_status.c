@@ -21,6 +21,7 @@ static void test_status_name_every_code_is_its_own_name(void **state)
         {BSLAM_E_SINGULAR, "BSLAM_E_SINGULAR"},
         {BSLAM_E_MAP, "BSLAM_E_MAP"},
         {BSLAM_E_STATE, "BSLAM_E_STATE"},
+        {BSLAM_E_SIZE, "BSLAM_E_SIZE"},
     };
     // A new status needs a line above.
     assert_int_equal(COUNT_OF(cases), BSLAM_STATUS_COUNT);

@@ -1,4 +1,6 @@
 #include "support.h"
+#include "bslam/settings_internal.h"
+#include "plain_settings.h"
 
 #include <math.h>
 
@@ -65,10 +67,12 @@ static void test_default_every_field_is_the_tables_and_passes_the_check(void **s
 {
     bslam_settings_t settings;
     memset(&settings, 0xa5, sizeof settings);
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
 #define ASSERT_DEFAULT(field, value, low, high, meaning) \
     assert_near(settings.field, value, UNIT_ROUNDING *fabs((double)(value)));
     BSLAM_SETTINGS(ASSERT_DEFAULT, ASSERT_DEFAULT)
+    BSLAM_EXPERT(ASSERT_DEFAULT, ASSERT_DEFAULT)
+    BSLAM_TUNING(ASSERT_DEFAULT, ASSERT_DEFAULT)
     int bad_id = 7;
     assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
     assert_int_equal(bad_id, 7);
@@ -79,7 +83,7 @@ static void test_default_every_field_is_the_tables_and_passes_the_check(void **s
 static void test_get_every_field_is_the_structs(void **state)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     int id = 0;
 #define ASSERT_GET(field, value, low, high, meaning) \
     settings.field = (high); \
@@ -88,13 +92,15 @@ static void test_get_every_field_is_the_structs(void **state)
 #define ASSERT_GET_REAL(field, value, low, high, meaning) \
     ASSERT_GET(field, value, low, BSLAM_R(high), meaning)
     BSLAM_SETTINGS(ASSERT_GET_REAL, ASSERT_GET)
+    BSLAM_EXPERT(ASSERT_GET_REAL, ASSERT_GET)
+    BSLAM_TUNING(ASSERT_GET_REAL, ASSERT_GET)
     assert_int_equal(id, bslam_settings_count());
 }
 
 static void test_get_no_such_field_is_zero(void **state)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     assert_true(bslam_settings_get(&settings, -1) == 0);
     assert_true(bslam_settings_get(&settings, bslam_settings_count()) == 0);
 }
@@ -102,7 +108,7 @@ static void test_get_no_such_field_is_zero(void **state)
 static void test_set_both_limits_are_taken_and_read_back(void **state)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     for (int id = 0; id < bslam_settings_count(); id++) {
         const bslam_setting_info_t *info = bslam_settings_info(id);
         assert_int_equal(bslam_settings_set(&settings, id, info->low), BSLAM_OK);
@@ -116,7 +122,7 @@ static void test_set_touches_no_other_field(void **state)
 {
     for (int id = 0; id < bslam_settings_count(); id++) {
         bslam_settings_t settings;
-        bslam_settings_default(&settings);
+        bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
         assert_int_equal(bslam_settings_set(&settings, id, bslam_settings_info(id)->high), BSLAM_OK);
         for (int other = 0; other < bslam_settings_count(); other++) {
             if (other != id) {
@@ -136,7 +142,7 @@ static void test_set_outside_the_range_is_refused_and_changes_nothing(void **sta
             bslam_settings_t settings;
             bslam_settings_t before;
             memset(&settings, 0, sizeof settings);
-            bslam_settings_default(&settings);
+            bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
             memcpy(&before, &settings, sizeof settings);
             assert_int_equal(bslam_settings_set(&settings, id, wrong[i]), BSLAM_E_PARAMETER);
             assert_memory_equal(&settings, &before, sizeof settings);
@@ -147,7 +153,7 @@ static void test_set_outside_the_range_is_refused_and_changes_nothing(void **sta
 static void test_set_fraction_for_an_integer_is_refused(void **state)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     for (int id = 0; id < bslam_settings_count(); id++) {
         const bslam_setting_info_t *info = bslam_settings_info(id);
         if (info->is_integer) {
@@ -160,7 +166,7 @@ static void test_set_fraction_for_an_integer_is_refused(void **state)
 static void test_set_no_such_field_is_refused(void **state)
 {
     bslam_settings_t settings;
-    bslam_settings_default(&settings);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     assert_int_equal(bslam_settings_set(&settings, -1, 0), BSLAM_E_PARAMETER);
     assert_int_equal(bslam_settings_set(&settings, bslam_settings_count(), 0), BSLAM_E_PARAMETER);
 }
@@ -170,7 +176,7 @@ static void test_set_no_such_field_is_refused(void **state)
 /// One field of otherwise good parameters is set to `value`: the check must blame it.
 #define ASSERT_BLAMED(field, value) \
     do { \
-        bslam_settings_t settings = unit_params(); \
+        bslam_settings_t settings = unit_settings(); \
         settings.field = (value); \
         assert_check_blames(&settings, #field); \
     } while (0)
@@ -199,7 +205,7 @@ static void test_check_every_integer_field_outside_its_range_is_blamed(void **st
 static void test_check_both_limits_of_every_field_are_taken(void **state)
 {
     for (int id = 0; id < bslam_settings_count(); id++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         // A field that the contradictions below are about keeps its value.
         if (strstr(bslam_settings_info(id)->name, "_states") != NULL) {
             continue;
@@ -214,7 +220,7 @@ static void test_check_both_limits_of_every_field_are_taken(void **state)
 
 static void test_check_velocity_and_scale_states_together_are_refused(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     settings.scale_states = 1;
     assert_check_blames(&settings, "scale_states");
@@ -222,7 +228,7 @@ static void test_check_velocity_and_scale_states_together_are_refused(void **sta
 
 static void test_check_velocity_states_need_noise_of_both_wheels(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     settings.left_speed_sd_mps = 0;
     assert_check_blames(&settings, "left_speed_sd_mps");

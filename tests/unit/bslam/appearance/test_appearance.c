@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "bslam/association/viewpoint.h"
+#include "plain_settings.h"
 
 static bslam_appearance_t appearance;
 static bslam_settings_t settings;
@@ -12,7 +13,7 @@ enum { SHARE = 3 };
 
 static int setup(void **state)
 {
-    settings = unit_params();
+    settings = unit_settings();
     settings.appearance_samples = 3;
     settings.learn_travel_m = BSLAM_R(0.1);
     settings.share_value = BSLAM_R(0.3);

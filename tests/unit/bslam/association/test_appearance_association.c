@@ -7,6 +7,7 @@
 #include "bslam/association/conditional.h"
 #include "bslam/association/viewpoint.h"
 #include "bslam/model/noise.h"
+#include "plain_settings.h"
 
 static const bslam_pose_t on_axle = {0, 0, 0};
 static const float PLAIN[BSLAM_SAMPLE_FEATURES] = {0.0f};
@@ -26,7 +27,7 @@ static bslam_sighting_t seen_with(bslam_sighting_t sighting, const float *signat
 
 static bslam_settings_t svm_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = BSLAM_ASSOCIATION_SVM;
     settings.candidate_d2 = 30;
     settings.new_per_m2 = BSLAM_R(0.02);
@@ -55,8 +56,7 @@ typedef struct decision {
 static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                             const bslam_sighting_t *seen, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf,      settings, &appearance, &bslam_appearance_answers,
-                                          &on_axle, seen,     count,       time_us};
+    const bslam_sighting_frame_t frame = {ekf, settings, &appearance, &on_axle, seen, count, time_us};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     bslam_associate_svm(&frame, decision.matches);
@@ -329,8 +329,7 @@ static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bea
     bslam_appearance_t *const known[] = {NULL, &appearance};
     double scores[2];
     for (int i = 0; i < 2; i++) {
-        const bslam_sighting_frame_t frame = {ekf,   &settings, known[i], &bslam_appearance_answers,
-                                              mount, &seen,     1,        0};
+        const bslam_sighting_frame_t frame = {ekf, &settings, known[i], mount, &seen, 1, 0};
         bslam_match_t match;
         bslam_associate_svm(&frame, &match);
         scores[i] = (double)match.score;

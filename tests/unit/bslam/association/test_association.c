@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "bslam/association/association.h"
+#include "plain_settings.h"
 
 static const bslam_pose_t on_axle = {0, 0, 0};
 
@@ -15,7 +16,7 @@ typedef struct decision {
 static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                          const bslam_pose_t *mount, const bslam_sighting_t *sightings, int count)
 {
-    const bslam_sighting_frame_t frame = {ekf, settings, NULL, NULL, mount, sightings, count, 0};
+    const bslam_sighting_frame_t frame = {ekf, settings, NULL, mount, sightings, count, 0};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
     method(&frame, decision.matches);
@@ -70,7 +71,7 @@ static bslam_ekf_t three_beacons(const bslam_settings_t *settings)
 
 static void test_known_label_of_the_map_is_a_match_and_another_is_new(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     // Where it is seen plays no part.
     const bslam_sighting_t seen[] = {unit_polar(2, 9, 11), unit_polar(0, 4, 7), unit_direction(1, 10),
@@ -84,7 +85,7 @@ static void test_known_label_of_the_map_is_a_match_and_another_is_new(void **sta
 
 static void test_known_sighting_without_a_label_is_rejected(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, BSLAM_LABEL_NONE)};
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, 1);
@@ -93,7 +94,7 @@ static void test_known_sighting_without_a_label_is_rejected(void **state)
 
 static void test_known_repeated_label_leaves_the_first(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, 10), unit_polar(0, 4, 10), unit_polar(0, 4, 7),
                                      unit_polar(0, 5, 7), unit_polar(0, 4, 10)};
@@ -109,7 +110,7 @@ static void test_known_repeated_label_leaves_the_first(void **state)
 static void test_known_label_has_so_many_rivals_and_no_more(void **state)
 {
     enum { NEGATIVES = 8 };
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.gate_d2 = BSLAM_R(13.8);
     static double places[NEGATIVES][2];
     for (int i = 0; i < NEGATIVES; i++) {
@@ -132,7 +133,7 @@ static void test_known_label_has_so_many_rivals_and_no_more(void **state)
 /// A rival where the robot stands has no direction, and so no distance to compare.
 static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     static const double places[2][2] = {{4, 0}, {0, 0}};
     bslam_ekf_t ekf = unit_map_of(&settings, places, 2);
     for (int b = 0; b < 2; b++) {
@@ -146,7 +147,7 @@ static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **st
 
 static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, 10), BSLAM_CLASS_NOT_MAPPABLE),
                                      unit_polar(0, 4, 10)};
@@ -161,7 +162,7 @@ static const bslam_associate_fn by_distance[] = {bslam_associate_nearest, bslam_
 
 static void test_by_distance_empty_map_makes_everything_new(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_direction(0, -1)};
@@ -174,7 +175,7 @@ static void test_by_distance_empty_map_makes_everything_new(void **state)
 
 static void test_by_distance_not_mappable_sighting_is_rejected(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, -1), BSLAM_CLASS_NOT_MAPPABLE)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
@@ -186,7 +187,7 @@ static void test_by_distance_not_mappable_sighting_is_rejected(void **state)
 
 static void test_by_distance_nearest_of_two_is_the_match(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     // Beacons 0 and 2 are 14 degrees apart.
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4.02, -1), unit_polar(0.23, 4.1, -1)};
@@ -199,7 +200,7 @@ static void test_by_distance_nearest_of_two_is_the_match(void **state)
 
 static void test_by_distance_of_several_sightings_the_nearest_keeps_the_beacon(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.60, 3, -1), unit_polar(1.571, 3, -1),
                                      unit_polar(1.58, 3, -1)};
@@ -213,7 +214,7 @@ static void test_by_distance_of_several_sightings_the_nearest_keeps_the_beacon(v
 
 static void test_by_distance_of_equally_near_sightings_the_first_keeps_the_beacon(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.6, 3, -1), unit_polar(1.6, 3, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
@@ -225,7 +226,7 @@ static void test_by_distance_of_equally_near_sightings_the_first_keeps_the_beaco
 
 static void test_by_distance_other_class_is_never_the_match(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
     ekf.beacons[1].beacon_class = 3;
     const bslam_sighting_t here = unit_polar(1.5708, 3, -1);
@@ -244,7 +245,7 @@ static void test_by_distance_other_class_is_never_the_match(void **state)
 
 static void test_by_distance_sensor_is_where_its_mount_says(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     // The sensor stands at (2, 1) and looks backwards: beacon 1, at (0, 3), is ahead to its right.
     const bslam_pose_t mount = {2, 1, real(3.14159265358979)};
@@ -261,7 +262,7 @@ static void test_by_distance_sensor_is_where_its_mount_says(void **state)
 
 static void test_nearest_on_either_side_of_the_threshold(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.nearest_threshold_m = BSLAM_R(0.5);
     const bslam_ekf_t ekf = three_beacons(&settings);
     // Beyond beacon 1, straight on: 3 m + this much.
@@ -276,7 +277,7 @@ static void test_nearest_on_either_side_of_the_threshold(void **state)
 
 static void test_nearest_direction_on_either_side_of_the_threshold(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.nearest_threshold_rad = BSLAM_R(0.1);
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t near[] = {unit_direction(-0.099, -1)};
@@ -289,7 +290,7 @@ static void test_nearest_direction_on_either_side_of_the_threshold(void **state)
 
 static void test_nearest_direction_a_turn_further_is_the_same(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_direction(1.57 - 6.2831853, -1)};
     const decision_t d = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, seen, 1);
@@ -298,7 +299,7 @@ static void test_nearest_direction_a_turn_further_is_the_same(void **state)
 
 static void test_nearest_known_beacon_is_one_of_the_map(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
     int index;
     assert_int_equal(bslam_ekf_add_known(&ekf, -5, 0, &index), BSLAM_OK);
@@ -324,7 +325,7 @@ static double distance2_to(const bslam_ekf_t *ekf, const bslam_settings_t *setti
 
 static void test_mahalanobis_match_ambiguous_and_new_by_the_two_thresholds(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(1.5708, 3.5, -1)};
     const double d2 = distance2_to(&ekf, &settings, &seen[0], 1);
@@ -346,7 +347,7 @@ static void test_mahalanobis_match_ambiguous_and_new_by_the_two_thresholds(void 
 
 static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
     for (int k = 0; k < 2; k++) {
         const int at = ekf.beacons[2].at + k;
@@ -362,7 +363,7 @@ static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one
 
 static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
     int index;
@@ -375,7 +376,7 @@ static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **
 
 static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
     for (int k = 0; k < 2; k++) {
         const int at = ekf.beacons[1].at + k;
@@ -392,7 +393,7 @@ static void test_method_is_the_one_that_the_parameter_names(void **state)
 {
     static const bslam_associate_fn methods[] = {bslam_associate_known, bslam_associate_nearest,
                                                  bslam_associate_mahalanobis};
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     for (int i = 0; i < COUNT_OF(methods); i++) {
         settings.association = i;
         assert_true(bslam_associate_method(&settings) == methods[i]);
@@ -401,7 +402,7 @@ static void test_method_is_the_one_that_the_parameter_names(void **state)
 
 static void test_every_method_takes_an_empty_frame(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
     for (settings.association = 0; settings.association <= 2; settings.association++) {
         (void)decide(bslam_associate_method(&settings), &ekf, &settings, &on_axle, NULL, 0);

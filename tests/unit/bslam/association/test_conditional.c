@@ -4,6 +4,7 @@
 
 #include "bslam/association/conditional.h"
 #include "bslam/slam/slam.h"
+#include "plain_settings.h"
 
 static bslam_slam_t slam;
 static bslam_conditional_t conditional;
@@ -11,7 +12,7 @@ static bslam_conditional_t conditional;
 /// A robot with two beacons, and doubt about its pose.
 static int setup(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_sighting_t seen[] = {unit_polar(0.3, 2, 1), unit_polar(-0.4, 3, 2)};
     const bslam_pose_t origin = {0, 0, 0};
     int bad_id;

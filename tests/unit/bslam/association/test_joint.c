@@ -5,6 +5,7 @@
 
 #include "bslam/association/association.h"
 #include "bslam/association/conditional.h"
+#include "plain_settings.h"
 
 static const bslam_pose_t on_axle = {0, 0, 0};
 
@@ -12,7 +13,7 @@ enum { BEACONS = 4, SIGHTINGS = 4 };
 
 static bslam_settings_t joint_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = BSLAM_ASSOCIATION_JOINT;
     settings.joint_sd = BSLAM_R(3.09);
     settings.joint_nodes = 100000;
@@ -123,7 +124,7 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
             continue;
         }
         bslam_match_t matches[SIGHTINGS];
-        const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, SIGHTINGS, 0};
+        const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, SIGHTINGS, 0};
         bslam_associate_joint(&frame, matches);
         for (int i = 0; i < SIGHTINGS; i++) {
             assert_int_equal(matches[i].beacon, expected.beacon[i]);
@@ -146,7 +147,7 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
         seen[i] = unit_polar(atan2(places[i][1], places[i][0]) + 0.15, hypot(places[i][0], places[i][1]), -1);
     }
     bslam_match_t matches[3];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 3, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 3, 0};
     bslam_associate_mahalanobis(&frame, matches);
     assert_int_not_equal(matches[0].beacon, 0);
     bslam_associate_joint(&frame, matches);
@@ -168,7 +169,7 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
         bslam_symmat_set(ekf.covariance, at, at, -1);
     }
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
     bslam_match_t matches[2];
     bslam_associate_joint(&frame, matches);
     unit_assert_decided(&matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -183,7 +184,7 @@ static void test_joint_out_of_nodes_still_decides_all(void **state)
     const bslam_ekf_t ekf = map_of(&settings, places, 1);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(2, 4, -1)};
     bslam_match_t matches[2];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 2, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
     bslam_associate_joint(&frame, matches);
     assert_int_equal(matches[0].verdict, BSLAM_VERDICT_REJECT);
     assert_int_equal(matches[0].reason, BSLAM_REASON_AMBIGUOUS);
@@ -203,7 +204,7 @@ static void test_joint_more_sightings_than_are_paired_together(void **state)
     seen[6] = seen[2];  // the same beacon again, in the second group
     const bslam_ekf_t ekf = map_of(&settings, places, 8);
     bslam_match_t matches[8];
-    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, NULL, &on_axle, seen, 8, 0};
+    const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 8, 0};
     bslam_associate_joint(&frame, matches);
     for (int i = 0; i < 8; i++) {
         assert_int_equal(matches[i].beacon, i == 6 ? -1 : i);

@@ -5,6 +5,7 @@
 
 #include "bslam/association/missed_beacons.h"
 #include "base/trig.h"
+#include "plain_settings.h"
 
 static bslam_appearance_t appearance;
 static bslam_settings_t settings;
@@ -16,7 +17,7 @@ static const double places[2][2] = {{0, 0}, {0, 6}};
 
 static int setup(void **state)
 {
-    settings = unit_params();
+    settings = unit_settings();
     settings.missed_views = 3;
     ekf = unit_map_of(&settings, places, 2);
     now_us = 0;

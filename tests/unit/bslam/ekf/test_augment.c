@@ -1,5 +1,6 @@
 #include "support.h"
 #include "twin.h"
+#include "plain_settings.h"
 
 #include <math.h>
 
@@ -13,7 +14,7 @@ static const bslam_pose_t mount = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.4)};
 /// map.
 static bslam_ekf_t random_filter(bslam_settings_t *settings, unit_random_t *random)
 {
-    *settings = unit_params();
+    *settings = unit_settings();
     settings->velocity_states = 1;
     bslam_ekf_t ekf;
     twin_randomise(&ekf, settings, random, 2, 1);
@@ -154,7 +155,7 @@ static void test_add_sized_is_the_augment_step(void **state)
 
 static void test_add_sized_beyond_their_room_are_points(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.range_scale_sd = BSLAM_R(0.07);
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
@@ -170,7 +171,7 @@ static void test_add_sized_beyond_their_room_are_points(void **state)
 
 static void test_add_sized_where_rays_took_their_room_is_a_point(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.range_scale_sd = BSLAM_R(0.07);
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
@@ -222,7 +223,7 @@ static void assert_fills_up(bslam_ekf_t *ekf, const bslam_settings_t *settings, 
 
 static void test_add_points_beyond_the_map_are_refused(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
     assert_fills_up(&ekf, &settings, unit_polar(0.3, 2, 1), BSLAM_BEACONS_MAX);
@@ -232,7 +233,7 @@ static void test_add_points_beyond_the_map_are_refused(void **state)
 
 static void test_add_rays_beyond_their_number_are_refused_but_points_are_not(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
     assert_fills_up(&ekf, &settings, unit_direction(0.3, 1), BSLAM_RAYS_MAX);
@@ -609,7 +610,7 @@ static void test_give_scale_puts_a_value_of_its_own_behind_the_point(void **stat
 
 static void test_give_scale_beyond_their_room_is_not_done(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
     int index;

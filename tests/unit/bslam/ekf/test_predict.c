@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "bslam/model/motion.h"
+#include "plain_settings.h"
 
 /// In double the finite differences of the expected Jacobians limit the comparison; in float some hundred
 /// roundings of numbers of order 1 (positions up to 10 m).
@@ -183,12 +184,12 @@ static void check_plain(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 
 static void test_predict_is_the_textbook_prediction(void **state)
 {
-    for_every_kind(unit_params(), check_plain);
+    for_every_kind(unit_settings(), check_plain);
 }
 
 static void test_predict_with_constant_scales_is_the_textbook_prediction(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.forward_scale = BSLAM_R(1.1);
     settings.turn_scale = BSLAM_R(0.8);
     for_every_kind(settings, check_plain);
@@ -196,7 +197,7 @@ static void test_predict_with_constant_scales_is_the_textbook_prediction(void **
 
 static void test_speeds_that_are_no_states_are_not_measured(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 0;
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
@@ -207,7 +208,7 @@ static void test_speeds_that_are_no_states_are_not_measured(void **state)
 
 static void test_predict_moves_no_beacon(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     unit_random_t random = {2};
     bslam_ekf_t ekf = random_filter(&settings, &random);
     const bslam_ekf_t before = ekf;
@@ -223,7 +224,7 @@ static void test_predict_moves_no_beacon(void **state)
 static void test_predict_without_motion_and_noise_changes_no_value(void **state)
 {
     const bslam_motion_t rest = {.dt_s = BSLAM_R(0.04)};
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     unit_random_t random = {3};
     bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t expected = twin_of(&ekf);
@@ -250,7 +251,7 @@ static void check_scales(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 
 static void test_predict_with_scale_states_is_the_textbook_prediction(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.scale_states = 1;
     for_every_kind(settings, check_scales);
 }
@@ -273,14 +274,14 @@ static void check_velocity(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 
 static void test_predict_with_velocity_states_predicts_then_measures(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     for_every_kind(settings, check_velocity);
 }
 
 static void test_predict_with_velocity_states_and_constant_scales_measures_the_scaled_reading(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     settings.forward_scale = BSLAM_R(1.1);
     settings.turn_scale = BSLAM_R(0.8);
@@ -289,7 +290,7 @@ static void test_predict_with_velocity_states_and_constant_scales_measures_the_s
 
 static void test_predict_with_velocity_states_that_never_decay_keeps_them(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     settings.velocity_decay_s = BSLAM_R(1e6);
     settings.turn_rate_decay_s = BSLAM_R(1e6);
@@ -299,7 +300,7 @@ static void test_predict_with_velocity_states_that_never_decay_keeps_them(void *
 static void
 test_predict_with_velocity_states_and_indefinite_noise_is_refused_or_measures_nothing(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     unit_random_t random = {4};
     bslam_motion_t bad[3] = {motion, motion, motion};
@@ -331,7 +332,7 @@ test_predict_with_velocity_states_and_indefinite_noise_is_refused_or_measures_no
 
 static void test_resume_adds_the_doubt_to_the_pose_alone(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     unit_random_t random = {5};
     bslam_ekf_t ekf = random_filter(&settings, &random);
     twin_t expected = twin_of(&ekf);
@@ -344,7 +345,7 @@ static void test_resume_adds_the_doubt_to_the_pose_alone(void **state)
 
 static void test_resume_time_and_again_does_not_add_up_beyond_lost(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     unit_random_t random = {6};
     bslam_ekf_t ekf = random_filter(&settings, &random);
     twin_t expected = twin_of(&ekf);
@@ -362,7 +363,7 @@ static void test_resume_time_and_again_does_not_add_up_beyond_lost(void **state)
 
 static void test_resume_with_velocity_states_stands_still_as_at_the_start(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     unit_random_t random = {7};
     bslam_ekf_t ekf = random_filter(&settings, &random);
@@ -381,7 +382,7 @@ static void test_resume_with_velocity_states_stands_still_as_at_the_start(void *
 
 static void test_resume_with_scale_states_keeps_them(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.scale_states = 1;
     unit_random_t random = {8};
     bslam_ekf_t ekf = random_filter(&settings, &random);
@@ -394,7 +395,7 @@ static void test_resume_with_scale_states_keeps_them(void **state)
 
 static void test_init_knows_its_pose_exactly_and_has_no_beacons(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf;
     memset(&ekf, 0xff, sizeof ekf);
     bslam_ekf_init(&ekf, &settings);
@@ -406,7 +407,7 @@ static void test_init_knows_its_pose_exactly_and_has_no_beacons(void **state)
 
 static void test_init_with_velocity_states_stands_still_within_their_deviations(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     bslam_ekf_t ekf;
     bslam_ekf_init(&ekf, &settings);
@@ -418,7 +419,7 @@ static void test_init_with_velocity_states_stands_still_within_their_deviations(
 
 static void test_init_with_scale_states_starts_at_the_given_scales(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.scale_states = 1;
     settings.forward_scale = BSLAM_R(1.5);
     settings.turn_scale = BSLAM_R(0.75);

@@ -1,5 +1,6 @@
 #include "support.h"
 #include "twin.h"
+#include "plain_settings.h"
 
 #include <math.h>
 
@@ -132,7 +133,7 @@ static bslam_ekf_t random_filter(const bslam_settings_t *settings, unit_random_t
 
 static bslam_settings_t params_of(int filter, bool velocity)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.filter = filter;
     settings.velocity_states = velocity ? 1 : 0;
     return settings;

@@ -4,6 +4,7 @@
 
 #include "bslam/model/noise.h"
 #include "bslam/model/observation.h"
+#include "plain_settings.h"
 
 /// Arguments of the models in a test: the robot's pose, the sensor on it, then the beacon's values or a
 /// sighting's.
@@ -383,7 +384,7 @@ static void test_locate_point_undoes_observe_point(void **state)
 
 static void test_range_variance_is_the_sum_of_its_three_parts(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.range_sd_floor_m = BSLAM_R(0.5);
     settings.range_sd_fraction = BSLAM_R(0.25);
     settings.range_sd_per_m = BSLAM_R(0.125);
@@ -395,7 +396,7 @@ static void test_range_variance_is_the_sum_of_its_three_parts(void **state)
 
 static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicted_distance(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_sighting_t sighting = {.range_m = 4, .has_range = true, .range_sd_m = BSLAM_R(0.5)};
     assert_near(bslam_range_variance_m2(&settings, &sighting, 4), 0.25, 0);
     assert_near(bslam_range_variance_m2(&settings, &sighting, 8), 1, 0);
@@ -403,7 +404,7 @@ static void test_range_variance_of_the_detector_is_in_proportion_to_the_predicte
 
 static void test_unknown_scale_is_the_detector_s_or_the_parameter_s(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.range_scale_sd = BSLAM_R(0.5);
     bslam_sighting_t sighting = {.range_m = 4, .has_range = true};
     assert_near(bslam_unknown_scale_var(&settings, &sighting), 0.25, 0);
@@ -413,7 +414,7 @@ static void test_unknown_scale_is_the_detector_s_or_the_parameter_s(void **state
 
 static void test_correlation_factor_without_a_length_is_one(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.correlation_m = 0;
     assert_near(bslam_correlation_factor(&settings, 0), 1, 0);
     assert_near(bslam_correlation_factor(&settings, 5), 1, 0);
@@ -423,7 +424,7 @@ static void test_correlation_factor_without_a_length_is_one(void **state)
 /// information: that is tanh(way / (2 length)), which the factor follows within 9 %.
 static void test_correlation_factor_is_that_of_a_first_order_process(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.correlation_m = BSLAM_R(0.5);
     for (double travelled_m = 0.02; travelled_m < 5; travelled_m *= 1.3) {
         const double rho = exp(-travelled_m / 0.5);
@@ -434,14 +435,14 @@ static void test_correlation_factor_is_that_of_a_first_order_process(void **stat
 
 static void test_correlation_factor_at_a_standstill_is_bounded(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.correlation_m = BSLAM_R(0.5);
     assert_near(bslam_correlation_factor(&settings, 0), 100.005, 1e-3);
 }
 
 static void test_bearing_variance_grows_by_its_factor_without_a_distance(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.bearing_sd_rad = BSLAM_R(0.5);
     settings.bearing_only_variance_factor = 3;
     bslam_sighting_t sighting = {.has_range = true};

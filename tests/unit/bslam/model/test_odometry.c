@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "bslam/model/odometry.h"
+#include "plain_settings.h"
 
 #define TURN 6.283185307179586
 #define START_US 1000000
@@ -132,7 +133,7 @@ static void test_tick_difference_of_32_bits_at_its_extremes_is_exact(void **stat
 
 static void test_read_first_reading_without_a_clock_has_no_interval(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_reading_t first[] = {wheels(START_US, 5, 7), ticks(START_US, 10, 20),
                                               velocity(START_US, 3, 4), wheels(0, 1, 1)};
     for (int i = 0; i < COUNT_OF(first); i++) {
@@ -147,7 +148,7 @@ static void test_read_first_reading_without_a_clock_has_no_interval(void **state
 
 static void test_start_clock_counts_from_there_and_starts_once(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started();
     bslam_odometry_start(&odometry, START_US + 7);
     const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + STEP_US, 0.01, 0.01));
@@ -156,7 +157,7 @@ static void test_start_clock_counts_from_there_and_starts_once(void **state)
 
 static void test_read_interval_is_exact_however_late_the_clock(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const int64_t late_us = INT64_MAX / 2 - 1;
     bslam_odometry_t odometry;
     bslam_odometry_init(&odometry);
@@ -167,7 +168,7 @@ static void test_read_interval_is_exact_however_late_the_clock(void **state)
 
 static void test_read_time_that_does_not_advance_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     static const int64_t times[] = {START_US, START_US - 1, 0, -1, INT64_MIN, INT64_MIN / 2};
     for (int i = 0; i < COUNT_OF(times); i++) {
@@ -177,7 +178,7 @@ static void test_read_time_that_does_not_advance_is_refused(void **state)
 
 static void test_read_time_too_far_ahead_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     const int64_t limit_us = INT64_C(4000000);
     static const int64_t beyond_us[] = {1, 1000, INT64_MAX / 4};
@@ -191,7 +192,7 @@ static void test_read_time_too_far_ahead_is_refused(void **state)
 
 static void test_read_first_time_out_of_range_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry;
     memset(&odometry, 0, sizeof odometry);
     bslam_odometry_init(&odometry);
@@ -205,7 +206,7 @@ static void test_read_first_time_out_of_range_is_refused(void **state)
 
 static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.travel_sd_per_sqrt_m = BSLAM_R(0.1);
     bslam_odometry_t odometry = started();
     const double left = 0.02;
@@ -225,7 +226,7 @@ static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
 
 static void test_read_noise_of_the_body_grows_with_time_way_and_turn(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.left_speed_sd_mps = 0;
     settings.right_speed_sd_mps = 0;
     settings.forward_sd_per_sqrt_s = BSLAM_R(0.1);
@@ -248,7 +249,7 @@ static void test_read_noise_of_the_body_grows_with_time_way_and_turn(void **stat
 
 static void test_read_velocity_is_the_motion_of_its_wheels(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t by_velocity = started();
     bslam_odometry_t by_wheels = started();
     const double v = 0.7;
@@ -267,7 +268,7 @@ static void test_read_velocity_is_the_motion_of_its_wheels(void **state)
 
 static void test_read_ticks_motion_is_that_of_the_wheels(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.left_radius_m = BSLAM_R(0.05);
     settings.right_radius_m = BSLAM_R(0.06);
     bslam_odometry_t odometry = started_at_ticks(&settings, 500, 600);
@@ -282,7 +283,7 @@ static void test_read_ticks_across_the_roll_over_at_any_width_go_on(void **state
 {
     static const int widths[] = {2, 8, 16, 24, 32};
     for (int i = 0; i < COUNT_OF(widths); i++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.counter_bits = widths[i];
         const uint32_t top = UINT32_MAX >> (32 - widths[i]);
         bslam_odometry_t odometry = started_at_ticks(&settings, top, 0);
@@ -300,7 +301,7 @@ static void test_read_ticks_beyond_the_counters_width_are_refused(void **state)
 {
     static const int widths[] = {2, 8, 16, 31};
     for (int i = 0; i < COUNT_OF(widths); i++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.counter_bits = widths[i];
         const bslam_odometry_t odometry = started_at_ticks(&settings, 1, 1);
         const uint32_t beyond[] = {1u << widths[i], UINT32_MAX};
@@ -313,7 +314,7 @@ static void test_read_ticks_beyond_the_counters_width_are_refused(void **state)
 
 static void test_read_unknown_source_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     bslam_odometry_reading_t reading = wheels(START_US + STEP_US, 0, 0);
     const int unknown = 17;
@@ -323,7 +324,7 @@ static void test_read_unknown_source_is_refused(void **state)
 
 static void test_read_value_that_is_no_number_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     static const double bad[] = {NAN, INFINITY, -INFINITY, 1e13, -1e13};
     const int64_t time_us = START_US + STEP_US;
@@ -341,7 +342,7 @@ static void test_read_value_that_is_no_number_is_refused(void **state)
 
 static void test_read_looks_only_at_its_sources_fields(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started();
     bslam_odometry_reading_t reading = wheels(START_US + STEP_US, 0.01, 0.01);
     reading.v_mps = reading.omega_radps = reading.gyro_radps = (bslam_real_t)NAN;
@@ -351,7 +352,7 @@ static void test_read_looks_only_at_its_sources_fields(void **state)
 
 static void test_read_denormal_travel_is_a_motion_like_any_other(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started();
     const double tiny = BSLAM_REAL_DOUBLE ? 1e-310 : 1e-40;
     const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(START_US + STEP_US, tiny, tiny));
@@ -363,7 +364,7 @@ static void test_read_denormal_travel_is_a_motion_like_any_other(void **state)
 
 static void test_read_wheel_faster_than_possible_is_a_jump(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.speed_max_mps = 2;
     const bslam_odometry_t odometry = started();
     const double limit = 2 * STEP_S;
@@ -380,7 +381,7 @@ static void test_read_wheel_faster_than_possible_is_a_jump(void **state)
 
 static void test_read_turn_of_many_revolutions_is_a_jump(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.speed_max_mps = 1000;
     settings.wheelbase_m = BSLAM_R(1e-3);
     const bslam_odometry_t odometry = started();
@@ -390,7 +391,7 @@ static void test_read_turn_of_many_revolutions_is_a_jump(void **state)
 
 static void test_read_gyro_turn_of_many_revolutions_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     assert_refused(&odometry, &settings, with_gyro(wheels(START_US + STEP_US, 0, 0), 1e12), BSLAM_E_RANGE);
     assert_refused(&odometry, &settings, with_gyro(wheels(START_US + STEP_US, 0, 0), -1e12), BSLAM_E_RANGE);
@@ -398,7 +399,7 @@ static void test_read_gyro_turn_of_many_revolutions_is_refused(void **state)
 
 static void test_read_gyro_noise_that_is_none_is_refused(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     const bslam_odometry_t odometry = started();
     static const struct {
         double sd_radps;
@@ -420,7 +421,7 @@ static void test_read_gyro_noise_that_is_none_is_refused(void **state)
 
 static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.speed_max_mps = 2;
     bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     bslam_motion_t untouched;
@@ -438,7 +439,7 @@ static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(vo
 
 static void test_read_jump_of_another_source_leaves_the_tick_reference(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.speed_max_mps = 2;
     bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     const bslam_odometry_reading_t jump = wheels(START_US + STEP_US, 5, 5);
@@ -450,7 +451,7 @@ static void test_read_jump_of_another_source_leaves_the_tick_reference(void **st
 
 static void test_restart_starts_clock_and_ticks_anew(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
     bslam_odometry_restart(&odometry);
     const bslam_motion_t first = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 0, 0));
@@ -463,7 +464,7 @@ static void test_restart_starts_clock_and_ticks_anew(void **state)
 
 static void test_read_first_ticks_after_the_clock_started_leave_the_interval_open(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started();
     const double dt = 2 * STEP_S;
     const bslam_motion_t motion = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 70, 80));
@@ -477,7 +478,7 @@ static void test_read_first_ticks_after_the_clock_started_leave_the_interval_ope
 
 static void test_read_ticks_after_another_source_start_afresh(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started_at_ticks(&settings, 100, 100);
     (void)read_ok(&odometry, &settings, wheels(START_US + STEP_US, 0.01, 0.01));
     // The counters saw the same way: counting it twice would be wrong.
@@ -489,7 +490,7 @@ static void test_read_ticks_after_another_source_start_afresh(void **state)
 
 static void test_read_gap_inflates_by_the_part_beyond_its_limit(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.left_speed_sd_mps = 0;
     settings.right_speed_sd_mps = 0;
     static const double gaps_s[] = {0, 0.5, 2};
@@ -537,7 +538,7 @@ static void test_read_gyro_is_fused_as_the_information_form_has_it(void **state)
 {
     static const double sds[] = {0.001, 0.02, 1, 50};
     for (int i = 0; i < COUNT_OF(sds); i++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.gyro_sd_radps = real(sds[i]);
         bslam_odometry_t without = started();
         bslam_odometry_t with = started();
@@ -564,7 +565,7 @@ static void test_read_gyro_is_fused_as_the_information_form_has_it(void **state)
 
 static void test_read_gyro_beside_noiseless_wheels_changes_nothing(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.left_speed_sd_mps = 0;
     settings.right_speed_sd_mps = 0;
     bslam_odometry_t odometry = started();

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "bslam/model/odometry_history.h"
+#include "plain_settings.h"
 
 #define STEP_US 40000
 #define FORWARD_M 0.02
@@ -43,7 +44,7 @@ static void take_until(bslam_history_t *history, int64_t until_us)
 
 static bslam_settings_t arc_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.motion = 1;
     return settings;
 }

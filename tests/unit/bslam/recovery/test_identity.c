@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "bslam/recovery/identity.h"
+#include "plain_settings.h"
 
 enum { BEACONS = 3, GROWN = 16, YOUNG = 11 };
 
@@ -16,7 +17,7 @@ static bslam_appearance_t appearance;
 /// All confirmed, with the labels 10, 11, 12; without looks.
 static int setup(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.appearance_samples = 3;
     int bad_id;
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);

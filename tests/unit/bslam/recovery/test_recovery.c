@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "bslam/recovery/recovery.h"
+#include "plain_settings.h"
 
 #define PI 3.14159265358979323846
 
@@ -18,7 +19,7 @@ static int cut = -1;        // the beacon that is seen in direction only
 
 static int setup(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.left_speed_sd_mps = BSLAM_R(0.01);
     settings.right_speed_sd_mps = BSLAM_R(0.01);
     int bad_id;

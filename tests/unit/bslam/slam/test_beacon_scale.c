@@ -5,6 +5,7 @@
 
 #include "bslam/slam/slam.h"
 #include "bslam/smoother/smoother.h"
+#include "plain_settings.h"
 
 enum { STEP_US = 40000, DOOR = 3, CABINET = 7 };
 
@@ -13,7 +14,7 @@ static int64_t now_us;
 
 static int setup(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.gate_d2 = BSLAM_R(13.8);
     settings.ray_linear_limit = BSLAM_R(1e-4);  // rays stay rays
     settings.left_speed_sd_mps = 0;

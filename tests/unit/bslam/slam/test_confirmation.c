@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "bslam/slam/slam.h"
+#include "plain_settings.h"
 
 enum { STEP_US = 40000 };
 
@@ -12,7 +13,7 @@ static int64_t now_us;
 
 static void start(int32_t association)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = association;
     settings.existence_score = BSLAM_R(0.5);
     settings.existence_sum = 4;

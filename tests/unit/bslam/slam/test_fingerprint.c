@@ -1,13 +1,14 @@
 #include "kept_map.h"
 
 #include "bslam/slam/fingerprint.h"
+#include "plain_settings.h"
 
 static bslam_slam_t slam;
 
 /// A robot that has seen two beacons.
 static int start(void **state)
 {
-    const bslam_settings_t settings = unit_params();
+    const bslam_settings_t settings = unit_settings();
     int bad_id = -1;
     const bslam_sighting_t seen[] = {unit_polar(0.3, 2, 1), unit_polar(-0.4, 3, 2)};
     if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
+#include "plain_settings.h"
 
 #define STEP_US 40000
 #define STEP_S 0.04
@@ -125,7 +126,7 @@ static void assert_odometry_refused(bslam_slam_t *slam, bslam_odometry_reading_t
 /// Parameters of a refusal's test: of the filter that its state names, or of the one that needs none.
 static bslam_settings_t refusing_params(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     if (*state != NULL) {
         settings.filter = *(const int32_t *)*state;
         settings.velocity_states = 1;
@@ -150,7 +151,7 @@ static void test_init_bad_parameter_is_refused_and_changes_nothing(void **state)
     bslam_slam_t before;
     memset(&slam, 0x33, sizeof slam);
     memcpy(&before, &slam, sizeof slam);
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.wheelbase_m = -1;
     int bad_id = -1;
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_E_PARAMETER);
@@ -182,7 +183,7 @@ static void test_odometry_every_refusal_changes_nothing(void **state)
 
 static void test_odometry_without_noise_for_velocity_states_is_refused_and_changes_nothing(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     // Positive, so it passes the check; its square is zero.
     settings.left_speed_sd_mps = settings.right_speed_sd_mps = real(BSLAM_REAL_DOUBLE ? 1e-200 : 1e-30);
@@ -300,7 +301,7 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
 
 static void test_sightings_at_the_limits_of_their_fields_are_taken(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     bslam_sighting_t seen[] = {unit_polar(6.283, 3, INT32_MAX), unit_polar(-6.283, 0.0011, 0),
                                unit_direction(0.5, 77), unit_polar(1, 10000, 5)};
     // Not read where there is none.
@@ -347,7 +348,7 @@ static void test_add_known_beacon_every_refusal_changes_nothing(void **state)
 
 static void test_add_known_beacon_to_a_full_map_is_refused_and_changes_nothing(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     for (int i = 0; i < BSLAM_BEACONS_MAX; i++) {
         assert_int_equal(bslam_slam_add_known_beacon(&slam, i, real(i + 1), 0), BSLAM_OK);
     }
@@ -379,7 +380,7 @@ static void test_remove_and_view_of_no_such_beacon_are_refused_and_change_nothin
 
 static void test_sightings_new_and_matched_are_accounted_for(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.gate_d2 = 25;
     bslam_slam_t slam = started(settings);
     const bslam_sighting_t seen[] = {unit_polar(0.3, 4, 7), unit_polar(-0.8, 3, 8)};
@@ -400,7 +401,7 @@ static void test_sightings_new_and_matched_are_accounted_for(void **state)
     assert_account(&slam, 1, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE);
     assert_int_equal(account(&slam, 1)->beacon_uid, 2);
 
-    const bslam_counters_t *counters = bslam_slam_counters(&slam);
+    const bslam_slam_counters_t *counters = bslam_slam_counters(&slam);
     assert_int_equal(counters->frames, 2);
     assert_int_equal(counters->sightings, 4);
     assert_int_equal(counters->added, 3);
@@ -410,7 +411,7 @@ static void test_sightings_new_and_matched_are_accounted_for(void **state)
 
 static void test_sightings_rejected_say_why(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 5, 0, 0), BSLAM_OK);
     bslam_sighting_t seen[] = {unit_polar(0.3, 4, 1), unit_polar(0.3, 4, 1),
                                unit_polar(0.3, 4, BSLAM_LABEL_NONE), unit_polar(0.3, 4, 2),
@@ -421,7 +422,7 @@ static void test_sightings_rejected_say_why(void **state)
     assert_account(&slam, 1, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_DUPLICATE);
     assert_account(&slam, 2, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_NO_IDENTITY);
     assert_account(&slam, 3, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_CLASS);
-    const bslam_counters_t *counters = bslam_slam_counters(&slam);
+    const bslam_slam_counters_t *counters = bslam_slam_counters(&slam);
     assert_int_equal(counters->duplicates, 1);
     assert_int_equal(counters->unidentified, 1);
     assert_int_equal(counters->unmappable, 1);
@@ -437,7 +438,7 @@ static void test_sightings_rejected_say_why(void **state)
 
 static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     for (int i = 0; i < slam.ekf.dim; i++) {
         bslam_symmat_set(slam.ekf.covariance, i, i, -1);
@@ -451,7 +452,7 @@ static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **st
 
 static void test_sightings_ambiguous_are_rejected(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = 2;
     settings.match_d2 = BSLAM_R(1e-3);
     settings.new_d2 = BSLAM_R(1e6);
@@ -465,7 +466,7 @@ static void test_sightings_ambiguous_are_rejected(void **state)
 
 static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_ratio(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.gate_d2 = 9;
     settings.confirm_sightings = 1;
     bslam_slam_t slam = started(settings);
@@ -485,7 +486,7 @@ static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_r
 
 static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.huber_d = 1;
     bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
@@ -498,7 +499,7 @@ static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
 
 static void test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is_not_used(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.range_scale_sd = BSLAM_R(0.1);
     bslam_sighting_t as_first = unit_polar(0.3, 4, 9);
     as_first.beacon_class = 3;
@@ -523,7 +524,7 @@ static void test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is
 
 static void test_sightings_beyond_the_maps_room_are_rejected_and_the_first_are_added(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     const int room = 3;
     for (int i = 0; i < BSLAM_BEACONS_MAX - room; i++) {
         assert_int_equal(bslam_slam_add_known_beacon(&slam, 1000 + i, real(i + 1), 5), BSLAM_OK);
@@ -544,7 +545,7 @@ static void test_sightings_beyond_the_maps_room_are_rejected_and_the_first_are_a
 
 static void test_sightings_more_rays_than_room_are_rejected_but_points_are_not(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     bslam_sighting_t seen[BSLAM_RAYS_MAX + 2];
     for (int i = 0; i < BSLAM_RAYS_MAX + 1; i++) {
         seen[i] = unit_direction(0.2 * i, i);
@@ -558,7 +559,7 @@ static void test_sightings_more_rays_than_room_are_rejected_but_points_are_not(v
 
 static void test_sightings_empty_frame_is_a_frame(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     see(&slam, 11 * STEP_US, NULL, 0);
     int count = -1;
     (void)bslam_slam_accounts(&slam, &count);
@@ -569,7 +570,7 @@ static void test_sightings_empty_frame_is_a_frame(void **state)
 static void test_sightings_order_within_a_frame_does_not_matter(void **state)
 {
     // Directions whose variance depends on the state, so that it shows if the state has moved on in between.
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.filter = 1;
     settings.bearing_only_curvature_factor = 50;
     bslam_slam_t forwards = started(settings);
@@ -603,7 +604,7 @@ static void test_sightings_order_within_a_frame_does_not_matter(void **state)
 
 static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 3;
     bslam_slam_t slam = started(settings);
     for (int i = 0; i < 4; i++) {
@@ -616,7 +617,7 @@ static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void *
 
 static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 3;
     settings.confirm_travel_m = BSLAM_R(0.1);
     bslam_slam_t slam = started(settings);
@@ -642,7 +643,7 @@ static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_
 
 static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 3;
     settings.confirm_d2 = 1;
     bslam_slam_t slam = started(settings);
@@ -663,7 +664,7 @@ static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_b
 
 static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_d2 = 1;
     bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0, 4, 1));
@@ -678,7 +679,7 @@ static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_fo
 
 static void test_sightings_one_sighting_confirms_where_that_is_asked(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 1;
     bslam_slam_t slam = started(settings);
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
@@ -687,7 +688,7 @@ static void test_sightings_one_sighting_confirms_where_that_is_asked(void **stat
 
 static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = 2;
     settings.confirm_sightings = 2;
     settings.confirm_window_us = 10 * STEP_US;
@@ -716,7 +717,7 @@ static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
 
 static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_window_us = 2 * STEP_US;
     settings.gate_d2 = 9;
     bslam_slam_t slam = started(settings);
@@ -740,7 +741,7 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
 static void
 test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 4;
     settings.gate_d2 = 9;
     bslam_slam_t slam = started(settings);
@@ -765,7 +766,7 @@ test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_c
 
 static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = 2;
     settings.confirm_window_us = 2 * STEP_US;
     bslam_slam_t slam = started(settings);
@@ -784,7 +785,7 @@ static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **sta
 
 static void test_remove_beacon_then_its_label_is_new_again(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     const uint32_t uid = beacon(&slam, 1).uid;
     assert_int_equal(bslam_slam_remove_beacon(&slam, uid), BSLAM_OK);
     assert_int_equal(bslam_slam_beacon_count(&slam), 2);
@@ -796,7 +797,7 @@ static void test_remove_beacon_then_its_label_is_new_again(void **state)
 
 static void test_sightings_ray_seen_from_aside_settles_into_a_point(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.motion = 1;
     settings.left_speed_sd_mps = BSLAM_R(0.001);
     settings.right_speed_sd_mps = BSLAM_R(0.001);
@@ -822,7 +823,7 @@ static void test_sightings_ray_seen_from_aside_settles_into_a_point(void **state
 
 static void test_sightings_before_any_odometry_start_the_clock(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     drive(&slam, STEP_US, 0.01, 0.01);
     assert_near(bslam_slam_pose(&slam).x_m, 0.01, 1e-8);
@@ -834,7 +835,7 @@ static void test_sightings_before_any_odometry_start_the_clock(void **state)
 
 static void test_sightings_ahead_of_a_clock_without_odometry_are_seen_from_the_start(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     see_one(&slam, 0, unit_polar(0.3, 4, 1));
     see_one(&slam, 100000, unit_polar(0, 2, 2));
     assert_near(beacon(&slam, 1).x_m, 2, POSITION_ERROR);
@@ -846,7 +847,7 @@ static void test_sightings_ahead_of_a_clock_without_odometry_are_seen_from_the_s
 static void test_pose_at_a_past_time_is_where_the_robot_was(void **state)
 {
     for (int motion = 0; motion <= 1; motion++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.motion = motion;
         bslam_slam_t slam = started(settings);
         const int steps = BSLAM_HISTORY_MAX + 7;
@@ -870,7 +871,7 @@ static void test_pose_at_a_past_time_is_where_the_robot_was(void **state)
 
 static void test_pose_at_within_a_step_is_on_the_arc(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.motion = 1;
     bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 10);
@@ -887,7 +888,7 @@ static void test_pose_at_within_a_step_is_on_the_arc(void **state)
 
 static void test_pose_at_ahead_goes_on_as_before_up_to_its_limit(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.motion = 1;
     settings.ahead_max_us = 100000;
     bslam_slam_t slam = started(settings);
@@ -926,7 +927,7 @@ static void assert_beacon_is_placed_from(bslam_settings_t settings, int64_t time
 
 static void test_sightings_are_placed_from_where_the_robot_was(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     static const int64_t times_us[] = {0,           3 * STEP_US,        200000, 9 * STEP_US - 1,
                                        9 * STEP_US, 9 * STEP_US + 50000};
     for (int i = 0; i < COUNT_OF(times_us); i++) {
@@ -936,7 +937,7 @@ static void test_sightings_are_placed_from_where_the_robot_was(void **state)
 
 static void test_sightings_delay_shifts_where_they_are_placed_from(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.sighting_delay_us = 150000;
     assert_beacon_is_placed_from(settings, 9 * STEP_US, 9 * STEP_US - 150000);
     assert_beacon_is_placed_from(settings, 9 * STEP_US + 120000, 9 * STEP_US - 30000);
@@ -947,7 +948,7 @@ static void test_sightings_delay_shifts_where_they_are_placed_from(void **state)
 
 static void test_sightings_of_a_delayed_frame_before_the_clock_are_refused(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.sighting_delay_us = 10000000;
     bslam_slam_t slam = started(settings);
     drive_circle(&slam, 0, 5);
@@ -958,7 +959,7 @@ static void test_sightings_of_a_delayed_frame_before_the_clock_are_refused(void 
 /// Every form of the filter: 0 to 5.
 static bslam_settings_t form(int kind)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.motion = 1;
     settings.filter = kind % 2;
     settings.velocity_states = kind / 2 == 1;
@@ -1063,7 +1064,7 @@ static void test_odometry_largest_motion_does_not_overflow_the_way(void **state)
 
 static void test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     bslam_real_t before[6];
     bslam_real_t after[6];
     const bslam_pose_t pose = bslam_slam_pose(&slam);
@@ -1087,7 +1088,7 @@ static void test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew(void *
 
 static void test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     const bslam_odometry_reading_t first = {
         .time_us = 0, .source = BSLAM_ODOMETRY_TICKS, .left_ticks = 30000, .right_ticks = 30000};
     bslam_odometry_reading_t reset = first;
@@ -1102,7 +1103,7 @@ static void test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks(void
 
 static void test_resume_odometry_forgets_the_past_before_it(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     assert_int_equal(bslam_slam_resume_odometry(&slam, 1, 1), BSLAM_OK);
     drive(&slam, 100 * STEP_US, 0, 0);
     drive(&slam, 101 * STEP_US, 0.01, 0.01);
@@ -1114,7 +1115,7 @@ static void test_resume_odometry_forgets_the_past_before_it(void **state)
 
 static void test_resume_odometry_with_a_clock_that_starts_over_goes_on(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     const bslam_sighting_t seen = unit_polar(0.3, 4, 1);
     drive_circle(&slam, INT64_C(5000000000), 5);
     see_one(&slam, INT64_C(5000000000) + 4 * STEP_US, seen);
@@ -1129,7 +1130,7 @@ static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map
 {
     static const double places[3][2] = {{4, 1}, {-2, 3}, {1, -4}};
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.filter = filter;
         settings.gate_d2 = 25;
         bslam_slam_t slam = started(settings);
@@ -1158,7 +1159,7 @@ static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map
 
 static void test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     bslam_slam_t before;
     memcpy(&before, &slam, sizeof before);
     static const double bad[][2] = {{-1, 0}, {31, 0}, {0, -1}, {0, 3.3}, {NAN, 0}, {0, NAN}, {INFINITY, 0}};
@@ -1170,7 +1171,7 @@ static void test_resume_odometry_impossible_doubt_is_refused_and_changes_nothing
 
 static void test_resume_odometry_with_velocity_states_forgets_the_speed(void **state)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.velocity_states = 1;
     // A ponderous robot: were the speed from before still believed, it would take seconds to learn otherwise.
     settings.velocity_walk_mps_sqrt_s = BSLAM_R(0.02);
@@ -1200,7 +1201,7 @@ static void test_sightings_of_known_beacons_localise_and_never_move_them(void **
 {
     static const double places[3][2] = {{4, 1}, {-2, 3}, {1, -4}};
     for (int filter = 0; filter <= 1; filter++) {
-        bslam_settings_t settings = unit_params();
+        bslam_settings_t settings = unit_settings();
         settings.filter = filter;
         settings.motion = 1;
         bslam_slam_t slam = started(settings);
@@ -1238,7 +1239,7 @@ static void test_sightings_of_known_beacons_localise_and_never_move_them(void **
 
 static void test_beacon_view_has_the_papers_polar_coordinates(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 1, -3, 4), BSLAM_OK);
     assert_int_equal(bslam_slam_add_known_beacon(&slam, 2, -3, real(-1e-30)), BSLAM_OK);
     assert_near(beacon(&slam, 0).range_m, 5, 8 * UNIT_ROUNDING);
@@ -1251,7 +1252,7 @@ static void test_init_starts_at_the_origin_with_an_empty_map(void **state)
 {
     bslam_slam_t slam;
     memset(&slam, 0xee, sizeof slam);
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     int bad_id = -1;
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
     const bslam_pose_t origin = {0, 0, 0};
@@ -1262,7 +1263,7 @@ static void test_init_starts_at_the_origin_with_an_empty_map(void **state)
     int count = -1;
     (void)bslam_slam_accounts(&slam, &count);
     assert_int_equal(count, 0);
-    const bslam_counters_t none = {0};
+    const bslam_slam_counters_t none = {0};
     assert_memory_equal(bslam_slam_counters(&slam), &none, sizeof none);
     bslam_pose_t at;
     assert_int_equal(bslam_slam_pose_at(&slam, 123, &at), BSLAM_OK);
@@ -1271,7 +1272,7 @@ static void test_init_starts_at_the_origin_with_an_empty_map(void **state)
 
 static void test_pose_covariance_is_the_lower_triangle_of_the_states(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     bslam_real_t lower[6];
     bslam_slam_pose_covariance(&slam, lower);
     static const int places[6][2] = {{0, 0}, {1, 0}, {1, 1}, {2, 0}, {2, 1}, {2, 2}};
@@ -1282,7 +1283,7 @@ static void test_pose_covariance_is_the_lower_triangle_of_the_states(void **stat
 
 static void test_counters_a_state_that_is_not_finite_is_counted(void **state)
 {
-    bslam_slam_t slam = running(unit_params());
+    bslam_slam_t slam = running(unit_settings());
     assert_int_equal(bslam_slam_counters(&slam)->insane, 0);
     slam.ekf.mean[BSLAM_STATE_X] = (bslam_real_t)NAN;
     see(&slam, 11 * STEP_US, NULL, 0);
@@ -1291,7 +1292,7 @@ static void test_counters_a_state_that_is_not_finite_is_counted(void **state)
 
 static void test_set_pose_refuses_each_number_that_is_not_finite_and_changes_nothing(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     drive_circle(&slam, STEP_US, 10);
     const bslam_slam_t before = slam;
     for (int i = 0; i < 3; i++) {
@@ -1309,7 +1310,7 @@ static void test_set_pose_refuses_each_number_that_is_not_finite_and_changes_not
 /// Of a robot that is lost a frame is accounted for, and used for nothing.
 static void test_sightings_of_a_lost_robot_are_deferred_until_it_has_a_pose(void **state)
 {
-    bslam_slam_t slam = started(unit_params());
+    bslam_slam_t slam = started(unit_settings());
     drive_circle(&slam, STEP_US, 1);
     see_one(&slam, STEP_US, unit_polar(0.2, 3, 1));
     bslam_slam_lose_pose(&slam);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "bslam/slam/slam.h"
+#include "plain_settings.h"
 
 enum { STEP_US = 40000 };
 
@@ -23,7 +24,7 @@ static void start(bslam_settings_t settings)
 
 static bslam_settings_t svm_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.association = BSLAM_ASSOCIATION_SVM;
     settings.left_speed_sd_mps = BSLAM_R(1e-3);
     settings.right_speed_sd_mps = BSLAM_R(1e-3);

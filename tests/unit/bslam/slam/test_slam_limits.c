@@ -4,7 +4,8 @@
 
 #include <math.h>
 
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
+#include "plain_settings.h"
 
 #define STEP_US 40000
 #ifndef UNIT_LIMITS_STEPS
@@ -112,7 +113,7 @@ static void assert_sound(const bslam_slam_t *slam)
 
 static void assert_accounts_add_up(const bslam_slam_t *slam)
 {
-    const bslam_counters_t *c = bslam_slam_counters(slam);
+    const bslam_slam_counters_t *c = bslam_slam_counters(slam);
     assert_int_equal(c->sightings, c->matched + c->added + c->rejected + c->deferred);
     assert_true(c->gated + c->map_full <= c->rejected);
 }
@@ -120,7 +121,7 @@ static void assert_accounts_add_up(const bslam_slam_t *slam)
 /// Filter, motion and further states in every combination that is allowed: 0 to 11.
 static bslam_settings_t params_of(int kind)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.filter = kind % 2;
     settings.motion = kind / 2 % 2;
     settings.velocity_states = kind / 4 == 1;
@@ -238,7 +239,7 @@ static void test_window_removes_and_gives_the_room_back(void **state)
         move(&drive);
         assert_sound(&drive.slam);
     }
-    const bslam_counters_t *c = bslam_slam_counters(&drive.slam);
+    const bslam_slam_counters_t *c = bslam_slam_counters(&drive.slam);
     assert_int_equal(c->added - c->removed, bslam_slam_beacon_count(&drive.slam));
     assert_true(c->removed > 0);
 }

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 
 /// One step: what the wheels report, how many sightings follow, and the size of the state after it.
 typedef struct vector_step {

@@ -4,6 +4,7 @@
 #include "support.h"
 
 #include "bslam/smoother/smoother_internal.h"
+#include "plain_settings.h"
 
 static const double PI = 3.14159265358979;
 
@@ -13,7 +14,7 @@ static bslam_smoother_t smoother;
 static void start(double x_m, double y_m, double sd_m)
 {
     static bslam_ekf_t filter;
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     int index;
     settings.filter = BSLAM_FILTER_SMOOTHER;
     settings.velocity_states = 1;

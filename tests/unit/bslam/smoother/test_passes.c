@@ -7,6 +7,7 @@
 
 #include "bslam/model/motion.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "plain_settings.h"
 
 enum { BEACONS = 3, BASE = 5, WALKS = 2, STEP = WALKS + 2, DIM = BASE + 2 * BEACONS };
 
@@ -279,7 +280,7 @@ static void see(unit_random_t *random, const double *map)
 
 static bslam_settings_t smoother_params(void)
 {
-    bslam_settings_t p = unit_params();
+    bslam_settings_t p = unit_settings();
     p.filter = BSLAM_FILTER_SMOOTHER;
     p.motion = BSLAM_MOTION_ARC;
     p.velocity_states = 1;

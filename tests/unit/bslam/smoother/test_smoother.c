@@ -5,6 +5,7 @@
 
 #include "bslam/slam/slam.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "plain_settings.h"
 
 enum { STEP_US = 40000, LABELS = 4 };
 
@@ -18,7 +19,7 @@ static int step;
 
 static bslam_settings_t smoother_params(void)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.filter = BSLAM_FILTER_SMOOTHER;
     settings.velocity_states = 1;
     settings.velocity_walk_mps_sqrt_s = 30;

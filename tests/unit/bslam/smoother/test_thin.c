@@ -6,6 +6,7 @@
 #include "bslam/model/motion.h"
 #include "bslam/model/observation.h"
 #include "bslam/smoother/smoother_internal.h"
+#include "plain_settings.h"
 
 enum { NODES = 40, BEACONS = 3 };
 
@@ -61,7 +62,7 @@ static void show(int k, bslam_smoother_seen_t seen)
 /// The third beacon is seen from every second node, and its distance from every fourth.
 static void fill(int nodes)
 {
-    bslam_settings_t settings = unit_params();
+    bslam_settings_t settings = unit_settings();
     settings.filter = BSLAM_FILTER_SMOOTHER;
     settings.velocity_states = 1;
     bslam_ekf_init(&filter, &settings);

@@ -4,6 +4,7 @@
 #include "made_view.h"
 
 #include "vision/detection/detector.h"
+#include "base/scalar.h"
 
 /// Place of the logarithm of a box's area among the features.
 #define LOG_AREA 5

@@ -3,6 +3,7 @@
 #include "picture.h"
 
 #include "vision/detection/gradients.h"
+#include "base/scalar.h"
 
 enum {
     SIDE = 24,

@@ -1,0 +1,337 @@
+// The public calls: what a robot's main loop would else have to do around each of them, in its order.
+#include "bslam/bslam.h"
+
+#include "base/scalar.h"
+#include "bslam/instance.h"
+#include "bslam/settings_internal.h"
+#include "bslam/slam/fingerprint.h"
+#include "bslam/slam/slam_internal.h"
+#include "bslam/store/map.h"
+#include "bslam/store/slots.h"
+
+_Static_assert(sizeof(bslam_settings_t) <= BSLAM_SIZE_SETTINGS, "size.h: settings");
+_Static_assert(sizeof(bslam_ekf_t) <= BSLAM_SIZE_EKF, "size.h: filter");
+_Static_assert(sizeof(bslam_slam_t) <= BSLAM_SIZE_PIPELINE, "size.h: pipeline");
+_Static_assert(sizeof(bslam_instance_t) <= sizeof(bslam_t), "size.h: the sum");
+
+// ---- the guard: a step begins with a look at the memory and ends with a seal on it ------------------------
+
+#if BSLAM_GUARD
+static bslam_slam_t *copy_of(bslam_instance_t *robot)
+{
+#if BSLAM_GUARD == 2
+    return &robot->copy;
+#else
+    (void)robot;
+    return NULL;
+#endif
+}
+#endif
+
+static bslam_status_t begin_step(bslam_instance_t *robot)
+{
+#if BSLAM_GUARD
+    if (robot->slam.settings.guard != 0) {
+        return bslam_guard_check(&robot->guard, &robot->slam);
+    }
+#endif
+    (void)robot;
+    return BSLAM_OK;
+}
+
+static void end_step(bslam_instance_t *robot)
+{
+#if BSLAM_GUARD
+    if (robot->slam.settings.guard != 0) {
+        bslam_guard_seal(&robot->guard, &robot->slam);
+    }
+#endif
+    (void)robot;
+}
+
+/// A step that failed has changed counters, which are sealed, too.
+static bslam_status_t ended(bslam_instance_t *robot, bslam_status_t status)
+{
+    end_step(robot);
+    return status;
+}
+
+// ---- beginning --------------------------------------------------------------------------------------------
+
+/// A setting that asks for what this build leaves out; negative: none does.
+static int asks_for_more(const bslam_settings_t *settings)
+{
+    size_t offset = 0;
+    if (!BSLAM_SMOOTHER && settings->filter == BSLAM_FILTER_SMOOTHER) {
+        offset = offsetof(bslam_settings_t, filter);
+    } else if (!BSLAM_APPEARANCE && settings->association == BSLAM_ASSOCIATION_SVM) {
+        offset = offsetof(bslam_settings_t, association);
+    } else if (!BSLAM_RECOVERY && settings->recovery != 0) {
+        offset = offsetof(bslam_settings_t, recovery);
+    } else if (!BSLAM_GUARD && settings->guard != 0) {
+        offset = offsetof(bslam_settings_t, guard);
+    } else {
+        return -1;
+    }
+    return bslam_settings_at(offset);
+}
+
+/// What may stand beside the pipeline, empty.
+static bslam_status_t begin_members(bslam_instance_t *robot)
+{
+    bslam_status_t status = BSLAM_OK;
+#if BSLAM_RECOVERY
+    bslam_recovery_init(&robot->recovery);
+#endif
+#if BSLAM_GUARD
+    bslam_guard_init(&robot->guard, copy_of(robot));
+#endif
+#if BSLAM_APPEARANCE
+    const bslam_settings_t *settings = &robot->slam.settings;
+    status = bslam_appearance_init(&robot->appearance, settings->seeds, settings->seed_count);
+    if (settings->association == BSLAM_ASSOCIATION_SVM) {
+        bslam_slam_attach_appearance(&robot->slam, &robot->appearance);
+    }
+#endif
+#if BSLAM_SMOOTHER
+    bslam_slam_attach_smoother(&robot->slam, &robot->smoother);
+#endif
+    return status;
+}
+
+bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t sizes_hash,
+                                const bslam_settings_t *settings, int *bad_setting)
+{
+    if (robot_bytes != sizeof *robot || sizes_hash != BSLAM_SIZES_HASH) {
+        return BSLAM_E_SIZE;
+    }
+    const int more = asks_for_more(settings);
+    if (more >= 0) {
+        *bad_setting = more;
+        return BSLAM_E_PARAMETER;
+    }
+    if (settings->seed_count < 0 || settings->seed_count > BSLAM_SEEDS_MAX ||
+        (settings->seeds == NULL && settings->seed_count > 0)) {
+        return BSLAM_E_COUNT;
+    }
+    bslam_instance_t *instance = bslam_instance(robot);
+    bslam_status_t status = bslam_slam_init(&instance->slam, settings, bad_setting);
+    if (status == BSLAM_OK) {
+        status = begin_members(instance);
+        end_step(instance);
+    }
+    return status;
+}
+
+bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
+{
+#if BSLAM_GUARD
+    bslam_instance_t *instance = bslam_instance(robot);
+    instance->guard.copy = copy_of(instance);  // whatever the reset left of it
+    bslam_status_t status = bslam_guard_check(&instance->guard, &instance->slam);
+    if (status != BSLAM_OK) {
+        status = bslam_guard_restore(&instance->guard, &instance->slam);
+    }
+    if (status != BSLAM_OK) {
+        return status;
+    }
+#if BSLAM_RECOVERY
+    bslam_recovery_restart(&instance->recovery);
+#endif
+    return ended(instance, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
+#else
+    (void)robot;
+    (void)position_sd_m;
+    (void)heading_sd_rad;
+    return BSLAM_E_STATE;
+#endif
+}
+
+// ---- steps ------------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_odometry(bslam_t *robot, const bslam_odometry_reading_t *reading)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK ? status : ended(instance, bslam_slam_odometry(&instance->slam, reading));
+}
+
+bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK
+               ? status
+               : ended(instance, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
+}
+
+static bslam_status_t take_frame(bslam_instance_t *robot, int64_t time_us, const bslam_sighting_t *sightings,
+                                 int count)
+{
+#if BSLAM_RECOVERY
+    if (robot->slam.settings.recovery != 0) {
+        return bslam_recovery_sightings(&robot->recovery, &robot->slam, time_us, sightings, count);
+    }
+#endif
+    return bslam_slam_sightings(&robot->slam, time_us, sightings, count);
+}
+
+bslam_status_t bslam_sightings(bslam_t *robot, int64_t time_us, const bslam_sighting_t *sightings, int count)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK ? status : ended(instance, take_frame(instance, time_us, sightings, count));
+}
+
+// ---- results ----------------------------------------------------------------------------------------------
+
+bslam_pose_t bslam_pose(const bslam_t *robot)
+{
+    return bslam_slam_pose(&bslam_const_instance(robot)->slam);
+}
+
+bslam_status_t bslam_pose_at(const bslam_t *robot, int64_t time_us, bslam_pose_t *pose)
+{
+    return bslam_slam_pose_at(&bslam_const_instance(robot)->slam, time_us, pose);
+}
+
+void bslam_pose_covariance(const bslam_t *robot, bslam_real_t lower[6])
+{
+    bslam_slam_pose_covariance(&bslam_const_instance(robot)->slam, lower);
+}
+
+bslam_health_t bslam_health(const bslam_t *robot)
+{
+    const bslam_instance_t *instance = bslam_const_instance(robot);
+    bslam_health_t health = {.state = instance->slam.is_lost ? BSLAM_RECOVERY_LOST : BSLAM_RECOVERY_FOLLOWING,
+                             .is_frozen = instance->slam.is_frozen,
+                             .beacons = bslam_slam_beacon_count(&instance->slam),
+                             .bad_sighting = bslam_slam_bad_sighting(&instance->slam)};
+#if BSLAM_RECOVERY
+    health.state = bslam_recovery_state(&instance->recovery, &instance->slam);
+#endif
+    return health;
+}
+
+uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before)
+{
+    return bslam_slam_fingerprint(&bslam_const_instance(robot)->slam, before);
+}
+
+const bslam_account_t *bslam_results(const bslam_t *robot, int *count)
+{
+    return bslam_slam_accounts(&bslam_const_instance(robot)->slam, count);
+}
+
+bslam_counters_t bslam_counters(const bslam_t *robot)
+{
+    const bslam_instance_t *instance = bslam_const_instance(robot);
+    bslam_counters_t counters = {.slam = instance->slam.counters};
+#if BSLAM_RECOVERY
+    counters.recovery = instance->recovery.counters;
+#endif
+#if BSLAM_GUARD
+    counters.guard = instance->guard.counters;
+#endif
+#if BSLAM_APPEARANCE
+    counters.appearance = instance->appearance.counters;
+    counters.learner = instance->appearance.learner.counters;
+#endif
+    return counters;
+}
+
+// ---- the map ----------------------------------------------------------------------------------------------
+
+bslam_status_t bslam_beacon(const bslam_t *robot, int index, bslam_beacon_view_t *view)
+{
+    return bslam_slam_beacon(&bslam_const_instance(robot)->slam, index, view);
+}
+
+bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t label, bslam_real_t x_m, bslam_real_t y_m)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK
+               ? status
+               : ended(instance, bslam_slam_add_known_beacon(&instance->slam, label, x_m, y_m));
+}
+
+static bslam_status_t remove_beacon(bslam_slam_t *slam, uint32_t uid)
+{
+    if (uid == BSLAM_ALL_BEACONS) {
+        bslam_slam_forget_map(slam);
+        return BSLAM_OK;
+    }
+    return bslam_slam_remove_beacon(slam, uid);
+}
+
+bslam_status_t bslam_remove_beacon(bslam_t *robot, uint32_t uid)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK ? status : ended(instance, remove_beacon(&instance->slam, uid));
+}
+
+void bslam_freeze_map(bslam_t *robot, bool is_frozen)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    if (begin_step(instance) == BSLAM_OK) {
+        instance->slam.is_frozen = is_frozen;
+        end_step(instance);
+    }
+}
+
+static bslam_status_t set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bslam_real_t position_sd_m,
+                               bslam_real_t heading_sd_rad)
+{
+    if (pose == NULL) {
+        bslam_slam_lose_pose(slam);
+        return BSLAM_OK;
+    }
+    return bslam_slam_set_pose(slam, pose, position_sd_m, heading_sd_rad);
+}
+
+bslam_status_t bslam_set_pose(bslam_t *robot, const bslam_pose_t *pose, bslam_real_t position_sd_m,
+                              bslam_real_t heading_sd_rad)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK
+               ? status
+               : ended(instance, set_pose(&instance->slam, pose, position_sd_m, heading_sd_rad));
+}
+
+// ---- keeping the map --------------------------------------------------------------------------------------
+
+bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes)
+{
+    const bslam_slam_t *slam = &bslam_const_instance(robot)->slam;
+    bslam_map_fault_t fault;
+    *bytes = bslam_map_size(slam);
+    return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
+}
+
+bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, bslam_map_fault_t *fault)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    *fault = BSLAM_MAP_FINE;
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK
+               ? status
+               : ended(instance, bslam_map_load(&instance->slam, source, BSLAM_MAP_LIVING, fault));
+}
+
+bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
+{
+    return bslam_slots_save(flash, &bslam_const_instance(robot)->slam, fault);
+}
+
+bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
+{
+    bslam_instance_t *instance = bslam_instance(robot);
+    *fault = BSLAM_MAP_FINE;
+    const bslam_status_t status = begin_step(instance);
+    return status != BSLAM_OK
+               ? status
+               : ended(instance, bslam_slots_load(flash, &instance->slam, BSLAM_MAP_LIVING, fault));
+}

@@ -1,0 +1,74 @@
+/// How many bytes an instance takes, from config.h: so that bslam_t can be a plain variable, and what stands
+/// in it be the library's own. The library does not compile where a sum is too small; a test holds what is
+/// too much below 2 %. docs/SIZES.md prints them.
+#ifndef BSLAM_SIZE_H
+#define BSLAM_SIZE_H
+
+#include "bslam/config.h"
+
+/// Of a number and of an address.
+#define BSLAM_SIZE_REAL (BSLAM_REAL_DOUBLE ? 8 : 4)
+#define BSLAM_SIZE_POINTER ((int)sizeof(void *))
+
+/// State values: 5 for the robot, 2 a beacon, and room for 2 more a ray; filled up to a multiple of four.
+#define BSLAM_SIZE_STATE ((5 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 3) / 4 * 4)
+/// A filter: mean, triangle of the covariance, rows that wait; beacons.
+#define BSLAM_SIZE_EKF \
+    (BSLAM_SIZE_REAL * (BSLAM_SIZE_STATE * 6 + BSLAM_SIZE_STATE * (BSLAM_SIZE_STATE + 4) / 2 + 4) + \
+     BSLAM_BEACONS_MAX * (56 + 4 * BSLAM_SIZE_REAL) + 32)
+/// The values of the settings.
+#define BSLAM_SIZE_SETTINGS (82 * BSLAM_SIZE_REAL + 88 + 2 * BSLAM_SIZE_POINTER)
+/// The pipeline: filter, waiting odometry, and for each sighting its innovation, match and account.
+#define BSLAM_SIZE_PIPELINE \
+    (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
+     BSLAM_SIGHTINGS_MAX * (32 + 29 * BSLAM_SIZE_REAL) + 4 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 180)
+
+#define BSLAM_SIZE_RECOVERY (BSLAM_RECOVERY * (496 + 124 * BSLAM_SIZE_REAL))
+#define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 32 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
+
+/// A classifier: its list of negatives, its weights, its samples.
+#define BSLAM_SIZE_SAMPLE (BSLAM_SAMPLE_FLOAT ? 288 : 72)
+#define BSLAM_SIZE_SAMPLES (BSLAM_LEARNER_SLOTS * BSLAM_SAMPLES_PER_CLASSIFIER)
+#define BSLAM_SIZE_CLASSIFIER \
+    (12 + 2 * BSLAM_SAMPLES_PER_CLASSIFIER + 4 * BSLAM_NEGATIVES_MAX + (BSLAM_SAMPLE_FLOAT ? 288 : 144))
+/// And one training under way for all.
+#define BSLAM_SIZE_TRAINING \
+    (848 + (BSLAM_SAMPLE_FLOAT ? 288 : 144) + BSLAM_SIZE_SAMPLES + \
+     14 * (BSLAM_SAMPLES_PER_CLASSIFIER + BSLAM_NEGATIVES_MAX))
+#define BSLAM_SIZE_APPEARANCE \
+    (BSLAM_APPEARANCE * \
+     (BSLAM_BEACONS_MAX * (56 + 2 * BSLAM_SIZE_REAL) + BSLAM_LEARNER_SLOTS * BSLAM_SIZE_CLASSIFIER + \
+      BSLAM_SIZE_SAMPLES * BSLAM_SIZE_SAMPLE + BSLAM_SIZE_TRAINING + 104))
+
+/// The smoother: two filters, and the nodes of the path.
+#define BSLAM_SIZE_SMOOTHER \
+    (BSLAM_SMOOTHER * \
+     (2 * BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + 2 * BSLAM_SIZE_STATE * BSLAM_SIZE_REAL + \
+      BSLAM_SMOOTHER_NODES_MAX * (16 + 11 * BSLAM_SIZE_REAL) + BSLAM_SMOOTHER_SEEN_MAX * 4 + \
+      (BSLAM_SMOOTHER_NODES_MAX + 19) / 20 * 20 * BSLAM_SIZE_REAL + 20 * 35 * BSLAM_SIZE_REAL + \
+      BSLAM_BEACONS_MAX * ((BSLAM_REAL_DOUBLE ? 24 : 20) + 8 * BSLAM_SIZE_REAL) + 27 * BSLAM_SIZE_REAL + \
+      96))
+
+#define BSLAM_BYTES \
+    ((BSLAM_SIZE_PIPELINE + BSLAM_SIZE_RECOVERY + BSLAM_SIZE_GUARD + BSLAM_SIZE_APPEARANCE + \
+      BSLAM_SIZE_SMOOTHER + 39) / \
+     8 * 8)
+
+/// Differs where sizes do, so that library and application notice: bslam_init.
+#define BSLAM_SIZES_MIX(hash, value) ((hash) * 16777619u + (uint32_t)(value))
+#define BSLAM_SIZES_FEW \
+    BSLAM_SIZES_MIX( \
+        BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(2166136261u, BSLAM_REAL_DOUBLE), \
+                                                        BSLAM_SIGHTINGS_MAX), \
+                                        BSLAM_BEACONS_MAX), \
+                        BSLAM_RAYS_MAX), \
+        BSLAM_HISTORY_MAX)
+#define BSLAM_SIZES_HASH \
+    BSLAM_SIZES_MIX( \
+        BSLAM_SIZES_MIX( \
+            BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_MIX(BSLAM_SIZES_FEW, BSLAM_RECOVERY), BSLAM_GUARD), \
+                            BSLAM_APPEARANCE *BSLAM_SAMPLES_PER_CLASSIFIER), \
+            BSLAM_APPEARANCE *BSLAM_NEGATIVES_MAX), \
+        BSLAM_SMOOTHER *BSLAM_SMOOTHER_NODES_MAX)
+
+#endif

@@ -1,0 +1,67 @@
+#include "plain_settings.h"
+
+bslam_settings_t unit_settings(void)
+{
+    bslam_settings_t p;
+    bslam_settings_preset(&p, BSLAM_PRESET_PAPER);
+    p.filter = 0;
+    p.motion = 0;
+    p.velocity_states = 0;
+    p.scale_states = 0;
+    p.velocity_sd_mps = BSLAM_R(0.4);
+    p.velocity_walk_mps_sqrt_s = BSLAM_R(0.2);
+    p.velocity_decay_s = BSLAM_R(5.0);
+    p.turn_rate_sd_radps = BSLAM_R(0.5);
+    p.turn_rate_walk_radps_sqrt_s = BSLAM_R(0.7);
+    p.turn_rate_decay_s = BSLAM_R(3.0);
+    p.forward_scale = 1;
+    p.turn_scale = 1;
+    p.scale_sd = BSLAM_R(0.2);
+    p.scale_walk_sqrt_s = BSLAM_R(0.002);
+    p.wheelbase_m = BSLAM_R(0.4);
+    p.left_radius_m = BSLAM_R(0.05);
+    p.right_radius_m = BSLAM_R(0.05);
+    p.ticks_per_revolution = 1000;
+    p.counter_bits = 16;
+    p.speed_max_mps = 20;
+    p.left_speed_sd_mps = BSLAM_R(0.3);
+    p.right_speed_sd_mps = BSLAM_R(0.2);
+    p.travel_sd_per_sqrt_m = 0;
+    p.forward_sd_per_sqrt_s = 0;
+    p.forward_sd_per_sqrt_m = 0;
+    p.turn_sd_per_sqrt_s = 0;
+    p.turn_sd_per_sqrt_m = 0;
+    p.turn_sd_per_sqrt_rad = 0;
+    p.gyro_sd_radps = BSLAM_R(0.02);
+    p.gap_us = 2000000;
+    p.gap_speed_sd_mps = BSLAM_R(0.2);
+    p.gap_turn_sd_radps = BSLAM_R(0.5);
+    p.mount_x_m = 0;
+    p.mount_y_m = 0;
+    p.mount_yaw_rad = 0;
+    p.sighting_delay_us = 0;
+    p.ahead_max_us = 200000;
+    p.bearing_sd_rad = BSLAM_R(0.02);
+    p.range_sd_floor_m = BSLAM_R(0.01);
+    p.range_sd_fraction = BSLAM_R(0.02);
+    p.range_sd_per_m = BSLAM_R(0.01);
+    p.bearing_only_variance_factor = 2;
+    p.bearing_only_curvature_factor = 0;
+    p.gate_d2 = 0;
+    p.huber_d = 0;
+    p.ray_inverse_distance_per_m = BSLAM_R(0.2);
+    p.ray_inverse_distance_sd_per_m = BSLAM_R(0.1);
+    p.ray_linear_limit = BSLAM_R(0.1);
+    p.association = 0;
+    p.nearest_threshold_m = 1;
+    p.nearest_threshold_rad = BSLAM_R(0.2);
+    p.match_d2 = BSLAM_R(13.8);
+    p.new_d2 = 40;
+    p.confirm_sightings = 4;
+    p.confirm_window_us = 0;
+    p.existence_score = BSLAM_R(0.5);
+    p.existence_sum = BSLAM_R(6.5);
+    p.existence_first_sum = 3;
+    p.existence_beacons = 4;
+    return p;
+}
