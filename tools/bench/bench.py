@@ -27,7 +27,7 @@ from tools.checks.markdown import Row, table
 BUILD = ROOT / "build" / "bench"
 
 NEAR_OPTIMAL = {6: 7_500, 20: 35_000, 50: 153_000, 100: 550_000}
-"""Instructions of near-optimal plain C for the same step without velocity states (docs/EXPERIMENTS.md)."""
+"""Instructions of near-optimal plain C for the same step without velocity states, by a study before this."""
 
 PARTS = {
     "covariance and state (`math`, `ekf`)": ("math", "ekf"),
@@ -180,29 +180,25 @@ def sections(step: str, rounds: int) -> Iterator[str]:
 
 HEAD = """# Benchmarks
 
-Written by `make bench-doc`; do not edit. `make bench` measures the same on your
-machine, with those of the others that are installed there.
+Written by `make bench-doc`. `make bench` measures the same on your host, with those of
+the others that are installed there. No board has run it yet.
 """
-STEP_NOTE = """Instructions by callgrind, `-O2`; odometry and 2 to 4 sightings with distance, invariant
-filter. They are not cycles."""
-PART_NOTE = """By callgrind, as above; inlined functions count where they stand in the source. No flag but
-`-O2` is used elsewhere on this page."""
-TIME_NOTE = f"""CPU time of a step with 2 to 4 sightings among so many beacons, all mapped, identities
-given, `-O2`: median of rounds in which each program runs once [least, largest] (goal). bslam in float,
-invariant, without velocity states; in brackets its own least time. MRPT is its range-bearing EKF-SLAM,
-the class behind its `kf-slam`, in its fastest form and as it comes; only its step is timed, not the
-making of its inputs. iSAM2 keeps all poses, so its time grows: here over {filters.GTSAM_STEPS} steps."""
-MEMORY_NOTE = """bslam: the one struct, in float. The others: what the heap holds after a step, without
-the drive itself and without what a step needs on the way."""
-ACCURACY_NOTE = """Mean position error of simulated drives of 200 s (seeds 100:104 and 100:102) whose wheels
-jitter by 0.3 m/s, the noise for which all have a model; without identities by nearest neighbour in
-Mahalanobis' distance in both programs that can. MRPT knows one sd for all distances. bslam counts all
-beacons that it holds. It has room for four times the beacons there are, 100 at most. GTSAM's error stands
-in EXPERIMENTS."""
-MACHINE_NOTE = """Signatures of rendered beacons. Training: one machine, one against the rest, to
-LIBLINEAR's default tolerance, from nothing; bslam on the 8-bit samples that the robot keeps. Decision:
-the values of all machines for one signature. Headers come from scikit-learn's LinearSVC on the same
-views; m2cgen computes in double, for which a Cortex-M4F calls a library that is not counted in its flash."""
+STEP_NOTE = """Instructions by callgrind, `-O2`; odometry and 2 to 4 sightings with distance, known
+association, invariant filter. They are not cycles. Near-optimal is a study's count for the same step."""
+PART_NOTE = """By callgrind; inlined functions count where they stand in the source."""
+TIME_NOTE = f"""CPU time of a step with 2 to 4 sightings, all beacons mapped, known association, `-O2`:
+median of rounds in which each program runs once [least, largest] (goal). bslam: float, invariant, without
+velocity states; in brackets its least time. MRPT: range-bearing EKF-SLAM, in its fastest form and as it
+comes; only its step is timed. iSAM2 keeps all poses, so its time grows: over {filters.GTSAM_STEPS} steps."""
+MEMORY_NOTE = """bslam: the one struct, in float. The others: what the heap holds after a step."""
+ACCURACY_NOTE = """Mean position error of simulated drives of 200 s (seeds 100:104 and 100:102), actuation
+noise of 0.3 m/s. Unknown: nearest neighbour by Mahalanobis distance. MRPT has one standard deviation for
+all distances. bslam has room for four times the beacons there are, 100 at most, and counts all it holds.
+GTSAM's error stands in [RESULTS](RESULTS.md#consistency)."""
+MACHINE_NOTE = """Descriptors of rendered beacons. Training: one classifier against the rest, to LIBLINEAR's
+default tolerance; bslam on the 8-bit samples that the robot keeps. Decision: all classifiers' values for
+one descriptor. Headers come from scikit-learn's LinearSVC on the same views. m2cgen computes in double; its
+flash leaves out the library for that."""
 
 
 def main() -> int:

@@ -46,14 +46,14 @@ STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
     "predict": "odometry and an empty frame",
-    "step": "odometry and a frame of 3 sightings with distance, identity known",
-    "filter": "of that the filter's own functions: a prediction, 3 sightings with distance, the correction",
-    "predict_velocity": "the same as predict, with velocity states",
-    "step_velocity": "the same as step, with velocity states",
-    "filter_velocity": "the same as filter, with velocity states",
+    "step": "odometry and a frame of 3 sightings with distance, known association",
+    "filter": "of that the filter's own functions",
+    "predict_velocity": "predict, with velocity states",
+    "step_velocity": "step, with velocity states",
+    "filter_velocity": "filter, with velocity states",
     "augment": "a frame that starts a beacon",
     "associate_mahalanobis": "3 sightings against the whole map",
-    "train": "one training of a machine, mean, on made-up signatures that are hard to part",
+    "train": "one training of a classifier, mean, on synthetic descriptors that are hard to separate",
 }
 
 
@@ -85,8 +85,8 @@ def linked_bytes(with_looks: bool) -> int:
 
 
 def linked_rows() -> Iterator[Row]:
-    yield "identity told, or by place and class", linked_bytes(with_looks=False)
-    yield "and machines that learn looks on the robot", linked_bytes(with_looks=True)
+    yield "known association, or by position and class", linked_bytes(with_looks=False)
+    yield "and classifiers that learn appearance on the robot", linked_bytes(with_looks=True)
 
 
 def image_sections(path: Path) -> tuple[int, int]:
@@ -224,36 +224,35 @@ def document() -> str:
     frames = {lens: seeing["Cortex-M4F", lens] for lens in RIGS}
     return f"""# What bslam costs on a microcontroller
 
-Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. Compiler: \
-{output_of("arm-none-eabi-gcc", "--version").splitlines()[0]}.
+Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. No board has run this yet: \
+cores are emulated. Compiler: {output_of("arm-none-eabi-gcc", "--version").splitlines()[0]}.
 
 ## Flash
 
 Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
-takes of it what is called.
+takes only what is called.
 
 {table(("layer", "bytes"), flash_rows())}
-What a robot without a camera takes of it and of libc when its image is linked, bytes: odometry, sightings \
-with and without distance, all five ways of association, pose, covariance, map (tests/bench/link_core.c). \
-Learning is linked where looks are attached, names of parameters where they are asked for.
+What a robot without a camera links of it and of libc, bytes: odometry, sightings with and without distance, \
+all ways of association, pose, covariance, map (tests/bench/link_core.c).
 
 {table(("linked", "bytes"), linked_rows())}
 ## RAM
 
-Instances, bytes, by `BSLAM_BEACONS_MAX`, Cortex-M4F, all other sizes at their defaults. `bslam_appearance_t` is \
-for association by looks only, `bslam_vision_t` (QVGA, four cameras) for robots that see by bslam, \
-`bslam_smoother_t` for `filter` = 2, which has no use for rays.
+Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. \
+`bslam_appearance_t` is for association by appearance, `bslam_vision_t` (QVGA, four cameras) for the camera \
+front end, `bslam_smoother_t` for `filter` = 2, which needs no rays.
 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images
 
-`robot.elf`, `-O2`, bytes; RAM without stack. The MPS2 boards have the host's largest sizes (80 beacons); \
-stm32f405 learns looks, stm32f405_seeing has the front end for one QVGA camera, both 20 beacons; microbit 6.
+`robot.elf`, `-O2`, bytes; RAM without stack. MPS2 boards have room for 80 beacons, microbit for 6. \
+stm32f405 learns appearance, stm32f405_seeing has the front end for one QVGA camera; both have room for 20.
 
 {table(("image", "ROM", "RAM"), image_rows())}
 ## Stack
 
-The longest path from a call on, bytes, from the linked image: the compiler's frames along the call graph \
+The longest path from a call on, bytes, along the call graph of the linked image \
 (tools/checks/check_image.py).
 
 {table(code_heads(STEP_FUNCTIONS), stack_rows("cost", STEP_FUNCTIONS))}
@@ -268,21 +267,19 @@ Counted by QEMU (`-icount`), the same at every run; instructions are not cycles.
 
 {table(("part", "beacons", *COST_BOARDS), cost_rows(measured))}
 {parts}
-A step in direction only with the smoother (`filter` = 2) on a Cortex-M4F, its window full: 3 sightings a \
-frame of 6 beacons, 5 of 20; firmware/bench/cost_smoother.c.
+A bearing-only step with the smoother on a Cortex-M4F, its window full: 3 sightings a frame of 6 beacons, \
+5 of 20 (firmware/bench/cost_smoother.c).
 
 {table(("", "beacons", "instructions", f"of {CORE_HZ // 1_000_000} million a second"), smoother_rows())}
-The vision front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a walk through a rendered \
-world (seed {WORLD_SEED}; firmware/bench/cost_vision.c). In which functions: \
-`.venv/bin/python -m tools.bench.profile_image cost_vision`. A frame costs as much as it shows: of other \
-worlds `--worlds 7000:7020 --frames 8` tells.
+The camera front end, instructions a pixel, mean of {FRAMES} frames of 320x240 of a rendered world (seed \
+{WORLD_SEED}; firmware/bench/cost_vision.c). By function, and in other worlds: \
+`.venv/bin/python -m tools.bench.profile_image cost_vision --worlds 7000:7020 --frames 8`.
 
 {table(("lens", *COST_BOARDS), vision_rows(seeing))}
 ## A second on a Cortex-M4F
 
-{STEPS_A_SECOND} steps a second, 20 beacons, instructions a step and their share of \
-{CORE_HZ // 1_000_000} million a second. A core takes more than a cycle for some instructions: \
-this is a lower bound of its load.
+{STEPS_A_SECOND} steps a second with 20 beacons: instructions a step, and their share of \
+{CORE_HZ // 1_000_000} million a second. Some instructions take more than a cycle, so the load is higher.
 
 {table(("part", "instructions", "share"), budget(measured["Cortex-M4F"], frames))}"""
 

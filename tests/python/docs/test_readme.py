@@ -30,8 +30,8 @@ def test_what_it_costs_is_what_was_measured(column, beacons):
 
 def test_flash_is_what_was_measured():
     sizes = text_of("docs/SIZES.md")
-    linked = rows(sizes, "identity told, or by place and class")[0][0]
-    learning = rows(sizes, "and machines that learn looks on the robot")[0][0]
+    linked = rows(sizes, "known association, or by position and class")[0][0]
+    learning = rows(sizes, "and classifiers that learn appearance on the robot")[0][0]
     layers = re.findall(r"^\| [a-z]+ \| (\d+) \|$", sizes.split("## RAM")[0], re.MULTILINE)
     sentence = re.search(
         r"links ([\d.]+) KB .*?, ([\d.]+) KB .*?has (\d+) KB", text_of("README.md"), re.DOTALL
@@ -45,14 +45,17 @@ def test_flash_is_what_was_measured():
 @pytest.mark.parametrize(
     ("told", "measured"),
     [
-        ("bslam on given reference logs, distance and direction", "none: velocity states"),
-        ("the same, `--filter invariant`", "`--observation direction --filter invariant`"),
-        ("bslam on given reference logs, direction only: the smoother", "given logs: smoother"),
+        ("bslam on given reference logs, distance and direction", "distance and bearing"),
+        ("the same, `--filter invariant`", "bearing-only, `--filter invariant`"),
+        (
+            "bslam on given reference logs, direction only: the smoother",
+            "bearing-only, smoother (the default)",
+        ),
     ],
 )
-def test_errors_on_the_given_logs_are_those_of_the_experiments(told, measured):
+def test_errors_on_the_given_logs_are_those_of_the_results(told, measured):
     row = re.findall(
-        r"^\| (?:" + re.escape(measured) + r") \|(.*)\|$", text_of("docs/EXPERIMENTS.md"), re.MULTILINE
+        r"^\| (?:" + re.escape(measured) + r") \|(.*)\|$", text_of("docs/RESULTS.md"), re.MULTILINE
     )
     errors = [float(re.search(r"[\d.]+", cell)[0]) for cell in row[0].split("|")[:3]]
     assert rows(text_of("README.md"), told)[0] == pytest.approx(errors, abs=0.051)
