@@ -40,7 +40,6 @@ VISION_MACROS: Macros = (
 def _macros(real: str, beacons_max: int) -> Macros:
     return [
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
-        ("BSLAM_SAMPLE_FLOAT", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
         ("BSLAM_RAYS_MAX", str(beacons_max)),
         ("BSLAM_SIGHTINGS_MAX", str(max(64, beacons_max + 16))),  # every beacon at once, and some clutter
@@ -71,7 +70,7 @@ def declarations(macros: Macros, header: str) -> str:
             Path(empty, libc_header).touch()
         defines = [f"-D{name}={value}" for name, value in macros]
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
-        command += [*defines, "-D__attribute__(x)=", str(FIRMWARE_DIR / header)]
+        command += [*defines, "-D__attribute__(x)=", "-DINT_MAX=2147483647", str(FIRMWARE_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return _drop_inline_functions(text)
 
