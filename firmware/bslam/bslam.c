@@ -297,11 +297,17 @@ bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink
     return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
 }
 
+/// A robot whose map is frozen takes another one frozen.
+static bslam_map_mode_t mode_of(const bslam_slam_t *slam)
+{
+    return slam->is_frozen ? BSLAM_MAP_FROZEN : BSLAM_MAP_LIVING;
+}
+
 bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, bslam_map_fault_t *fault)
 {
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_map_load(slam, source, BSLAM_MAP_LIVING, fault));
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_map_load(slam, source, mode_of(slam), fault));
 }
 
 bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
@@ -314,5 +320,5 @@ bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash,
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
     return slam == NULL ? BSLAM_E_STATE
-                        : ended(robot, bslam_slots_load(flash, slam, BSLAM_MAP_LIVING, fault));
+                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }
