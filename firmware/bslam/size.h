@@ -21,7 +21,7 @@
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
-     BSLAM_SIGHTINGS_MAX * (40 + 29 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + 4 * BSLAM_SIZE_REAL + \
+     BSLAM_SIGHTINGS_MAX * (36 + 29 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + 4 * BSLAM_SIZE_REAL + \
      2 * BSLAM_SIZE_POINTER + 180)
 
 #define BSLAM_SIZE_RECOVERY (BSLAM_RECOVERY * (496 + 124 * BSLAM_SIZE_REAL))
