@@ -27,8 +27,7 @@ typedef struct bslam_slam {
     int32_t account_count;
     int32_t bad_sighting;  ///< place of the sighting for which the last frame was refused, else -1
     // Scratch: holds nothing between calls.
-    bslam_match_t matches[BSLAM_SIGHTINGS_MAX];
-    bslam_innovation_t innovations[BSLAM_SIGHTINGS_MAX];
+    bslam_record_t records[BSLAM_SIGHTINGS_MAX];
 } bslam_slam_t;
 
 /// Whether it learns appearance, and whether a smoother leads it: constants of the build where it has none.

@@ -499,7 +499,7 @@ static void test_where_little_speaks_for_its_beacon_a_direction_alone_waits(void
 {
     const int64_t long_us = svm_params().decision_delay_us;
     assert_int_equal(see_after(long_us, 0.009, false, 0).outcome, BSLAM_OUTCOME_MATCHED);
-    const double lead = (double)slam.matches[0].lead;
+    const double lead = (double)slam.records[0].match.lead;
     assert_true(lead > 0);
     assert_int_equal(see_after(long_us, 0.009, false, lead - 0.01).outcome, BSLAM_OUTCOME_MATCHED);
     const bslam_account_t account = see_after(long_us, 0.009, false, lead + 0.01);
@@ -519,7 +519,7 @@ static void test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view(void 
     assert_true(appearance.of[0].view_score >= settings.again_odds);
     drive_on(settings.decision_delay_us);
     see_object(0, 7, 0.06);
-    const bslam_real_t anew = slam.matches[0].score;
+    const bslam_real_t anew = slam.records[0].match.score;
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
     assert_near(appearance.of[0].view_score, anew, 1e-6);
     see_object(0, 8, 0.3);
