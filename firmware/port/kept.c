@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "port/port.h"
 
 #define MAGIC 0x5450454bu  // "KEPT"

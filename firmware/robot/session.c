@@ -2,7 +2,7 @@
 
 #include "robot/messages.h"
 #include "robot/param_store.h"
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "port/port.h"
 
 #include <stddef.h>

@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "bslam/model/noise.h"
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 
 static bslam_slam_t slam;
 static bslam_appearance_t appearance;
