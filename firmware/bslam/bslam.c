@@ -311,6 +311,12 @@ bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink
     return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
 }
 
+/// A robot whose map is frozen takes another one frozen.
+static bslam_map_mode_t mode_of(const bslam_instance_t *robot)
+{
+    return robot->slam.is_frozen ? BSLAM_MAP_FROZEN : BSLAM_MAP_LIVING;
+}
+
 bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, bslam_map_fault_t *fault)
 {
     bslam_instance_t *instance = bslam_instance(robot);
@@ -318,7 +324,7 @@ bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, 
     const bslam_status_t status = begin_step(instance);
     return status != BSLAM_OK
                ? status
-               : ended(instance, bslam_map_load(&instance->slam, source, BSLAM_MAP_LIVING, fault));
+               : ended(instance, bslam_map_load(&instance->slam, source, mode_of(instance), fault));
 }
 
 bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
@@ -333,5 +339,5 @@ bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash,
     const bslam_status_t status = begin_step(instance);
     return status != BSLAM_OK
                ? status
-               : ended(instance, bslam_slots_load(flash, &instance->slam, BSLAM_MAP_LIVING, fault));
+               : ended(instance, bslam_slots_load(flash, &instance->slam, mode_of(instance), fault));
 }

@@ -288,7 +288,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t l
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON. O(n²).
 BSLAM_MUST_CHECK bslam_status_t bslam_remove_beacon(bslam_t *robot, uint32_t uid);
 
-/// Frozen: no beacon changes, none is added and none taken out by itself.
+/// Frozen: no beacon is added, learned or taken out by itself. A map that is loaded then stays as it is: its
+/// beacons become known ones, which never change.
 void bslam_freeze_map(bslam_t *robot, bool is_frozen);
 
 /// Puts the robot somewhere in the map, as of the last frame, this doubtful: at a charging station, say.
