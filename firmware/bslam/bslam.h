@@ -138,6 +138,9 @@ typedef struct bslam_health {
 /// How the robot is doing. O(1).
 bslam_health_t bslam_health(const bslam_t *robot);
 
+/// Where a chain of fingerprints starts.
+#define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
+
 /// Goes on with a hash of the whole state: two robots that were told the same have the same. O(n²).
 uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before);
 
