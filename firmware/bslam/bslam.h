@@ -351,6 +351,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_s
 
 /// Bytes that the flash takes at once, at places that are multiples of it, are a divisor of this.
 #define BSLAM_FLASH_PIECE 16
+/// Areas of a bslam_flash_t.
+#define BSLAM_SLOTS 2
 
 /// What a board gives to keep a map over a power cut: two areas, each erased as a whole (bytes become 0xff),
 /// of which one always holds a whole map. False: it failed.
