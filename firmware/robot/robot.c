@@ -236,10 +236,9 @@ bool robot_lets_wait(robot_t *robot, const bslam_odometry_reading_t *reading)
     }
     robot->left_ticks = reading->left_ticks;
     robot->right_ticks = reading->right_ticks;
-#if ROBOT_VISUAL_GYRO
-    const bslam_vision_t *vision = &robot->camera.vision;
-    return !reading->has_gyro && vision->camera_count > 0 &&
-           gyro_wait_begin(&robot->gyro_wait, vision, &robot->in_force, reading);
+#if ROBOT_VISION && BSLAM_VISION_TURNS
+    return !reading->has_gyro && robot->camera.camera_count > 0 &&
+           gyro_wait_begin(&robot->gyro_wait, &robot->camera, &robot->in_force, reading);
 #else
     return false;
 #endif
@@ -247,7 +246,7 @@ bool robot_lets_wait(robot_t *robot, const bslam_odometry_reading_t *reading)
 
 bool robot_end_wait(robot_t *robot, bslam_odometry_reading_t *reading)
 {
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
     return gyro_wait_end(&robot->gyro_wait, reading);
 #else
     (void)robot;
@@ -261,8 +260,8 @@ bool robot_end_wait(robot_t *robot, bslam_odometry_reading_t *reading)
 bslam_status_t robot_set_camera(robot_t *robot, int index, const bslam_camera_t *camera)
 {
     const bslam_status_t status = camera_input_set_camera(&robot->camera, index, camera);
-#if ROBOT_VISUAL_GYRO
-    gyro_wait_start(&robot->gyro_wait, &robot->camera.vision);
+#if ROBOT_VISION && BSLAM_VISION_TURNS
+    gyro_wait_start(&robot->gyro_wait, &robot->camera);
 #endif
     return status;
 }
@@ -272,9 +271,9 @@ bslam_status_t robot_look(robot_t *robot, int camera, int64_t time_us)
     const bslam_status_t status =
         camera_input_look(&robot->camera, robot->moves != robot->moves_seen[camera]);
     robot->moves_seen[camera] = robot->moves;
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
     if (status == BSLAM_OK) {
-        gyro_wait_see(&robot->gyro_wait, &robot->camera.vision, camera, time_us);
+        gyro_wait_see(&robot->gyro_wait, &robot->camera, camera, time_us);
     }
 #else
     (void)time_us;
