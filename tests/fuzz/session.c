@@ -27,6 +27,18 @@ static float gyro_radps;
 
 // ---- a board of nothing but memory -----------------------------------------------------------------------
 
+/// What comes, messages and pictures, the target gives itself.
+int port_read(void)
+{
+    return -1;
+}
+
+bool port_camera_row(port_row_t *row)
+{
+    (void)row;
+    return false;
+}
+
 void port_write(const uint8_t *bytes, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
