@@ -61,6 +61,9 @@ void bslam_recovery_init(bslam_recovery_t *recovery);
 /// The filter starts over: what is known against its pose is forgotten, counts stay.
 void bslam_recovery_restart(bslam_recovery_t *recovery);
 
+/// Of memory that may be damaged: forgets what is known against the pose unless all of it may be used.
+void bslam_recovery_mend(bslam_recovery_t *recovery);
+
 /// bslam_slam_sightings with a look at whether the robot is where the filter has it. Sightings of a frame
 /// that is not used have the account "deferred", reason "lost". The same statuses; of what is refused nothing
 /// changes. O(count machines) more, and while lost or contradicted O(clues³).
