@@ -49,15 +49,13 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
                                int beacon)
 {
     const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
-    bslam_real_t x;
-    bslam_real_t y;
+    bslam_real_t x, y;
     bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
     if (sighting->has_range) {
         const bslam_sighted_point_t seen =
             bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
         const bslam_real_t limit = frame->settings->nearest_threshold_m;
-        const bslam_real_t dx = (seen.x_m - x) / limit;
-        const bslam_real_t dy = (seen.y_m - y) / limit;
+        const bslam_real_t dx = (seen.x_m - x) / limit, dy = (seen.y_m - y) / limit;
         return dx * dx + dy * dy;
     }
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);

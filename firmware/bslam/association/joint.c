@@ -15,9 +15,7 @@ typedef struct search {
     int32_t choice[BSLAM_GIVEN_MAX];  ///< a beacon, or -1
     int32_t scalars[BSLAM_GIVEN_MAX + 1];
     int32_t pairs[BSLAM_GIVEN_MAX + 1];
-    int32_t best[BSLAM_GIVEN_MAX];
-    int32_t count;
-    int32_t best_pairs;
+    int32_t best[BSLAM_GIVEN_MAX], count, best_pairs;
     bslam_real_t best_distance2;
 } search_t;
 

@@ -15,8 +15,7 @@ typedef struct moving {
     bslam_real_t *covariance;
     bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
     bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
-    int base_dim;
-    int dim;
+    int base_dim, dim;
 } moving_t;
 
 /// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
@@ -244,8 +243,7 @@ static bool read_speedometers(const bslam_real_t *mean, const bslam_settings_t *
         return false;
     }
     const bslam_real_t rate = 1 / motion->dt_s;
-    const bslam_real_t forward_weight = 1 / (noise.xx * rate);
-    const bslam_real_t turn_weight = 1 / (noise.yy * rate);
+    const bslam_real_t forward_weight = 1 / (noise.xx * rate), turn_weight = 1 / (noise.yy * rate);
     const bslam_real_t carried = -noise.yx / noise.xx * turn_weight;
     const bslam_real_t forward =
         motion->forward_m * settings->forward_scale * rate - mean[BSLAM_STATE_FORWARD];
@@ -449,9 +447,8 @@ void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings,
 
 bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot)
 {
-    const bslam_pose_t pose = {robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
+    return (bslam_pose_t){robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
                                robot->mean[BSLAM_STATE_THETA]};
-    return pose;
 }
 
 // ---- after an interruption --------------------------------------------------------------------------------

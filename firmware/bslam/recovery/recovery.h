@@ -55,9 +55,6 @@ typedef struct bslam_recovery {
     int64_t fix_us;
 } bslam_recovery_t;
 
-/// Nothing is known against the pose.
-void bslam_recovery_init(bslam_recovery_t *recovery);
-
 /// The filter starts over: what is known against its pose is forgotten, counts stay.
 void bslam_recovery_restart(bslam_recovery_t *recovery);
 

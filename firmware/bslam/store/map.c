@@ -104,8 +104,7 @@ typedef struct record {
     bslam_beacon_t beacon;
     uint32_t classifier;
     bslam_real_t scale;  ///< 0: nobody knows
-    bslam_real_t x_m;
-    bslam_real_t y_m;
+    bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } record_t;
 
@@ -293,8 +292,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
 
 /// Saved values in their order: the next state value after `place` of a saved beacon.
 typedef struct place {
-    int beacon;
-    int value;
+    int beacon, value;
 } place_t;
 
 /// Moves on to the next saved state value; false: there is none.
