@@ -34,14 +34,7 @@ enum { RIVALS_MAX = 8 };
 static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                  int beacon)
 {
-    bslam_innovation_t innovation;
-    bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, sighting, beacon, &innovation) !=
-            BSLAM_OK ||
-        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
-        return -1;
-    }
-    return d2;
+    return bslam_ekf_sighting_distance2(frame->ekf, frame->settings, frame->mount, sighting, beacon);
 }
 
 /// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.

@@ -224,8 +224,7 @@ static void doubt_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int 
     const bslam_real_t left_var = ekf->covariance[bslam_symmat_at(at, at)];
     bslam_real_t var = scale_var > left_var ? scale_var : left_var;
     var = var > SCALE_VAR_MIN ? var : SCALE_VAR_MIN;
-    const bslam_row_t row = {.other = {1}, .at = (uint16_t)at, .dim = 1};
-    bslam_ekf_apply_scalar(ekf, &row, 0, -(var + var * var / more_var));
+    bslam_ekf_pin(ekf, at, 0, -(var + var * var / more_var));
     bslam_ekf_correct(ekf, settings);
 }
 

@@ -164,6 +164,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
                                                     const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
 
+/// The same of a sighting if it shows beacon `index`; negative: it has none. O(1).
+bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting,
+                                          int index);
+
 /// a P bᵀ for two rows, from the covariance as it stands: how alike the errors of two predictions are. O(1).
 bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b);
 
@@ -217,7 +222,7 @@ void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_settings_t *settings
 /// The state value at `at` is its mean and this much more, up to `variance`.
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance);
 
-/// Brings the stored covariance up to date, the correction still waiting.
+/// Brings the stored covariance up to date, in one pass for all that waits; the correction still waits.
 void bslam_ekf_settle(bslam_ekf_t *ekf);
 
 // ---- map --------------------------------------------------------------------------------------------------

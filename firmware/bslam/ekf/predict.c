@@ -60,13 +60,6 @@ static void move_correction(const moving_t *state, const bslam_transition_t *tra
     memcpy(state->correction, moved, sizeof moved);
 }
 
-/// Where size is asked for, the general way serves the pose alone, too.
-#ifdef __OPTIMIZE_SIZE__
-enum { IS_SMALL = 1 };
-#else
-enum { IS_SMALL = 0 };
-#endif
-
 /// The robot's block of F P Fᵀ where it has nothing but its pose: theta moves x and y.
 static void move_pose_block(bslam_real_t *p, bslam_real_t x_theta, bslam_real_t y_theta)
 {
@@ -112,7 +105,7 @@ static void move_covariance(const moving_t *state, const bslam_transition_t *tra
     if (state->noted != NULL) {
         *state->noted = *transition;
     }
-    if (!IS_SMALL && base == POSE_DIM) {
+    if (base == POSE_DIM) {
         move_pose_block(state->covariance, transition->by[0][BSLAM_STATE_THETA],
                         transition->by[1][BSLAM_STATE_THETA]);
     } else {
@@ -448,7 +441,7 @@ void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings,
 bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot)
 {
     return (bslam_pose_t){robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
-                               robot->mean[BSLAM_STATE_THETA]};
+                          robot->mean[BSLAM_STATE_THETA]};
 }
 
 // ---- after an interruption --------------------------------------------------------------------------------

@@ -169,16 +169,11 @@ typedef struct verdict {
     uint32_t uid;  ///< of one that contradicts
 } verdict_t;
 
-/// Squared distance of a sighting from a beacon; -1: it has none.
+/// Squared distance of a sighting from a beacon; negative: it has none.
 static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *mount,
                                  const bslam_sighting_t *sighting, int beacon)
 {
-    bslam_innovation_t innovation;
-    bslam_real_t distance2;
-    const bool has =
-        bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, sighting, beacon, &innovation) == BSLAM_OK &&
-        bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK;
-    return has ? distance2 : -1;
+    return bslam_ekf_sighting_distance2(&slam->ekf, &slam->settings, mount, sighting, beacon);
 }
 
 /// Of the beacons that a sighting may show, the squared distance from the nearest; -1: it has none.
