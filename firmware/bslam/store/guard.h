@@ -23,7 +23,7 @@
 typedef struct bslam_guard {
     bslam_guard_counters_t counters;
     uint32_t checksum;
-    bool is_sealed;
+    uint32_t seal;  ///< a constant once there is a checksum: memory that holds anything has no such number
     bslam_slam_t *copy;
 } bslam_guard_t;
 
