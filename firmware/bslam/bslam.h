@@ -142,6 +142,9 @@ typedef struct bslam_health {
 /// How the robot is doing. O(1).
 bslam_health_t bslam_health(const bslam_t *robot);
 
+/// Where a chain of fingerprints starts.
+#define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
+
 /// Goes on with a hash of the whole state: two robots that were told the same have the same. O(n²).
 uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before);
 
@@ -292,7 +295,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t l
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON. O(n²).
 BSLAM_MUST_CHECK bslam_status_t bslam_remove_beacon(bslam_t *robot, uint32_t uid);
 
-/// Frozen: no beacon changes, none is added and none taken out by itself.
+/// Frozen: no beacon is added, learned or taken out by itself. A map that is loaded then stays as it is: its
+/// beacons become known ones, which never change.
 void bslam_freeze_map(bslam_t *robot, bool is_frozen);
 
 /// Puts the robot somewhere in the map, as of the last frame, this doubtful: at a charging station, say.

@@ -8,13 +8,15 @@ typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const 
                                      int beacon);
 
 /// Leaves each beacon to the nearest of the sightings that chose it, the first of equals.
-static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     for (int i = 1; i < frame->count; i++) {
-        for (int j = 0; j < i && matches[i].verdict == BSLAM_VERDICT_MATCH; j++) {
-            if (matches[j].verdict == BSLAM_VERDICT_MATCH && matches[j].beacon == matches[i].beacon) {
-                bslam_match_t *loser =
-                    matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
+        for (int j = 0; j < i && records[i].match.verdict == BSLAM_VERDICT_MATCH; j++) {
+            if (records[j].match.verdict == BSLAM_VERDICT_MATCH &&
+                records[j].match.beacon == records[i].match.beacon) {
+                bslam_match_t *loser = records[i].match.distance2 < records[j].match.distance2
+                                           ? &records[j].match
+                                           : &records[i].match;
                 loser->verdict = BSLAM_VERDICT_REJECT;
                 loser->reason = BSLAM_REASON_DUPLICATE;
                 loser->beacon = -1;
@@ -111,11 +113,11 @@ static bool label_is_repeated(const bslam_sighting_frame_t *frame, int i)
     return false;
 }
 
-void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
-        bslam_match_t *match = &matches[i];
+        bslam_match_t *match = &records[i].match;
         if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
@@ -133,11 +135,11 @@ void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *m
 
 /// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
 static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2_fn distance2,
-                                  bslam_real_t match2, bslam_real_t new2, bslam_match_t *matches)
+                                  bslam_real_t match2, bslam_real_t new2, bslam_record_t *records)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
-        bslam_match_t *match = &matches[i];
+        bslam_match_t *match = &records[i].match;
         if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
@@ -161,17 +163,17 @@ static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2
             match->beacon = -1;
         }
     }
-    keep_one_to_one(frame, matches);
+    keep_one_to_one(frame, records);
 }
 
-void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
-    associate_by_distance(frame, euclidean2, 1, 1, matches);
+    associate_by_distance(frame, euclidean2, 1, 1, records);
 }
 
-void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
-    associate_by_distance(frame, mahalanobis2, frame->settings->match_d2, frame->settings->new_d2, matches);
+    associate_by_distance(frame, mahalanobis2, frame->settings->match_d2, frame->settings->new_d2, records);
 }
 
 bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings)
