@@ -50,7 +50,7 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "vision/measurement": PIXELS,
     "vision/gyro": DETECTION | {"vision/measurement", "vision/front_end.h"},
     "link": frozenset({"base"}),
-    "models": frozenset({"bslam/bslam.h", "vision/model.h"}),
+    "models": frozenset({"bslam/bslam.h", "vision/vision.h"}),
     "port": frozenset({"base", "bslam/bslam.h", "vision/vision.h"}),
     # A user's program as any other: public headers, and of base what they are made of.
     "robot": frozenset({"base", "bslam/bslam.h", "vision/vision.h", "link", "models", "port"}),
