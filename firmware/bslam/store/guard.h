@@ -15,7 +15,7 @@
 typedef struct bslam_guard {
     bslam_guard_counters_t counters;
     uint32_t checksum;
-    bool is_sealed;
+    uint32_t seal;  ///< a constant once there is a checksum: memory that holds anything has no such number
     bslam_slam_t *copy;  ///< where each seal keeps the state to fall back to; NULL: nowhere
 } bslam_guard_t;
 
