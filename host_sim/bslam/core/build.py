@@ -17,7 +17,14 @@ from pathlib import Path
 
 from cffi import FFI
 
-from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
+from bslam.core.builds import (
+    FIRMWARE_DIR,
+    REALS,
+    SIZE_CLASSES,
+    VISION_EXTENSION,
+    VISION_TRAINING_EXTENSION,
+    extension_name,
+)
 
 CORE_DIR = Path(__file__).resolve().parent
 SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision")}
@@ -103,19 +110,21 @@ def build(real: str, beacons_max: int) -> Path:
     return compile_extension(name, declared, f'#include "{HEADER}"', macros, "bslam")
 
 
-def build_vision() -> Path:
-    """Builds the vision front end, in float as on the target, with its model where there is one yet."""
-    header = "vision/gyro/visual_gyro.h"  # it includes all the others
-    includes = f'#include "{header}"\n'
-    text = declarations(VISION_MACROS, header)
+def build_vision(name: str = VISION_EXTENSION, header: str = "vision/vision.h") -> Path:
+    """Builds the vision library, in float as on the target, with its model where there is one yet."""
+    text = declarations(VISION_MACROS, header) + "#define BSLAM_VISION_HASH ...\n"
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
+    includes, model = f'#include "{header}"\n', "NULL"
     if BEACONS_HEADER.is_file():
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"
-    else:
-        model = "NULL"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    return compile_extension(VISION_EXTENSION, text, includes + function, VISION_MACROS, "vision")
+    return compile_extension(name, text, includes + function, VISION_MACROS, "vision")
+
+
+def build_vision_training() -> Path:
+    """The same with what is inside."""
+    return build_vision(VISION_TRAINING_EXTENSION, "vision/internal.h")
 
 
 def compile_extension(
@@ -156,8 +165,8 @@ def main() -> int:
     """Builds every extension, one on a core (in processes, since cffi changes the directory)."""
     sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
     with ProcessPoolExecutor() as pool:
-        vision = pool.submit(build_vision)
-        for path in [*pool.map(build, reals, sizes), vision.result()]:
+        vision = [pool.submit(one) for one in (build_vision, build_vision_training)]
+        for path in [*pool.map(build, reals, sizes), *(one.result() for one in vision)]:
             print(f"built {path.name}", file=sys.stderr)
     return 0
 

@@ -9,7 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
+from bslam.core.builds import (
+    REALS,
+    SIZE_CLASSES,
+    VISION_EXTENSION,
+    VISION_TRAINING_EXTENSION,
+    extension_name,
+)
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
@@ -144,11 +150,11 @@ def library(real: str, beacons_max: int) -> Library:
 
 
 class VisionLibrary:
-    """The vision front end 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
+    """The vision library 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
 
-    def __init__(self) -> None:
+    def __init__(self, extension: str = VISION_EXTENSION) -> None:
         try:
-            module = import_module(VISION_EXTENSION)
+            module = import_module(extension)
         except ImportError as error:
             raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error
         self.ffi = module.ffi
@@ -158,6 +164,10 @@ class VisionLibrary:
         """Raises CoreError unless status is BSLAM_OK."""
         if status != self.lib.BSLAM_OK:
             raise CoreError(self.ffi.string(self.lib.bslam_status_name(status)).decode(), message)
+
+    def size_of(self, type_name: str) -> tuple[int, int]:
+        """Bytes of an instance and the hash of the sizes, as the init macros of the header give them."""
+        return self.ffi.sizeof(type_name), self.lib.BSLAM_VISION_HASH
 
     def new_filled(self, type_name: str, **values: Any) -> Any:
         """A struct with these members set and all else zero."""
@@ -243,5 +253,11 @@ class VisionLibrary:
 
 @cache
 def vision_library() -> VisionLibrary:
-    """The one build of the front end."""
+    """The one build of the vision library."""
     return VisionLibrary()
+
+
+@cache
+def vision_training_library() -> VisionLibrary:
+    """The build that shows what is inside it: all that the other one has, and more."""
+    return VisionLibrary(VISION_TRAINING_EXTENSION)
