@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from bslam.core.vision import DetectorModel, FrontEnd
+from bslam.core.vision import DetectorModel
+from bslam.core.vision_training import FrontEnd
 from tools.training.detector_fit import (
     FUSION_LIMIT,
     FUSION_SHARE,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.vision import FrontEnd
+from bslam.core.vision_training import FrontEnd
 from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, dress, free_pose, make_world
 from bslam.world.scenario import load_scenario

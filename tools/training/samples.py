@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core.learner import rendered_seeds
-from bslam.core.vision import BeaconModel, Candidate, FrontEnd
+from bslam.core.vision import BeaconModel, Candidate
+from bslam.core.vision_training import FrontEnd
 from bslam.datasets.pictures import Box, Scaled, camera_for, load_picture
 from bslam.errors import BslamError
 from bslam.rig import Camera

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
-from bslam.core.vision import vision_library
+from bslam.core.raw import vision_training_library
 from bslam.modelfile import AdditiveSvm
 from tools.training.additive import (
     DEVIATION_MIN,
@@ -59,7 +59,7 @@ def test_a_band_and_a_product_are_told(machine: AdditiveSvm) -> None:
 
 
 def test_c_decides_as_python(machine: AdditiveSvm) -> None:
-    library = vision_library()
+    library = vision_training_library()
     keep: list[object] = []
     made = library.ffi.new("bslam_additive_t *", library.additive(machine, keep))
     assert library.lib.bslam_additive_check(made, machine.features) == library.lib.BSLAM_OK

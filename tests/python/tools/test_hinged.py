@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
-from bslam.core.vision import vision_library
+from bslam.core.raw import vision_training_library
 from bslam.modelfile import HingedSvm
 from tools.training.closer import mirrored
 from tools.training.compiled import compile_library
@@ -53,7 +53,7 @@ def test_what_is_far_from_the_middle_either_way_is_told(machine: HingedSvm) -> N
 
 
 def test_c_decides_as_python(machine: HingedSvm) -> None:
-    library = vision_library()
+    library = vision_training_library()
     keep: list[object] = []
     made = library.ffi.new("bslam_hinged_t *", library.hinged(machine, keep))
     assert library.lib.bslam_hinged_check(made, machine.features) == library.lib.BSLAM_OK
@@ -82,7 +82,7 @@ def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -
 
 def pixels_of(half: NDArray[np.uint16], box: tuple[float, float, float, float]) -> NDArray[np.uint8]:
     """What the pixels of a box in a half-resolution copy tell."""
-    library = vision_library()
+    library = vision_training_library()
     pixels = library.ffi.cast("uint16_t *", half.ctypes.data)
     frame = library.new_filled("bslam_frame_t", width_px=WIDTH_PX, height_px=HEIGHT_PX, half=pixels)
     sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))
