@@ -1,5 +1,5 @@
 # Parts of the documents that are generated, so that they cannot lag behind the code.
 
 .PHONY: docs
-docs: setup-run ## write the generated parts of docs/: the table of parameters
-	@$(PYTHON) -m tools.checks.params_doc --into docs/API.md
+docs: setup-run ## write the generated parts of docs/TUNING.md: presets and settings
+	@$(PYTHON) -m tools.checks.params_doc --into docs/TUNING.md

@@ -1,24 +1,16 @@
 """docs/PLUGIN.md and docs/DETECTOR.md: their code runs and does what they say."""
 
 import json
-import os
 import re
-import subprocess
-from pathlib import Path
 
 import pytest
 
 from bslam.cli import main
 from bslam.runs.methods import shipped_methods
+from docs.reading import FIRMWARE, block, output_of, read
 
-ROOT = Path(__file__).resolve().parents[3]
-PLUGIN = (ROOT / "docs" / "PLUGIN.md").read_text(encoding="utf-8")
-DETECTOR = (ROOT / "docs" / "DETECTOR.md").read_text(encoding="utf-8")
-
-
-def block(text, language):
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    return found
+PLUGIN, DETECTOR = read("docs/PLUGIN.md"), read("docs/DETECTOR.md")
+HEADERS = "".join(path.read_text(encoding="utf-8") for path in FIRMWARE.rglob("*.h"))
 
 
 def test_forty_lines_are_an_algorithm_that_works(tmp_path, monkeypatch, capsys):
@@ -42,16 +34,9 @@ def test_algorithms_that_come_along_are_all_listed():
 
 
 def test_detector_example_compiles_and_prints_what_is_said(tmp_path):
-    (tmp_path / "example.c").write_text(block(DETECTOR, "c"))
-    core = sorted(map(str, (ROOT / "firmware" / "bslam").glob("*/*.c")))
-    flags = ["-std=c11", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", f"-I{ROOT / 'firmware'}"]
-    command = [os.environ.get("CC", "cc"), *flags, "example.c", *core, "-lm", "-o", "example"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    done = subprocess.run(["./example"], cwd=tmp_path, check=True, capture_output=True, text=True)
-    assert done.stdout == block(DETECTOR, "text")
+    assert output_of(block(DETECTOR, "c"), tmp_path) == block(DETECTOR, "text")
 
 
 @pytest.mark.parametrize("name", re.findall(r"`(BSLAM_\w+|bslam_\w+)`", DETECTOR))
 def test_names_of_the_core_exist(name):
-    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "firmware" / "bslam").rglob("*.h"))
-    assert re.search(rf"\b{name}\b", text)
+    assert re.search(rf"\b{name}\b", HEADERS)
