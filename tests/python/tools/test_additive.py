@@ -74,13 +74,13 @@ def test_c_decides_as_python(machine: AdditiveSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: AdditiveSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["vision/classifiers/additive.h"], {})
+    header = Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_additive_t", "machine", header.additive("kinds", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(
         tmp_path,
         """#include "machine.h"
-#include "bslam/svm/additive.c"
+#include "vision/classifiers/additive.c"
 void decide(const float *x, float *values);
 void decide(const float *x, float *values)
 {

@@ -65,12 +65,12 @@ def test_c_decides_as_python(machine: HingedSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["vision/classifiers/hinged.h"], {})
+    header = Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_hinged_t", "machine", header.hinged("close", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(
         tmp_path,
-        '#include "machine.h"\n#include "bslam/svm/hinged.c"\nvoid decide(const uint8_t *x, float *values);\n'
+        '#include "machine.h"\n#include "vision/classifiers/hinged.c"\nvoid decide(const uint8_t *x, float *values);\n'
         "void decide(const uint8_t *x, float *values) { bslam_hinged_decide(&machine, x, values); }\n",
     )
     x = samples(3, 100)[0]
