@@ -10,12 +10,12 @@ import pytest
 from bslam.core import CoreError
 from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.vision import FrontEnd
-from bslam.core.vision_training import FrontEnd as OpenFrontEnd
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, make_world, walk
+from tools.training.front_end import FrontEnd as OpenFrontEnd
 
 
 @pytest.fixture
