@@ -19,6 +19,7 @@
 typedef struct camera_input {
     bslam_vision_t vision;
     bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
+    int camera_count;
     uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];
     size_t row_bytes;  ///< of the frame that streams in; 0: there is none
     size_t filled;     ///< bytes of the row that have come

@@ -240,9 +240,8 @@ bool robot_lets_wait(robot_t *robot, const bslam_odometry_reading_t *reading)
     robot->left_ticks = reading->left_ticks;
     robot->right_ticks = reading->right_ticks;
 #if ROBOT_VISUAL_GYRO
-    const bslam_vision_t *vision = &robot->camera.vision;
-    return !reading->has_gyro && vision->camera_count > 0 &&
-           gyro_wait_begin(&robot->gyro_wait, vision, &robot->in_force, reading);
+    return !reading->has_gyro && robot->camera.camera_count > 0 &&
+           gyro_wait_begin(&robot->gyro_wait, &robot->camera, &robot->in_force, reading);
 #else
     return false;
 #endif
@@ -265,7 +264,7 @@ bslam_status_t robot_set_camera(robot_t *robot, int index, const bslam_camera_t 
 {
     const bslam_status_t status = camera_input_set_camera(&robot->camera, index, camera);
 #if ROBOT_VISUAL_GYRO
-    gyro_wait_start(&robot->gyro_wait, &robot->camera.vision);
+    gyro_wait_start(&robot->gyro_wait, &robot->camera);
 #endif
     return status;
 }
@@ -277,7 +276,7 @@ bslam_status_t robot_look(robot_t *robot, int camera, int64_t time_us)
     robot->moves_seen[camera] = robot->moves;
 #if ROBOT_VISUAL_GYRO
     if (status == BSLAM_OK) {
-        gyro_wait_see(&robot->gyro_wait, &robot->camera.vision, camera, time_us);
+        gyro_wait_see(&robot->gyro_wait, &robot->camera, camera, time_us);
     }
 #else
     (void)time_us;
