@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "base/trig.h"
-#include "vision/internal.h"
 
 #include "models/beacons.h"
 #include "picture.h"
