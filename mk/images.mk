@@ -9,13 +9,13 @@ PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # the front end for pictures, turns seen, and the smoother.
-HOST_SIZES := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
+HOST_SIZES := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,session messages own_sensors records map_transfer param_store \
-    camera_input gyro_wait health) firmware/bench/text.c
+ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,robot health camera_input gyro_wait param_store \
+    session messages records map_transfer own_sensors) firmware/bench/text.c
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -67,7 +67,7 @@ build/microbit/shallow.elf: build/microbit/robot.elf
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DSESSION_VISION=1 -DSESSION_TURNS=1 -DSESSION_SMOOTHER=1 -DSESSION_MAP_BYTES=65536
+HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)

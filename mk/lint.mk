@@ -10,7 +10,7 @@ C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES) $(CAMERA_SOURC
 PYTHON_DIRS := $(wildcard host_sim/bslam tools tests/python)
 
 LINTS := lint-columns lint-c-format lint-c-tidy lint-python lint-types lint-layers \
-    lint-complexity lint-version
+    lint-complexity lint-version lint-limits
 
 .PHONY: lint $(LINTS)
 lint: $(LINTS) library-m4f ## formatting, static analysis, layers, symbols, complexity
@@ -39,14 +39,19 @@ lint-python:
 lint-types:
 	@$(PYTHON) -m mypy --no-error-summary
 
-lint-layers:
-	@$(PYTHON) -m tools.checks.check_layers
+# Of the unit tests' objects, in which everything that may be left out is in, and the robot's.
+lint-layers: $(UNIT_CORE_float) $(HOST_ROBOT_OBJECTS)
+	@$(PYTHON) -m tools.checks.check_layers --objects $^
 
 lint-complexity:
 	@$(PYTHON) -m tools.checks.check_complexity $(CORE_SOURCES) $(CORE_HEADERS) $(ROBOT_FILES) $(PYTHON_DIRS)
 
 lint-version:
 	@$(PYTHON) -m tools.checks.check_version
+
+# A table of what the project is held to, beside what it is: tools/checks/limits.toml.
+lint-limits:
+	@$(PYTHON) -m tools.checks.check_limits
 
 .PHONY: format
 format: ## rewrite C and Python files in the house format

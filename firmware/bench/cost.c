@@ -136,17 +136,16 @@ static uint32_t augment_ticks(int beacons)
 static uint32_t associate_ticks(int beacons, bslam_associate_fn associate)
 {
     const bslam_pose_t mount = {0, 0, 0};
-    bslam_match_t matches[SEEN];
+    bslam_record_t records[SEEN];
     bslam_sighting_t seen[SEEN];
     uint32_t ticks = 0;
     for (int k = 0; k < STEPS; k++) {
         for (int i = 0; i < SEEN; i++) {
             seen[i] = see((k * SEEN + i) % beacons);
         }
-        const bslam_sighting_frame_t frame = {
-            &slam.ekf, &slam.settings, &appearance, &mount, seen, SEEN, 0};
+        const bslam_sighting_frame_t frame = {&slam.ekf, &slam.settings, &appearance, &mount, seen, SEEN, 0};
         const uint32_t began = port_ticks();
-        associate(&frame, matches);
+        associate(&frame, records);
         ticks += port_ticks() - began;
     }
     return ticks / STEPS;

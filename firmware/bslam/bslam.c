@@ -28,31 +28,29 @@ static bslam_slam_t *copy_of(bslam_instance_t *robot)
 }
 #endif
 
-static bslam_status_t begin_step(bslam_instance_t *robot)
+/// The pipeline, if its memory is as the step before left it; else NULL, for BSLAM_E_STATE.
+static bslam_slam_t *begin_step(bslam_t *robot)
 {
+    bslam_instance_t *instance = bslam_instance(robot);
 #if BSLAM_GUARD
-    if (robot->slam.settings.guard != 0) {
-        return bslam_guard_check(&robot->guard, &robot->slam);
+    if (instance->slam.settings.guard != 0 &&
+        bslam_guard_check(&instance->guard, &instance->slam) != BSLAM_OK) {
+        return NULL;
     }
 #endif
-    (void)robot;
-    return BSLAM_OK;
-}
-
-static void end_step(bslam_instance_t *robot)
-{
-#if BSLAM_GUARD
-    if (robot->slam.settings.guard != 0) {
-        bslam_guard_seal(&robot->guard, &robot->slam);
-    }
-#endif
-    (void)robot;
+    return &instance->slam;
 }
 
 /// A step that failed has changed counters, which are sealed, too.
-static bslam_status_t ended(bslam_instance_t *robot, bslam_status_t status)
+static bslam_status_t ended(bslam_t *robot, bslam_status_t status)
 {
-    end_step(robot);
+#if BSLAM_GUARD
+    bslam_instance_t *instance = bslam_instance(robot);
+    if (instance->slam.settings.guard != 0) {
+        bslam_guard_seal(&instance->guard, &instance->slam);
+    }
+#endif
+    (void)robot;
     return status;
 }
 
@@ -115,12 +113,8 @@ bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t siz
         return BSLAM_E_COUNT;
     }
     bslam_instance_t *instance = bslam_instance(robot);
-    bslam_status_t status = bslam_slam_init(&instance->slam, settings, bad_setting);
-    if (status == BSLAM_OK) {
-        status = begin_members(instance);
-        end_step(instance);
-    }
-    return status;
+    const bslam_status_t status = bslam_slam_init(&instance->slam, settings, bad_setting);
+    return status != BSLAM_OK ? status : ended(robot, begin_members(instance));
 }
 
 bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
@@ -138,7 +132,7 @@ bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_r
 #if BSLAM_RECOVERY
     bslam_recovery_restart(&instance->recovery);
 #endif
-    return ended(instance, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
+    return ended(robot, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
 #else
     (void)robot;
     (void)position_sd_m;
@@ -151,18 +145,15 @@ bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_r
 
 bslam_status_t bslam_odometry(bslam_t *robot, const bslam_odometry_reading_t *reading)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK ? status : ended(instance, bslam_slam_odometry(&instance->slam, reading));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slam_odometry(slam, reading));
 }
 
 bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK
-               ? status
-               : ended(instance, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE
+                        : ended(robot, bslam_slam_resume_odometry(slam, position_sd_m, heading_sd_rad));
 }
 
 static bslam_status_t take_frame(bslam_instance_t *robot, int64_t time_us, const bslam_sighting_t *sightings,
@@ -178,9 +169,9 @@ static bslam_status_t take_frame(bslam_instance_t *robot, int64_t time_us, const
 
 bslam_status_t bslam_sightings(bslam_t *robot, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK ? status : ended(instance, take_frame(instance, time_us, sightings, count));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE
+                        : ended(robot, take_frame(bslam_instance(robot), time_us, sightings, count));
 }
 
 // ---- results ----------------------------------------------------------------------------------------------
@@ -205,8 +196,8 @@ bslam_health_t bslam_health(const bslam_t *robot)
     const bslam_instance_t *instance = bslam_const_instance(robot);
     bslam_health_t health = {.state = instance->slam.is_lost ? BSLAM_RECOVERY_LOST : BSLAM_RECOVERY_FOLLOWING,
                              .is_frozen = instance->slam.is_frozen,
-                             .beacons = bslam_slam_beacon_count(&instance->slam),
-                             .bad_sighting = bslam_slam_bad_sighting(&instance->slam)};
+                             .beacons = instance->slam.ekf.beacon_count,
+                             .bad_sighting = instance->slam.bad_sighting};
 #if BSLAM_RECOVERY
     health.state = bslam_recovery_state(&instance->recovery, &instance->slam);
 #endif
@@ -220,7 +211,9 @@ uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before)
 
 const bslam_account_t *bslam_results(const bslam_t *robot, int *count)
 {
-    return bslam_slam_accounts(&bslam_const_instance(robot)->slam, count);
+    const bslam_slam_t *slam = &bslam_const_instance(robot)->slam;
+    *count = slam->account_count;
+    return slam->accounts;
 }
 
 bslam_counters_t bslam_counters(const bslam_t *robot)
@@ -249,11 +242,8 @@ bslam_status_t bslam_beacon(const bslam_t *robot, int index, bslam_beacon_view_t
 
 bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t label, bslam_real_t x_m, bslam_real_t y_m)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK
-               ? status
-               : ended(instance, bslam_slam_add_known_beacon(&instance->slam, label, x_m, y_m));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slam_add_known_beacon(slam, label, x_m, y_m));
 }
 
 static bslam_status_t remove_beacon(bslam_slam_t *slam, uint32_t uid)
@@ -267,17 +257,16 @@ static bslam_status_t remove_beacon(bslam_slam_t *slam, uint32_t uid)
 
 bslam_status_t bslam_remove_beacon(bslam_t *robot, uint32_t uid)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK ? status : ended(instance, remove_beacon(&instance->slam, uid));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, remove_beacon(slam, uid));
 }
 
 void bslam_freeze_map(bslam_t *robot, bool is_frozen)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    if (begin_step(instance) == BSLAM_OK) {
-        instance->slam.is_frozen = is_frozen;
-        end_step(instance);
+    bslam_slam_t *slam = begin_step(robot);
+    if (slam != NULL) {
+        slam->is_frozen = is_frozen;
+        (void)ended(robot, BSLAM_OK);
     }
 }
 
@@ -294,11 +283,8 @@ static bslam_status_t set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bsl
 bslam_status_t bslam_set_pose(bslam_t *robot, const bslam_pose_t *pose, bslam_real_t position_sd_m,
                               bslam_real_t heading_sd_rad)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK
-               ? status
-               : ended(instance, set_pose(&instance->slam, pose, position_sd_m, heading_sd_rad));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, set_pose(slam, pose, position_sd_m, heading_sd_rad));
 }
 
 // ---- keeping the map --------------------------------------------------------------------------------------
@@ -311,14 +297,17 @@ bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink
     return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
 }
 
+/// A robot whose map is frozen takes another one frozen.
+static bslam_map_mode_t mode_of(const bslam_slam_t *slam)
+{
+    return slam->is_frozen ? BSLAM_MAP_FROZEN : BSLAM_MAP_LIVING;
+}
+
 bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, bslam_map_fault_t *fault)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
     *fault = BSLAM_MAP_FINE;
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK
-               ? status
-               : ended(instance, bslam_map_load(&instance->slam, source, BSLAM_MAP_LIVING, fault));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_map_load(slam, source, mode_of(slam), fault));
 }
 
 bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
@@ -328,10 +317,8 @@ bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *fl
 
 bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
 {
-    bslam_instance_t *instance = bslam_instance(robot);
     *fault = BSLAM_MAP_FINE;
-    const bslam_status_t status = begin_step(instance);
-    return status != BSLAM_OK
-               ? status
-               : ended(instance, bslam_slots_load(flash, &instance->slam, BSLAM_MAP_LIVING, fault));
+    bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE
+                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }

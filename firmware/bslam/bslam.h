@@ -138,6 +138,9 @@ typedef struct bslam_health {
 /// How the robot is doing. O(1).
 bslam_health_t bslam_health(const bslam_t *robot);
 
+/// Where a chain of fingerprints starts.
+#define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
+
 /// Goes on with a hash of the whole state: two robots that were told the same have the same. O(n²).
 uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before);
 
@@ -288,7 +291,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t l
 /// Takes a beacon out of the map. BSLAM_E_NO_BEACON. O(n²).
 BSLAM_MUST_CHECK bslam_status_t bslam_remove_beacon(bslam_t *robot, uint32_t uid);
 
-/// Frozen: no beacon changes, none is added and none taken out by itself.
+/// Frozen: no beacon is added, learned or taken out by itself. A map that is loaded then stays as it is: its
+/// beacons become known ones, which never change.
 void bslam_freeze_map(bslam_t *robot, bool is_frozen);
 
 /// Puts the robot somewhere in the map, as of the last frame, this doubtful: at a charging station, say.
@@ -347,6 +351,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_s
 
 /// Bytes that the flash takes at once, at places that are multiples of it, are a divisor of this.
 #define BSLAM_FLASH_PIECE 16
+/// Areas of a bslam_flash_t.
+#define BSLAM_SLOTS 2
 
 /// What a board gives to keep a map over a power cut: two areas, each erased as a whole (bytes become 0xff),
 /// of which one always holds a whole map. False: it failed.

@@ -153,7 +153,7 @@ typedef int8_t bslam_stored_t;
 #endif
 
 /// A signature as classifiers keep it: each value x as the nearest whole number to x / BSLAM_SAMPLE_UNIT,
-/// -127 to 127, or as it is in the double-precision build; then a 0, for the constant.
+/// -127 to 127, or as it is in the double-precision build; then a 1 in the same units, the constant.
 typedef struct bslam_sample {
     bslam_stored_t q[BSLAM_SAMPLE_SIZE];
 } bslam_sample_t;

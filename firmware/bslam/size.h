@@ -18,10 +18,11 @@
      BSLAM_BEACONS_MAX * (56 + 4 * BSLAM_SIZE_REAL) + 32)
 /// The values of the settings.
 #define BSLAM_SIZE_SETTINGS (82 * BSLAM_SIZE_REAL + 88 + 2 * BSLAM_SIZE_POINTER)
-/// The pipeline: filter, waiting odometry, and for each sighting its innovation, match and account.
+/// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
-     BSLAM_SIGHTINGS_MAX * (32 + 29 * BSLAM_SIZE_REAL) + 4 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 180)
+     BSLAM_SIGHTINGS_MAX * (36 + 29 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + 4 * BSLAM_SIZE_REAL + \
+     2 * BSLAM_SIZE_POINTER + 180)
 
 #define BSLAM_SIZE_RECOVERY (BSLAM_RECOVERY * (496 + 124 * BSLAM_SIZE_REAL))
 #define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 32 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))

@@ -3,7 +3,7 @@
 #ifndef PORT_KEPT_H
 #define PORT_KEPT_H
 
-#include "bslam/store/slots.h"
+#include "bslam/bslam.h"
 
 /// Erases the older area, writes, reads back. False: it failed, and what was kept before is still there.
 bool kept_save(const bslam_flash_t *flash, const uint8_t *bytes, uint32_t count);

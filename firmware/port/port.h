@@ -69,7 +69,7 @@ typedef struct port_row {
 /// The next row, if one has come.
 bool port_camera_row(port_row_t *row);
 
-/// Two areas of flash for what port_save keeps, as bslam/store/slots.h describes them.
+/// Two areas of flash for what port_save keeps, as bslam/bslam.h, bslam_flash_t describes them.
 struct bslam_flash;
 const struct bslam_flash *port_flash(void);
 
@@ -78,7 +78,7 @@ const struct bslam_flash *port_flash(void);
 bool port_save(const uint8_t *bytes, size_t count);
 bool port_load(uint8_t *bytes, size_t count);
 
-/// Two areas of flash for a map (bslam/store/slots.h); NULL: the board keeps none.
+/// Two areas of flash for a map (bslam/bslam.h, bslam_flash_t); NULL: the board keeps none.
 const struct bslam_flash *port_map_flash(void);
 
 #endif

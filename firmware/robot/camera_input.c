@@ -1,91 +1,86 @@
 #include "robot/camera_input.h"
 
-#if SESSION_VISION
+#if ROBOT_VISION
 
 #include "models/beacons.h"
 
 /// No frame streams in, and none has been looked at.
-static void clear(camera_input_t *seeing)
+static void clear(camera_input_t *input)
 {
-    seeing->row_bytes = 0;
-    seeing->takes_rows = false;
-    seeing->count = 0;
+    input->row_bytes = 0;
+    input->takes_rows = false;
+    input->count = 0;
 }
 
-bslam_status_t camera_input_set_camera(camera_input_t *seeing, int index, const bslam_camera_t *camera)
+bslam_status_t camera_input_set_camera(camera_input_t *input, int index, const bslam_camera_t *camera)
 {
-    clear(seeing);
-    seeing->vision.camera_count = 0;
+    clear(input);
+    input->vision.camera_count = 0;
     if (index < 0 || index >= BSLAM_CAMERAS_MAX) {
         return BSLAM_E_COUNT;
     }
-    seeing->cameras[index] = *camera;
-    const bslam_status_t status =
-        bslam_vision_init(&seeing->vision, &bslam_beacons_model, seeing->cameras, index + 1);
-#if SESSION_TURNS
-    gyro_wait_start(&seeing->turning, &seeing->vision);
-#endif
-    return status;
+    input->cameras[index] = *camera;
+    return bslam_vision_init(&input->vision, &bslam_beacons_model, input->cameras, index + 1);
 }
 
-static bslam_status_t begin(camera_input_t *seeing, int camera, bslam_pixel_format_t format)
+static bslam_status_t begin(camera_input_t *input, int camera, bslam_pixel_format_t format)
 {
-    clear(seeing);
-    if (camera < 0 || camera >= seeing->vision.camera_count) {
+    clear(input);
+    if (camera < 0 || camera >= input->vision.camera_count) {
         return BSLAM_E_COUNT;
     }
-    const bslam_camera_t *lens = &seeing->cameras[camera];
-    return bslam_vision_begin(&seeing->vision, camera, format, lens->width_px, lens->height_px);
+    const bslam_camera_t *lens = &input->cameras[camera];
+    return bslam_vision_begin(&input->vision, camera, format, lens->width_px, lens->height_px);
 }
 
-bslam_status_t camera_input_begin(camera_input_t *seeing, int camera, bslam_pixel_format_t format)
+bslam_status_t camera_input_begin(camera_input_t *input, int camera, bslam_pixel_format_t format)
 {
-    const bslam_status_t status = begin(seeing, camera, format);
+    const bslam_status_t status = begin(input, camera, format);
     if (status == BSLAM_OK) {
         const size_t pixel_bytes = format == BSLAM_PIXELS_RGB888 ? 3 : 2;
-        seeing->row_bytes = (size_t)seeing->cameras[camera].width_px * pixel_bytes;
-        seeing->filled = 0;
+        input->row_bytes = (size_t)input->cameras[camera].width_px * pixel_bytes;
+        input->filled = 0;
     }
     return status;
 }
 
-bslam_status_t camera_input_take(camera_input_t *seeing, uint8_t byte)
+bslam_status_t camera_input_take(camera_input_t *input, uint8_t byte)
 {
-    if (seeing->row_bytes == 0) {
+    if (input->row_bytes == 0) {
         return BSLAM_E_COUNT;
     }
-    seeing->row[seeing->filled++] = byte;
-    if (seeing->filled < seeing->row_bytes) {
+    input->row[input->filled++] = byte;
+    if (input->filled < input->row_bytes) {
         return BSLAM_OK;
     }
-    seeing->filled = 0;
-    return bslam_vision_row(&seeing->vision, seeing->row);
+    input->filled = 0;
+    return bslam_vision_row(&input->vision, input->row);
 }
 
-bslam_status_t camera_input_begin_rows(camera_input_t *seeing, int camera)
+bslam_status_t camera_input_begin_rows(camera_input_t *input, int camera)
 {
-    const bslam_status_t status = begin(seeing, camera, BSLAM_PIXELS_RGB565);
-    seeing->takes_rows = status == BSLAM_OK;
+    const bslam_status_t status = begin(input, camera, BSLAM_PIXELS_RGB565);
+    input->takes_rows = status == BSLAM_OK;
     return status;
 }
 
-bslam_status_t camera_input_take_row(camera_input_t *seeing, const void *pixels)
+bslam_status_t camera_input_take_row(camera_input_t *input, const void *pixels)
 {
-    if (!seeing->takes_rows) {
+    if (!input->takes_rows) {
         return BSLAM_E_COUNT;
     }
-    return bslam_vision_row(&seeing->vision, pixels);
+    return bslam_vision_row(&input->vision, pixels);
 }
 
-bslam_status_t camera_input_look(camera_input_t *seeing, bool robot_moved)
+bslam_status_t camera_input_look(camera_input_t *input, bool robot_moved)
 {
-    clear(seeing);
-    const bslam_status_t status = bslam_vision_end(&seeing->vision, robot_moved);
+    clear(input);
+    const bslam_status_t status = bslam_vision_end(&input->vision, robot_moved);
     int32_t count = 0;
-    const bslam_candidate_t *found = bslam_vision_candidates(&seeing->vision, &count);
+    const bslam_candidate_t *found = bslam_vision_candidates(&input->vision, &count);
     for (int i = 0; status == BSLAM_OK && i < count; i++) {
         if (found[i].has_bearing) {
-            seeing->sightings[seeing->count++] = bslam_sighting_of(&found[i]);
+            input->sightings[input->count++] = bslam_sighting_of(&found[i]);
         }
     }
     return status;

@@ -1,20 +1,22 @@
-/// Pictures that come as pieces of rows, and what is seen in them as sightings: the vision front end behind
-/// the link or a board's camera. Only in an application that is built with SESSION_VISION.
+/// Pictures that come as pieces of rows, and what is seen in them as sightings: the vision library behind the
+/// link or a board's camera. Only in an application that is built with ROBOT_VISION.
 #ifndef ROBOT_CAMERA_INPUT_H
 #define ROBOT_CAMERA_INPUT_H
 
-#include "robot/gyro_wait.h"
-#include "bslam/bslam.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include "vision/vision.h"
 
-#ifndef SESSION_VISION
-#define SESSION_VISION 0
+#ifndef ROBOT_VISION
+#define ROBOT_VISION 0
 #endif
 
-#if SESSION_VISION
+#if ROBOT_VISION
 
-/// All members are this module's own. All zero: no camera yet.
-typedef struct seeing {
+/// All members are this module's own, but for reading. All zero: no camera yet.
+typedef struct camera_input {
     bslam_vision_t vision;
     bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
     uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];
@@ -23,28 +25,25 @@ typedef struct seeing {
     bool takes_rows;   ///< a frame streams in by whole rows
     bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];
     int count;  ///< of sightings in the last finished frame
-#if SESSION_TURNS
-    gyro_wait_t turning;
-#endif
 } camera_input_t;
 
 /// Sets camera `index`, and that there are index + 1; starts over, with empty memories of the room. What
 /// bslam_vision_init refuses, BSLAM_E_COUNT for an index: then there is no camera.
-bslam_status_t camera_input_set_camera(camera_input_t *seeing, int index, const bslam_camera_t *camera);
+bslam_status_t camera_input_set_camera(camera_input_t *input, int index, const bslam_camera_t *camera);
 
 /// Starts a frame of a camera: its statuses are bslam_vision_begin's, BSLAM_E_COUNT: there is no camera.
-bslam_status_t camera_input_begin(camera_input_t *seeing, int camera, bslam_pixel_format_t format);
+bslam_status_t camera_input_begin(camera_input_t *input, int camera, bslam_pixel_format_t format);
 
 /// The next byte of the frame, row after row. bslam_vision_row's statuses.
-bslam_status_t camera_input_take(camera_input_t *seeing, uint8_t byte);
+bslam_status_t camera_input_take(camera_input_t *input, uint8_t byte);
 
 /// The same for a frame in RGB565 that comes in whole rows. A frame begun in the other way ends it.
-bslam_status_t camera_input_begin_rows(camera_input_t *seeing, int camera);
-bslam_status_t camera_input_take_row(camera_input_t *seeing, const void *pixels);
+bslam_status_t camera_input_begin_rows(camera_input_t *input, int camera);
+bslam_status_t camera_input_take_row(camera_input_t *input, const void *pixels);
 
-/// Looks at the frame: its sightings, in the robot's axes, stand in seeing->sightings until the next frame
+/// Looks at the frame: its sightings, in the robot's axes, stand in input->sightings until the next frame
 /// begins. bslam_vision_end's statuses.
-bslam_status_t camera_input_look(camera_input_t *seeing, bool robot_moved);
+bslam_status_t camera_input_look(camera_input_t *input, bool robot_moved);
 
 #endif
 #endif

@@ -1,10 +1,11 @@
 #include "robot/gyro_wait.h"
-#include "base/scalar.h"
 
-#if SESSION_TURNS
+#if ROBOT_VISUAL_GYRO
 
-#define SPEED_SD_LEAST_MPS 0.01f  // where the parameters say that the wheels hardly err
+#define SPEED_SD_LEAST_MPS 0.01f  // where the settings say that the wheels hardly err
 #define SPEED_SD_MOST_MPS 100.0f
+#define TURN_RAD 6.2831853f
+#define ROOT_HALF 0.70710678f
 
 /// A lens of 180 degrees among the cameras makes all rates rough.
 static bslam_real_t least_sd_radps(const bslam_vision_t *vision)
@@ -17,67 +18,81 @@ static bslam_real_t least_sd_radps(const bslam_vision_t *vision)
     return BSLAM_VISUAL_GYRO_SD_RADPS;
 }
 
-void gyro_wait_start(gyro_wait_t *turning, const bslam_vision_t *vision)
+void gyro_wait_start(gyro_wait_t *wait, const bslam_vision_t *vision)
 {
-    bslam_turns_init(&turning->turns, vision);
-    bslam_visual_gyro_init(&turning->gyro, least_sd_radps(vision));
-    bslam_odometry_init(&turning->wheels);
-    turning->is_waiting = false;
+    bslam_turns_init(&wait->turns, vision);
+    bslam_visual_gyro_init(&wait->gyro, least_sd_radps(vision));
+    wait->is_waiting = false;
 }
 
-static bslam_real_t within_limits(bslam_real_t sd_mps)
+/// How far a wheel went: its counter rolls over at counter_bits.
+static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, uint32_t after,
+                             bslam_real_t radius_m)
 {
+    const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
+    const int64_t scaled = (int32_t)((after - before) << unused_bits);
+    const bslam_real_t ticks = (bslam_real_t)(scaled / (INT64_C(1) << unused_bits));
+    return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
+}
+
+/// Forward, mean since the reading before.
+static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odometry_reading_t *before,
+                              const bslam_odometry_reading_t *now)
+{
+    const bslam_real_t left_m =
+        travel_m(settings, before->left_ticks, now->left_ticks, settings->left_radius_m);
+    const bslam_real_t right_m =
+        travel_m(settings, before->right_ticks, now->right_ticks, settings->right_radius_m);
+    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(now->time_us - before->time_us);
+}
+
+/// Of the mean of two wheels that err independently.
+static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
+{
+    const bslam_real_t sd_mps =
+        ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
     if (sd_mps > SPEED_SD_MOST_MPS) {
         return SPEED_SD_MOST_MPS;
     }
     return sd_mps < SPEED_SD_LEAST_MPS ? SPEED_SD_LEAST_MPS : sd_mps;
 }
 
-static bslam_status_t advance(bslam_visual_gyro_t *gyro, int64_t time_us, const bslam_motion_t *motion)
+bool gyro_wait_begin(gyro_wait_t *wait, const bslam_vision_t *vision, const bslam_settings_t *settings,
+                     const bslam_odometry_reading_t *reading)
 {
-    bslam_real_t speed_mps = 0;
-    bslam_real_t sd_mps = SPEED_SD_LEAST_MPS;
-    if (motion->dt_s > 0) {
-        speed_mps = motion->forward_m / motion->dt_s;
-        sd_mps = within_limits(bslam_sqrt(motion->forward_var_m2) / motion->dt_s);
-    }
-    return bslam_visual_gyro_advance(gyro, time_us, speed_mps, sd_mps);
-}
-
-bool gyro_wait_wait(gyro_wait_t *turning, const bslam_vision_t *vision, const bslam_settings_t *settings,
-                    const bslam_odometry_reading_t *reading)
-{
-    bslam_motion_t motion;
-    if (bslam_odometry_read(&turning->wheels, settings, reading, &motion) != BSLAM_OK ||
-        advance(&turning->gyro, reading->time_us, &motion) != BSLAM_OK) {
-        gyro_wait_start(turning, vision);
+    const bool follows = wait->gyro.running && reading->time_us > wait->reading.time_us;
+    const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
+    const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
+    wait->reading = *reading;
+    if (jumped || bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) !=
+                      BSLAM_OK) {
+        gyro_wait_start(wait, vision);
         return false;
     }
-    turning->reading = *reading;
-    turning->is_waiting = true;
+    wait->is_waiting = true;
     return true;
 }
 
-void gyro_wait_see(gyro_wait_t *turning, const bslam_vision_t *vision, int camera, int64_t time_us)
+void gyro_wait_see(gyro_wait_t *wait, const bslam_vision_t *vision, int camera, int64_t time_us)
 {
-    if (!turning->gyro.running || turning->gyro.time_us != time_us) {
+    if (!wait->gyro.running || wait->gyro.time_us != time_us) {
         return;
     }
     bslam_turn_t turn;
-    const bool tells = bslam_turns_see(&turning->turns, vision, &turn);
-    const bslam_status_t status = bslam_visual_gyro_take(&turning->gyro, camera, tells ? &turn : NULL);
-    if (status == BSLAM_OK && turning->is_waiting) {
-        bslam_odometry_reading_t *reading = &turning->reading;
+    const bool tells = bslam_turns_see(&wait->turns, vision, &turn);
+    const bslam_status_t status = bslam_visual_gyro_take(&wait->gyro, camera, tells ? &turn : NULL);
+    if (status == BSLAM_OK && wait->is_waiting) {
+        bslam_odometry_reading_t *reading = &wait->reading;
         reading->has_gyro =
-            bslam_visual_gyro_rate(&turning->gyro, &reading->gyro_radps, &reading->gyro_sd_radps);
+            bslam_visual_gyro_rate(&wait->gyro, &reading->gyro_radps, &reading->gyro_sd_radps);
     }
 }
 
-bool gyro_wait_end_wait(gyro_wait_t *turning, bslam_odometry_reading_t *reading)
+bool gyro_wait_end(gyro_wait_t *wait, bslam_odometry_reading_t *reading)
 {
-    const bool was_waiting = turning->is_waiting;
-    turning->is_waiting = false;
-    *reading = turning->reading;
+    const bool was_waiting = wait->is_waiting;
+    wait->is_waiting = false;
+    *reading = wait->reading;
     return was_waiting;
 }
 

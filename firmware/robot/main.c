@@ -1,45 +1,20 @@
 /// The example application: a robot whose encoders, gyro and cameras, if the port has any, and whose host,
-/// over the link, feed the filter; pose, map and accounts go back over the link.
-#include "robot/session.h"
+/// over the link, feed the estimator; pose, map and accounts go back over the link.
 #include "port/port.h"
+#include "robot/own_sensors.h"
+#include "robot/robot.h"
+#include "robot/session.h"
 
-PORT_KEPT static session_t session;
-
-static void take_bytes(void)
-{
-    int byte = port_read();
-    while (byte >= 0) {
-        session_take(&session, (uint8_t)byte);
-        byte = port_read();
-    }
-}
-
-static void take_reading(void)
-{
-    bslam_odometry_reading_t reading;
-    if (session_read_body(&reading)) {
-        session_take_reading(&session, &reading);
-    }
-}
-
-static void take_camera(void)
-{
-#if SESSION_VISION
-    port_row_t row;
-    if (port_camera_row(&row)) {
-        session_take_row(&session, &row);
-    }
-#endif
-}
+PORT_KEPT static robot_t robot;
+static session_t session;
 
 int main(void)
 {
     port_init();
-    session_init(&session);
+    session_start(&session, &robot);
     for (;;) {
-        take_bytes();
-        take_reading();
-        take_camera();
+        session_listen(&session);
+        own_sensors_take(&robot, &session);
         port_watchdog();
     }
 }

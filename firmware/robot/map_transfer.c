@@ -1,5 +1,7 @@
 #include "robot/map_transfer.h"
 
+#include <string.h>
+
 /// Bytes of a map in one answer, behind its status, detail and size.
 #define PIECE_BYTES (BSLAM_LINK_PAYLOAD_MAX - 6)
 
@@ -25,54 +27,61 @@ static bool take_piece(void *context, const void *bytes, uint32_t count)
     return true;
 }
 
-void map_transfer_put(const bslam_slam_t *slam, uint32_t at, bslam_link_writer_t *out)
+void map_transfer_put(const bslam_t *slam, uint32_t at, bslam_link_writer_t *out)
 {
-    bslam_link_put_u32(out, bslam_map_size(slam));
+    uint32_t size = 0;
+    bslam_status_t status = bslam_save_map(slam, NULL, &size);
+    bslam_link_put_u32(out, size);
     piece_t piece = {.before = at, .left = PIECE_BYTES, .out = out};
     const bslam_map_sink_t sink = {take_piece, &piece};
-    bslam_map_fault_t fault;
-    const bslam_status_t status = bslam_map_write(slam, &sink, &fault);
-    (void)status;  // the sink takes all
+    if (status == BSLAM_OK) {
+        status = bslam_save_map(slam, &sink, &size);
+    }
+    (void)status;  // of a map that cannot be read nothing is put
 }
 
 #if SESSION_MAP_BYTES > 0
 
-bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t *reader)
+bool map_transfer_take(map_transfer_t *transfer, uint32_t at, bslam_link_reader_t *reader)
 {
-    if (at > sizeof carried->bytes || reader->left > sizeof carried->bytes - at) {
+    if (at > sizeof transfer->bytes || reader->left > sizeof transfer->bytes - at) {
         return false;
     }
     for (uint32_t to = at; reader->left > 0; to++) {
-        carried->bytes[to] = bslam_link_get_u8(reader);
+        transfer->bytes[to] = bslam_link_get_u8(reader);
     }
     return true;
 }
 
-bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
-                                 bslam_map_mode_t mode)
+static bool read_bytes(const void *context, uint32_t at, void *bytes, uint32_t count)
 {
-    const uint32_t held = size < sizeof carried->bytes ? size : (uint32_t)sizeof carried->bytes;
-    const bslam_map_source_t source = bslam_map_from_memory(carried->bytes, held);
-    return bslam_map_load(slam, &source, mode, &carried->fault);
+    const map_transfer_t *transfer = context;
+    memcpy(bytes, &transfer->bytes[at], count);
+    return true;
+}
+
+bslam_status_t map_transfer_load(map_transfer_t *transfer, bslam_t *slam, uint32_t size)
+{
+    const uint32_t held = size < sizeof transfer->bytes ? size : (uint32_t)sizeof transfer->bytes;
+    const bslam_map_source_t source = {read_bytes, transfer, held};
+    return bslam_load_map(slam, &source, &transfer->fault);
 }
 
 #else
 
-bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t *reader)
+bool map_transfer_take(map_transfer_t *transfer, uint32_t at, bslam_link_reader_t *reader)
 {
-    (void)carried;
+    (void)transfer;
     (void)at;
     (void)reader;
     return false;
 }
 
-bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
-                                 bslam_map_mode_t mode)
+bslam_status_t map_transfer_load(map_transfer_t *transfer, bslam_t *slam, uint32_t size)
 {
     (void)slam;
     (void)size;
-    (void)mode;
-    carried->fault = BSLAM_MAP_UNREADABLE;
+    transfer->fault = BSLAM_MAP_UNREADABLE;
     return BSLAM_E_MAP;
 }
 

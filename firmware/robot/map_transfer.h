@@ -12,7 +12,7 @@
 #endif
 
 /// All members are its own.
-typedef struct carried {
+typedef struct map_transfer {
     bslam_map_fault_t fault;  ///< of the last map that was to be loaded
 #if SESSION_MAP_BYTES > 0
     uint8_t bytes[SESSION_MAP_BYTES];
@@ -21,14 +21,13 @@ typedef struct carried {
 
 /// Puts the size of the map and its bytes from place `at` on, as many as one message holds. The map is
 /// written anew for each piece: nothing is kept, and what changed in between shows by the CRC. O(n² +
-/// machines).
-void map_transfer_put(const bslam_slam_t *slam, uint32_t at, bslam_link_writer_t *out);
+/// classifiers).
+void map_transfer_put(const bslam_t *slam, uint32_t at, bslam_link_writer_t *out);
 
 /// Takes what is left of a message as the bytes of a map from place `at` on. False: there is no such room.
-bool map_transfer_take(map_transfer_t *carried, uint32_t at, bslam_link_reader_t *reader);
+bool map_transfer_take(map_transfer_t *transfer, uint32_t at, bslam_link_reader_t *reader);
 
-/// Loads the `size` bytes that were taken (bslam_map_load).
-BSLAM_MUST_CHECK bslam_status_t map_transfer_load(map_transfer_t *carried, bslam_slam_t *slam, uint32_t size,
-                                                  bslam_map_mode_t mode);
+/// Loads the `size` bytes that were taken (bslam_load_map).
+BSLAM_MUST_CHECK bslam_status_t map_transfer_load(map_transfer_t *transfer, bslam_t *slam, uint32_t size);
 
 #endif

@@ -1,16 +1,13 @@
 #include "robot/messages.h"
 
-#include "robot/records.h"
-#include "robot/param_store.h"
 #include "port/port.h"
+#include "robot/param_store.h"
+#include "robot/records.h"
 
 #define BEACON_BYTES 43
 #define BEACONS_A_FRAME ((BSLAM_LINK_PAYLOAD_MAX - 16) / BEACON_BYTES)
 #define FLAG_FINGERPRINT 1u
-#define FLAG_LOOKS 2u
 #define FLAG_AS_IT_IS 4u
-#define FLAG_RECOVERY 8u
-#define FLAG_GUARD 16u
 #define FLAG_MOVED 1u
 
 // ---- applied: the payload in, a status out ---------------------------------------------------------------
@@ -30,17 +27,16 @@ static void keep(session_t *session, bslam_status_t status)
     session->last_status = (uint8_t)status;
 }
 
-static void forget_seeds(session_t *session)
+/// After a call of the estimator itself.
+static void end_call(session_t *session, bslam_status_t status)
 {
-#if SESSION_APPEARANCE
-    session->seed_count = 0;
-#else
-    (void)session;
-#endif
+    keep(session, status);
+    robot_end_call(session->robot, status, session->parser.header.time_us);
 }
 
 static void apply_hello(session_t *session, bslam_link_reader_t *reader)
 {
+    robot_t *robot = session->robot;
     const uint32_t id = bslam_link_get_u32(reader);
     const uint8_t flags = bslam_link_get_u8(reader);
     if (is_whole(session, reader)) {
@@ -48,65 +44,23 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         session->open = true;
         session->takes_fingerprints = (flags & FLAG_FINGERPRINT) != 0;
         if ((flags & FLAG_AS_IT_IS) != 0) {
-            session->settings = session->slam.settings;
+            robot->settings = robot->in_force;
         } else {
-            session->uses_appearance = (flags & FLAG_LOOKS) != 0;
-            health_init(&session->watch, (flags & FLAG_RECOVERY) != 0, (flags & FLAG_GUARD) != 0);
-            bslam_settings_preset(&session->settings, BSLAM_PRESET_PAPER);
+            const bslam_counters_t counters = bslam_counters(&robot->slam);
+            health_init(&robot->health, &counters);
+            bslam_settings_preset(&robot->settings, BSLAM_PRESET_REAL_WHEELS);
         }
-        forget_seeds(session);
         keep(session, BSLAM_OK);
     }
-}
-
-/// Where the host wishes it, and where identity is told by looks.
-static uint8_t attach_looks(session_t *session)
-{
-    session->uses_appearance |= session->settings.association == BSLAM_ASSOCIATION_SVM;
-    if (!session->uses_appearance) {
-        return BSLAM_OK;
-    }
-#if SESSION_APPEARANCE
-    const bslam_status_t status =
-        bslam_appearance_init(&session->appearance, session->seeds, session->seed_count);
-    if (status == BSLAM_OK) {
-        bslam_slam_attach_appearance(&session->slam, &session->appearance);
-    }
-    return (uint8_t)status;
-#else
-    return SESSION_E_APPEARANCE;
-#endif
-}
-
-/// Where the parameters ask for it.
-static uint8_t attach_smoother(session_t *session)
-{
-#if SESSION_SMOOTHER
-    bslam_slam_attach_smoother(&session->slam, &session->smoother);
-    return BSLAM_OK;
-#else
-    return session->settings.filter == BSLAM_FILTER_SMOOTHER ? SESSION_E_SMOOTHER : BSLAM_OK;
-#endif
-}
-
-uint8_t session_start_over(session_t *session, int *bad_id)
-{
-    const bslam_status_t status = bslam_slam_init(&session->slam, &session->settings, bad_id);
-    session->fingerprint = BSLAM_FINGERPRINT_START;
-    health_restart(&session->watch);
-    uint8_t attached = (uint8_t)status;
-    if (status == BSLAM_OK) {
-        attached = attach_smoother(session);
-    }
-    return attached == BSLAM_OK ? attach_looks(session) : attached;
 }
 
 static void apply_reset(session_t *session, bslam_link_reader_t *reader)
 {
     if (is_whole(session, reader)) {
-        int bad_id = NO_DETAIL;
-        session->last_status = session_start_over(session, &bad_id);
-        session->detail = (uint8_t)bad_id;
+        int bad_setting = SESSION_NO_DETAIL;
+        keep(session, robot_start_over(session->robot, &bad_setting));
+        session->detail = (uint8_t)bad_setting;
+        session->fingerprint = BSLAM_FINGERPRINT_START;
     }
 }
 
@@ -131,13 +85,12 @@ static void apply_odometry(session_t *session, bslam_link_reader_t *reader)
     reading.gyro_sd_radps = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
         const uint32_t began = port_ticks();
-        keep(session, bslam_slam_odometry(&session->slam, &reading));
+        keep(session, robot_odometry(session->robot, &reading));
         session->ticks = port_ticks() - began;
-        session->moves++;
     }
 }
 
-#if SESSION_APPEARANCE
+#if BSLAM_APPEARANCE
 
 static void read_signature(bslam_link_reader_t *reader, float signature[BSLAM_SAMPLE_FEATURES])
 {
@@ -171,33 +124,51 @@ static void apply_signatures(session_t *session, bslam_link_reader_t *reader)
     }
 }
 
-/// Encodes signatures into samples, all into the same one where `step` is 0.
-static bslam_status_t read_seeds(bslam_link_reader_t reader, int count, bslam_sample_t *samples, int step)
+/// A signature as classifiers keep it. False: not finite.
+static bool encode(const float signature[BSLAM_SAMPLE_FEATURES], bslam_sample_t *sample)
 {
-    bslam_status_t status = BSLAM_OK;
-    for (int i = 0; i < count && status == BSLAM_OK; i++) {
-        float signature[BSLAM_SAMPLE_FEATURES];
-        read_signature(&reader, signature);
-        status = bslam_sample_encode(signature, &samples[i * step]);
+    for (int k = 0; k < BSLAM_SAMPLE_FEATURES; k++) {
+        const float x = signature[k];
+        if (!(x >= -1e12f && x <= 1e12f)) {
+            return false;
+        }
+        const float limited = x < -1.0f ? -1.0f : x > 1.0f ? 1.0f : x;
+        sample->q[k] = (bslam_stored_t)(limited / BSLAM_SAMPLE_UNIT + (x < 0.0f ? -0.5f : 0.5f));
     }
-    return status;
+    sample->q[BSLAM_SAMPLE_FEATURES] = (bslam_stored_t)(1.0f / BSLAM_SAMPLE_UNIT + 0.5f);
+    return true;
 }
 
-/// Machines that run already learn from the seeds: none is written unless all are good.
+/// Encodes signatures into samples, all into the same one where `step` is 0. False: one is not finite.
+static bool read_seeds(bslam_link_reader_t reader, int count, bslam_sample_t *samples, int step)
+{
+    bool good = true;
+    for (int i = 0; i < count && good; i++) {
+        float signature[BSLAM_SAMPLE_FEATURES];
+        read_signature(&reader, signature);
+        good = encode(signature, &samples[i * step]);
+    }
+    return good;
+}
+
+/// Classifiers that run may already learn from the seeds: none is written unless all are good.
 static void apply_seeds(session_t *session, bslam_link_reader_t *reader)
 {
+    robot_t *robot = session->robot;
     const int first = bslam_link_get_u8(reader);
     const int count = bslam_link_get_u8(reader);
+    bslam_sample_t tried;
     if (first + count > BSLAM_SEEDS_MAX) {
         keep(session, BSLAM_E_COUNT);
     } else if (holds_signatures(session, reader, count)) {
-        bslam_sample_t tried;
-        bslam_status_t status = read_seeds(*reader, count, &tried, 0);
-        if (status == BSLAM_OK) {
-            status = read_seeds(*reader, count, &session->seeds[first], 1);
-            session->seed_count = first + count;
+        const bool good = read_seeds(*reader, count, &tried, 0);
+        if (good) {
+            (void)read_seeds(*reader, count, &robot->seeds[first], 1);
+            robot_seal_seeds(robot);
+            robot->settings.seeds = robot->seeds;
+            robot->settings.seed_count = first + count;
         }
-        keep(session, status);
+        keep(session, good ? BSLAM_OK : BSLAM_E_NOT_FINITE);
     }
 }
 
@@ -227,9 +198,9 @@ static void apply_sightings(session_t *session, bslam_link_reader_t *reader)
     if (count > BSLAM_SIGHTINGS_MAX || is_whole(session, reader)) {
         const uint32_t began = port_ticks();
         const int64_t time_us = session->parser.header.time_us;
-        keep(session, health_sightings(&session->watch, &session->slam, time_us, session->sightings, count));
+        keep(session, robot_sightings(session->robot, time_us, session->sightings, count));
         session->ticks = port_ticks() - began;
-        session->detail = (uint8_t)bslam_slam_bad_sighting(&session->slam);
+        session->detail = (uint8_t)bslam_health(&session->robot->slam).bad_sighting;
     }
 }
 
@@ -238,7 +209,7 @@ static void apply_resume(session_t *session, bslam_link_reader_t *reader)
     const bslam_real_t position_sd_m = bslam_link_get_real(reader);
     const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_slam_resume_odometry(&session->slam, position_sd_m, heading_sd_rad));
+        end_call(session, bslam_resume_odometry(&session->robot->slam, position_sd_m, heading_sd_rad));
     }
 }
 
@@ -251,7 +222,7 @@ static void apply_set_pose(session_t *session, bslam_link_reader_t *reader)
     const bslam_real_t position_sd_m = bslam_link_get_real(reader);
     const bslam_real_t heading_sd_rad = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_slam_set_pose(&session->slam, &pose, position_sd_m, heading_sd_rad));
+        end_call(session, bslam_set_pose(&session->robot->slam, &pose, position_sd_m, heading_sd_rad));
     }
 }
 
@@ -261,7 +232,7 @@ static void apply_known_beacon(session_t *session, bslam_link_reader_t *reader)
     const bslam_real_t x_m = bslam_link_get_real(reader);
     const bslam_real_t y_m = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_slam_add_known_beacon(&session->slam, label, x_m, y_m));
+        end_call(session, bslam_add_known_beacon(&session->robot->slam, label, x_m, y_m));
     }
 }
 
@@ -269,7 +240,7 @@ static void apply_remove_beacon(session_t *session, bslam_link_reader_t *reader)
 {
     const uint32_t uid = bslam_link_get_u32(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_slam_remove_beacon(&session->slam, uid));
+        end_call(session, bslam_remove_beacon(&session->robot->slam, uid));
     }
 }
 
@@ -278,15 +249,15 @@ static void apply_param_set(session_t *session, bslam_link_reader_t *reader)
     const int id = bslam_link_get_u16(reader);
     const bslam_real_t value = bslam_link_get_real(reader);
     if (is_whole(session, reader)) {
-        keep(session, bslam_settings_set(&session->settings, id, value));
+        keep(session, bslam_settings_set(&session->robot->settings, id, value));
     }
 }
 
 static void apply_param_save(session_t *session, bslam_link_reader_t *reader)
 {
     if (is_whole(session, reader)) {
-        session->last_status =
-            param_store_params_save(&session->settings) ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
+        const bool saved = param_store_save(&session->robot->settings);
+        session->last_status = saved ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
     }
 }
 
@@ -295,7 +266,8 @@ static void apply_map_save(session_t *session, bslam_link_reader_t *reader)
     if (is_whole(session, reader)) {
         const bslam_flash_t *flash = port_map_flash();
         bslam_map_fault_t fault;
-        const bool saved = flash != NULL && bslam_slots_save(flash, &session->slam, &fault) == BSLAM_OK;
+        const bool saved =
+            flash != NULL && bslam_save_to_flash(&session->robot->slam, flash, &fault) == BSLAM_OK;
         session->last_status = saved ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
     }
 }
@@ -303,19 +275,23 @@ static void apply_map_save(session_t *session, bslam_link_reader_t *reader)
 static void apply_map_write(session_t *session, bslam_link_reader_t *reader)
 {
     const uint32_t at = bslam_link_get_u32(reader);
-    const bool taken = !reader->failed && map_transfer_take(&session->carried, at, reader);
+    const bool taken = !reader->failed && map_transfer_take(&session->map, at, reader);
     session->last_status = taken ? (uint8_t)BSLAM_OK : (uint8_t)SESSION_E_STORE;
 }
 
 static void apply_map_load(session_t *session, bslam_link_reader_t *reader)
 {
+    bslam_t *slam = &session->robot->slam;
     const uint32_t size = bslam_link_get_u32(reader);
-    const bslam_map_mode_t mode = bslam_link_get_u8(reader) == 0 ? BSLAM_MAP_LIVING : BSLAM_MAP_FROZEN;
+    const bool freezes = bslam_link_get_u8(reader) != 0;
     if (is_whole(session, reader)) {
-        keep(session, map_transfer_load(&session->carried, &session->slam, size, mode));
-        if (session->last_status == BSLAM_OK) {
-            health_restart(&session->watch);
+        const bool was_frozen = bslam_health(slam).is_frozen;
+        bslam_freeze_map(slam, freezes);
+        const bslam_status_t status = map_transfer_load(&session->map, slam, size);
+        if (status != BSLAM_OK) {
+            bslam_freeze_map(slam, was_frozen);
         }
+        end_call(session, status);
     }
 }
 
@@ -326,7 +302,7 @@ static void apply_nothing(session_t *session, bslam_link_reader_t *reader)
     keep(session, BSLAM_OK);
 }
 
-#if SESSION_VISION
+#if ROBOT_VISION
 
 static void apply_camera(session_t *session, bslam_link_reader_t *reader)
 {
@@ -342,7 +318,7 @@ static void apply_camera(session_t *session, bslam_link_reader_t *reader)
     }
     camera.zoom = bslam_link_get_u8(reader);
     if (is_whole(session, reader)) {
-        keep(session, camera_input_set_camera(&session->seeing, index, &camera));
+        keep(session, robot_set_camera(session->robot, index, &camera));
     }
 }
 
@@ -352,7 +328,7 @@ static void apply_image(session_t *session, bslam_link_reader_t *reader)
     const bslam_pixel_format_t format = (bslam_pixel_format_t)bslam_link_get_u8(reader);
     if (is_whole(session, reader)) {
         session->ticks = 0;
-        keep(session, camera_input_begin(&session->seeing, camera, format));
+        keep(session, camera_input_begin(&session->robot->camera, camera, format));
     }
 }
 
@@ -361,7 +337,7 @@ static void apply_pixels(session_t *session, bslam_link_reader_t *reader)
     const uint32_t began = port_ticks();
     bslam_status_t status = BSLAM_OK;
     while (reader->left > 0 && status == BSLAM_OK) {
-        status = camera_input_take(&session->seeing, bslam_link_get_u8(reader));
+        status = camera_input_take(&session->robot->camera, bslam_link_get_u8(reader));
     }
     keep(session, status);
     session->ticks += port_ticks() - began;
@@ -372,11 +348,11 @@ static void apply_look(session_t *session, bslam_link_reader_t *reader)
     const bool moved = (bslam_link_get_u8(reader) & FLAG_MOVED) != 0;
     if (is_whole(session, reader)) {
         const uint32_t began = port_ticks();
-        camera_input_t *seeing = &session->seeing;
-        bslam_status_t status = camera_input_look(seeing, moved);
+        camera_input_t *input = &session->robot->camera;
+        bslam_status_t status = camera_input_look(input, moved);
         if (status == BSLAM_OK) {
-            status = health_sightings(&session->watch, &session->slam, session->parser.header.time_us,
-                                      seeing->sightings, seeing->count);
+            status = robot_sightings(session->robot, session->parser.header.time_us, input->sightings,
+                                     input->count);
         }
         keep(session, status);
         session->ticks += port_ticks() - began;
@@ -387,9 +363,9 @@ static void apply_look(session_t *session, bslam_link_reader_t *reader)
 
 // ---- answered: from the state as it stands, so that one that was lost can be given again -----------------
 
-void session_put_step(session_t *session, bslam_link_writer_t *out)
+void message_put_step(const session_t *session, bslam_link_writer_t *out)
 {
-    record_put_step(out, &session->slam, session->fingerprint, session->ticks);
+    record_put_step(out, &session->robot->slam, session->fingerprint, session->ticks);
 }
 
 static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
@@ -403,7 +379,7 @@ static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_
     bslam_link_put_u16(out, BSLAM_RAYS_MAX);
     bslam_link_put_u16(out, BSLAM_SIGHTINGS_MAX);
     bslam_link_put_u16(out, BSLAM_HISTORY_MAX);
-    bslam_link_put_u16(out, (uint16_t)bslam_settings_count());
+    bslam_link_put_u16(out, (uint16_t)param_store_count());
     bslam_link_put_u16(out, param_store_names_crc());
     bslam_link_put_u32(out, port_ticks_hz());
     const uint8_t *build_id = port_build_id();
@@ -415,14 +391,14 @@ static void answer_hello(session_t *session, bslam_link_reader_t *reader, bslam_
 static void answer_step(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    session_put_step(session, out);
+    message_put_step(session, out);
 }
 
 static void answer_sightings(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    session_put_step(session, out);
-    record_put_accounts(out, &session->slam);
+    message_put_step(session, out);
+    record_put_accounts(out, &session->robot->slam);
 }
 
 static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
@@ -435,14 +411,14 @@ static void answer_nothing(session_t *session, bslam_link_reader_t *reader, bsla
 static void answer_param(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     const int id = bslam_link_get_u16(reader);
-    bslam_link_put_real(out, bslam_settings_get(&session->settings, id));
+    bslam_link_put_real(out, param_store_get(&session->robot->settings, id));
 }
 
 static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
     bslam_pose_t pose = {0, 0, 0};
-    const bslam_status_t status = bslam_slam_pose_at(&session->slam, session->parser.header.time_us, &pose);
+    const bslam_status_t status = bslam_pose_at(&session->robot->slam, session->parser.header.time_us, &pose);
     bslam_link_put_u8(out, (uint8_t)status);
     bslam_link_put_real(out, pose.x_m);
     bslam_link_put_real(out, pose.y_m);
@@ -451,7 +427,7 @@ static void answer_pose_at(session_t *session, bslam_link_reader_t *reader, bsla
 
 static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
-    const int total = bslam_slam_beacon_count(&session->slam);
+    const int total = (int)bslam_health(&session->robot->slam).beacons;
     const int first = bslam_link_get_u8(reader);
     const int rest = first < total ? total - first : 0;
     const int count = rest < BEACONS_A_FRAME ? rest : BEACONS_A_FRAME;
@@ -459,43 +435,35 @@ static void answer_map(session_t *session, bslam_link_reader_t *reader, bslam_li
     bslam_link_put_u8(out, (uint8_t)count);
     for (int i = 0; i < count; i++) {
         bslam_beacon_view_t view;
-        if (bslam_slam_beacon(&session->slam, first + i, &view) == BSLAM_OK) {
+        if (bslam_beacon(&session->robot->slam, first + i, &view) == BSLAM_OK) {
             record_put_beacon(out, &view);
         }
     }
 }
 
-_Static_assert(2 + sizeof(bslam_counters_t) + sizeof(bslam_appearance_counters_t) +
+_Static_assert(2 + sizeof(bslam_slam_counters_t) + sizeof(bslam_appearance_counters_t) +
                        sizeof(bslam_learner_counters_t) + sizeof(bslam_link_counters_t) + 8 <=
                    BSLAM_LINK_PAYLOAD_MAX,
                "the counters are one answer");
 
 static void answer_map_read(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
-    map_transfer_put(&session->slam, bslam_link_get_u32(reader), out);
+    map_transfer_put(&session->robot->slam, bslam_link_get_u32(reader), out);
 }
 
 static void answer_map_load(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    bslam_link_put_u8(out, (uint8_t)session->carried.fault);
+    bslam_link_put_u8(out, (uint8_t)session->map.fault);
 }
 
 static void answer_counters(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    record_put_counters(out, &session->slam.counters, sizeof session->slam.counters);
-#if SESSION_APPEARANCE
-    const bslam_appearance_counters_t *appearance = &session->appearance.counters;
-    const bslam_learner_counters_t *learner = &session->appearance.learner.counters;
-#else
-    static const bslam_appearance_counters_t no_looks;
-    static const bslam_learner_counters_t no_learner;
-    const bslam_appearance_counters_t *appearance = &no_looks;
-    const bslam_learner_counters_t *learner = &no_learner;
-#endif
-    record_put_counters(out, appearance, sizeof *appearance);
-    record_put_counters(out, learner, sizeof *learner);
+    const bslam_counters_t counters = bslam_counters(&session->robot->slam);
+    record_put_counters(out, &counters.slam, sizeof counters.slam);
+    record_put_counters(out, &counters.appearance, sizeof counters.appearance);
+    record_put_counters(out, &counters.learner, sizeof counters.learner);
     record_put_counters(out, &session->parser.counters, sizeof session->parser.counters);
     bslam_link_put_u32(out, session->repeated);
     bslam_link_put_u32(out, session->replayed);
@@ -504,32 +472,33 @@ static void answer_counters(session_t *session, bslam_link_reader_t *reader, bsl
 static void answer_health(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     (void)reader;
-    health_put_health(&session->watch, &session->slam, out);
+    const robot_t *robot = session->robot;
+    record_put_health(out, &robot->health, &robot->in_force, bslam_health(&robot->slam).state);
 }
 
-#if SESSION_VISION
+#if ROBOT_VISION
 
 static void answer_look(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     answer_sightings(session, reader, out);
-    bslam_link_put_u8(out, (uint8_t)bslam_vision_reason(&session->seeing.vision));
-    bslam_link_put_u8(out, (uint8_t)session->seeing.count);
+    bslam_link_put_u8(out, (uint8_t)bslam_vision_reason(&session->robot->camera.vision));
+    bslam_link_put_u8(out, (uint8_t)session->robot->camera.count);
 }
 
 /// One a message: a frame of default size has no room for two.
 static void answer_seen(session_t *session, bslam_link_reader_t *reader, bslam_link_writer_t *out)
 {
     const int index = bslam_link_get_u8(reader);
-    const bool there = index < session->seeing.count;
+    const bool there = index < session->robot->camera.count;
     bslam_link_put_u8(out, there ? 1 : 0);
     if (there) {
-        record_put_sighting(out, &session->seeing.sightings[index], true);
+        record_put_sighting(out, &session->robot->camera.sightings[index], true);
     }
 }
 
 #endif
 
-static const message_t exchanges[] = {
+static const message_t messages[] = {
     {SESSION_HELLO, apply_hello, answer_hello},
     {SESSION_RESET, apply_reset, answer_nothing},
     {SESSION_ODOMETRY, apply_odometry, answer_step},
@@ -542,7 +511,7 @@ static const message_t exchanges[] = {
     {SESSION_POSE_AT, apply_nothing, answer_pose_at},
     {SESSION_MAP, apply_nothing, answer_map},
     {SESSION_COUNTERS, apply_nothing, answer_counters},
-#if SESSION_APPEARANCE
+#if BSLAM_APPEARANCE
     {SESSION_SIGNATURES, apply_signatures, answer_nothing},
     {SESSION_SEEDS, apply_seeds, answer_nothing},
 #endif
@@ -554,7 +523,7 @@ static const message_t exchanges[] = {
     {SESSION_MAP_WRITE, apply_map_write, answer_nothing},
     {SESSION_MAP_LOAD, apply_map_load, answer_map_load},
     {SESSION_MAP_SAVE, apply_map_save, answer_nothing},
-#if SESSION_VISION
+#if ROBOT_VISION
     {SESSION_CAMERA, apply_camera, answer_nothing},
     {SESSION_IMAGE, apply_image, answer_nothing},
     {SESSION_PIXELS, apply_pixels, answer_nothing},
@@ -563,16 +532,16 @@ static const message_t exchanges[] = {
 #endif
 };
 
-bool message_changes(const message_t *exchange)
+bool message_changes(const message_t *message)
 {
-    return exchange->apply != apply_nothing && exchange->type != SESSION_HELLO;
+    return message->apply != apply_nothing && message->type != SESSION_HELLO;
 }
 
 const message_t *message_find(uint8_t type)
 {
-    for (size_t i = 0; i < sizeof exchanges / sizeof exchanges[0]; i++) {
-        if (exchanges[i].type == type) {
-            return &exchanges[i];
+    for (size_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
+        if (messages[i].type == type) {
+            return &messages[i];
         }
     }
     return NULL;

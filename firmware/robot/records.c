@@ -6,12 +6,14 @@
 #define FLAG_CONFIRMED 1u
 #define FLAG_RANGE 1u
 #define FLAG_SIGNATURE 2u
+#define FLAG_RECOVERS 1u
+#define FLAG_GUARDS 2u
 
-static void put_pose(bslam_link_writer_t *out, const bslam_slam_t *slam)
+static void put_pose(bslam_link_writer_t *out, const bslam_t *slam)
 {
-    const bslam_pose_t pose = bslam_slam_pose(slam);
+    const bslam_pose_t pose = bslam_pose(slam);
     bslam_real_t lower[6];
-    bslam_slam_pose_covariance(slam, lower);
+    bslam_pose_covariance(slam, lower);
     bslam_link_put_real(out, pose.x_m);
     bslam_link_put_real(out, pose.y_m);
     bslam_link_put_real(out, pose.theta_rad);
@@ -20,7 +22,7 @@ static void put_pose(bslam_link_writer_t *out, const bslam_slam_t *slam)
     }
 }
 
-void record_put_step(bslam_link_writer_t *out, const bslam_slam_t *slam, uint64_t fingerprint, uint32_t ticks)
+void record_put_step(bslam_link_writer_t *out, const bslam_t *slam, uint64_t fingerprint, uint32_t ticks)
 {
     put_pose(out, slam);
     bslam_link_put_u64(out, fingerprint);
@@ -37,10 +39,10 @@ static void put_account(bslam_link_writer_t *out, const bslam_account_t *account
     bslam_link_put_real(out, account->weight);
 }
 
-void record_put_accounts(bslam_link_writer_t *out, const bslam_slam_t *slam)
+void record_put_accounts(bslam_link_writer_t *out, const bslam_t *slam)
 {
     int count = 0;
-    const bslam_account_t *accounts = bslam_slam_accounts(slam, &count);
+    const bslam_account_t *accounts = bslam_results(slam, &count);
     bslam_link_put_u8(out, (uint8_t)count);
     for (int i = 0; i < count; i++) {
         put_account(out, &accounts[i]);
@@ -72,6 +74,19 @@ void record_put_counters(bslam_link_writer_t *out, const void *counters, size_t 
         memcpy(&value, &bytes[at], sizeof value);
         bslam_link_put_u32(out, value);
     }
+}
+
+void record_put_health(bslam_link_writer_t *out, const health_t *health, const bslam_settings_t *settings,
+                       bslam_recovery_state_t state)
+{
+    bslam_link_put_u8(
+        out, (settings->recovery != 0 ? FLAG_RECOVERS : 0u) | (settings->guard != 0 ? FLAG_GUARDS : 0u));
+    bslam_link_put_u8(out, (uint8_t)state);
+    bslam_link_put_u8(out, (uint8_t)health->trouble);
+    bslam_link_put_u64(out, (uint64_t)health->trouble_us);
+    record_put_counters(out, &health->recovery, sizeof health->recovery);
+    record_put_counters(out, &health->guard, sizeof health->guard);
+    bslam_link_put_u32(out, health->insane);
 }
 
 void record_put_sighting(bslam_link_writer_t *out, const bslam_sighting_t *sighting, bool with_signature)

@@ -3,16 +3,22 @@
 #define ROBOT_RECORDS_H
 
 #include "bslam/bslam.h"
+#include "link/parser.h"
+#include "robot/health.h"
 
 /// STEP. ticks: what the last message took.
-void record_put_step(bslam_link_writer_t *out, const bslam_slam_t *slam, uint64_t fingerprint,
+void record_put_step(bslam_link_writer_t *out, const bslam_t *slam, uint64_t fingerprint,
                      uint32_t ticks);
 
 /// How many, then an ACCOUNT for each sighting of the last frame.
-void record_put_accounts(bslam_link_writer_t *out, const bslam_slam_t *slam);
+void record_put_accounts(bslam_link_writer_t *out, const bslam_t *slam);
 
 /// BEACON.
 void record_put_beacon(bslam_link_writer_t *out, const bslam_beacon_view_t *beacon);
+
+/// HEALTH.
+void record_put_health(bslam_link_writer_t *out, const health_t *health, const bslam_settings_t *settings,
+                       bslam_recovery_state_t state);
 
 /// A struct of nothing but uint32_t.
 void record_put_counters(bslam_link_writer_t *out, const void *counters, size_t size);

@@ -1,102 +1,150 @@
 #include "robot/session.h"
 
-#include "robot/messages.h"
-#include "robot/param_store.h"
-#include "bslam/store/crc32.h"
-#include "port/port.h"
-
-#include <stddef.h>
 #include <string.h>
 
-/// No reset takes longer.
-static const bslam_real_t RESTART_S = 1;
+#include "port/port.h"
+#include "robot/messages.h"
+#include "robot/records.h"
 
-void session_send(session_t *session, bslam_link_writer_t *out)
+// ---- frames out -------------------------------------------------------------------------------------------
+
+static void send(session_t *session, bslam_link_writer_t *out)
 {
     const size_t length = bslam_link_end(out);
     port_write(session->out, length);
 }
 
-void session_begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
-                   int64_t time_us)
+/// Its frame stands in session->out.
+static void begin(session_t *session, bslam_link_writer_t *out, uint8_t type, uint16_t sequence,
+                  int64_t time_us)
 {
     const bslam_link_header_t header = {.type = type, .sequence = sequence, .time_us = time_us};
     bslam_link_begin(out, session->out, sizeof session->out, &header);
 }
 
+/// A report of the robot's own.
+static void begin_report(session_t *session, bslam_link_writer_t *out, uint8_t type, int64_t time_us)
+{
+    session->report_sequence++;
+    begin(session, out, type, session->report_sequence, time_us);
+}
+
 /// Every answer says first what became of its message.
-static void answer(session_t *session, const message_t *exchange)
+static void answer(session_t *session, const message_t *message)
 {
     const bslam_link_header_t *asked = &session->parser.header;
     bslam_link_writer_t out;
-    session_begin(session, &out, asked->type | SESSION_ANSWER, asked->sequence, asked->time_us);
+    begin(session, &out, asked->type | SESSION_ANSWER, asked->sequence, asked->time_us);
     bslam_link_put_u8(&out, session->last_status);
     bslam_link_put_u8(&out, session->detail);
-    if (exchange != NULL && session->last_status < SESSION_E_NO_SESSION) {
+    if (message != NULL && session->last_status < SESSION_E_NO_SESSION) {
         bslam_link_reader_t reader = bslam_link_payload(&session->parser);
-        exchange->answer(session, &reader, &out);
+        message->answer(session, &reader, &out);
     }
-    session_send(session, &out);
+    send(session, &out);
 }
 
-/// In the map that was saved; false: there is none, or nothing that would find the robot in it.
-static bool enter_saved_map(session_t *session)
-{
-    const bslam_flash_t *flash = port_map_flash();
-    bslam_map_fault_t fault;
-    return flash != NULL && session->watch.recovers &&
-           bslam_slots_load(flash, &session->slam, BSLAM_MAP_LIVING, &fault) == BSLAM_OK;
-}
+// ---- what the robot's own sensors did ---------------------------------------------------------------------
 
-bool session_is_good(session_t *session, int64_t time_us)
+/// After whatever may have changed the estimator's state: its fingerprint, if the host takes any.
+static void end_step(session_t *session, uint8_t status)
 {
-    if (health_is_good(&session->watch, &session->slam, time_us)) {
-        return true;
+    if (status == BSLAM_E_STATE) {
+        session->fingerprint = BSLAM_FINGERPRINT_START;  // it started over
     }
-    int bad_id;
-    const uint8_t status = session_start_over(session, &bad_id);
-    (void)status;  // the parameters were good before
-    (void)enter_saved_map(session);
-    health_end_step(&session->watch, &session->slam, time_us);
-    return false;
-}
-
-void session_end_step(session_t *session)
-{
     if (session->takes_fingerprints) {
-        session->fingerprint = bslam_slam_fingerprint(&session->slam, session->fingerprint);
+        session->fingerprint = bslam_fingerprint(&session->robot->slam, session->fingerprint);
     }
 }
 
-static void apply(session_t *session, const message_t *exchange)
+void session_use_reading(session_t *session, const bslam_odometry_reading_t *reading)
 {
+    const uint32_t began = port_ticks();
+    const bslam_status_t status = robot_odometry(session->robot, reading);
+    session->ticks = port_ticks() - began;
+    end_step(session, (uint8_t)status);
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_POSE, reading->time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u32(&out, reading->left_ticks);
+    bslam_link_put_u32(&out, reading->right_ticks);
+    bslam_link_put_u8(&out, reading->has_gyro ? SESSION_HAS_GYRO : 0);
+    bslam_link_put_real(&out, reading->gyro_radps);
+    bslam_link_put_real(&out, reading->gyro_sd_radps);
+    message_put_step(session, &out);
+    send(session, &out);
+}
+
+void session_end_wait(session_t *session)
+{
+    bslam_odometry_reading_t reading;
+    if (robot_end_wait(session->robot, &reading)) {
+        session_use_reading(session, &reading);
+    }
+}
+
+#if ROBOT_VISION
+
+static void report_sighting(session_t *session, int64_t time_us, int number)
+{
+    const robot_t *robot = session->robot;
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_SIGHTED, time_us);
+    bslam_link_put_u8(&out, (uint8_t)number);
+    record_put_sighting(&out, &robot->camera.sightings[number],
+                        robot->in_force.association == BSLAM_ASSOCIATION_SVM);
+    send(session, &out);
+}
+
+void session_report_picture(session_t *session, int camera, int64_t time_us, bslam_status_t status,
+                            uint32_t ticks)
+{
+    const camera_input_t *input = &session->robot->camera;
+    session->ticks = ticks;
+    end_step(session, (uint8_t)status);
+    for (int i = 0; i < input->count; i++) {
+        report_sighting(session, time_us, i);
+    }
+    bslam_link_writer_t out;
+    begin_report(session, &out, SESSION_LOOKED, time_us);
+    bslam_link_put_u8(&out, (uint8_t)status);
+    bslam_link_put_u8(&out, (uint8_t)camera);
+    bslam_link_put_u8(&out, (uint8_t)bslam_vision_reason(&input->vision));
+    bslam_link_put_u8(&out, (uint8_t)input->count);
+    message_put_step(session, &out);
+    record_put_accounts(&out, &session->robot->slam);
+    send(session, &out);
+}
+
+#endif
+
+// ---- messages ---------------------------------------------------------------------------------------------
+
+static bool takes_step(uint8_t type)
+{
+    return type == SESSION_ODOMETRY || type == SESSION_SIGHTINGS || type == SESSION_LOOK;
+}
+
+static void apply(session_t *session, const message_t *message)
+{
+    const uint8_t type = session->parser.header.type;
     session->last_sequence = session->parser.header.sequence;
-    session->detail = NO_DETAIL;
-    if (session->parser.header.type != SESSION_PIXELS && session->parser.header.type != SESSION_LOOK) {
+    session->detail = SESSION_NO_DETAIL;
+    if (type != SESSION_PIXELS && type != SESSION_LOOK) {
         session->ticks = 0;
     }
-    if (!session->open && session->parser.header.type != SESSION_HELLO) {
+    if (!session->open && type != SESSION_HELLO) {
         session->last_status = SESSION_E_NO_SESSION;
         return;
     }
-    if (exchange == NULL) {
+    if (message == NULL) {
         session->last_status = SESSION_E_TYPE;
         return;
     }
-    const int64_t time_us = session->parser.header.time_us;
-    const bool is_of_filter = exchange->type != SESSION_PIXELS;  // of which there are too many to check each
-    if (is_of_filter && exchange->type != SESSION_HELLO && !session_is_good(session, time_us)) {
-        session->last_status = BSLAM_E_STATE;
-        return;
-    }
     bslam_link_reader_t reader = bslam_link_payload(&session->parser);
-    exchange->apply(session, &reader);
-    if (is_of_filter) {
-        health_end_step(&session->watch, &session->slam, time_us);
-    }
-    if (exchange->type == SESSION_ODOMETRY || exchange->type == SESSION_SIGHTINGS ||
-        exchange->type == SESSION_LOOK) {
-        session_end_step(session);
+    message->apply(session, &reader);
+    if (takes_step(type) || session->last_status == BSLAM_E_STATE) {
+        end_step(session, session->last_status);
     }
 }
 
@@ -117,7 +165,7 @@ static bool starts_session(const session_t *session)
 
 static void take_message(session_t *session)
 {
-    const message_t *exchange = message_find(session->parser.header.type);
+    const message_t *message = message_find(session->parser.header.type);
     const bool starts = starts_session(session);
     if (!starts && ahead(session) < 0) {
         session->replayed++;
@@ -126,12 +174,12 @@ static void take_message(session_t *session)
     if (!starts && ahead(session) == 0) {
         session->repeated++;
     } else {
-        if (exchange != NULL && message_changes(exchange)) {
-            session_end_wait(session);
+        if (message != NULL && message_changes(message)) {
+            session_end_wait(session);  // what comes is to find the estimator after it
         }
-        apply(session, exchange);
+        apply(session, message);
     }
-    answer(session, exchange);
+    answer(session, message);
 }
 
 void session_take(session_t *session, uint8_t byte)
@@ -141,98 +189,28 @@ void session_take(session_t *session, uint8_t byte)
     }
 }
 
-/// The robot's own cameras, if it has any; their number, 0 if the front end refuses one.
-static int open_eyes(session_t *session)
+void session_listen(session_t *session)
 {
-#if SESSION_VISION
-    int count = 0;
-    const bslam_camera_t *cameras = port_cameras(&count);
-    for (int i = 0; i < count; i++) {
-        if (camera_input_set_camera(&session->seeing, i, &cameras[i]) != BSLAM_OK) {
-            return 0;
-        }
+    int byte = port_read();
+    while (byte >= 0) {
+        session_take(session, (uint8_t)byte);
+        byte = port_read();
     }
-    return count;
-#else
-    (void)session;
-    return 0;
-#endif
 }
 
-/// What was stored; else the defaults, but that what a camera sees has no label.
-static uint8_t start_with_params(session_t *session, bool has_eyes)
+void session_start(session_t *session, robot_t *robot)
 {
-    int bad_id = NO_DETAIL;
-    if (param_store_params_load(&session->settings)) {
-        const uint8_t status = session_start_over(session, &bad_id);
-        if (status == BSLAM_OK) {
-            return status;
-        }
-        bslam_settings_preset(&session->settings, BSLAM_PRESET_PAPER);  // they contradict each other
-    }
-    if (has_eyes) {
-        session->settings.association =
-            SESSION_APPEARANCE ? BSLAM_ASSOCIATION_SVM : BSLAM_ASSOCIATION_MAHALANOBIS;
-    }
-    return session_start_over(session, &bad_id);
-}
-
-/// Of this image and no other: what is kept has its addresses.
-static uint32_t image_mark(void)
-{
-    return ~bslam_crc32_add(BSLAM_CRC32_START, port_build_id(), PORT_BUILD_ID_BYTES);
-}
-
-static bool is_kept(session_t *session)
-{
-    return session->mark == image_mark() && health_is_kept(&session->watch, &session->slam);
-}
-
-/// Time stamps and the counters of wheels begin anew, and the robot may have rolled on meanwhile.
-static uint8_t go_on(session_t *session)
-{
-    const bslam_settings_t *settings = &session->slam.settings;
-    const bslam_real_t way_sd_m = settings->gap_speed_sd_mps * RESTART_S;
-    const bslam_real_t turn_sd_rad = settings->gap_turn_sd_radps * RESTART_S;
-    session->settings = *settings;
-    session->uses_appearance = session->slam.appearance != NULL;
-    health_go_on(&session->watch, port_time_us());
-    return (uint8_t)bslam_slam_resume_odometry(&session->slam, way_sd_m < 30 ? way_sd_m : 30,
-                                               turn_sd_rad < 3 ? turn_sd_rad : 3);
-}
-
-static session_start_t start_cold(session_t *session, bool has_eyes, uint8_t *status)
-{
-    *status = start_with_params(session, has_eyes);
-    health_init(&session->watch, true, true);
-    if (*status == BSLAM_OK && enter_saved_map(session)) {
-        return SESSION_STARTED_IN_MAP;
-    }
-    health_init(&session->watch, false, false);
-    return SESSION_STARTED_EMPTY;
-}
-
-void session_init(session_t *session)
-{
-    const bool kept = is_kept(session);
-    const size_t keeps = kept ? offsetof(session_t, carried) : 0;
-    memset((uint8_t *)session + keeps, 0, sizeof *session - keeps);
-    const bool has_eyes = open_eyes(session) > 0;
-    uint8_t status = BSLAM_OK;
-    session_start_t start = SESSION_WENT_ON;
-    if (kept) {
-        status = go_on(session);
-    } else {
-        start = start_cold(session, has_eyes, &status);
-    }
-    session->mark = image_mark();
-    health_end_step(&session->watch, &session->slam, port_time_us());
+    robot_start_t start;
+    const bslam_status_t status = robot_start(robot, &start);
+    memset(session, 0, sizeof *session);
+    session->robot = robot;
+    session->fingerprint = BSLAM_FINGERPRINT_START;
     bslam_link_writer_t out;
     // A delimiter first: whatever the line had before the start is no part of this frame.
     const uint8_t delimiter = 0;
     port_write(&delimiter, 1);
-    session_begin(session, &out, SESSION_READY, 0, port_time_us());
-    bslam_link_put_u8(&out, status);
+    begin(session, &out, SESSION_READY, 0, port_time_us());
+    bslam_link_put_u8(&out, (uint8_t)status);
     bslam_link_put_u8(&out, (uint8_t)start);
-    session_send(session, &out);
+    send(session, &out);
 }

@@ -1,4 +1,4 @@
-/// Every compile-time size of the vision library. How to override one: config.h.
+/// Every compile-time size of the vision library. How to override one: base/config.h.
 #ifndef BSLAM_VISION_CONFIG_H
 #define BSLAM_VISION_CONFIG_H
 
@@ -42,6 +42,15 @@
 #endif
 #if BSLAM_CANDIDATES_MAX < 1 || BSLAM_CANDIDATES_MAX > 64
 #error "BSLAM_CANDIDATES_MAX is 1 to 64"
+#endif
+
+/// 1: the front end tells how far the robot turned between two pictures (bslam_vision_turn). 4 KB of RAM with
+/// one camera, 9 KB with four.
+#ifndef BSLAM_VISION_TURNS
+#define BSLAM_VISION_TURNS 1
+#endif
+#if BSLAM_VISION_TURNS != 0 && BSLAM_VISION_TURNS != 1
+#error "BSLAM_VISION_TURNS is 0 or 1"
 #endif
 
 #endif

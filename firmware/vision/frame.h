@@ -1,15 +1,9 @@
-/// What the vision modules exchange: a frame reduced while its rows streamed in, colours of the room, boxes,
-/// candidates.
-///
-/// Pixel (0, 0) is the upper left one, its centre at (0, 0). Colours are the camera's own, gamma included.
+/// What the vision modules exchange: a picture, here called a frame, reduced while its rows streamed in, and
+/// colours of the room. Colours are the camera's own, gamma included. Internal.
 #ifndef BSLAM_VISION_FRAME_H
 #define BSLAM_VISION_FRAME_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
-#include "vision/config.h"
-#include "base/real.h"
+#include "vision/vision.h"
 
 /// Side of a cell, pixels.
 #define BSLAM_CELL_PX 4
@@ -24,9 +18,6 @@
      ((BSLAM_IMAGE_WIDTH_MAX / BSLAM_CELL_PX + BSLAM_MASK_BITS - 1) / BSLAM_MASK_BITS))
 /// Pixels of the half-resolution copy.
 #define BSLAM_HALF_MAX ((BSLAM_IMAGE_WIDTH_MAX / 2) * (BSLAM_IMAGE_HEIGHT_MAX / 2))
-
-/// Values of a signature (signature.h).
-#define BSLAM_SIGNATURE_SIZE 71
 
 /// 4x4 pixels: their mean colour, and the spread (largest less smallest) of the luma of its four 2x2
 /// quarters.
@@ -87,52 +78,5 @@ static inline bslam_rgb_t bslam_rgb_of_565(uint16_t pixel)
     };
     return rgb;
 }
-
-/// Edges of a rectangle in the whole frame; pixel i covers [i - 0.5, i + 0.5].
-typedef struct bslam_box {
-    bslam_real_t left_px;
-    bslam_real_t top_px;
-    bslam_real_t right_px;
-    bslam_real_t bottom_px;
-} bslam_box_t;
-
-/// Why a candidate is not, or not fully, measured; bits of bslam_candidate_t.marks.
-enum {
-    BSLAM_MARK_CUT_LEFT = 1,  ///< reaches the frame's edge: the outline may go on outside
-    BSLAM_MARK_CUT_RIGHT = 2,
-    BSLAM_MARK_CUT_TOP = 4,
-    BSLAM_MARK_CUT_BOTTOM = 8,
-    BSLAM_MARK_SMALL = 16,       ///< too few pixels for a distance or a signature
-    BSLAM_MARK_SLANTED = 32,     ///< seen too obliquely
-    BSLAM_MARK_MISPLACED = 128,  ///< its height contradicts its place or its width: no distance
-    BSLAM_MARK_PART = 64,        ///< its level sides go on beyond it: the outline is that of a part
-    BSLAM_MARK_HIDDEN = 256,     ///< narrower than its kind: something is before it, its direction is rough
-};
-
-/// No object of the model's recogniser.
-#define BSLAM_OBJECT_NONE (-1)
-
-/// A thing that is probably a beacon.
-typedef struct bslam_candidate {
-    bslam_box_t outline;
-    bslam_real_t bearing_rad;  ///< of its middle, in the robot's frame; read only if has_bearing
-    bslam_real_t bearing_sd_rad;
-    bslam_real_t range_m;  ///< horizontal distance from the camera; read only if has_range
-    bslam_real_t range_sd_m;
-    bslam_real_t
-        range_noise_sd_m;  ///< the part of it that is another one in each frame; the rest is the thing's
-    bslam_real_t range_scale_sd;  ///< by what part all distances of the thing err alike
-    bool has_bearing;
-    bool has_range;
-    uint8_t beacon_class;  ///< 1 + index in the model's class table; BSLAM_CLASS_NONE if unsure
-    uint8_t second_class;  ///< the next likely one; BSLAM_CLASS_NONE if there is none
-    float class_margin;    ///< value of the class less that of the next; negative if its place decided
-    float score;           ///< detector's decision value: larger is surer
-    int16_t object;        ///< index in the model's recogniser; BSLAM_OBJECT_NONE: none of its objects
-    float object_margin;   ///< what the recogniser's machine for the likeliest object says
-    uint16_t marks;
-    float misplaced_sds;  ///< by how many standard deviations it hangs where its kind does not; 0: not at all
-    float signature[BSLAM_SIGNATURE_SIZE];
-} bslam_candidate_t;
 
 #endif

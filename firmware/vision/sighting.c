@@ -1,4 +1,4 @@
-#include "vision/sighting.h"
+#include "vision/vision.h"
 
 #include "base/scalar.h"
 #include "base/bounds.h"

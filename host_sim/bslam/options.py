@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from bslam.core.presets import preset_settings
+from bslam.datasets import dlr, mrclam
 from bslam.errors import BslamError
 from bslam.log import Log, Robot
-from bslam.runs import defaults
 
 OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
@@ -37,9 +38,8 @@ class RunOptions:
     wrong_identity_rate: float = 0.0  # "known:RATE": share of sightings whose identity is replaced by another
     filter: str = "invariant"
     motion: str = "arc"
-    velocity_states: bool | None = (
-        None  # None: the best known for the kind of odometry, see `uses_velocity_states`
-    )
+    presets: tuple[str, ...] = ()  # of the C library; none: by what the log says, see `presets_of`
+    velocity_states: bool | None = None  # None: as the presets have it
     noise: str | None = None  # what errs, reading or motion; None: as the log's robot says
     sensor: str = "simulated"
     rig: str | None = None  # the cameras, if the sensor is one
@@ -84,23 +84,33 @@ def wheel_noise(options: RunOptions, log: Log) -> str:
     return options.noise or log.robot.wheel_noise
 
 
-def uses_velocity_states(options: RunOptions, log: Log) -> bool:
-    """v and omega as states: asked for, else where the reading of a wheel errs and not the wheel.
+def presets_of(options: RunOptions, log: Log) -> tuple[str, ...]:
+    """The presets of the C library that a run starts from: asked for, else by what the log says of itself.
 
-    They are right for the paper's speedometer noise, and wrong where the wheel itself jitters and for real
-    odometry.
+    "paper" where the reading of a wheel errs and not the wheel. It is wrong where the wheel itself jitters,
+    and for real odometry.
     """
-    if options.velocity_states is not None:
-        return options.velocity_states
+    if options.presets:
+        return options.presets
     sigma_mps = log.robot.wheel_speed_sigma_mps if options.sigma_mps is None else options.sigma_mps
-    return log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
+    is_paper = log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
+    chosen = ["paper" if is_paper else "real-wheels"]
+    chosen += ["camera"] if options.sensor == "camera" else []
+    chosen += ["bearing-only"] if options.observation == "direction" else []
+    return tuple(chosen)
+
+
+def uses_velocity_states(options: RunOptions, log: Log) -> bool:
+    """v and omega are states of the filter."""
+    return bool(core_params(options, log)["velocity_states"])
 
 
 def recovery_of(options: RunOptions) -> str:
     """One of RECOVERIES: asked for, else by what can go wrong.
 
-    In a kept map the robot stands at a place that nobody knows. By looks it may take one beacon for another;
-    "carried" is for those who do carry it, and has false alarms where something new looks like a beacon.
+    In a kept map the robot stands at a place that nobody knows. By appearance it may take one beacon
+    for another; "carried" is for those who do carry it, and has false alarms where something new looks like
+    a beacon.
     """
     if options.recovery is not None:
         return options.recovery
@@ -113,39 +123,44 @@ def odometry_lead_us(options: RunOptions, log: Log) -> int:
     """How far odometry runs ahead of the true motion: asked for, else what is known of its data set."""
     if options.odometry_lead_us is not None:
         return options.odometry_lead_us
-    return defaults.REAL_ODOMETRY_LEAD_US if log.collection == "mrclam" else 0
+    return mrclam.ODOMETRY_LEAD_US if log.collection == "mrclam" else 0
 
 
 def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
-    """Parameters of the core, by their names in the C headers; a later source wins over an earlier one."""
-    params: dict[str, Number] = {
-        "filter": FILTERS.index(options.filter),
-        "motion": MOTIONS.index(options.motion),
-        "velocity_states": int(uses_velocity_states(options, log)),
-        "association": ASSOCIATIONS.index(options.association),
-    }
-    if options.observation == "direction":
-        params |= defaults.DIRECTION_ONLY.get(options.filter, {})
+    """Every setting of the core by its name in C; a later source wins over an earlier one."""
+    association, filter_ = ASSOCIATIONS.index(options.association), FILTERS.index(options.filter)
+    params = preset_settings(presets_of(options, log), association, filter_)
+    params["motion"] = MOTIONS.index(options.motion)
+    if options.velocity_states is not None:
+        params["velocity_states"] = int(options.velocity_states)
     params |= _robot_params(log.robot, log.odometry.kind)
     if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
-    if options.sensor == "camera":
-        params |= defaults.CAMERA
-        if options.association != "known":
-            params |= defaults.CAMERA_UNKNOWN_IDENTITY
-    if log.collection == "mrclam":
-        params |= defaults.REAL_LOG
-        if options.filter == "smoother" and options.observation == "direction":
-            params |= defaults.REAL_LOG_SMOOTHER
-        if options.association != "known":
-            params |= defaults.REAL_LOG_UNKNOWN_IDENTITY
-        if options.velocity_states:
-            params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
-    if log.collection == "dlr":
-        params |= defaults.DLR
-    if recovery_of(options) == "growing":
-        params |= defaults.GROWING
+    params |= _collection_params(options, log.collection) | _recovery_params(recovery_of(options))
     return params | dict(options.parameters)
+
+
+def _collection_params(options: RunOptions, collection: str | None) -> dict[str, Number]:
+    """What is known of a data set beyond what its log says."""
+    if collection == "dlr":
+        return dict(dlr.SETTINGS)
+    if collection != "mrclam":
+        return {}
+    params = dict(mrclam.SETTINGS)
+    if options.filter == "smoother" and options.observation == "direction":
+        params |= mrclam.BEARING_ONLY_SMOOTHER_SETTINGS
+    if options.association != "known":
+        params |= mrclam.UNKNOWN_IDENTITY_SETTINGS
+    if options.velocity_states:
+        params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
+    return params
+
+
+def _recovery_params(recovery: str) -> dict[str, Number]:
+    if recovery == "off":
+        return {"recovery": 0}
+    # A map that grows never settles: it takes several beacons that fit a pose elsewhere to be lost.
+    return {"recovery": 1} | ({"settled_us": 1_000_000_000} if recovery == "growing" else {})
 
 
 def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "bslam/store/map.h"
 
 enum { BLOB_MAX = 4096, LENGTH_AT = 8 };

@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bslam.core.vision import BeaconModel, DetectorModel
-from tools.training.export import Header, c_float, initialiser
+from tools.training.export import Header, c_float, named_initialiser
 
 
 def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:
     """The header that holds `static const bslam_beacon_model_t bslam_beacons_model`."""
-    header = Header("BSLAM_MODELS_BEACONS_H", ["vision/classifiers/beacon_model.h"], notes)
+    header = Header("BSLAM_MODELS_BEACONS_H", ["vision/vision.h"], notes)
     fields = {
         "class_count": str(len(model.classes)),
         "classes": header.classes("bslam_beacons_classes", model.classes),
         "pinhole": _detector(header, "bslam_beacons_pinhole", model.pinhole),
         "wide": _detector(header, "bslam_beacons_wide", model.wide),
+        "recogniser": "NULL",
     }
-    header.constant("bslam_beacon_model_t", "bslam_beacons_model", initialiser(fields, indent="    "))
+    header.constant("bslam_beacon_model_t", "bslam_beacons_model", named_initialiser(fields))
     return header.text()
 
 
 def _detector(header: Header, name: str, detector: DetectorModel) -> str:
-    return initialiser(
+    return named_initialiser(
         {
             "cell": header.svm(f"{name}_cell", detector.cell),
             "glance": header.svm(f"{name}_glance", detector.glance),
@@ -38,5 +39,6 @@ def _detector(header: Header, name: str, detector: DetectorModel) -> str:
             "close": header.hinged(f"{name}_close", detector.close),
             "verdict": header.svm(f"{name}_verdict", detector.verdict),
             "threshold": c_float(detector.threshold),
-        }
+        },
+        depth=2,
     )

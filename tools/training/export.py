@@ -55,40 +55,37 @@ class Header:
 
     def svm(self, name: str, svm: Svm) -> str:
         """Add the tables of a machine; the initialiser of its bslam_svm_t."""
-        fields = {"rows": str(svm.rows), "features": str(svm.features)}
-        if svm.quadratic:
-            fields["quadratic"] = "true"
+        weights = bytes_ = byte_scale = "NULL"
         if svm.byte_scale is None:
-            fields["weights"] = self.array(f"{name}_weights", svm.weights)
+            weights = self.array(f"{name}_weights", svm.weights)
         else:
-            fields["bytes"] = self.array(f"{name}_bytes", svm.weights)
-            fields["byte_scale"] = self.array(f"{name}_byte_scale", svm.byte_scale)
-        fields["bias"] = self.array(f"{name}_bias", svm.bias)
-        return initialiser(fields)
+            bytes_ = self.array(f"{name}_bytes", svm.weights)
+            byte_scale = self.array(f"{name}_byte_scale", svm.byte_scale)
+        bias = self.array(f"{name}_bias", svm.bias)
+        quadratic = "true" if svm.quadratic else "false"
+        return initialiser([str(svm.rows), str(svm.features), quadratic, weights, bytes_, byte_scale, bias])
 
     def additive(self, name: str, machine: AdditiveSvm) -> str:
         """Add the tables of an additive machine; the initialiser of its bslam_additive_t."""
-        fields = {"rows": str(machine.rows), "features": str(machine.features)}
-        fields["knots"] = self.array(f"{name}_knots", machine.knots)
-        if len(machine.crossed):
-            fields["crossed_count"] = str(len(machine.crossed))
-            fields["crossed"] = self.array(f"{name}_crossed", machine.crossed)
-        fields["bytes"] = self.array(f"{name}_bytes", machine.paired)
-        fields["byte_scale"] = self.array(f"{name}_byte_scale", machine.byte_scale)
-        fields["bias"] = self.array(f"{name}_bias", machine.bias)
+        fields = [str(machine.rows), str(machine.features), self.array(f"{name}_knots", machine.knots)]
+        fields.append(str(len(machine.crossed)))
+        fields.append(self.array(f"{name}_crossed", machine.crossed) if len(machine.crossed) else "NULL")
+        fields.append(self.array(f"{name}_bytes", machine.paired))
+        fields.append(self.array(f"{name}_byte_scale", machine.byte_scale))
+        fields.append(self.array(f"{name}_bias", machine.bias))
         return initialiser(fields)
 
     def hinged(self, name: str, machine: HingedSvm) -> str:
         """Add the tables of a hinged machine; the initialiser of its bslam_hinged_t."""
         return initialiser(
-            {
-                "rows": str(machine.rows),
-                "features": str(machine.features),
-                "knots": self.array(f"{name}_knots", machine.knots),
-                "bytes": self.array(f"{name}_bytes", machine.paired),
-                "byte_scale": self.array(f"{name}_byte_scale", machine.byte_scale),
-                "bias": self.array(f"{name}_bias", machine.bias),
-            }
+            [
+                str(machine.rows),
+                str(machine.features),
+                self.array(f"{name}_knots", machine.knots),
+                self.array(f"{name}_bytes", machine.paired),
+                self.array(f"{name}_byte_scale", machine.byte_scale),
+                self.array(f"{name}_bias", machine.bias),
+            ]
         )
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
@@ -123,11 +120,16 @@ class Header:
         )
 
 
-def initialiser(fields: Mapping[str, str], indent: str = "") -> str:
-    """`{.name = value, ...}`; a field a line where `indent` is given."""
-    if indent:
-        return "{\n" + "".join(f"{indent}.{name} = {value},\n" for name, value in fields.items()) + "}"
-    return "{" + ", ".join(f".{name} = {value}" for name, value in fields.items()) + "}"
+def initialiser(values: Sequence[str]) -> str:
+    """`{value, ...}`: every member of a struct in its order, so that C++ takes it, too."""
+    return "{" + ", ".join(values) + "}"
+
+
+def named_initialiser(fields: Mapping[str, str], depth: int = 1) -> str:
+    """The same, a member a line, with its name beside it; `depth` times indented."""
+    indent = "    " * depth
+    lines = "".join(f"{indent}{value},  // {name}\n" for name, value in fields.items())
+    return "{\n" + lines + indent[4:] + "}"
 
 
 def c_float(value: float) -> str:
@@ -147,11 +149,11 @@ def recogniser_header(recogniser: Recogniser, name: str) -> str:
     if not NAME.fullmatch(name):
         allowed = "small letters, digits and _, a letter first: it becomes a name in C"
         raise BslamError(f"header {name}.h: the name is not allowed; allowed: {allowed}")
-    header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/classifiers/beacon_model.h"], recogniser.notes)
+    header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/vision.h"], recogniser.notes)
     svm = header.svm(name, recogniser.svm)
     objects = header.classes(f"{name}_objects", recogniser.objects)
     fields = {"svm": svm, "objects": objects, "reject_margin": c_float(recogniser.reject_margin)}
-    header.constant("bslam_recogniser_t", f"bslam_{name}", initialiser(fields, indent="    "))
+    header.constant("bslam_recogniser_t", f"bslam_{name}", named_initialiser(fields))
     return header.text()
 
 

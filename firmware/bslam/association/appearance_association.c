@@ -145,10 +145,10 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
     return true;
 }
 
-static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, int beacon)
+static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_record_t *records, int beacon)
 {
     for (int i = 0; i < frame->count; i++) {
-        if (matches[i].verdict == BSLAM_VERDICT_MATCH && matches[i].beacon == beacon) {
+        if (records[i].match.verdict == BSLAM_VERDICT_MATCH && records[i].match.beacon == beacon) {
             return true;
         }
     }
@@ -200,9 +200,9 @@ static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const c
 
 /// Finds the best beacon of a sighting among those that are not taken.
 static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                      bslam_match_t *matches)
+                      bslam_record_t *records)
 {
-    bslam_match_t *match = &matches[i];
+    bslam_match_t *match = &records[i].match;
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
     candidate_t best = {.distance2 = -1};
@@ -214,7 +214,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *
         if (!weigh(frame, conditional, i, b, sample, &one) || one.distance2 > frame->settings->candidate_d2) {
             continue;
         }
-        if (is_taken(frame, matches, b)) {
+        if (is_taken(frame, records, b)) {
             match->reason = one.score > 0 ? BSLAM_REASON_DUPLICATE : match->reason;
         } else if (match->beacon < 0 || one.score > best.score) {
             second = best.score;
@@ -242,12 +242,13 @@ static bool is_open(const bslam_match_t *match)
 
 /// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0, or
 /// it waits.
-static int next_to_settle(const bslam_match_t *matches, int count)
+static int next_to_settle(const bslam_record_t *records, int count)
 {
     int next = -1;
     for (int i = 0; i < count; i++) {
-        const bool fits = is_open(&matches[i]) && matches[i].score > 0 && matches[i].delayed_for < 0;
-        if (fits && (next < 0 || matches[i].lead > matches[next].lead)) {
+        const bool fits =
+            is_open(&records[i].match) && records[i].match.score > 0 && records[i].match.delayed_for < 0;
+        if (fits && (next < 0 || records[i].match.lead > records[next].match.lead)) {
             next = i;
         }
     }
@@ -275,18 +276,19 @@ static void leave_open(bslam_match_t *match)
 }
 
 /// Where another sighting wants the same beacon, and about as much, neither gets it. True if so.
-static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *matches, int next)
+static bool is_contested(const bslam_sighting_frame_t *frame, bslam_record_t *records, int next)
 {
     bool contested = false;
     for (int i = 0; i < frame->count; i++) {
-        if (i != next && is_open(&matches[i]) && matches[i].beacon == matches[next].beacon &&
-            matches[i].score > matches[next].score - frame->settings->competitor_lead) {
-            leave_open(&matches[i]);
+        if (i != next && is_open(&records[i].match) &&
+            records[i].match.beacon == records[next].match.beacon &&
+            records[i].match.score > records[next].match.score - frame->settings->competitor_lead) {
+            leave_open(&records[i].match);
             contested = true;
         }
     }
     if (contested) {
-        leave_open(&matches[next]);
+        leave_open(&records[next].match);
     }
     return contested;
 }
@@ -294,19 +296,20 @@ static bool is_contested(const bslam_sighting_frame_t *frame, bslam_match_t *mat
 /// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
 /// made anew, given the matches so far.
 static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional,
-                   bslam_match_t *matches)
+                   bslam_record_t *records)
 {
-    for (int next = next_to_settle(matches, frame->count); next >= 0;
-         next = next_to_settle(matches, frame->count)) {
-        if (is_contested(frame, matches, next)) {
+    for (int next = next_to_settle(records, frame->count); next >= 0;
+         next = next_to_settle(records, frame->count)) {
+        if (is_contested(frame, records, next)) {
             continue;
         }
-        matches[next].verdict = BSLAM_VERDICT_MATCH;
-        give(frame, conditional, next, &matches[next]);
+        records[next].match.verdict = BSLAM_VERDICT_MATCH;
+        give(frame, conditional, next, &records[next].match);
         for (int i = 0; i < frame->count; i++) {
-            const bool is_clear = matches[i].lead >= frame->settings->learn_lead;
-            if (is_open(&matches[i]) && (!is_clear || matches[i].beacon == matches[next].beacon)) {
-                find_best(frame, conditional, i, matches);
+            const bool is_clear = records[i].match.lead >= frame->settings->learn_lead;
+            if (is_open(&records[i].match) &&
+                (!is_clear || records[i].match.beacon == records[next].match.beacon)) {
+                find_best(frame, conditional, i, records);
             }
         }
     }
@@ -317,13 +320,13 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *con
 /// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
 /// it will never be found.
 static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                              const bslam_match_t *matches)
+                              const bslam_record_t *records)
 {
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
     for (int b = 0; sample != NULL && b < frame->ekf->beacon_count; b++) {
         candidate_t one;
-        if (!is_taken(frame, matches, b) && weigh(frame, conditional, i, b, sample, &one) &&
+        if (!is_taken(frame, records, b) && weigh(frame, conditional, i, b, sample, &one) &&
             one.distance2 <= frame->settings->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
             looks_score(frame->settings, &one.opinion) >= 0.5f * frame->settings->appearance_high &&
@@ -350,9 +353,9 @@ static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t 
 
 /// What becomes of a sighting that matches no beacon.
 static void decide_rest(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                        bslam_match_t *matches)
+                        bslam_record_t *records)
 {
-    bslam_match_t *match = &matches[i];
+    bslam_match_t *match = &records[i].match;
     const bool is_duplicate = match->reason == BSLAM_REASON_DUPLICATE;
     const bool waits = is_near(frame, &frame->sightings[i], match);
     leave_open(match);
@@ -360,32 +363,32 @@ static void decide_rest(const bslam_sighting_frame_t *frame, bslam_conditional_t
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_DUPLICATE;
     } else if (!waits) {
-        match->delayed_for = looks_like_another(frame, conditional, i, matches);
+        match->delayed_for = looks_like_another(frame, conditional, i, records);
         match->verdict = match->delayed_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;
         match->reason = match->delayed_for < 0 ? BSLAM_REASON_NONE : BSLAM_REASON_APPEARANCE;
     }
 }
 
-void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     bslam_conditional_t conditional;
     bslam_conditional_init(&conditional);
     for (int i = 0; i < frame->count; i++) {
-        if (bslam_is_mappable(&frame->sightings[i], &matches[i])) {
-            matches[i].verdict = BSLAM_VERDICT_DEFER;
+        if (bslam_is_mappable(&frame->sightings[i], &records[i].match)) {
+            records[i].match.verdict = BSLAM_VERDICT_DEFER;
         }
     }
     for (int i = 0; i < frame->count; i++) {
-        if (is_open(&matches[i])) {
-            find_best(frame, &conditional, i, matches);
+        if (is_open(&records[i].match)) {
+            find_best(frame, &conditional, i, records);
         }
     }
-    settle(frame, &conditional, matches);
+    settle(frame, &conditional, records);
     for (int i = 0; i < frame->count; i++) {
-        if (is_open(&matches[i])) {
-            decide_rest(frame, &conditional, i, matches);
-        } else if (matches[i].verdict == BSLAM_VERDICT_MATCH) {
-            matches[i].reason = BSLAM_REASON_NONE;
+        if (is_open(&records[i].match)) {
+            decide_rest(frame, &conditional, i, records);
+        } else if (records[i].match.verdict == BSLAM_VERDICT_MATCH) {
+            records[i].match.reason = BSLAM_REASON_NONE;
         }
     }
 }

@@ -7,46 +7,22 @@
 typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                      int beacon);
 
-bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
-{
-    const bool mappable = sighting->beacon_class != BSLAM_CLASS_NOT_MAPPABLE;
-    match->verdict = BSLAM_VERDICT_REJECT;
-    match->reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS;
-    match->beacon = -1;
-    match->distance2 = -1;
-    match->score = 0;
-    match->view_score = 0;
-    match->lead = 0;
-    match->sure = false;
-    match->delayed_for = -1;
-    return mappable;
-}
-
 /// Leaves each beacon to the nearest of the sightings that chose it, the first of equals.
-static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     for (int i = 1; i < frame->count; i++) {
-        for (int j = 0; j < i && matches[i].verdict == BSLAM_VERDICT_MATCH; j++) {
-            if (matches[j].verdict == BSLAM_VERDICT_MATCH && matches[j].beacon == matches[i].beacon) {
-                bslam_match_t *loser =
-                    matches[i].distance2 < matches[j].distance2 ? &matches[j] : &matches[i];
+        for (int j = 0; j < i && records[i].match.verdict == BSLAM_VERDICT_MATCH; j++) {
+            if (records[j].match.verdict == BSLAM_VERDICT_MATCH &&
+                records[j].match.beacon == records[i].match.beacon) {
+                bslam_match_t *loser = records[i].match.distance2 < records[j].match.distance2
+                                           ? &records[j].match
+                                           : &records[i].match;
                 loser->verdict = BSLAM_VERDICT_REJECT;
                 loser->reason = BSLAM_REASON_DUPLICATE;
                 loser->beacon = -1;
             }
         }
     }
-}
-
-bool bslam_is_placed(const bslam_ekf_t *ekf, int64_t within_us, int other_than, int64_t time_us)
-{
-    for (int b = 0; b < ekf->beacon_count; b++) {
-        if (b != other_than && ekf->beacons[b].confirmed &&
-            time_us - ekf->beacons[b].last_seen_us <= within_us) {
-            return true;
-        }
-    }
-    return false;
 }
 
 // ---- known identity ---------------------------------------------------------------------------------------
@@ -137,11 +113,11 @@ static bool label_is_repeated(const bslam_sighting_frame_t *frame, int i)
     return false;
 }
 
-void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
-        bslam_match_t *match = &matches[i];
+        bslam_match_t *match = &records[i].match;
         if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
@@ -159,11 +135,11 @@ void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *m
 
 /// Nearest neighbour: at most match2 away is a match, beyond new2 is new, between is left alone.
 static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2_fn distance2,
-                                  bslam_real_t match2, bslam_real_t new2, bslam_match_t *matches)
+                                  bslam_real_t match2, bslam_real_t new2, bslam_record_t *records)
 {
     for (int i = 0; i < frame->count; i++) {
         const bslam_sighting_t *sighting = &frame->sightings[i];
-        bslam_match_t *match = &matches[i];
+        bslam_match_t *match = &records[i].match;
         if (!bslam_is_mappable(sighting, match)) {
             continue;
         }
@@ -187,17 +163,17 @@ static void associate_by_distance(const bslam_sighting_frame_t *frame, distance2
             match->beacon = -1;
         }
     }
-    keep_one_to_one(frame, matches);
+    keep_one_to_one(frame, records);
 }
 
-void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
-    associate_by_distance(frame, euclidean2, 1, 1, matches);
+    associate_by_distance(frame, euclidean2, 1, 1, records);
 }
 
-void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
-    associate_by_distance(frame, mahalanobis2, frame->settings->match_d2, frame->settings->new_d2, matches);
+    associate_by_distance(frame, mahalanobis2, frame->settings->match_d2, frame->settings->new_d2, records);
 }
 
 bslam_associate_fn bslam_associate_method(const bslam_settings_t *settings)

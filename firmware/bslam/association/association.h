@@ -29,6 +29,14 @@ typedef struct bslam_match {
     int32_t delayed_for;  ///< svm: index of the beacon that it is kept from for a while; else -1
 } bslam_match_t;
 
+/// All that is known of one sighting on its way through a frame: each stage fills in its own part.
+typedef struct bslam_record {
+    const bslam_sighting_t *sighting;
+    bslam_account_t *account;       ///< what became of it: the result
+    bslam_match_t match;            ///< what association decides
+    bslam_innovation_t innovation;  ///< of what is fused
+} bslam_record_t;
+
 /// All a method may look at.
 typedef struct bslam_sighting_frame {
     const bslam_ekf_t *ekf;
@@ -40,28 +48,29 @@ typedef struct bslam_sighting_frame {
     int64_t time_us;
 } bslam_sighting_frame_t;
 
-/// Decides for every sighting of the frame: matches[0..count). A beacon is matched at most once in a frame.
-typedef void (*bslam_associate_fn)(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+/// Decides for every sighting of the frame: the match in records[0..count). A beacon is matched at most once
+/// in a frame.
+typedef void (*bslam_associate_fn)(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// By label: the detector knows which beacon it is. O(count * beacons).
-void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// The paper's baseline (Bailey's flowchart): far from any found feature is new, else it is the nearest one.
 /// Measured in the map, or as an angle where there is no distance. O(count * beacons).
-void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
-void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// The paper's two steps: candidates by position, then their machines decide between match, new and wait.
 /// Without looks or signatures by position alone. O(count * beacons), and again where two sightings want one
 /// beacon.
-void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// Joint compatibility branch and bound: the pairing that explains the most sightings together, within
 /// match_d2 each; what is in no pair is new beyond new_d2. At most BSLAM_GIVEN_MAX sightings are paired
 /// together, the next after them, and at most joint_nodes choices are tried for each such group.
-void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *matches);
+void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// Whether some beacon that counts, other than one (-1: whichever), was where it should be within the last
 /// `within_us`: then the robot's pose is not what is wrong. O(beacons).

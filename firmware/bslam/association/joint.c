@@ -31,8 +31,8 @@ static bslam_real_t joint_limit(const bslam_settings_t *settings, int32_t freedo
     return n * root * root * root;
 }
 
-static bool is_free(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, const search_t *search,
-                    int32_t level, int32_t beacon)
+static bool is_free(const bslam_sighting_frame_t *frame, const bslam_record_t *records,
+                    const search_t *search, int32_t level, int32_t beacon)
 {
     for (int32_t i = 0; i < level; i++) {
         if (search->choice[i] == beacon) {
@@ -40,7 +40,7 @@ static bool is_free(const bslam_sighting_frame_t *frame, const bslam_match_t *ma
         }
     }
     for (int i = 0; i < frame->count; i++) {
-        if (matches[i].verdict == BSLAM_VERDICT_MATCH && matches[i].beacon == beacon) {
+        if (records[i].match.verdict == BSLAM_VERDICT_MATCH && records[i].match.beacon == beacon) {
             return false;
         }
     }
@@ -79,7 +79,7 @@ static void keep_if_better(search_t *search)
 }
 
 /// Tries the next choice of a level. True if the search may go one level deeper.
-static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, search_t *search,
+static bool try_next(const bslam_sighting_frame_t *frame, const bslam_record_t *records, search_t *search,
                      int32_t level)
 {
     const int32_t beacon = search->next[level]++;
@@ -89,7 +89,7 @@ static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *m
         search->choice[level] = -1;
         search->pairs[level + 1] = search->pairs[level];
     } else {
-        if (!is_free(frame, matches, search, level, beacon) || !pair(frame, search, level, beacon)) {
+        if (!is_free(frame, records, search, level, beacon) || !pair(frame, search, level, beacon)) {
             return false;
         }
         search->choice[level] = beacon;
@@ -100,14 +100,14 @@ static bool try_next(const bslam_sighting_frame_t *frame, const bslam_match_t *m
 }
 
 /// Depth first, until all is tried or joint_nodes choices were.
-static void run(const bslam_sighting_frame_t *frame, const bslam_match_t *matches, search_t *search)
+static void run(const bslam_sighting_frame_t *frame, const bslam_record_t *records, search_t *search)
 {
     int32_t level = 0;
     search->next[0] = 0;
     for (int32_t node = 0; node < frame->settings->joint_nodes && level >= 0; node++) {
         if (search->next[level] > frame->ekf->beacon_count) {
             level--;
-        } else if (try_next(frame, matches, search, level)) {
+        } else if (try_next(frame, records, search, level)) {
             if (level + 1 == search->count) {
                 keep_if_better(search);
             } else {
@@ -138,7 +138,7 @@ static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_ma
 }
 
 /// Searches for the sightings that were gathered, and writes down what was found.
-static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_match_t *matches)
+static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_record_t *records)
 {
     bslam_conditional_init(&search->conditional);
     search->scalars[0] = 0;
@@ -148,9 +148,9 @@ static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_
     for (int32_t k = 0; k < BSLAM_GIVEN_MAX; k++) {
         search->best[k] = -1;
     }
-    run(frame, matches, search);
+    run(frame, records, search);
     for (int32_t k = 0; k < search->count; k++) {
-        bslam_match_t *match = &matches[search->sightings[k]];
+        bslam_match_t *match = &records[search->sightings[k]].match;
         match->beacon = search->best[k];
         if (match->beacon >= 0) {
             match->verdict = BSLAM_VERDICT_MATCH;
@@ -161,24 +161,24 @@ static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_
     search->count = 0;
 }
 
-void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_match_t *matches)
+void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
     search_t search;
     search.count = 0;
     for (int i = 0; i < frame->count; i++) {
-        (void)bslam_is_mappable(&frame->sightings[i], &matches[i]);
+        (void)bslam_is_mappable(&frame->sightings[i], &records[i].match);
     }
     for (int i = 0; i < frame->count; i++) {
-        if (matches[i].reason == BSLAM_REASON_CLASS) {
+        if (records[i].match.reason == BSLAM_REASON_CLASS) {
             continue;
         }
         search.sightings[search.count] = i;
         search.count++;
         if (search.count == BSLAM_GIVEN_MAX) {
-            settle(frame, &search, matches);
+            settle(frame, &search, records);
         }
     }
     if (search.count > 0) {
-        settle(frame, &search, matches);
+        settle(frame, &search, records);
     }
 }

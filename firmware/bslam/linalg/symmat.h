@@ -74,9 +74,6 @@ void bslam_symmat_times_two(const bslam_real_t *m, int n, const bslam_row_t *a, 
 /// out[0..n) = column j; out is 0 from there up to BSLAM_SYMMAT_PADDED(n). O(n).
 void bslam_symmat_column(const bslam_real_t *m, int n, int j, bslam_real_t *out);
 
-/// out[0..n) = the n x n matrix times a vector. O(n^2).
-void bslam_symmat_multiply(const bslam_real_t *m, int n, const bslam_real_t *vector, bslam_real_t *out);
-
 // ---- the sum of terms -------------------------------------------------------------------------------------
 
 /// One symmetric term of a sum: row i of the matrix gets row_factors[i] * columns[0..i].
@@ -103,9 +100,5 @@ void bslam_symmat_insert(bslam_real_t *m, int n, int at);
 /// with n / 10^7 (float) a singular matrix passes in spite of rounding. False: with the rows before, it is no
 /// positive semidefinite matrix, raised so; the row then holds nothing. O(i^2 / 2).
 bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise);
-
-/// True if the n x n matrix is positive semidefinite to working precision: bslam_symmat_factor_row of each.
-/// scratch has BSLAM_SYMMAT_LENGTH(n) elements. O(n^3 / 6): for tests.
-bool bslam_symmat_is_positive(const bslam_real_t *m, int n, bslam_real_t *scratch);
 
 #endif

@@ -98,15 +98,16 @@ static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
            beacon->score_sum < (knows_few(slam) ? settings->existence_first_sum : settings->existence_sum);
 }
 
-void bslam_slam_mark_tentative(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count)
+void bslam_slam_mark_tentative(bslam_slam_t *slam, int count)
 {
     for (int i = 0; i < count; i++) {
-        slam->measures_distance = slam->measures_distance || sightings[i].has_range;
-        bslam_match_t *match = &slam->matches[i];
+        const bslam_sighting_t *sighting = slam->records[i].sighting;
+        bslam_match_t *match = &slam->records[i].match;
+        slam->measures_distance = slam->measures_distance || sighting->has_range;
         const bool is_tried =
             match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
-        const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, &sightings[i]) &&
-                                sightings[i].score < slam->settings.existence_score;
+        const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, sighting) &&
+                                sighting->score < slam->settings.existence_score;
         match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TENTATIVE : match->verdict;
     }
 }

@@ -4,9 +4,6 @@
 
 #include "bslam/slam/slam.h"
 
-/// Where a chain of fingerprints starts.
-#define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
-
 /// Goes on with a chain of fingerprints: the size of the state, its mean and its covariance, and where a
 /// smoother is attached all that its window holds, where looks are the weights of every machine, bit for bit.
 /// FNV-1a, 64 bits, over 32-bit words. Once two chains differ they stay different while the states that

@@ -61,26 +61,28 @@ static void note_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
 }
 
 /// A sighting of what may be no beacon moves nothing, but says whether it is one.
-static void try_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
-                      const bslam_match_t *match, bslam_account_t *account)
+static void count_tentative(bslam_slam_t *slam, int64_t time_us, const bslam_record_t *record)
 {
+    const bslam_match_t *match = &record->match;
     bslam_beacon_t *beacon = match->beacon >= 0 ? &slam->ekf.beacons[match->beacon] : NULL;
     if (beacon != NULL && slam->settings.gate_d2 > 0 && match->distance2 > slam->settings.gate_d2) {
-        reject(slam, BSLAM_REASON_GATE, beacon, account);
+        reject(slam, BSLAM_REASON_GATE, beacon, record->account);
         beacon->gated++;
-        account->test_ratio = test_ratio(slam->settings.gate_d2, match->distance2);
+        record->account->test_ratio = test_ratio(slam->settings.gate_d2, match->distance2);
         return;
     }
-    fill_account(account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
+    fill_account(record->account, BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_TENTATIVE, beacon);
     if (beacon != NULL) {
-        note_match(slam, time_us, sighting, beacon, match->distance2);
+        note_match(slam, time_us, record->sighting, beacon, match->distance2);
     }
 }
 
 /// Fuses a sighting with the beacon that association chose.
-static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
-                       bslam_beacon_t *beacon, bslam_innovation_t *innovation, bslam_account_t *account)
+static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_record_t *record)
 {
+    bslam_beacon_t *beacon = &slam->ekf.beacons[record->match.beacon];
+    bslam_innovation_t *innovation = &record->innovation;
+    bslam_account_t *account = record->account;
     const bslam_real_t travelled_m =
         (bslam_real_t)(slam->travelled_um - beacon->travelled_um) / MICROMETRES_PER_M;
     const bslam_real_t factor = bslam_correlation_factor(&slam->settings, travelled_m);
@@ -99,11 +101,11 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, const bslam_sighting
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     if (bslam_slam_smooths(slam)) {
-        const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, sighting);
-        bslam_smoother_see(slam->smoother, &taken, (int)(beacon - slam->ekf.beacons));
+        const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
+        bslam_smoother_see(slam->smoother, &taken, record->match.beacon);
     }
     beacon->travelled_um = slam->travelled_um;
-    note_match(slam, time_us, sighting, beacon, fusion.distance2);
+    note_match(slam, time_us, record->sighting, beacon, fusion.distance2);
 }
 
 /// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
@@ -119,8 +121,10 @@ static void note_rivals(bslam_slam_t *slam, int index)
 }
 
 static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                    const bslam_sighting_t *sighting, bslam_account_t *account)
+                    const bslam_record_t *record)
 {
+    const bslam_sighting_t *sighting = record->sighting;
+    bslam_account_t *account = record->account;
     int index;
     const bslam_status_t status =
         bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, sighting, &index)
@@ -171,80 +175,120 @@ static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sigh
            !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
 }
 
+// ---- the stages, in their order: bslam_slam_close_frame ---------------------------------------------------
+
+static void associate(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
+                      const bslam_sighting_t *sightings, int count)
+{
+    const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, mount,
+                                          sightings,  count,           time_us};
+    for (int i = 0; i < count; i++) {
+        slam->records[i].sighting = &sightings[i];
+        slam->records[i].account = &slam->accounts[i];
+    }
+    const bslam_associate_fn method = bslam_associate_method(&slam->settings);
+    method(&frame, slam->records);
+}
+
+/// What of a match's distance is used, before any innovation is taken.
+static void choose_distances(bslam_slam_t *slam, const bslam_pose_t *mount, int count)
+{
+    for (int i = 0; i < count; i++) {
+        bslam_match_t *match = &slam->records[i].match;
+        const bslam_sighting_t *sighting = slam->records[i].sighting;
+        match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&
+                            (bslam_slam_begin_scale(slam, mount, match->beacon, sighting) ||
+                             !bslam_slam_vote_distance(slam, mount, match->beacon, sighting));
+    }
+}
+
+static void take_innovation(bslam_slam_t *slam, const bslam_pose_t *mount, bslam_real_t gate_d2,
+                            bslam_record_t *record)
+{
+    bslam_match_t *match = &record->match;
+    bslam_innovation_t *innovation = &record->innovation;
+    const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
+    const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
+    if (bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &taken, match->beacon, innovation) !=
+        BSLAM_OK) {
+        reject(slam, BSLAM_REASON_SINGULAR, beacon, record->account);
+        match->verdict = BSLAM_VERDICT_REJECT;
+    }
+    innovation->has_range = innovation->has_range && !match->range_used;
+    innovation->gate_d2 = gate_d2;
+}
+
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
 /// them before the first is fused, so that the order within a frame does not matter.
-static void take_innovations(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                             const bslam_sighting_t *sightings, int count)
+static void measure(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, int count)
 {
+    choose_distances(slam, mount, count);
     const bslam_real_t gate_d2 = gate_of(slam, time_us);
     for (int i = 0; i < count; i++) {
-        bslam_match_t *match = &slam->matches[i];
-        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, &sightings[i], match)) {
+        bslam_record_t *record = &slam->records[i];
+        bslam_match_t *match = &record->match;
+        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, record->sighting, match)) {
             match->verdict = BSLAM_VERDICT_DEFER;
             match->reason = BSLAM_REASON_AMBIGUOUS;
         }
         if (match->verdict == BSLAM_VERDICT_REJECT) {
-            reject(slam, match->reason, NULL, &slam->accounts[i]);
+            reject(slam, match->reason, NULL, record->account);
         } else if (match->verdict == BSLAM_VERDICT_DEFER) {
-            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
+            fill_account(record->account, BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
-            const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
-            const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, &sightings[i]);
-            bslam_innovation_t *innovation = &slam->innovations[i];
-            if (bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &taken, match->beacon, innovation) !=
-                BSLAM_OK) {
-                reject(slam, BSLAM_REASON_SINGULAR, beacon, &slam->accounts[i]);
-                match->verdict = BSLAM_VERDICT_REJECT;
-            }
-            innovation->has_range = innovation->has_range && !match->range_used;
-            innovation->gate_d2 = gate_d2;
+            take_innovation(slam, mount, gate_d2, record);
         }
     }
 }
 
-/// Fuses all matches, then adds what is new. Not to be inlined: association, before it, goes deepest, and
-/// would have its frame on the stack.
-__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t time_us,
-                                                  const bslam_pose_t *mount,
-                                                  const bslam_sighting_t *sightings, int count)
+static void fuse(bslam_slam_t *slam, int64_t time_us, int count)
 {
-    bslam_slam_mark_tentative(slam, sightings, count);
     for (int i = 0; i < count; i++) {
-        bslam_match_t *match = &slam->matches[i];
-        match->range_used = match->verdict == BSLAM_VERDICT_MATCH &&
-                            (bslam_slam_begin_scale(slam, mount, match->beacon, &sightings[i]) ||
-                             !bslam_slam_vote_distance(slam, mount, match->beacon, &sightings[i]));
-    }
-    take_innovations(slam, time_us, mount, sightings, count);
-    for (int i = 0; i < count; i++) {
-        const bslam_match_t *match = &slam->matches[i];
-        if (match->verdict == BSLAM_VERDICT_TENTATIVE) {
-            try_match(slam, time_us, &sightings[i], match, &slam->accounts[i]);
-        } else if (match->verdict == BSLAM_VERDICT_MATCH) {
-            fuse_match(slam, time_us, &sightings[i], &slam->ekf.beacons[match->beacon], &slam->innovations[i],
-                       &slam->accounts[i]);
+        bslam_record_t *record = &slam->records[i];
+        if (record->match.verdict == BSLAM_VERDICT_TENTATIVE) {
+            count_tentative(slam, time_us, record);
+        } else if (record->match.verdict == BSLAM_VERDICT_MATCH) {
+            fuse_match(slam, time_us, record);
         }
     }
+}
+
+/// Moves the mean; then the detector's classes are counted, which another scale may follow.
+static void correct(bslam_slam_t *slam, int count)
+{
     bslam_ekf_correct(&slam->ekf, &slam->settings);
     for (int i = 0; i < count; i++) {
-        if (slam->matches[i].verdict == BSLAM_VERDICT_MATCH &&
-            slam->accounts[i].outcome == BSLAM_OUTCOME_MATCHED) {
-            bslam_slam_vote_class(slam, slam->matches[i].beacon, &sightings[i]);
-        }
-    }
-    for (int i = 0; i < count; i++) {
-        if (slam->matches[i].verdict != BSLAM_VERDICT_NEW) {
-            continue;
-        }
-        if (slam->is_frozen) {
-            reject(slam, BSLAM_REASON_FROZEN, NULL, &slam->accounts[i]);
-        } else {
-            add_new(slam, time_us, mount, &sightings[i], &slam->accounts[i]);
+        const bslam_record_t *record = &slam->records[i];
+        if (record->match.verdict == BSLAM_VERDICT_MATCH &&
+            record->account->outcome == BSLAM_OUTCOME_MATCHED) {
+            bslam_slam_vote_class(slam, record->match.beacon, record->sighting);
         }
     }
 }
 
-// ---- looks ------------------------------------------------------------------------------------------------
+static void augment(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, int count)
+{
+    for (int i = 0; i < count; i++) {
+        const bslam_record_t *record = &slam->records[i];
+        if (record->match.verdict == BSLAM_VERDICT_NEW && slam->is_frozen) {
+            reject(slam, BSLAM_REASON_FROZEN, NULL, record->account);
+        } else if (record->match.verdict == BSLAM_VERDICT_NEW) {
+            add_new(slam, time_us, mount, record);
+        }
+    }
+}
+
+/// Not to be inlined: association, before it, goes deepest, and would have its frame on the stack.
+__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t time_us,
+                                                  const bslam_pose_t *mount, int count)
+{
+    measure(slam, time_us, mount, count);
+    fuse(slam, time_us, count);
+    correct(slam, count);
+    augment(slam, time_us, mount, count);
+}
+
+// ---- learning ---------------------------------------------------------------------------------------------
 
 static bool was_tried(const bslam_account_t *account)
 {
@@ -255,8 +299,8 @@ static bool was_tried(const bslam_account_t *account)
 static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
 {
     for (int i = 0; i < count; i++) {
-        const bslam_account_t *account = &slam->accounts[i];
-        const bslam_match_t *match = &slam->matches[i];
+        const bslam_account_t *account = slam->records[i].account;
+        const bslam_match_t *match = &slam->records[i].match;
         if (match->delayed_for >= 0) {
             bslam_appearance_note_delay(slam->appearance, &slam->settings, match->delayed_for, time_us);
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
@@ -268,16 +312,18 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
     }
 }
 
-void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                 int count)
+static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
 {
+    if (!bslam_slam_learns(slam) || slam->settings.association != BSLAM_ASSOCIATION_SVM) {
+        return;
+    }
     note_matches(slam, time_us, count);
     if (slam->is_frozen) {
         return;
     }
     bool all_matched = count > 0;
     for (int i = 0; i < count; i++) {
-        const bslam_account_t *account = &slam->accounts[i];
+        const bslam_account_t *account = slam->records[i].account;
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
         const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account);
         all_matched = all_matched && is_matched;
@@ -285,7 +331,7 @@ void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bsla
             continue;
         }
         const int index = bslam_slam_find_beacon(slam, account->beacon_uid);
-        if (is_new || slam->matches[i].sure) {
+        if (is_new || slam->records[i].match.sure) {
             bslam_appearance_train(slam->appearance, &slam->settings, index, slam->ekf.beacon_count,
                                    slam->travelled_um, &sightings[i]);
         } else {
@@ -341,7 +387,7 @@ static void drop_rivals(bslam_slam_t *slam)
     slam->confirmed_now = false;
 }
 
-/// Rays whose distance is known become points; provisional beacons whose time is up leave.
+/// Rays whose distance is known become points; tentative beacons whose time is up leave.
 static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
 {
     for (int b = slam->ekf.beacon_count - 1; b >= 0; b--) {
@@ -356,6 +402,17 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
     }
     if (slam->confirmed_now) {
         drop_rivals(slam);
+    }
+}
+
+/// Time passes in a withheld frame, too: it leaves what one without sightings does.
+static void tidy(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
+{
+    if (!slam->is_lost) {
+        tidy_map(slam, time_us, mount);
+    }
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_frame(slam->smoother, &slam->settings, &slam->ekf);
     }
 }
 
@@ -398,29 +455,25 @@ bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const 
     return BSLAM_OK;
 }
 
+static void withhold(bslam_slam_t *slam, int count)
+{
+    for (int i = 0; i < count; i++) {
+        fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
+    }
+}
+
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use)
 {
     if (use && !slam->is_lost) {
-        const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, mount,
-                                              sightings,  count,           time_us};
-        const bslam_associate_fn associate = bslam_associate_method(&slam->settings);
-        associate(&frame, slam->matches);
-        use_matches(slam, time_us, mount, sightings, count);
-        if (bslam_slam_learns(slam) && slam->settings.association == BSLAM_ASSOCIATION_SVM) {
-            bslam_slam_learn_appearance(slam, time_us, sightings, count);
-        }
+        associate(slam, time_us, mount, sightings, count);
+        bslam_slam_mark_tentative(slam, count);
+        use_matches(slam, time_us, mount, count);  // measure, fuse, correct, augment
+        learn(slam, time_us, sightings, count);
     } else {
-        for (int i = 0; i < count; i++) {
-            fill_account(&slam->accounts[i], BSLAM_OUTCOME_DEFERRED, BSLAM_REASON_LOST, NULL);
-        }
+        withhold(slam, count);
     }
-    if (!slam->is_lost) {  // time passes in a withheld frame, too: it leaves what one without sightings does
-        tidy_map(slam, time_us, mount);
-    }
-    if (bslam_slam_smooths(slam)) {
-        bslam_smoother_frame(slam->smoother, &slam->settings, &slam->ekf);
-    }
+    tidy(slam, time_us, mount);
     slam->last_frame_us = time_us;
     slam->has_frame = true;
     bslam_odometry_start(&slam->odometry, time_us);

@@ -214,27 +214,6 @@ void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6])
     }
 }
 
-const bslam_account_t *bslam_slam_accounts(const bslam_slam_t *slam, int *count)
-{
-    *count = slam->account_count;
-    return slam->accounts;
-}
-
-int bslam_slam_bad_sighting(const bslam_slam_t *slam)
-{
-    return slam->bad_sighting;
-}
-
-const bslam_slam_counters_t *bslam_slam_counters(const bslam_slam_t *slam)
-{
-    return &slam->counters;
-}
-
-int bslam_slam_beacon_count(const bslam_slam_t *slam)
-{
-    return slam->ekf.beacon_count;
-}
-
 bslam_status_t bslam_slam_beacon(const bslam_slam_t *slam, int index, bslam_beacon_view_t *view)
 {
     if (index < 0 || index >= slam->ekf.beacon_count) {

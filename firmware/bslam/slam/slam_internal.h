@@ -37,7 +37,7 @@ void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const 
 /// Notes whether the sensor measures distances, and turns matches with beacons of which nobody knows yet
 /// whether they are any, and new ones that would be refuted at once, into BSLAM_VERDICT_TENTATIVE. Before
 /// anything of the frame is used: its order does not matter.
-void bslam_slam_mark_tentative(bslam_slam_t *slam, const bslam_sighting_t *sightings, int count);
+void bslam_slam_mark_tentative(bslam_slam_t *slam, int count);
 
 // ---- scale.c: what a beacon is taken for, and how much too long its distances are by that -----------------
 
@@ -69,11 +69,6 @@ BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_
 /// accounts; where the robot is lost, the map stays as it is.
 void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
                             const bslam_pose_t *mount, bool use);
-
-/// Notes which matches wait, and how well others fit. Unless the map is frozen, machines learn from what a
-/// frame surely showed, and train for a bounded time.
-void bslam_slam_learn_appearance(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                 int count);
 
 // ---- slam.c -----------------------------------------------------------------------------------------------
 

@@ -27,11 +27,6 @@ static const bslam_real_t FIT_RATIO_MAX = BSLAM_R(1.5);
 static const bslam_real_t FIT_MIN = BSLAM_R(1.0);
 enum { HALVINGS_MAX = 4 };
 static const bslam_real_t NEVER_SEEN_M2 = BSLAM_R(1e6);
-/// The logarithm of 4.7 m, and its standard deviation: 2.9 to 7.8 m. Rather too far than too near: directions
-/// are the more linear the farther a beacon is.
-static const bslam_real_t LN_GUESS_M = BSLAM_R(1.55);
-static const bslam_real_t GUESS_SD_LN = BSLAM_R(0.5);
-static const bslam_real_t RANGE_MIN_M = BSLAM_R(1e-3);
 /// No beacon is linearised about a place nearer than this to where the robot is: with 1 / distance in its
 /// Jacobian, one that is thought too near and is driven at throws the path metres off.
 static const bslam_real_t NEAR_MIN_M = BSLAM_R(1.0);
@@ -40,112 +35,7 @@ static const bslam_real_t PIN_VARIANCE = BSLAM_R(1e-6);
 /// What the way back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
 static const bslam_real_t DOUBT_MIN = BSLAM_R(1e-6);
 
-// ---- along the nodes --------------------------------------------------------------------------------------
-
-/// `range`: NULL without one.
-static bslam_sighting_t sighting_of(const bslam_settings_t *model, const bslam_smoother_seen_t *direction,
-                                    const bslam_smoother_seen_t *range)
-{
-    bslam_sighting_t sighting = {.bearing_rad = bslam_smoother_bearing_rad(direction),
-                                 .bearing_sd_rad = bslam_smoother_sd_rad(direction),
-                                 .has_range = range != NULL,
-                                 .label = BSLAM_LABEL_NONE};
-    if (range != NULL && range->weight != BSLAM_SMOOTHER_FIRST) {
-        sighting.range_m = range->value * BSLAM_SMOOTHER_RANGE_M;
-        const bslam_real_t variance = bslam_range_variance_m2(model, &sighting, sighting.range_m);
-        sighting.range_sd_m = bslam_sqrt(variance / range->weight);
-    }
-    return sighting;
-}
-
-/// How far a beacon is that was never seen before: one guesses, give or take a factor. Said of the robot that
-/// saw it, not of a place in the map: where the robot is may be doubtful, too.
-static bslam_status_t guess_range(bslam_innovation_t *innovation)
-{
-    const bslam_real_t range_m = -innovation->range_m;  // what is predicted, the sighting's being 0
-    const bslam_real_t sd_m = GUESS_SD_LN * range_m;
-    if (!(range_m > RANGE_MIN_M)) {
-        return BSLAM_E_SINGULAR;
-    }
-    innovation->range_m = range_m * (LN_GUESS_M - bslam_ln(range_m));
-    innovation->range_var_m2 = sd_m * sd_m;
-    return BSLAM_OK;
-}
-
-/// What was seen of a beacon, into a filter, and how it fitted. False if it cannot be used.
-static bool take_seen(const bslam_settings_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
-                      const bslam_smoother_seen_t *range, bslam_fusion_t *fusion)
-{
-    const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
-    const bslam_sighting_t sighting = sighting_of(model, direction, range);
-    bslam_innovation_t innovation;
-    bslam_status_t status =
-        bslam_ekf_innovation(ekf, model, &mount, &sighting, direction->beacon, &innovation);
-    if (status == BSLAM_OK && range != NULL && range->weight == BSLAM_SMOOTHER_FIRST) {
-        status = guess_range(&innovation);
-    }
-    return status == BSLAM_OK && bslam_ekf_fuse(ekf, model, &innovation, fusion) == BSLAM_OK;
-}
-
-/// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
-static void take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
-                      int first_seen)
-{
-    if (node->motion.dt_s > 0) {
-        bslam_ekf_measure_speeds(ekf, &smoother->model, &node->motion);
-    }
-    for (int k = 0; k < node->seen; k++) {
-        const bslam_smoother_seen_t *direction = bslam_smoother_seen(smoother, first_seen + k);
-        const bslam_smoother_seen_t *range = NULL;
-        if (k + 1 < node->seen &&
-            bslam_smoother_seen(smoother, first_seen + k + 1)->beacon == BSLAM_SMOOTHER_RANGE) {
-            k++;
-            range = bslam_smoother_seen(smoother, first_seen + k);
-        }
-        bslam_fusion_t fusion;
-        if (take_seen(&smoother->model, ekf, direction, range, &fusion)) {
-            smoother->misfit += fusion.weight * fusion.distance2;
-            smoother->fitted++;
-        } else {
-            smoother->left_out++;
-        }
-    }
-    bslam_ekf_settle(ekf);
-}
-
-/// A filter that stands at the node before goes on to this one.
-static void pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
-                      int first_seen)
-{
-    const bslam_bend_t bend = bslam_smoother_bend(node);
-    bslam_ekf_predict_about(ekf, &smoother->model, &node->motion, &bend, node->at, NULL);
-    take_node(smoother, ekf, node, first_seen);
-}
-
 // ---- forth ------------------------------------------------------------------------------------------------
-
-void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
-{
-    const bslam_smoother_node_t *node = bslam_smoother_node(smoother, 0);
-    smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
-    bslam_smoother_linearise_base(smoother);
-    pass_node(smoother, &smoother->base, node, 0);
-    smoother->first_seen = (smoother->first_seen + node->seen) % BSLAM_SMOOTHER_SEEN_MAX;
-    smoother->seen_count -= node->seen;
-    smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;
-    smoother->node_count--;
-    if (smoother->anchors > 0) {
-        smoother->anchors--;
-    }
-    if (smoother->anchors > 0) {
-        return;
-    }
-    int level = BSLAM_SMOOTHER_LEVELS - 1;
-    while (level > 0 && smoother->levels[level] == 0) {
-        level--;
-    }
-    smoother->levels[level] -= smoother->node_count > 0 ? 1 : 0;  // the next one is the oldest now
-}
 
 void bslam_smoother_begin(bslam_smoother_t *smoother)
 {
@@ -211,7 +101,7 @@ static void keep_off(const bslam_ekf_t *run, bslam_real_t place[2])
     const bslam_real_t dx = place[0] - run->mean[BSLAM_STATE_X];
     const bslam_real_t dy = place[1] - run->mean[BSLAM_STATE_Y];
     const bslam_real_t distance_m = bslam_sqrt(dx * dx + dy * dy);
-    if (distance_m > RANGE_MIN_M && distance_m < NEAR_MIN_M) {
+    if (distance_m > BSLAM_SMOOTHER_RANGE_MIN_M && distance_m < NEAR_MIN_M) {
         place[0] += dx * (NEAR_MIN_M / distance_m - 1);
         place[1] += dy * (NEAR_MIN_M / distance_m - 1);
     }
@@ -437,7 +327,7 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
     bslam_ekf_predict_about(&smoother->run, &smoother->model, &begin->motion, &bend, begin->at, NULL);
     for (int k = first; k <= last; k++) {
         const bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
-        take_node(smoother, &smoother->run, node, first_seen);
+        bslam_smoother_take_node(smoother, &smoother->run, node, first_seen);
         first_seen += node->seen;
         if (k + 1 < smoother->top) {
             step_on(smoother, bslam_smoother_node(smoother, k + 1), &smoother->steps[k - first]);
@@ -475,7 +365,7 @@ static void advance(bslam_smoother_t *smoother)
     } else if (smoother->at % BSLAM_SMOOTHER_PART == 0) {
         note_mark(&smoother->run, &smoother->marks[smoother->at / BSLAM_SMOOTHER_PART]);
     }
-    pass_node(smoother, &smoother->run, node, smoother->at_seen);
+    bslam_smoother_pass_node(smoother, &smoother->run, node, smoother->at_seen);
     smoother->at++;
     smoother->at_seen += node->seen;
 }

@@ -23,7 +23,6 @@ static const bslam_real_t UNSEEN_SD_M = BSLAM_R(20.0);
 /// Passes are wanted most while the map is young. In nodes a frame: at first, and less by one for each so
 /// many nodes.
 enum { UNITS_FIRST = 64, NODES_A_UNIT_LESS = BSLAM_SMOOTHER_NODES_MAX / 15 + 1 };
-static const bslam_real_t UNITS_MAX = BSLAM_R(65535.0);
 static const bslam_real_t HUBER_D = BSLAM_R(3.0);
 
 static void clear_block(bslam_smoother_t *smoother)
@@ -72,21 +71,6 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *
 
 // ---- nodes ------------------------------------------------------------------------------------------------
 
-void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
-{
-    sum->dt_s += motion->dt_s;
-    sum->forward_m += motion->forward_m;
-    sum->turn_rad += motion->turn_rad;
-    sum->forward_var_m2 += motion->forward_var_m2;
-    sum->turn_var_rad2 += motion->turn_var_rad2;
-    sum->forward_turn_cov_mrad += motion->forward_turn_cov_mrad;
-}
-
-int32_t bslam_smoother_units(bslam_real_t value)
-{
-    return (int32_t)(value < UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5)) : UNITS_MAX);
-}
-
 static bslam_real_t mean_range_m(const bslam_smoother_line_t *line)
 {
     return line->range_m / (bslam_real_t)line->ranges;
@@ -95,7 +79,8 @@ static bslam_real_t mean_range_m(const bslam_smoother_line_t *line)
 /// There is more to say of the beacon than its direction.
 static bool has_range(const bslam_smoother_line_t *line)
 {
-    return line->ranges > 0 ? mean_range_m(line) < UNITS_MAX * BSLAM_SMOOTHER_RANGE_M : line->is_first;
+    return line->ranges > 0 ? mean_range_m(line) < BSLAM_SMOOTHER_UNITS_MAX * BSLAM_SMOOTHER_RANGE_M
+                            : line->is_first;
 }
 
 static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
@@ -108,17 +93,6 @@ static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
         .beacon = BSLAM_SMOOTHER_RANGE,
     };
     return range;
-}
-
-uint8_t bslam_smoother_weight(bslam_real_t sd_rad)
-{
-    bslam_real_t mantissa = sd_rad / BSLAM_SMOOTHER_SD_RAD;
-    int exponent = 0;
-    for (; mantissa >= BSLAM_R(31.5) && exponent < 15; exponent++) {
-        mantissa /= 2;
-    }
-    const int32_t low = bslam_smoother_units(mantissa) - 16;
-    return (uint8_t)(exponent * 16 + (low < 0 ? 0 : (low > 15 ? 15 : low)));
 }
 
 /// The line through a beacon's bearings, at the block's middle. Its slope is about that of the turn.

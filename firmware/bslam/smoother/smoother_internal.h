@@ -9,6 +9,10 @@
 #define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
 #define BSLAM_SMOOTHER_BEND BSLAM_R(5e-5)
 #define BSLAM_SMOOTHER_MOVED BSLAM_R(1e-3)
+#define BSLAM_SMOOTHER_UNITS_MAX BSLAM_R(65535.0)
+
+/// Nearer than this a direction says nothing of a distance, nor a distance of a direction.
+#define BSLAM_SMOOTHER_RANGE_MIN_M BSLAM_R(1e-3)
 
 /// A block lasts no longer, nor does a node's motion where nothing is seen.
 #define BSLAM_SMOOTHER_BLOCK_MAX_S BSLAM_R(0.2)
@@ -52,9 +56,13 @@ static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *di
            BSLAM_SMOOTHER_SD_RAD;
 }
 
+// ---- linearise.c
+
 /// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the
 /// logarithm of its distance from the base's robot, which is what directions are nearly linear in. O(n²).
 void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
+
+// ---- nodes.c
 
 /// sum += motion, which goes on from it or leads to it.
 void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion);
@@ -65,15 +73,27 @@ int32_t bslam_smoother_units(bslam_real_t value);
 /// A standard deviation as a bslam_smoother_seen_t has it.
 uint8_t bslam_smoother_weight(bslam_real_t sd_rad);
 
+/// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
+void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+                              int first_seen);
+
+/// A filter that stands at the node before goes on to this one.
+void bslam_smoother_pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+                              int first_seen);
+
+/// The oldest node leaves, into the base. The cycle must be begun anew.
+void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
+
+// ---- thin.c
+
 /// Of nodes beyond so many, the oldest two of a level become one of the next, whose room is used up first; at
 /// the last one the oldest leaves, into the base. The cycle must be begun anew. O(what is kept).
 void bslam_smoother_thin(bslam_smoother_t *smoother, int nodes_max);
 
+// ---- passes.c
+
 /// Begins a cycle: what is too old leaves first, into the base.
 void bslam_smoother_begin(bslam_smoother_t *smoother);
-
-/// The oldest node leaves, into the base. The cycle must be begun anew.
-void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
 
 /// Does so much work; a node of one phase, in the mean, is a unit. `is_whole`: the newest node is as new as
 /// it can be, so that a cycle may end. True if it did: then smoother->run is the filter at the newest node.

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "base/scalar.h"
 
 static void blame(bslam_codec_t *codec, bslam_map_fault_t fault)

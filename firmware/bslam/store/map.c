@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "bslam/store/classifiers.h"
 #include "bslam/store/codec.h"
 #include "base/scalar.h"

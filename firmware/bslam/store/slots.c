@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 
 #define MAGIC 0x534c5342u  // "BSLS"
 

@@ -8,8 +8,6 @@
 
 #include "bslam/store/map.h"
 
-#define BSLAM_SLOTS 2
-
 /// Saves the map. BSLAM_E_MAP: *fault is BSLAM_MAP_UNREADABLE if the flash failed or the map is larger than a
 /// slot, else what is wrong with what was read back; the map saved before is still there. Which slot is whole
 /// bslam_map_check says: one that is refused for its covariance alone counts as whole here.

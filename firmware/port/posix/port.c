@@ -3,7 +3,7 @@
 /// its robot.
 #define _POSIX_C_SOURCE 200809L
 
-#include "bslam/store/slots.h"
+#include "bslam/bslam.h"
 #include "port/film.h"
 
 #include <fcntl.h>

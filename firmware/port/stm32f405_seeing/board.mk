@@ -2,6 +2,6 @@
 # told apart by place: what learns looks has no room beside.
 BOARD_CORE_stm32f405_seeing := m4f
 BOARD_SOURCES_stm32f405_seeing := $(wildcard firmware/port/stm32f405/*.c) $(PORT_SOURCES)
-BOARD_FLAGS_stm32f405_seeing := -DCORE_HZ=168000000u -DFILM_ADDRESS=0x08040000u -DSESSION_VISION=1 \
-    -DSESSION_APPEARANCE=0 -DBSLAM_CAMERAS_MAX=1
+BOARD_FLAGS_stm32f405_seeing := -DCORE_HZ=168000000u -DFILM_ADDRESS=0x08040000u -DROBOT_VISION=1 \
+    -DBSLAM_CAMERAS_MAX=1
 BOARD_QEMU_stm32f405_seeing := netduinoplus2

@@ -1,13 +1,14 @@
-/// The example application on FreeRTOS. What robot.c does in one loop two tasks do: one reads the encoders
-/// when they are due, whatever the other is at; the other owns the session and does all the work. So no
+/// The example application on FreeRTOS. What main.c does in one loop two tasks do: one reads the encoders
+/// when they are due, whatever the other is at; the other owns robot and session and does all the work. So no
 /// reading waits until a picture has been looked at.
 #include <FreeRTOS.h>
 #include <queue.h>
 #include <task.h>
 
-#include "robot/session.h"
 #include "port/cortex_m/systick.h"
 #include "port/port.h"
+#include "robot/own_sensors.h"
+#include "robot/session.h"
 
 /// Readings that may wait while a picture is looked at.
 #define READINGS_MAX 64
@@ -17,7 +18,8 @@
 #define ROBOT_PRIORITY 1
 #define BODY_PRIORITY 2
 
-PORT_KEPT static session_t session;
+PORT_KEPT static robot_t robot;
+static session_t session;
 static QueueHandle_t readings;
 
 static void read_body(void *unused)
@@ -25,7 +27,7 @@ static void read_body(void *unused)
     (void)unused;
     for (;;) {
         bslam_odometry_reading_t reading;
-        while (session_read_body(&reading)) {
+        while (own_sensors_read(&reading)) {
             // A queue that is full loses the reading: the next one has its ticks.
             (void)xQueueSend(readings, &reading, 0);
         }
@@ -33,32 +35,23 @@ static void read_body(void *unused)
     }
 }
 
-static void take_bytes(void)
-{
-    int byte = port_read();
-    while (byte >= 0) {
-        session_take(&session, (uint8_t)byte);
-        byte = port_read();
-    }
-}
-
 static void take_readings(void)
 {
     bslam_odometry_reading_t reading;
     while (xQueueReceive(readings, &reading, 0) == pdTRUE) {
-        session_take_reading(&session, &reading);
+        own_sensors_take_reading(&robot, &session, &reading);
     }
 }
 
 static void take_camera(void)
 {
-#if SESSION_VISION
+#if ROBOT_VISION
     port_row_t row;
     taskENTER_CRITICAL();
     const bool there = port_camera_row(&row);
     taskEXIT_CRITICAL();
     if (there) {
-        session_take_row(&session, &row);
+        own_sensors_take_row(&robot, &session, &row);
     }
 #endif
 }
@@ -66,9 +59,9 @@ static void take_camera(void)
 static void run_robot(void *unused)
 {
     (void)unused;
-    session_init(&session);
+    session_start(&session, &robot);
     for (;;) {
-        take_bytes();
+        session_listen(&session);
         take_readings();
         take_camera();
         port_watchdog();

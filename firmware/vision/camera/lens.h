@@ -1,44 +1,11 @@
-/// A camera on the robot: which direction a pixel looks in, and the reverse. MATH-CAMERA "Lens".
-///
-/// Two kinds of lens, each with OpenCV's radial distortion, so that OpenCV's calibration can be used as it
-/// is: pinhole (calib3d, k1 and k2) and equidistant (calib3d's fisheye, k1 and k2: r = f theta (1 + k1 theta²
-/// + k2 theta⁴)). Pixel (0, 0) is the centre of the upper left one.
+/// Which direction a pixel of a camera looks in, and the reverse. MATH-CAMERA "Lens". Internal.
 ///
 /// Directions are unit vectors in the robot's axes: x forward, y left, z up. The camera's yaw and pitch are
 /// in them; its place is not, so a direction starts at the camera.
 #ifndef BSLAM_VISION_CAMERA_LENS_H
 #define BSLAM_VISION_CAMERA_LENS_H
 
-#include <stdint.h>
-
-#include "base/real.h"
-#include "base/status.h"
-
-typedef enum bslam_lens_kind {
-    BSLAM_LENS_PINHOLE = 0,     ///< straight lines stay straight; to about 120 degrees
-    BSLAM_LENS_EQUIDISTANT = 1  ///< the angle from the axis grows in proportion to the radius; to 180 degrees
-} bslam_lens_kind_t;
-
-/// Frames of at most this many pixels a side.
-#define BSLAM_FRAME_SIDE_MAX 4096
-#define BSLAM_ZOOM_MAX 2
-
-typedef struct bslam_camera {
-    bslam_lens_kind_t lens;
-    int32_t width_px;  ///< of the frame
-    int32_t height_px;
-    bslam_real_t fx_px;  ///< focal lengths
-    bslam_real_t fy_px;
-    bslam_real_t cx_px;  ///< where the axis meets the frame
-    bslam_real_t cy_px;
-    bslam_real_t k1;
-    bslam_real_t k2;
-    bslam_real_t yaw_rad;    ///< mounting: of the axis, positive to the left
-    bslam_real_t pitch_rad;  ///< positive looks down
-    bslam_real_t z_m;        ///< height above the floor
-    int32_t zoom;  ///< the front end looks at a pixel as so many, across and down: 2 for a lens that shows
-                   ///< much in few pixels; 0 and 1: as it is
-} bslam_camera_t;
+#include "vision/vision.h"
 
 /// A unit vector in the robot's axes.
 typedef struct bslam_direction {
@@ -46,13 +13,6 @@ typedef struct bslam_direction {
     bslam_real_t y;
     bslam_real_t z;
 } bslam_direction_t;
-
-/// BSLAM_OK if the other functions may be given this camera. BSLAM_E_NOT_FINITE: a value is NaN or infinite.
-/// BSLAM_E_PARAMETER: an unknown kind; a frame side outside 8 to BSLAM_FRAME_SIDE_MAX; a focal length outside
-/// 1 to 1e5 px; a centre outside the frame; |yaw| above pi, |pitch| above 1.5 rad; a height outside 0 to 10
-/// m; a zoom outside 0 to BSLAM_ZOOM_MAX; a distortion that folds: within the frame the radius must grow with
-/// the angle, so that every pixel looks in one direction.
-BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera);
 
 /// The direction that a point of the image looks in; it may lie outside the frame.
 /// BSLAM_E_NOT_FINITE; BSLAM_E_RANGE: so far outside that the lens has no direction for it, or the inverse of

@@ -1,13 +1,11 @@
 /// Which of a user's own objects a candidate is, by its signature. Paper, module BOR: recognition in detail,
 /// of objects whose size is known. tools/training/train_beacons.py trains it; docs/RETRAIN.md says how.
+/// Internal.
 #ifndef BSLAM_VISION_CLASSIFIERS_RECOGNISER_H
 #define BSLAM_VISION_CLASSIFIERS_RECOGNISER_H
 
 #include "vision/classifiers/beacon_model.h"
-#include "vision/frame.h"
-
-/// Objects of a recogniser.
-#define BSLAM_OBJECTS_MAX 64
+#include "vision/vision.h"
 
 /// BSLAM_OK if bslam_recognise may be given it. Else what bslam_svm_check answers; BSLAM_E_COUNT: more
 /// than BSLAM_OBJECTS_MAX objects; BSLAM_E_PARAMETER: the machine is quadratic, there are no objects;

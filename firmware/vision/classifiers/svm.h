@@ -1,37 +1,11 @@
 /// Support vector machines that were trained elsewhere: decision values of a linear machine, or of a
 /// quadratic one by explicit expansion of its features, which leaves a dot product. Binary, or one against
-/// the rest for each of several classes. MATH-CAMERA "SVM inference".
-///
-/// A machine is a view of constant tables, in flash for one that tools/training/export.py wrote; the library
-/// copies nothing. Always float, in the double build too: what was trained is what runs.
+/// the rest for each of several classes. MATH-CAMERA "SVM inference". Internal.
 #ifndef BSLAM_VISION_CLASSIFIERS_SVM_H
 #define BSLAM_VISION_CLASSIFIERS_SVM_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
 #include "base/status.h"
-
-/// Most rows and features of a machine.
-#define BSLAM_SVM_ROWS_MAX 255
-#define BSLAM_SVM_FEATURES_MAX 255
-
-/// Weights of a row. A quadratic machine has those of x_i first, then those of x_i x_j for i <= j, row by
-/// row: 00 01 02 11 12 22 for three features.
-#define BSLAM_SVM_WEIGHTS(features, quadratic) \
-    ((features) + ((quadratic) ? (features) * ((features) + 1) / 2 : 0))
-
-/// A machine: row r decides f_r(x) = bias[r] + sum of w[r][k] phi_k(x). Weights are either floats or bytes,
-/// the other pointer being NULL; a byte stands for byte * byte_scale[r].
-typedef struct bslam_svm {
-    int32_t rows;             ///< 1: binary; more: a row a class, against the rest
-    int32_t features;         ///< length of x
-    bool quadratic;           ///< phi(x) = x and its products in pairs; false: x alone
-    const float *weights;     ///< rows * BSLAM_SVM_WEIGHTS(features, quadratic) values, row by row, or NULL
-    const int8_t *bytes;      ///< as many, or NULL
-    const float *byte_scale;  ///< rows values, not negative; read only with bytes
-    const float *bias;        ///< rows values
-} bslam_svm_t;
+#include "vision/model.h"
 
 /// Whether all are numbers that a machine may have: not NaN, infinite or beyond 1e12.
 bool bslam_are_numbers(const float *values, int32_t count);

@@ -124,12 +124,12 @@ static float peak_of(float before, float here, float after)
 }
 
 /// The line of cells that the side snaps to. *shift is where in it, in cells.
-static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
+static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, bslam_box_side_t side,
                          int32_t line, float *shift)
 {
     near_t near = {.view = view, .box = box, .line = line};
-    near.outside = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_TOP ? -1 : 1;
-    near.is_upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    near.outside = side == BSLAM_BOX_LEFT || side == BSLAM_BOX_TOP ? -1 : 1;
+    near.is_upright = side == BSLAM_BOX_LEFT || side == BSLAM_BOX_RIGHT;
     near.cells = near.is_upright ? box->bottom - box->top : box->right - box->left;
     if (near.is_upright) {
         fill_columns(&near, INNER);
@@ -152,27 +152,26 @@ static int32_t snap_side(const bslam_view_t *view, const bslam_proposal_t *box, 
 
 bslam_proposal_t bslam_box_refined(const bslam_view_t *view, const bslam_proposal_t *rough)
 {
-    const int32_t lines[BSLAM_SIDES] = {rough->left, rough->right - 1, rough->top, rough->bottom - 1};
-    const int32_t ends[BSLAM_SIDES] = {view->frame->columns, view->frame->columns, view->frame->rows,
-                                       view->frame->rows};
-    int32_t cells[BSLAM_SIDES];
-    bslam_real_t edges_px[BSLAM_SIDES];
-    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
+    const int32_t lines[BSLAM_BOX_SIDES] = {rough->left, rough->right - 1, rough->top, rough->bottom - 1};
+    const int32_t ends[BSLAM_BOX_SIDES] = {view->frame->columns, view->frame->columns, view->frame->rows,
+                                           view->frame->rows};
+    int32_t cells[BSLAM_BOX_SIDES];
+    bslam_real_t edges_px[BSLAM_BOX_SIDES];
+    for (int32_t side = 0; side < BSLAM_BOX_SIDES; side++) {
         float shift = 0;
-        const int32_t line = snap_side(view, rough, (bslam_side_t)side, lines[side], &shift);
+        const int32_t line = snap_side(view, rough, (bslam_box_side_t)side, lines[side], &shift);
         cells[side] = bslam_clamp(line, 0, ends[side] - 1);
         edges_px[side] = ((bslam_real_t)cells[side] + (bslam_real_t)shift) * BSLAM_CELL_PX + BSLAM_R(1.5);
     }
     bslam_proposal_t box = *rough;
-    if (cells[BSLAM_SIDE_RIGHT] <= cells[BSLAM_SIDE_LEFT] ||
-        cells[BSLAM_SIDE_BOTTOM] <= cells[BSLAM_SIDE_TOP]) {
+    if (cells[BSLAM_BOX_RIGHT] <= cells[BSLAM_BOX_LEFT] || cells[BSLAM_BOX_BOTTOM] <= cells[BSLAM_BOX_TOP]) {
         return box;
     }
-    box.left = (int16_t)cells[BSLAM_SIDE_LEFT];
-    box.right = (int16_t)(cells[BSLAM_SIDE_RIGHT] + 1);
-    box.top = (int16_t)cells[BSLAM_SIDE_TOP];
-    box.bottom = (int16_t)(cells[BSLAM_SIDE_BOTTOM] + 1);
-    box.box = (bslam_box_t){edges_px[BSLAM_SIDE_LEFT], edges_px[BSLAM_SIDE_TOP], edges_px[BSLAM_SIDE_RIGHT],
-                            edges_px[BSLAM_SIDE_BOTTOM]};
+    box.left = (int16_t)cells[BSLAM_BOX_LEFT];
+    box.right = (int16_t)(cells[BSLAM_BOX_RIGHT] + 1);
+    box.top = (int16_t)cells[BSLAM_BOX_TOP];
+    box.bottom = (int16_t)(cells[BSLAM_BOX_BOTTOM] + 1);
+    box.box = (bslam_box_t){edges_px[BSLAM_BOX_LEFT], edges_px[BSLAM_BOX_TOP], edges_px[BSLAM_BOX_RIGHT],
+                            edges_px[BSLAM_BOX_BOTTOM]};
     return box;
 }

@@ -38,14 +38,14 @@ static rows_t rows_of(const bslam_view_t *view, area_t area)
 }
 
 /// A strip along a side of a box, outside.
-static area_t strip_of(const bslam_proposal_t *box, bslam_side_t side)
+static area_t strip_of(const bslam_proposal_t *box, bslam_box_side_t side)
 {
     switch (side) {
-    case BSLAM_SIDE_LEFT:
+    case BSLAM_BOX_LEFT:
         return (area_t){box->left - STRIP, box->top, box->left, box->bottom};
-    case BSLAM_SIDE_RIGHT:
+    case BSLAM_BOX_RIGHT:
         return (area_t){box->right, box->top, box->right + STRIP, box->bottom};
-    case BSLAM_SIDE_TOP:
+    case BSLAM_BOX_TOP:
         return (area_t){box->left, box->top - STRIP, box->right, box->top};
     default:
         return (area_t){box->left, box->bottom, box->right, box->bottom + STRIP};
@@ -279,7 +279,7 @@ static int32_t halves_sum(uint32_t halves)
     return (int32_t)((halves & 0xFFFFU) + (halves >> 16));
 }
 
-bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side)
+bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_box_side_t side)
 {
     const rows_t rows = rows_of(view, strip_of(box, side));
     const words_t words = words_of(view, &rows);

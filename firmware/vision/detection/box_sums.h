@@ -34,6 +34,6 @@ void bslam_sum_box(const bslam_view_t *view, const bslam_proposal_t *box,
                    bslam_zone_sums_t zones[BSLAM_BOX_ZONES * BSLAM_BOX_ZONES], bslam_sums_t *inside);
 
 /// Sums of the strip along a side, outside, as far as it is in the frame.
-bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side);
+bslam_sums_t bslam_sum_beside(const bslam_view_t *view, const bslam_proposal_t *box, bslam_box_side_t side);
 
 #endif

@@ -72,8 +72,8 @@ typedef struct bslam_channel_tables {
     bslam_tone_sum_t kept[BSLAM_TONES_KEPT];
 } bslam_channel_tables_t;
 
-/// How the colour steps sideways where a kind of upright would stand (uprights.h), by kind and column; mean,
-/// in quarters.
+/// How the colour steps sideways where a kind of upright would stand (vertical_edges.h), by kind and column;
+/// mean, in quarters.
 #define BSLAM_UPRIGHTS 6
 typedef struct bslam_edge_steps {
     uint8_t of_kind[BSLAM_UPRIGHTS][BSLAM_COLUMNS_MAX];

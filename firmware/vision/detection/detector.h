@@ -33,7 +33,7 @@ int32_t bslam_detector_judge(const bslam_detector_model_t *model, const bslam_be
 #define BSLAM_FUSION_LIMIT 4.0f
 void bslam_detector_normalise(const bslam_detector_model_t *model, float features[BSLAM_BLOB_FEATURES]);
 
-/// Normalised features as the closer look's machine is told them, after those of the pixels (patch.h):
+/// Normalised features as the closer look's machine is told them, after those of the pixels (gradients.h):
 /// BSLAM_CLOSE_STEPS steps for 1, 128 for 0.
 #define BSLAM_CLOSE_STEPS 42.0f
 void bslam_detector_tell(const float normalised[BSLAM_BLOB_FEATURES], uint8_t told[BSLAM_BLOB_FEATURES]);

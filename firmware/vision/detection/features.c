@@ -203,13 +203,13 @@ static float *likeness_features(const bslam_sums_t *a, const bslam_sums_t *b, fl
 /// How sharp the sides are. 2 features a side: mean step, share of it that steps.
 static float *edge_features(const bslam_view_t *view, const bslam_proposal_t *p, float *x)
 {
-    const int32_t lines[BSLAM_SIDES] = {p->left, p->right - 1, p->top, p->bottom - 1};
-    for (int32_t side = 0; side < BSLAM_SIDES; side++) {
-        const bslam_edge_t edge = bslam_edge_along(view, p, (bslam_side_t)side, lines[side]);
+    const int32_t lines[BSLAM_BOX_SIDES] = {p->left, p->right - 1, p->top, p->bottom - 1};
+    for (int32_t side = 0; side < BSLAM_BOX_SIDES; side++) {
+        const bslam_cell_edge_t edge = bslam_edge_along(view, p, (bslam_box_side_t)side, lines[side]);
         *x++ = edge.step;
         *x++ = edge.share;
     }
-    fold(x - 2 * BSLAM_SIDES, x - 2 * BSLAM_SIDES + 2, 2);
+    fold(x - 2 * BSLAM_BOX_SIDES, x - 2 * BSLAM_BOX_SIDES + 2, 2);
     return x;
 }
 
@@ -270,13 +270,13 @@ void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *propo
     bslam_sum_box(view, p, zones, &inside);
     const rays_t rays = rays_of(view, &p->box);
     float *x = place_features(view, p, &rays, features);
-    const bslam_sums_t left = bslam_sum_beside(view, p, BSLAM_SIDE_LEFT),
-                       right = bslam_sum_beside(view, p, BSLAM_SIDE_RIGHT);
+    const bslam_sums_t left = bslam_sum_beside(view, p, BSLAM_BOX_LEFT),
+                       right = bslam_sum_beside(view, p, BSLAM_BOX_RIGHT);
     x = contrast_features(&inside, &left, x);
     x = contrast_features(&inside, &right, x);
     fold(x - 2 * CONTRAST_FEATURES, x - CONTRAST_FEATURES, CONTRAST_FEATURES);
-    for (int32_t side = BSLAM_SIDE_TOP; side < BSLAM_SIDES; side++) {
-        const bslam_sums_t beside = bslam_sum_beside(view, p, (bslam_side_t)side);
+    for (int32_t side = BSLAM_BOX_TOP; side < BSLAM_BOX_SIDES; side++) {
+        const bslam_sums_t beside = bslam_sum_beside(view, p, (bslam_box_side_t)side);
         x = contrast_features(&inside, &beside, x);
     }
     x = likeness_features(&left, &right, x);

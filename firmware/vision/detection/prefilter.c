@@ -3,7 +3,7 @@
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"
 #include "vision/detection/features.h"
-#include "vision/pixels/steps.h"
+#include "vision/detection/steps.h"
 
 /// Rows of cells that stand for a box, and lines of the floor that tell how far the wall behind it is.
 #define ROWS_LOOKED_AT 4
@@ -77,18 +77,18 @@ static float *look_features(const bslam_view_t *view, const bslam_proposal_t *bo
                   right = bslam_least(box->right + BESIDE, columns) - 1;
     const int32_t top = bslam_most(box->top - BESIDE, 0),
                   bottom = bslam_least(box->bottom + BESIDE, rows) - 1;
-    glanced_t inside = {0}, sides[BSLAM_SIDES] = {0};
+    glanced_t inside = {0}, sides[BSLAM_BOX_SIDES] = {0};
     for (int32_t i = 0; i < ROWS_LOOKED_AT; i++) {
         const int32_t first = (box->top + (2 * i + 1) * height / (2 * ROWS_LOOKED_AT)) * columns;
         add_row(view, first + box->left, width, &inside);
-        add_cell(view, first + left, &sides[BSLAM_SIDE_LEFT]);
-        add_cell(view, first + right, &sides[BSLAM_SIDE_RIGHT]);
+        add_cell(view, first + left, &sides[BSLAM_BOX_LEFT]);
+        add_cell(view, first + right, &sides[BSLAM_BOX_RIGHT]);
     }
-    add_row(view, top * columns + box->left, width, &sides[BSLAM_SIDE_TOP]);
-    add_row(view, bottom * columns + box->left, width, &sides[BSLAM_SIDE_BOTTOM]);
+    add_row(view, top * columns + box->left, width, &sides[BSLAM_BOX_TOP]);
+    add_row(view, bottom * columns + box->left, width, &sides[BSLAM_BOX_BOTTOM]);
     const look_t in = mean_of(&inside);
-    const look_t a = mean_of(&sides[BSLAM_SIDE_LEFT]), b = mean_of(&sides[BSLAM_SIDE_RIGHT]);
-    const look_t above = mean_of(&sides[BSLAM_SIDE_TOP]), below = mean_of(&sides[BSLAM_SIDE_BOTTOM]);
+    const look_t a = mean_of(&sides[BSLAM_BOX_LEFT]), b = mean_of(&sides[BSLAM_BOX_RIGHT]);
+    const look_t above = mean_of(&sides[BSLAM_BOX_TOP]), below = mean_of(&sides[BSLAM_BOX_BOTTOM]);
     *x++ = in.light - (float)view->background->tone[BSLAM_ZONE_WALL].light;
     *x++ = in.value;
     *x++ = 0.5f * (a.value + b.value);
@@ -103,13 +103,13 @@ static float *look_features(const bslam_view_t *view, const bslam_proposal_t *bo
 
 /// How the colour steps across every few cells of a line of them: mean, a cell counting so much at most, and
 /// the share that does.
-static bslam_edge_t edge_of(const uint8_t *step, int32_t count, int32_t apart_by)
+static bslam_cell_edge_t edge_of(const uint8_t *step, int32_t count, int32_t apart_by)
 {
     const int32_t every = count < 2 * SIDE_CELLS ? 1 : count / SIDE_CELLS;
     const int32_t cells = (count + every - 1) / every;
     const bslam_step_sums_t sums = bslam_sum_steps(step, cells, every * apart_by);
     const float per_cell = 1.0f / (float)cells;
-    return (bslam_edge_t){(float)sums.sum * per_cell, (float)sums.clear * per_cell};
+    return (bslam_cell_edge_t){(float)sums.sum * per_cell, (float)sums.clear * per_cell};
 }
 
 /// The box's sides. 8 numbers; of left and right mean and difference, since a room has neither.
@@ -118,10 +118,10 @@ static float *side_features(const bslam_view_t *view, const bslam_proposal_t *bo
     const int32_t columns = view->frame->columns;
     const int32_t width = box->right - box->left, height = box->bottom - box->top;
     const int32_t first = box->top * columns + box->left, last = (box->bottom - 1) * columns + box->left;
-    const bslam_edge_t left = edge_of(view->step_x + first, height, columns);
-    const bslam_edge_t right = edge_of(view->step_x + first + width - 1, height, columns);
-    const bslam_edge_t top = edge_of(view->step_y + first, width, 1);
-    const bslam_edge_t bottom = edge_of(view->step_y + last, width, 1);
+    const bslam_cell_edge_t left = edge_of(view->step_x + first, height, columns);
+    const bslam_cell_edge_t right = edge_of(view->step_x + first + width - 1, height, columns);
+    const bslam_cell_edge_t top = edge_of(view->step_y + first, width, 1);
+    const bslam_cell_edge_t bottom = edge_of(view->step_y + last, width, 1);
     *x++ = 0.5f * (left.step + right.step);
     *x++ = 0.5f * (left.share + right.share);
     *x++ = apart(left.step, right.step);

@@ -6,7 +6,7 @@
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"
 #include "vision/detection/box_refinement.h"
-#include "vision/pixels/steps.h"
+#include "vision/detection/steps.h"
 
 /// What cells a segmentation joins.
 typedef enum source {
@@ -197,13 +197,13 @@ static bool is_known(const bslam_proposals_t *proposals, const bslam_box_t *box)
     return false;
 }
 
-bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
-                              int32_t line)
+bslam_cell_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box,
+                                   bslam_box_side_t side, int32_t line)
 {
     const int32_t columns = view->frame->columns, rows = view->frame->rows;
-    const bool upright = side == BSLAM_SIDE_LEFT || side == BSLAM_SIDE_RIGHT;
+    const bool upright = side == BSLAM_BOX_LEFT || side == BSLAM_BOX_RIGHT;
     const int32_t first = upright ? box->top : box->left, end = upright ? box->bottom : box->right;
-    bslam_edge_t edge = {0, 0};
+    bslam_cell_edge_t edge = {0, 0};
     if (line < 0 || line >= (upright ? columns : rows) || first >= end) {
         return edge;
     }

@@ -52,28 +52,28 @@ void bslam_proposals_add(bslam_proposals_t *proposals, const bslam_view_t *view,
                          const bslam_proposal_t *proposal);
 
 /// Sides of a box.
-typedef enum bslam_side {
-    BSLAM_SIDE_LEFT = 0,
-    BSLAM_SIDE_RIGHT = 1,
-    BSLAM_SIDE_TOP = 2,
-    BSLAM_SIDE_BOTTOM = 3,
-    BSLAM_SIDES = 4
-} bslam_side_t;
+typedef enum bslam_box_side {
+    BSLAM_BOX_LEFT = 0,
+    BSLAM_BOX_RIGHT = 1,
+    BSLAM_BOX_TOP = 2,
+    BSLAM_BOX_BOTTOM = 3,
+    BSLAM_BOX_SIDES = 4
+} bslam_box_side_t;
 
 /// A cell's step counts so much at most along an edge; above the other it is clearly one.
 #define BSLAM_EDGE_STEP_MAX 60
 #define BSLAM_EDGE_STEP_MIN 8
 
 /// How the colour steps across a line of cells.
-typedef struct bslam_edge {
+typedef struct bslam_cell_edge {
     float step;   ///< mean over the line; a cell counts 60 at most
     float share;  ///< of the cells that step by more than 8
-} bslam_edge_t;
+} bslam_cell_edge_t;
 
 /// The edge along a column (sides left, right) or row (top, bottom) of cells, between the box's other sides.
 /// All zero outside the frame.
-bslam_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box, bslam_side_t side,
-                              int32_t line);
+bslam_cell_edge_t bslam_edge_along(const bslam_view_t *view, const bslam_proposal_t *box,
+                                   bslam_box_side_t side, int32_t line);
 
 /// Finds the boxes: at most BSLAM_PROPOSALS_MAX, none twice. Scratch, whose content does not matter before or
 /// after: BSLAM_RUNS_MAX runs, twice BSLAM_MASK_WORDS words.

@@ -1,5 +1,5 @@
 /// How far one pattern of columns is shifted against another, and how far the robot drove meanwhile. Inside
-/// of turn.c; MATH-CAMERA "Visual gyro".
+/// of frame_rotation.c; MATH-CAMERA "Visual gyro".
 #ifndef BSLAM_VISION_GYRO_COLUMN_SHIFT_H
 #define BSLAM_VISION_GYRO_COLUMN_SHIFT_H
 

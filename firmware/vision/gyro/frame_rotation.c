@@ -92,7 +92,7 @@ static void make_grid(bslam_turn_grid_t *grid, const bslam_camera_t *camera)
     fill_in_front(grid, camera);
 }
 
-void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision)
+void bslam_turns_init(bslam_turns_t *turns, const bslam_front_end_t *vision)
 {
     memset(turns, 0, sizeof *turns);
     turns->way.variance_m2 = WAY_SD_MOST_M * WAY_SD_MOST_M;
@@ -162,7 +162,7 @@ typedef struct bslam_nearness {
     bslam_real_t sd_per_m;
 } nearness_t;
 
-static nearness_t nearness_at(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t cell)
+static nearness_t nearness_at(const bslam_turn_grid_t *grid, const bslam_front_end_t *vision, int32_t cell)
 {
     const bslam_floor_line_t *line = &vision->floor_line;
     const bslam_real_t told_m = line->distance_m[cell];
@@ -177,7 +177,7 @@ static nearness_t nearness_at(const bslam_turn_grid_t *grid, const bslam_vision_
 }
 
 /// Where each column looks, and how near things are there.
-static void look_along(const bslam_turn_grid_t *grid, const bslam_vision_t *vision, int32_t count,
+static void look_along(const bslam_turn_grid_t *grid, const bslam_front_end_t *vision, int32_t count,
                        bslam_turn_column_t *columns)
 {
     bslam_real_t sine, cosine, step_sine, step_cosine;
@@ -202,7 +202,7 @@ static void doubt_way(bslam_turn_way_t *way)
     }
 }
 
-static bool compare(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
+static bool compare(bslam_turns_t *turns, const bslam_front_end_t *vision, bslam_turn_t *turn)
 {
     const int32_t camera = vision->camera;
     const bslam_turn_grid_t *grid = &turns->grids[camera];
@@ -223,11 +223,11 @@ static bool compare(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_tu
     return true;
 }
 
-bool bslam_turns_see(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn)
+bool bslam_turns_see(bslam_turns_t *turns, const bslam_front_end_t *vision, bslam_turn_t *turn)
 {
     const bslam_camera_t *camera = &vision->cameras[vision->camera];
     bslam_turn_pattern_t *before = &turns->before[vision->camera];
-    const bslam_vision_reason_t reason = bslam_vision_reason(vision);
+    const bslam_vision_reason_t reason = vision->reason;
     turns->now.known = reason == BSLAM_VISION_SEEN || reason == BSLAM_VISION_NOTHING;
     bool found = false;
     if (turns->now.known) {

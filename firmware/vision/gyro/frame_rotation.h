@@ -1,15 +1,9 @@
 /// How far the robot turned between two frames of a camera, by how far the pattern of the columns went
-/// sideways. MATH-CAMERA "Visual gyro".
-///
-///     bslam_turns_init(&turns, &vision)                   once, after bslam_vision_init
-///     bslam_turns_see(&turns, &vision, &turn)             after each bslam_vision_end
-///
-/// It needs no beacon: a skirting board's end, a door frame or a lamp will do. What it says goes to
-/// bslam_visual_gyro_t (visual_gyro.h), which makes a rate of it that odometry takes as a gyro's.
+/// sideways. MATH-CAMERA "Visual gyro". Internal: vision.h has bslam_vision_turn.
 #ifndef BSLAM_VISION_GYRO_FRAME_ROTATION_H
 #define BSLAM_VISION_GYRO_FRAME_ROTATION_H
 
-#include "vision/vision.h"
+#include "vision/front_end.h"
 
 enum {
     BSLAM_TURN_BANDS = 6,        ///< of rows, from the horizon up
@@ -24,17 +18,6 @@ typedef uint32_t bslam_turn_place_t;
 #else
 typedef uint16_t bslam_turn_place_t;
 #endif
-
-/// The turn between two frames of one camera.
-typedef struct bslam_turn {
-    bslam_real_t turn_rad;       ///< to the left, if all that is seen were infinitely far away
-    bslam_real_t variance_rad2;  ///< of its noise
-    bslam_real_t mismatch;       ///< of the two patterns: 0 they are alike, 1 they have nothing in common
-    /// A metre driven forward looks like a turn of minus so much, if things are where the floor ends, and
-    /// what that errs by: things are nearer or farther, each by itself.
-    bslam_real_t parallax_rad_per_m;
-    bslam_real_t parallax_sd_rad_per_m;  ///< negative where what is seen lies to the right
-} bslam_turn_t;
 
 /// What a camera saw last: the brightness of each column less that of its neighbourhood.
 typedef struct bslam_turn_pattern {
@@ -85,12 +68,12 @@ typedef struct bslam_turns {
 } bslam_turns_t;
 
 /// Makes an instance ready for the cameras of a front end that is.
-void bslam_turns_init(bslam_turns_t *turns, const bslam_vision_t *vision);
+void bslam_turns_init(bslam_turns_t *turns, const bslam_front_end_t *vision);
 
 /// Looks at the frame that the front end has finished last, and remembers it. True, and *turn, if it tells
 /// how far the robot has turned since the frame of the same camera before. False, *turn unchanged: there is
 /// none before, one of the two was unusable (black, say), or it shows nothing but plain walls.
 /// Work: some 9 instructions a pixel.
-bool bslam_turns_see(bslam_turns_t *turns, const bslam_vision_t *vision, bslam_turn_t *turn);
+bool bslam_turns_see(bslam_turns_t *turns, const bslam_front_end_t *vision, bslam_turn_t *turn);
 
 #endif

@@ -13,6 +13,8 @@ enum {
     STATES = BSLAM_VISUAL_GYRO_STATES
 };
 
+_Static_assert(sizeof(bslam_gyro_filter_t) <= sizeof(bslam_visual_gyro_t), "size.h: the visual gyro");
+
 static const int64_t NO_FRAME = INT64_MIN;
 static const int64_t STEP_MAX_US = 4000000;
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
@@ -45,8 +47,13 @@ static bslam_real_t square(bslam_real_t x)
     return x * x;
 }
 
-void bslam_visual_gyro_init(bslam_visual_gyro_t *gyro, bslam_real_t least_sd_radps)
+bslam_status_t bslam_visual_gyro_init_sized(bslam_visual_gyro_t *instance, size_t gyro_bytes,
+                                            uint32_t sizes_hash, bslam_real_t least_sd_radps)
 {
+    if (gyro_bytes != sizeof *instance || sizes_hash != BSLAM_VISION_HASH) {
+        return BSLAM_E_SIZE;
+    }
+    bslam_gyro_filter_t *gyro = bslam_gyro_filter(instance);
     memset(gyro, 0, sizeof *gyro);
     gyro->least_sd_radps = least_sd_radps;
     gyro->covariance[RATE][RATE] = square(RATE_SD);
@@ -55,10 +62,11 @@ void bslam_visual_gyro_init(bslam_visual_gyro_t *gyro, bslam_real_t least_sd_rad
         gyro->covariance[NEARNESS + camera][NEARNESS + camera] = square(NEARNESS_SD);
         gyro->frame_us[camera] = NO_FRAME;
     }
+    return BSLAM_OK;
 }
 
 /// A linear measurement, coefficients of the state, with its innovation and noise. False if gated out.
-static bool update(bslam_visual_gyro_t *gyro, const bslam_real_t *coefficients, bslam_real_t innovation,
+static bool update(bslam_gyro_filter_t *gyro, const bslam_real_t *coefficients, bslam_real_t innovation,
                    bslam_real_t variance, bool gated)
 {
     bslam_real_t cross[STATES], sum = variance;
@@ -82,7 +90,7 @@ static bool update(bslam_visual_gyro_t *gyro, const bslam_real_t *coefficients, 
 }
 
 /// Multiplies a state value, and adds to its variance.
-static void scale_state(bslam_visual_gyro_t *gyro, int32_t place, bslam_real_t factor, bslam_real_t variance)
+static void scale_state(bslam_gyro_filter_t *gyro, int32_t place, bslam_real_t factor, bslam_real_t variance)
 {
     gyro->state[place] *= factor;
     for (int32_t j = 0; j < STATES; j++) {
@@ -100,7 +108,7 @@ static bslam_real_t seconds(int64_t time_us)
 }
 
 /// Adds the rate's turn to an angle.
-static void turn_on(bslam_visual_gyro_t *gyro, int32_t angle, bslam_real_t dt_s)
+static void turn_on(bslam_gyro_filter_t *gyro, int32_t angle, bslam_real_t dt_s)
 {
     gyro->state[angle] += dt_s * gyro->state[RATE];
     for (int32_t j = 0; j < STATES; j++) {
@@ -111,7 +119,7 @@ static void turn_on(bslam_visual_gyro_t *gyro, int32_t angle, bslam_real_t dt_s)
     }
 }
 
-static void predict(bslam_visual_gyro_t *gyro, bslam_real_t dt_s)
+static void predict(bslam_gyro_filter_t *gyro, bslam_real_t dt_s)
 {
     gyro->covariance[RATE][RATE] += square(RATE_SD_PER_SQRT_S) * dt_s;
     gyro->covariance[SPEED][SPEED] += square(SPEED_SD_PER_SQRT_S) * dt_s;
@@ -127,7 +135,7 @@ static void predict(bslam_visual_gyro_t *gyro, bslam_real_t dt_s)
 
 /// By how much the heading's variance grows in a second, of late and in the last step; frames that tell of
 /// steps before make it shrink.
-static bslam_real_t growth(const bslam_visual_gyro_t *gyro)
+static bslam_real_t growth(const bslam_gyro_filter_t *gyro)
 {
     const bslam_real_t share = gyro->step_s < GROWTH_LASTS_S ? gyro->step_s / GROWTH_LASTS_S : 1;
     const bslam_real_t now_rad2ps = gyro->covariance[HEADING][HEADING] / gyro->step_s;
@@ -136,7 +144,7 @@ static bslam_real_t growth(const bslam_visual_gyro_t *gyro)
 
 /// Whoever was told a rate knows of the heading and of how doubtful it is; else the wheels have told the
 /// turn.
-static void end_step(bslam_visual_gyro_t *gyro)
+static void end_step(bslam_gyro_filter_t *gyro)
 {
     if (gyro->told) {
         gyro->growth_rad2ps = growth(gyro);
@@ -148,9 +156,10 @@ static void end_step(bslam_visual_gyro_t *gyro)
     gyro->told = false;
 }
 
-bslam_status_t bslam_visual_gyro_advance(bslam_visual_gyro_t *gyro, int64_t time_us, bslam_real_t speed_mps,
-                                         bslam_real_t speed_sd_mps)
+bslam_status_t bslam_visual_gyro_advance(bslam_visual_gyro_t *instance, int64_t time_us,
+                                         bslam_real_t speed_mps, bslam_real_t speed_sd_mps)
 {
+    bslam_gyro_filter_t *gyro = bslam_gyro_filter(instance);
     if (!bslam_is_number(speed_mps)) {
         return BSLAM_E_NOT_FINITE;
     }
@@ -173,7 +182,7 @@ bslam_status_t bslam_visual_gyro_advance(bslam_visual_gyro_t *gyro, int64_t time
 }
 
 /// Takes a turn that spans the time since the camera's frame before.
-static void take_turn(bslam_visual_gyro_t *gyro, int32_t camera, const bslam_turn_t *turn)
+static void take_turn(bslam_gyro_filter_t *gyro, int32_t camera, const bslam_turn_t *turn)
 {
     const int32_t nearness = NEARNESS + camera;
     const bslam_real_t span_s = seconds(gyro->time_us - gyro->frame_us[camera]);
@@ -201,8 +210,9 @@ static void take_turn(bslam_visual_gyro_t *gyro, int32_t camera, const bslam_tur
     gyro->refused = (uint8_t)(taken ? 0 : gyro->refused + 1);
 }
 
-bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro, int32_t camera, const bslam_turn_t *turn)
+bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *instance, int32_t camera, const bslam_turn_t *turn)
 {
+    bslam_gyro_filter_t *gyro = bslam_gyro_filter(instance);
     if (camera < 0 || camera >= BSLAM_CAMERAS_MAX) {
         return BSLAM_E_RANGE;
     }
@@ -226,8 +236,9 @@ bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro, int32_t camera,
     return BSLAM_OK;
 }
 
-bool bslam_visual_gyro_rate(bslam_visual_gyro_t *gyro, bslam_real_t *rate_radps, bslam_real_t *sd_radps)
+bool bslam_visual_gyro_rate(bslam_visual_gyro_t *instance, bslam_real_t *rate_radps, bslam_real_t *sd_radps)
 {
+    bslam_gyro_filter_t *gyro = bslam_gyro_filter(instance);
     gyro->told = gyro->step_s > 0 && gyro->covariance[RATE][RATE] <= square(TOLD_SD);
     if (gyro->told) {
         const bslam_real_t grown = growth(gyro) > 0 ? GROWTH_FACTOR * growth(gyro) / gyro->step_s : 0;

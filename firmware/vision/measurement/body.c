@@ -1,6 +1,5 @@
 #include "vision/measurement/body.h"
 
-#include "vision/measurement/orientation.h"
 #include "base/scalar.h"
 
 // A flank's width depends on where its near corner is: rounds.
@@ -40,22 +39,4 @@ bslam_stance_t bslam_outline_stance(const bslam_outline_t *o, bslam_real_t flank
     return (bslam_stance_t){(float)o->turn,
                             o->body_left - o->left > flank_least ? (float)o->left : BSLAM_FLAT.left,
                             o->right - o->body_right > flank_least ? (float)o->right : BSLAM_FLAT.right};
-}
-
-bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
-                      bslam_level_t *level)
-{
-    bslam_level_sides_t sides;
-    if (!bslam_side_scan(&sides.top, frame, facing, BSLAM_SIDE_TOP, body->top, body->left, body->right,
-                         body->pixel) ||
-        !bslam_side_scan(&sides.bottom, frame, facing, BSLAM_SIDE_BOTTOM, body->bottom, body->left,
-                         body->right, body->pixel)) {
-        return false;
-    }
-    const bslam_stance_t stance = bslam_turns_best(frame, facing, &sides, body, level);
-    const bslam_line_t top = bslam_side_line(&sides.top, &stance);
-    const bslam_line_t bottom = bslam_side_line(&sides.bottom, &stance);
-    bslam_side_trace(&sides.top, facing, &top, &stance, &level->top);
-    bslam_side_trace(&sides.bottom, facing, &bottom, &stance, &level->bottom);
-    return true;
 }

@@ -25,7 +25,7 @@ typedef struct bslam_body {
     bslam_shape_t shape;
 } bslam_body_t;
 
-/// What is known of a turn before it is seen: its standard deviation. TURN_COST in turns.c is the same.
+/// What is known of a turn before it is seen: its standard deviation. TURN_COST in orientation.c is the same.
 #define BSLAM_TURN_SD BSLAM_R(0.85)
 
 /// The body with this turn: its visible flank taken off. The flank's rear corner is `depth` behind the
@@ -42,20 +42,5 @@ bslam_real_t bslam_body_width(const bslam_stance_t *stance);
 /// How an outline's body stands: its level sides run on along a flank that is at least so wide, across, and
 /// as along the front where it is narrower.
 bslam_stance_t bslam_outline_stance(const bslam_outline_t *outline, bslam_real_t flank_least);
-
-/// The upper and the lower edge, and the turn at which they were found.
-typedef struct bslam_level {
-    bslam_edge_t top;
-    bslam_edge_t bottom;
-    bslam_real_t turn;
-    bslam_real_t
-        middle_offset;        ///< from the front's middle there to the mean of all, by their probabilities,
-    bslam_real_t middle_var;  ///< and these places' variance
-} bslam_level_t;
-
-/// Finds them. Two lines that are level in the room meet at the horizon, so one turn serves both. False if
-/// the lens does not see a side.
-bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
-                      bslam_level_t *level);
 
 #endif

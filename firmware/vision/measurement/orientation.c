@@ -15,8 +15,14 @@ static const float TURN_COST = 0.7f;
 static const float WIDTH_COST = 60.0f;
 static const float WIDTH_COST_MAX = 6.0f;
 
+/// A body's upper and lower side, looked at.
+typedef struct level_sides {
+    bslam_side_t top;
+    bslam_side_t bottom;
+} level_sides_t;
+
 /// How many turns to either side make a difference of a place at the ends of a side.
-static int32_t turn_count(const bslam_level_sides_t *sides, const bslam_body_t *body)
+static int32_t turn_count(const level_sides_t *sides, const bslam_body_t *body)
 {
     const bslam_real_t top = bslam_abs((bslam_real_t)sides->top.reach);
     const bslam_real_t bottom = bslam_abs((bslam_real_t)sides->bottom.reach);
@@ -42,9 +48,10 @@ static float width_cost(const bslam_body_t *body, const bslam_stance_t *stance)
     return cost < WIDTH_COST_MAX ? cost : WIDTH_COST_MAX;
 }
 
-bslam_stance_t bslam_turns_best(const bslam_frame_t *frame, const bslam_facing_t *facing,
-                                const bslam_level_sides_t *sides, const bslam_body_t *body,
-                                bslam_level_t *level)
+/// The stance at which both sides are likeliest; its turn, and what the others leave open of the front's
+/// middle, go into *level.
+static bslam_stance_t best_stance(const bslam_frame_t *frame, const bslam_facing_t *facing,
+                                  const level_sides_t *sides, const bslam_body_t *body, bslam_level_t *level)
 {
     const int32_t turns = turn_count(sides, body);
     float scores[2 * TURNS_MAX + 1];
@@ -74,4 +81,22 @@ bslam_stance_t bslam_turns_best(const bslam_frame_t *frame, const bslam_facing_t
     level->middle_offset = (bslam_real_t)mean;
     level->middle_var = (bslam_real_t)(second / whole - mean * mean);
     return bslam_body_stance(body, level->turn);
+}
+
+bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
+                      bslam_level_t *level)
+{
+    level_sides_t sides;
+    if (!bslam_side_scan(&sides.top, frame, facing, BSLAM_SIDE_TOP, body->top, body->left, body->right,
+                         body->pixel) ||
+        !bslam_side_scan(&sides.bottom, frame, facing, BSLAM_SIDE_BOTTOM, body->bottom, body->left,
+                         body->right, body->pixel)) {
+        return false;
+    }
+    const bslam_stance_t stance = best_stance(frame, facing, &sides, body, level);
+    const bslam_line_t top = bslam_side_line(&sides.top, &stance);
+    const bslam_line_t bottom = bslam_side_line(&sides.bottom, &stance);
+    bslam_side_trace(&sides.top, facing, &top, &stance, &level->top);
+    bslam_side_trace(&sides.bottom, facing, &bottom, &stance, &level->bottom);
+    return true;
 }

@@ -1,20 +1,23 @@
 /// Which way a body is turned: by its level sides, by how wide its front may be, and by what front and flank
-/// look like. Inside of body.c; MATH-CAMERA "Outline".
+/// look like. Inside of outline.c; MATH-CAMERA "Outline".
 #ifndef BSLAM_VISION_MEASUREMENT_ORIENTATION_H
 #define BSLAM_VISION_MEASUREMENT_ORIENTATION_H
 
 #include "vision/measurement/body.h"
 
-/// A body's upper and lower side, looked at.
-typedef struct bslam_level_sides {
-    bslam_side_t top;
-    bslam_side_t bottom;
-} bslam_level_sides_t;
+/// The upper and the lower edge, and the turn at which they were found.
+typedef struct bslam_level {
+    bslam_edge_t top;
+    bslam_edge_t bottom;
+    bslam_real_t turn;
+    bslam_real_t
+        middle_offset;        ///< from the front's middle there to the mean of all, by their probabilities,
+    bslam_real_t middle_var;  ///< and these places' variance
+} bslam_level_t;
 
-/// The stance at which both sides are likeliest; its turn, and what the others leave open of the front's
-/// middle, go into *level.
-bslam_stance_t bslam_turns_best(const bslam_frame_t *frame, const bslam_facing_t *facing,
-                                const bslam_level_sides_t *sides, const bslam_body_t *body,
-                                bslam_level_t *level);
+/// Finds them. Two lines that are level in the room meet at the horizon, so one turn serves both. False if
+/// the lens does not see a side.
+bool bslam_body_level(const bslam_body_t *body, const bslam_frame_t *frame, const bslam_facing_t *facing,
+                      bslam_level_t *level);
 
 #endif

@@ -1,7 +1,7 @@
 #include "vision/measurement/outline.h"
 
 #include "base/trig.h"
-#include "vision/measurement/body.h"
+#include "vision/measurement/orientation.h"
 #include "base/scalar.h"
 
 // A body's front and its turn determine each other: rounds.

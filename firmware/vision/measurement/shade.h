@@ -1,5 +1,5 @@
 /// Colours along upright lines of the facing plane: whether what is next to a side is the object or the wall,
-/// and whether it is busy or plain. Inside of ends.c and flank.c; MATH-CAMERA "Outline".
+/// and whether it is busy or plain. Inside of ends.c and side_face.c; MATH-CAMERA "Outline".
 #ifndef BSLAM_VISION_MEASUREMENT_SHADE_H
 #define BSLAM_VISION_MEASUREMENT_SHADE_H
 

@@ -1,5 +1,5 @@
 /// What the front and the flank of a body look like: an edge lies between them, and shelves, drawers and ribs
-/// are on fronts. Inside of turns.c; MATH-CAMERA "Outline".
+/// are on fronts. Inside of orientation.c; MATH-CAMERA "Outline".
 #ifndef BSLAM_VISION_MEASUREMENT_SIDE_FACE_H
 #define BSLAM_VISION_MEASUREMENT_SIDE_FACE_H
 

@@ -15,7 +15,6 @@ from bslam.core.slam import Slam
 from bslam.motion import Pose
 
 _NO_GYRO: tuple[None, float] = (None, 0.0)
-_BY_LOOKS = 3  # the parameter `association` of the method that learns what beacons look like
 
 
 class Bslam:
@@ -27,10 +26,8 @@ class Bslam:
 
     def _new(self) -> Slam:
         setup = self._setup
-        looks = setup.parameters["association"] == _BY_LOOKS
-        return Slam(
-            setup.parameters, beacons_max=setup.beacons_max, real=setup.real, looks=looks, seeds=setup.seeds
-        )
+        params = setup.parameters | {"recovery": 0}  # nobody carries the robot away
+        return Slam(params, beacons_max=setup.beacons_max, real=setup.real, seeds=setup.seeds)
 
     def reset(self, seed: int) -> None:
         """See `Algorithm`. Nothing inside is random."""

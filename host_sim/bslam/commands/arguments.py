@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import joblib
 
+from bslam.core.presets import PRESETS
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
@@ -58,7 +59,7 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
     meaning = (
         "whose a sighting is; known:RATE: identity wrong at that rate (default: svm where sightings have "
-        "looks and the map is not known, else known)"
+        "signatures and the map is not known, else known)"
     )
     add("association", _association, None, associations, meaning)
     meaning = (
@@ -66,6 +67,16 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "not known)"
     )
     add("filter", _word(FILTERS), None, _names(FILTERS), meaning)
+    group.add_argument(
+        "--preset",
+        dest="presets",
+        action="append",
+        type=_word(PRESETS),
+        default=[],
+        metavar=_names(PRESETS),
+        help="settings to start from; repeated: one on top of the other (default: by what the scenario or the "
+        "log says of itself)",
+    )
     meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
     add("sigma", _sigma_mps, None, "M/S", meaning)
     group.add_argument("--motion", choices=MOTIONS, default="arc", help="odometry step (default: arc)")
@@ -73,7 +84,7 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         "--velocity-states",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="v and omega in the state (default: on for speedometer noise)",
+        help="v and omega in the state (default: as the presets have it)",
     )
     group.add_argument(
         "--noise",
@@ -122,7 +133,7 @@ def _add_map_options(group: Any) -> None:
         choices=RECOVERIES,
         help="notice when it is lost, and find itself again. growing: when several beacons of the map it "
         "makes fit a pose elsewhere; carried: when one does, too, if nothing new was seen for a while "
-        "(default: growing by looks, carried with --map, else off)",
+        "(default: growing by appearance, carried with --map, else off)",
     )
 
 
@@ -247,6 +258,7 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "filter": arguments.filter,
         "sigma_mps": arguments.sigma,
         "motion": arguments.motion,
+        "presets": tuple(arguments.presets),
         "velocity_states": arguments.velocity_states,
         "noise": arguments.noise,
         "sensor": getattr(arguments, "sensor", "simulated"),

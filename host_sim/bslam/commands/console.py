@@ -18,7 +18,6 @@ from bslam.core.errors import CoreError
 from bslam.errors import BslamError
 from bslam.link.messages import Health, PoseReport
 from bslam.log import Log, read_folder
-from bslam.options import ASSOCIATIONS
 from bslam.recording import RecordingWriter
 from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, Start, State
 from bslam.recording.recorder import MAP_PERIOD_US
@@ -138,8 +137,7 @@ def _watch(arguments: argparse.Namespace) -> int:
         if arguments.record is None:
             _follow(slam, screen, None, arguments)
         else:
-            looks = slam.params["association"] == ASSOCIATIONS.index("svm")
-            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max, looks)
+            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max)
             start.about.update(slam.target_description())
             with RecordingWriter(arguments.record, start) as writer:
                 if not arguments.reset:

@@ -81,10 +81,6 @@ def _from_text(path: Path) -> KeptMap:
 def _write(path: Path, kept: KeptMap) -> None:
     blob = pack(kept)
     ensure_sound(path, blob)
-    try:
-        Slam(beacons_max=SIZE_CLASSES[-1]).load_map(blob)  # which looks at the covariance as a whole
-    except BslamError as error:
-        raise BslamError(f"{path}: {error}") from error
     write_atomically(path, blob)
     print(f"written: {path}, {len(kept.beacons)} beacons, {len(blob)} bytes")
 

@@ -36,7 +36,9 @@ mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mappi
 dlr: DIR is the DLR Spatial Cognition data set, held against its least-squares solution after rigid alignment.
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
 COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam", "dlr": ""}  # folders of the data directory
-_OF_THE_RECORDING = ("observation", "association", "filter", "sigma", "motion", "velocity_states", "noise")
+_OF_THE_RECORDING = (
+    "observation", "association", "filter", "presets", "sigma", "motion", "velocity_states", "noise"
+)
 """Options that a recording has decided."""
 
 
@@ -86,7 +88,7 @@ def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:
             raise BslamError(f"'{path}': allowed: csv DIR, mrclam DIR, dlr DIR, or recordings, FILE{SUFFIX}")
     for name, default in arguments.defaults.items():
         if getattr(arguments, name) != default:
-            option = f"--{name.replace('_', '-')}"
+            option = "--preset" if name == "presets" else f"--{name.replace('_', '-')}"
             raise BslamError(f"{option}: a recording runs with its own parameters; allowed: --set KEY=VALUE")
     changes = core_parameters(arguments)
     sources = [RecordingSource(Path(path)) for path in paths]

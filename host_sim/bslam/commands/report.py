@@ -40,6 +40,9 @@ def finish(
     Raises BslamError if an input was bad, after all that could run did.
     """
     print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
+    presets = dict.fromkeys(", ".join(outcome.entry.get("presets", ())) for outcome in result.outcomes)
+    if any(presets):
+        print(f"presets: {'; '.join(filter(None, presets))}")
     print(f"files in {out}: {', '.join(_files(result, more))}")
     for outcome in result.outcomes:
         if outcome.crash is not None:

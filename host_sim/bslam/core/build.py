@@ -17,11 +17,32 @@ from pathlib import Path
 
 from cffi import FFI
 
-from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
+from bslam.core.builds import (
+    FIRMWARE_DIR,
+    REALS,
+    SIZE_CLASSES,
+    VISION_EXTENSION,
+    VISION_TRAINING_EXTENSION,
+    extension_name,
+)
 
 CORE_DIR = Path(__file__).resolve().parent
 SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision")}
 """Folders of the firmware that make each library."""
+HEADER = "bslam/bslam.h"
+CONSTANTS = "\n".join(
+    f"#define {name} ..."
+    for name in ("BSLAM_SIZES_HASH", "BSLAM_SAMPLE_FEATURES", "BSLAM_SEEDS_MAX", "BSLAM_CLASS_NOT_MAPPABLE")
+)
+"""Macros of the header that are needed here: the preprocessor leaves none."""
+CALLBACKS = """
+extern "Python" bool sink_write(void *, const void *, uint32_t);
+extern "Python" bool source_read(const void *, uint32_t, void *, uint32_t);
+extern "Python" bool flash_erase(void *, int);
+extern "Python" bool flash_write(void *, int, uint32_t, const void *, uint32_t);
+extern "Python" bool flash_read(void *, int, uint32_t, void *, uint32_t);
+"""
+"""What bslam_map_sink_t, bslam_map_source_t and bslam_flash_t call: raw.py."""
 BEACONS_HEADER = FIRMWARE_DIR / "models" / "beacons.h"
 
 LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limits.h", "float.h")
@@ -37,13 +58,17 @@ VISION_MACROS: Macros = (
 """Room for a 180-degree lens of 320x240 that is looked at doubled."""
 
 
-def _macros(real: str, beacons_max: int) -> Macros:
+def macros_of(real: str, beacons_max: int) -> Macros:
+    """The sizes of one build: it has all that the estimator may have."""
     return [
         ("BSLAM_REAL_DOUBLE", "1" if real == "double" else "0"),
         ("BSLAM_BEACONS_MAX", str(beacons_max)),
         ("BSLAM_RAYS_MAX", str(beacons_max)),
         ("BSLAM_SIGHTINGS_MAX", str(max(64, beacons_max + 16))),  # every beacon at once, and some clutter
         ("BSLAM_HISTORY_MAX", "128"),
+        ("BSLAM_APPEARANCE", "1"),
+        ("BSLAM_SMOOTHER", "1"),
+        ("BSLAM_GUARD", "2"),
     ]
 
 
@@ -72,33 +97,40 @@ def declarations(macros: Macros, header: str) -> str:
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
         command += [*defines, "-D__attribute__(x)=", "-DINT_MAX=2147483647", str(FIRMWARE_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    # How many bytes an instance has is for the compiler to say: cffi reads no conditional expression.
+    text = re.sub(r"\bbytes\[[^;]*\];", "bytes[...];", text)
     return _drop_inline_functions(text)
 
 
 def build(real: str, beacons_max: int) -> Path:
     """Builds the filter for a scalar type and size class; returns where."""
-    macros = _macros(real, beacons_max)
+    macros = macros_of(real, beacons_max)
+    declared = declarations(macros, HEADER) + CONSTANTS + CALLBACKS
     name = extension_name(real, beacons_max)
-    return _compile(name, declarations(macros, "bslam/bslam.h"), '#include "bslam/bslam.h"', macros, "bslam")
+    return compile_extension(name, declared, f'#include "{HEADER}"', macros, "bslam")
 
 
-def build_vision() -> Path:
-    """Builds the vision front end, in float as on the target, with its model where there is one yet."""
-    header = "vision/gyro/visual_gyro.h"  # it includes all the others
-    includes = f'#include "{header}"\n'
-    text = declarations(VISION_MACROS, header)
+def build_vision(name: str = VISION_EXTENSION, header: str = "vision/vision.h") -> Path:
+    """Builds the vision library, in float as on the target, with its model where there is one yet."""
+    text = declarations(VISION_MACROS, header) + "#define BSLAM_VISION_HASH ...\n"
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
+    includes, model = f'#include "{header}"\n', "NULL"
     if BEACONS_HEADER.is_file():
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"
-    else:
-        model = "NULL"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    return _compile(VISION_EXTENSION, text, includes + function, VISION_MACROS, "vision")
+    return compile_extension(name, text, includes + function, VISION_MACROS, "vision")
 
 
-def _compile(name: str, declared: str, source: str, macros: Macros, library: str) -> Path:
-    """Compiles one extension and puts it beside this file; returns where."""
+def build_vision_training() -> Path:
+    """The same with what is inside."""
+    return build_vision(VISION_TRAINING_EXTENSION, "vision/internal.h")
+
+
+def compile_extension(
+    name: str, declared: str, source: str, macros: Macros, library: str, folder: Path = CORE_DIR
+) -> Path:
+    """Compiles one extension and puts it into a folder; returns where."""
     ffi = FFI()
     ffi.cdef(declared)
     with tempfile.TemporaryDirectory() as work:
@@ -121,7 +153,7 @@ def _compile(name: str, declared: str, source: str, macros: Macros, library: str
             libraries=["m"],
         )
         built = Path(ffi.compile(tmpdir=work, verbose=False))
-        target = CORE_DIR / (name.rsplit(".", 1)[1] + sysconfig.get_config_var("EXT_SUFFIX"))
+        target = folder / (name.rsplit(".", 1)[-1] + sysconfig.get_config_var("EXT_SUFFIX"))
         # Replaced by a rename: a running process keeps the old file, an interrupted build leaves none.
         part = target.with_suffix(".part")
         shutil.copyfile(built, part)
@@ -133,8 +165,8 @@ def main() -> int:
     """Builds every extension, one on a core (in processes, since cffi changes the directory)."""
     sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
     with ProcessPoolExecutor() as pool:
-        vision = pool.submit(build_vision)
-        for path in [*pool.map(build, reals, sizes), vision.result()]:
+        vision = [pool.submit(one) for one in (build_vision, build_vision_training)]
+        for path in [*pool.map(build, reals, sizes), *(one.result() for one in vision)]:
             print(f"built {path.name}", file=sys.stderr)
     return 0
 

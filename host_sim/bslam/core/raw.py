@@ -1,21 +1,28 @@
 """The C library 1:1: one `Library` is one build. Nothing else in the package touches ffi."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
-from typing import Any
+from itertools import count
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
+from bslam.core.builds import (
+    REALS,
+    SIZE_CLASSES,
+    VISION_EXTENSION,
+    VISION_TRAINING_EXTENSION,
+    extension_name,
+)
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
 
 
 class Library:
-    """A build of the C library: `ffi` and `lib` of cffi, and its status names."""
+    """A build of the estimator: `ffi` and `lib` of cffi, and the names of its enums."""
 
     def __init__(self, real: str, beacons_max: int) -> None:
         try:
@@ -26,24 +33,34 @@ class Library:
         self.beacons_max = beacons_max
         self.ffi = module.ffi
         self.lib = module.lib
+        self.map_faults = self.enum_names("bslam_map_fault_t", "BSLAM_MAP_", space=" ")
+        _answer_callbacks(self.ffi)
 
     def ensure(self, status: int, message: str) -> None:
         """Raises CoreError unless status is BSLAM_OK."""
         if status != self.lib.BSLAM_OK:
             raise CoreError(self.text(self.lib.bslam_status_name(status)), message)
 
+    def settings_infos(self) -> Iterator[Any]:
+        """Every line of the tables of settings."""
+        for number in count():
+            info = self.lib.bslam_settings_info(number)
+            if info == self.ffi.NULL:
+                return
+            yield info
+
     def text(self, pointer: Any) -> str:
         """A C string."""
         return self.ffi.string(pointer).decode()
 
-    def fields(self, struct: Any, type_name: str) -> dict[str, Any]:
+    def fields(self, struct: Any) -> dict[str, Any]:
         """The members of a C struct of plain numbers, by name."""
-        return {name: getattr(struct, name) for name, _ in self.ffi.typeof(type_name).fields}
+        return {name: getattr(struct, name) for name, _ in self.ffi.typeof(struct).fields}
 
-    def enum_names(self, type_name: str, prefix: str) -> dict[int, str]:
-        """Value -> name in lower case without the prefix."""
+    def enum_names(self, type_name: str, prefix: str, space: str = "_") -> dict[int, str]:
+        """Value -> name in lower case without the prefix, with `space` between its words."""
         elements = self.ffi.typeof(type_name).elements
-        return {value: name.removeprefix(prefix).lower() for value, name in elements.items()}
+        return {value: name.removeprefix(prefix).lower().replace("_", space) for value, name in elements.items()}
 
     def sightings(
         self,
@@ -74,6 +91,50 @@ class Library:
         return array
 
 
+class Flash(Protocol):
+    """Two slots that keep a map over a power cut, as bslam_flash_t describes them. False: it failed."""
+
+    slot_bytes: int
+
+    def erase(self, slot: int) -> bool:
+        """All of a slot becomes 0xff."""
+
+    def write(self, slot: int, at: int, data: bytes) -> bool:
+        """From a place in a slot on."""
+
+    def read(self, slot: int, at: int, size: int) -> bytes:
+        """So many bytes from there."""
+
+
+def _answer_callbacks(ffi: Any) -> None:
+    """Binds what C calls. A context is the handle of what answers: a sink's bytearray, a source's bytes, or
+    a `Flash`.
+    """
+
+    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    def sink_write(context: Any, data: Any, size: int) -> bool:
+        ffi.from_handle(context).extend(ffi.buffer(data, size))
+        return True
+
+    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    def source_read(context: Any, at: int, data: Any, size: int) -> bool:
+        ffi.memmove(data, ffi.from_handle(context)[at : at + size], size)
+        return True
+
+    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    def flash_erase(context: Any, slot: int) -> bool:
+        return bool(ffi.from_handle(context).erase(slot))
+
+    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    def flash_write(context: Any, slot: int, at: int, data: Any, size: int) -> bool:
+        return bool(ffi.from_handle(context).write(slot, at, bytes(ffi.buffer(data, size))))
+
+    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    def flash_read(context: Any, slot: int, at: int, data: Any, size: int) -> bool:
+        ffi.memmove(data, ffi.from_handle(context).read(slot, at, size), size)
+        return True
+
+
 @cache
 def library(real: str, beacons_max: int) -> Library:
     """The smallest build of scalar type `real` that holds beacons_max beacons."""
@@ -89,11 +150,11 @@ def library(real: str, beacons_max: int) -> Library:
 
 
 class VisionLibrary:
-    """The vision front end 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
+    """The vision library 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
 
-    def __init__(self) -> None:
+    def __init__(self, extension: str = VISION_EXTENSION) -> None:
         try:
-            module = import_module(VISION_EXTENSION)
+            module = import_module(extension)
         except ImportError as error:
             raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error
         self.ffi = module.ffi
@@ -103,6 +164,10 @@ class VisionLibrary:
         """Raises CoreError unless status is BSLAM_OK."""
         if status != self.lib.BSLAM_OK:
             raise CoreError(self.ffi.string(self.lib.bslam_status_name(status)).decode(), message)
+
+    def size_of(self, type_name: str) -> tuple[int, int]:
+        """Bytes of an instance and the hash of the sizes, as the init macros of the header give them."""
+        return self.ffi.sizeof(type_name), self.lib.BSLAM_VISION_HASH
 
     def new_filled(self, type_name: str, **values: Any) -> Any:
         """A struct with these members set and all else zero."""
@@ -188,5 +253,11 @@ class VisionLibrary:
 
 @cache
 def vision_library() -> VisionLibrary:
-    """The one build of the front end."""
+    """The one build of the vision library."""
     return VisionLibrary()
+
+
+@cache
+def vision_training_library() -> VisionLibrary:
+    """The build that shows what is inside it: all that the other one has, and more."""
+    return VisionLibrary(VISION_TRAINING_EXTENSION)

@@ -1,4 +1,4 @@
-"""The pipeline of the C library as a class."""
+"""The estimator as a class."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.learner import SIGNATURE_SIZE, encode
-from bslam.core.raw import library
+from bslam.core.appearance import SIGNATURE_SIZE, encode
+from bslam.core.raw import Flash, library
 from bslam.errors import BslamError
 
-_NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE; a macro has no place in an ffi declaration
+BY_APPEARANCE = 3
+"""The setting `association` by which classifiers learn (BSLAM_ASSOCIATION_SVM)."""
+_NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE
 # What velocity_states = 1 allows of other parameters: the only contradictions that there are.
 _BESIDE_VELOCITY_STATES = {
     "scale_states": "0",
@@ -22,10 +24,11 @@ _BESIDE_VELOCITY_STATES = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One run-time parameter of the C library."""
+    """One setting of the C library. group: "settings", "expert" or "tuning"."""
 
     name: str
     meaning: str
+    group: str
     default: float
     low: float
     high: float
@@ -63,12 +66,11 @@ class Beacon:
 
 
 class Slam:
-    """A robot that localises itself and maps beacons: one instance of the C pipeline.
+    """A robot that localises itself and maps beacons: one bslam_t.
 
-    params: values by the C parameters' names, the rest at their defaults. beacons_max: beacons the map must
-    hold. real: "float", as on the target, or "double", the twin. looks: it learns what the beacons look like
-    (association 3); seeds (n, 71): signatures of things that are no beacon here. recovery: it notices when it
-    is lost, and finds itself again. Raises BslamError for what is no parameter or is out of range.
+    params: settings by the names of bslam_settings_t, the rest at their defaults. beacons_max: beacons the
+    map must hold. real: "float", as on the target, or "double". seeds (n, 71): signatures of things that are
+    no beacon here. Raises BslamError for what is no setting or is out of range.
     """
 
     def __init__(
@@ -77,13 +79,11 @@ class Slam:
         *,
         beacons_max: int = 20,
         real: str = "float",
-        looks: bool = False,
         seeds: NDArray[np.float32] | None = None,
-        recovery: bool = False,
     ) -> None:
         self._raw = library(real, beacons_max)
         self._lib, self._ffi = self._raw.lib, self._raw.ffi
-        self._slam = self._ffi.new("bslam_slam_t *")
+        self._robot = self._ffi.new("bslam_t *")
         self._reading = self._ffi.new("bslam_odometry_reading_t *")
         self._pose = self._ffi.new("bslam_pose_t *")
         self._lower = self._ffi.new("bslam_real_t[6]")
@@ -95,58 +95,62 @@ class Slam:
             "ticks": (self._lib.BSLAM_ODOMETRY_TICKS, "left_ticks", "right_ticks"),
             "velocity": (self._lib.BSLAM_ODOMETRY_VELOCITY, "v_mps", "omega_radps"),
         }
-        self._init(params or {})
-        self._smoother = None
-        if self._slam.params.filter == self._lib.BSLAM_FILTER_SMOOTHER:
-            self._smoother = self._ffi.new("bslam_smoother_t *")
-            self._lib.bslam_slam_attach_smoother(self._slam, self._smoother)
-        self._recovery = None
-        if recovery:
-            self._recovery = self._ffi.new("bslam_recovery_t *")
-            self._lib.bslam_recovery_init(self._recovery)
-        self._looks = None
-        if looks:
-            self._attach_looks(np.empty((0, SIGNATURE_SIZE), np.float32) if seeds is None else seeds)
+        self._table = {parameter.name: parameter for parameter in self.parameters(real)}
+        self._settings = self._ffi.new("bslam_settings_t *")
+        self._lib.bslam_settings_preset(self._settings, self._lib.BSLAM_PRESET_REAL_WHEELS)
+        self._set(params or {})
+        if seeds is not None:
+            self._seeds = self._samples(seeds)  # the C instance reads them where they are
+            self._settings.seeds, self._settings.seed_count = self._seeds, len(seeds)
+        self._begin(self._robot)
 
-    def _attach_looks(self, seeds: NDArray[np.float32]) -> None:
-        self._looks = self._ffi.new("bslam_appearance_t *")
-        self._seeds = encode(self._raw, seeds)
-        status = self._lib.bslam_appearance_init(self._looks, self._seeds, len(seeds))
-        self._raw.ensure(status, f"{len(seeds)} seeds")
-        self._lib.bslam_slam_attach_appearance(self._slam, self._looks)
-
-    def _init(self, params: Mapping[str, float]) -> None:
-        table = {p.name: p for p in self.parameters(self._raw.real)}
-        c_params = self._ffi.new("bslam_settings_t *")
-        self._lib.bslam_settings_default(c_params)
+    def _set(self, params: Mapping[str, float]) -> None:
         for name, value in params.items():
-            if name not in table:
-                raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(table)}")
-            parameter = table[name]
+            if name not in self._table:
+                raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}")
+            parameter = self._table[name]
             if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
                 kind = "a whole number" if parameter.is_integer else "a number"
                 allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"
                 raise BslamError(f"parameter {name} = {value}: allowed is {allowed}")
-            setattr(c_params, name, int(value) if parameter.is_integer else value)
-        bad_id = self._ffi.new("int *", -1)
-        status = self._lib.bslam_slam_init(self._slam, c_params, bad_id)
-        if status:
-            name = self._raw.text(self._lib.bslam_settings_info(bad_id[0]).name)
-            message = f"parameter {name} = {getattr(c_params, name):g} contradicts velocity_states = 1"
+            setattr(self._settings, name, int(value) if parameter.is_integer else value)
+
+    def _samples(self, signatures: NDArray[np.float32]) -> Any:
+        """Signatures (n, 71) as a C array."""
+        encoded = encode(signatures, self._raw.real)
+        array = self._ffi.new("bslam_sample_t[]", len(encoded))
+        self._ffi.buffer(array)[:] = encoded.tobytes()
+        return array
+
+    def _begin(self, robot: Any) -> None:
+        """bslam_init: at the origin of an empty map."""
+        size, sizes = self._ffi.sizeof("bslam_t"), self._lib.BSLAM_SIZES_HASH
+        bad = self._ffi.new("int *", -1)
+        status = self._lib.bslam_init_sized(robot, size, sizes, self._settings, bad)
+        if bad[0] >= 0:
+            name = self._raw.text(self._lib.bslam_settings_info(bad[0]).name)
+            message = f"parameter {name} = {getattr(self._settings, name):g} contradicts velocity_states = 1"
             self._raw.ensure(status, f"{message}: allowed beside it is {_BESIDE_VELOCITY_STATES[name]}")
+        self._raw.ensure(status, f"{self._settings.seed_count} seeds")
+
+    def restart(self, position_sd_m: float, heading_sd_rad: float) -> None:
+        """After a reset: goes on with the memory as it is, or with its copy, so much more doubtful.
+
+        Only with the setting `guard`. Raises CoreError if the memory holds no such state.
+        """
+        status = self._lib.bslam_restart(self._robot, position_sd_m, heading_sd_rad)
+        self._raw.ensure(status, f"restart with sd {position_sd_m} m, {heading_sd_rad} rad")
 
     @staticmethod
     def parameters(real: str = "float") -> list[Parameter]:
         """Every parameter with its meaning, default and range, in the order of the C table."""
         raw = library(real, 1)
         found = []
-        for index in range(raw.lib.bslam_settings_count()):
-            info = raw.lib.bslam_settings_info(index)
-            # Float's 0.1 prints as 0.10000000149; nine digits round-trip float and read as written.
+        for info in raw.settings_infos():
+            # Float's 0.1 prints as 0.10000000149; seven digits round-trip float and read as written.
             initial, low, high = (float(f"{value:.7g}") for value in (info.initial, info.low, info.high))
-            found.append(
-                Parameter(raw.text(info.name), raw.text(info.meaning), initial, low, high, info.is_integer)
-            )
+            name, meaning, group = (raw.text(word) for word in (info.name, info.meaning, info.group))
+            found.append(Parameter(name, meaning, group, initial, low, high, info.is_integer))
         return found
 
     @staticmethod
@@ -157,18 +161,21 @@ class Slam:
     @property
     def params(self) -> dict[str, float]:
         """The values in force."""
-        return self._raw.fields(self._slam.params, "bslam_settings_t")
+        return {name: getattr(self._settings, name) for name in self._table}
 
     @property
     def state_bytes(self) -> bytes:
-        """Every byte of the C instance, its looks and smoother: a refused input changes none of them."""
-        looks = b"" if self._looks is None else bytes(self._ffi.buffer(self._looks))
-        smoother = b"" if self._smoother is None else bytes(self._ffi.buffer(self._smoother))
-        return bytes(self._ffi.buffer(self._slam)) + looks + smoother
+        """Every byte of the C instance: a refused input changes none of them but counters."""
+        return bytes(self._ffi.buffer(self._robot))
+
+    @property
+    def memory(self) -> memoryview:
+        """The bytes of the C instance themselves, which may be damaged, to see what becomes of it."""
+        return memoryview(self._ffi.buffer(self._robot)).cast("B")
 
     def fingerprint(self, before: int) -> int:
-        """Goes on with a chain of fingerprints of the state (`bslam_slam_fingerprint`)."""
-        return int(self._lib.bslam_slam_fingerprint(self._slam, before))
+        """Goes on with a chain of fingerprints of the state (`bslam_fingerprint`)."""
+        return int(self._lib.bslam_fingerprint(self._robot, before))
 
     def odometry(
         self,
@@ -200,7 +207,7 @@ class Slam:
         reading.has_gyro = gyro_radps is not None
         reading.gyro_radps = gyro_radps or 0.0
         reading.gyro_sd_radps = gyro_sd_radps
-        status = self._lib.bslam_slam_odometry(self._slam, reading)
+        status = self._lib.bslam_odometry(self._robot, reading)
         if status:
             self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")
 
@@ -209,7 +216,7 @@ class Slam:
 
         Raises CoreError if a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
-        status = self._lib.bslam_slam_resume_odometry(self._slam, position_sd_m, heading_sd_rad)
+        status = self._lib.bslam_resume_odometry(self._robot, position_sd_m, heading_sd_rad)
         self._raw.ensure(status, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad")
 
     def sightings(
@@ -243,19 +250,14 @@ class Slam:
             signature = _checked_signatures(signature, len(rows))
         try:
             array = self._raw.sightings(rows, signature)
-            if self._recovery is None:
-                status = self._lib.bslam_slam_sightings(self._slam, time_us, array, len(rows))
-            else:
-                status = self._lib.bslam_recovery_sightings(
-                    self._recovery, self._slam, time_us, array, len(rows)
-                )
+            status = self._lib.bslam_sightings(self._robot, time_us, array, len(rows))
         except OverflowError as error:
             raise BslamError(f"frame at {time_us} us: {error}") from error
         if status:
-            bad = self._lib.bslam_slam_bad_sighting(self._slam)
+            bad = self._lib.bslam_health(self._robot).bad_sighting
             which = f", sighting {bad} {rows[bad]}" if bad >= 0 else f", {len(rows)} sightings"
             self._raw.ensure(status, f"frame at {time_us} us{which}")
-        accounts = self._slam.accounts
+        accounts = self._lib.bslam_results(self._robot, self._ffi.new("int *"))
         return [self._account(accounts[i]) for i in range(len(rows))]
 
     def _account(self, account) -> Account:  # type: ignore[no-untyped-def]
@@ -269,19 +271,19 @@ class Slam:
 
     def pose(self) -> tuple[float, float, float]:
         """(x_m, y_m, theta_rad) in the start pose's frame."""
-        pose = self._lib.bslam_slam_pose(self._slam)
+        pose = self._lib.bslam_pose(self._robot)
         return pose.x_m, pose.y_m, pose.theta_rad
 
     def pose_at(self, time_us: int) -> tuple[float, float, float]:
         """The pose at a time within the history. Raises CoreError outside it."""
-        status = self._lib.bslam_slam_pose_at(self._slam, time_us, self._pose)
+        status = self._lib.bslam_pose_at(self._robot, time_us, self._pose)
         if status:
             self._raw.ensure(status, f"pose at {time_us} us")
         return self._pose.x_m, self._pose.y_m, self._pose.theta_rad
 
     def pose_covariance_lower(self) -> tuple[float, ...]:
         """xx, yx, yy, tx, ty, tt of the covariance of (x, y, theta) in m², m rad, rad²."""
-        self._lib.bslam_slam_pose_covariance(self._slam, self._lower)
+        self._lib.bslam_pose_covariance(self._robot, self._lower)
         return tuple(self._lower)
 
     def pose_covariance(self) -> NDArray[np.float64]:
@@ -293,8 +295,8 @@ class Slam:
         """The map, provisional beacons included, in the order in which they were added."""
         view = self._ffi.new("bslam_beacon_view_t *")
         found = []
-        for index in range(self._lib.bslam_slam_beacon_count(self._slam)):
-            self._raw.ensure(self._lib.bslam_slam_beacon(self._slam, index, view), f"beacon {index}")
+        for index in range(self._lib.bslam_health(self._robot).beacons):
+            self._raw.ensure(self._lib.bslam_beacon(self._robot, index, view), f"beacon {index}")
             p = view.covariance_m2
             covariance = np.array([[p.xx, p.xy], [p.xy, p.yy]])
             found.append(
@@ -315,7 +317,7 @@ class Slam:
 
     def add_known_beacon(self, label: int, x_m: float, y_m: float) -> None:
         """A beacon whose position is given and never changes. Raises CoreError."""
-        status = self._lib.bslam_slam_add_known_beacon(self._slam, label, x_m, y_m)
+        status = self._lib.bslam_add_known_beacon(self._robot, label, x_m, y_m)
         self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})")
 
     def set_pose(
@@ -326,19 +328,18 @@ class Slam:
         Raises CoreError if it is not finite, or a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
         pose = self._ffi.new("bslam_pose_t *", (x_m, y_m, theta_rad))
-        status = self._lib.bslam_slam_set_pose(self._slam, pose, position_sd_m, heading_sd_rad)
+        status = self._lib.bslam_set_pose(self._robot, pose, position_sd_m, heading_sd_rad)
         doubt = f"sd {position_sd_m} m, {heading_sd_rad} rad"
         self._raw.ensure(status, f"pose ({x_m}, {y_m}, {theta_rad}) with {doubt}")
 
     def save_map(self) -> bytes:
-        """The confirmed beacons with covariance, and the machines, as docs/MAP.md has it."""
-        size = self._lib.bslam_map_size(self._slam)
-        room = self._ffi.new("uint8_t[]", size)
-        memory = self._ffi.new("bslam_map_memory_t *", (room, size, 0))
-        sink = self._ffi.new("bslam_map_sink_t *", self._lib.bslam_map_to_memory(memory))
-        fault = self._ffi.new("bslam_map_fault_t *")
-        self._raw.ensure(self._lib.bslam_map_write(self._slam, sink, fault), f"map of {size} bytes")
-        return bytes(self._ffi.buffer(room, memory.count))
+        """The confirmed beacons with covariance, and the classifiers, as docs/MAP.md has it."""
+        data = bytearray()
+        context = self._ffi.new_handle(data)
+        sink = self._ffi.new("bslam_map_sink_t *", (self._lib.sink_write, context))
+        size = self._ffi.new("uint32_t *")
+        self._raw.ensure(self._lib.bslam_save_map(self._robot, sink, size), f"map of {size[0]} bytes")
+        return bytes(data)
 
     def load_map(self, blob: bytes, *, frozen: bool = False) -> None:
         """Takes a map in place of its own; the robot does not know where it is in it (`set_pose`).
@@ -346,45 +347,63 @@ class Slam:
         frozen: nothing changes a beacon and none is added. Raises CoreError, and changes nothing, for a blob
         that is no whole map or that this build has no room for; the message says why.
         """
-        source = self._source(blob)
-        mode = self._lib.BSLAM_MAP_FROZEN if frozen else self._lib.BSLAM_MAP_LIVING
-        fault = self._ffi.new("bslam_map_fault_t *")
-        status = self._lib.bslam_map_load(self._slam, source[0], mode, fault)
-        reason = self._raw.text(self._lib.bslam_map_fault_name(fault[0]))
-        self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
+        was_frozen = self._lib.bslam_health(self._robot).is_frozen
+        self._lib.bslam_freeze_map(self._robot, frozen)
+        status, reason = self._load(self._robot, blob)
+        if status:
+            self._lib.bslam_freeze_map(self._robot, was_frozen)
+            self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
 
     def map_fault(self, blob: bytes) -> str:
-        """What `load_map` would say of a blob, by pairs of its covariance: "fine", "bad crc", ..."""
-        source = self._source(blob)
-        return self._raw.text(self._lib.bslam_map_fault_name(self._lib.bslam_map_check(source[0])))
+        """What `load_map` would say of a blob if there were no map yet: "fine", "bad crc", ..."""
+        empty = self._ffi.new("bslam_t *")
+        self._begin(empty)
+        return self._load(empty, blob)[1]
 
-    def _source(self, blob: bytes) -> tuple[Any, Any]:
-        """A source, and what must live as long as it is used."""
-        held = self._ffi.from_buffer("uint8_t[]", blob)
-        return self._ffi.new("bslam_map_source_t *", self._lib.bslam_map_from_memory(held, len(blob))), held
+    def _load(self, robot: Any, blob: bytes) -> tuple[int, str]:
+        """Status and the name of the fault."""
+        context = self._ffi.new_handle(bytes(blob))
+        source = self._ffi.new("bslam_map_source_t *", (self._lib.source_read, context, len(blob)))
+        fault = self._ffi.new("bslam_map_fault_t *")
+        status = self._lib.bslam_load_map(robot, source, fault)
+        return status, self._raw.map_faults[fault[0]]
+
+    def save_to_flash(self, flash: Flash) -> None:
+        """Saves the map in the slot that is older or damaged. Raises CoreError with what failed."""
+        self._ask_flash(self._lib.bslam_save_to_flash, flash)
+
+    def load_from_flash(self, flash: Flash) -> None:
+        """`load_map` of the newest one that is whole. Raises CoreError if there is none."""
+        self._ask_flash(self._lib.bslam_load_from_flash, flash)
+
+    def _ask_flash(self, call: Any, flash: Flash) -> None:
+        context = self._ffi.new_handle(flash)
+        functions = (self._lib.flash_erase, self._lib.flash_write, self._lib.flash_read)
+        made = self._ffi.new("bslam_flash_t *", (*functions, context, flash.slot_bytes))
+        fault = self._ffi.new("bslam_map_fault_t *")
+        status = call(self._robot, made, fault)
+        self._raw.ensure(status, f"flash: {self._raw.map_faults[fault[0]]}")
 
     def remove_beacon(self, uid: int) -> None:
         """Takes a beacon out of the map. Raises CoreError if there is none."""
-        self._raw.ensure(self._lib.bslam_slam_remove_beacon(self._slam, uid), f"beacon {uid}")
+        self._raw.ensure(self._lib.bslam_remove_beacon(self._robot, uid), f"beacon {uid}")
 
     def counters(self) -> dict[str, int]:
-        """Never-decreasing counts by the names of bslam_counters_t; with looks, theirs and the learner's."""
-        counts = self._raw.fields(self._slam.counters, "bslam_counters_t")
-        if self._looks is not None:
-            counts |= self._raw.fields(self._looks.counters, "bslam_appearance_counters_t")
-            counts |= self._raw.fields(self._looks.learner.counters, "bslam_learner_counters_t")
-        if self._recovery is not None:
-            counts |= self._raw.fields(self._recovery.counters, "bslam_recovery_counters_t")
+        """Never-decreasing counts by the names in bslam_counters_t; of what is switched off they are 0."""
+        counters, counts = self._lib.bslam_counters(self._robot), dict[str, int]()
+        for part in self._raw.fields(counters).values():
+            counts |= self._raw.fields(part)
         return counts
 
     @property
     def is_lost(self) -> bool:
         """Nobody knows where the robot is: its pose is what odometry makes of an unknown one."""
-        return bool(self._slam.is_lost)
+        return bool(self._lib.bslam_health(self._robot).state == self._lib.BSLAM_RECOVERY_LOST)
 
     def lose_pose(self) -> None:
         """Says that nobody knows where the robot is; sightings are used for nothing until it is found."""
-        self._lib.bslam_slam_lose_pose(self._slam)
+        status = self._lib.bslam_set_pose(self._robot, self._ffi.NULL, 0.0, 0.0)
+        self._raw.ensure(status, "a pose that nobody knows")
 
 
 def told_classes(mappable: Sequence[bool], beacon_class: Sequence[int] | None) -> list[int]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.raw import vision_library
+from bslam.core.raw import VisionLibrary, vision_library
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
 from bslam.rig import Camera
@@ -18,9 +18,6 @@ Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
 SIGNATURE_SIZE = 71
 """Values of a signature."""
-
-UNKNOWN = BeaconClass("")
-"""A kind of which no size is known."""
 
 MARKS = (
     "cut_left",
@@ -116,16 +113,6 @@ class Seeing:
     turn: Turn | None = None  # since this camera's frame before, if the two tell
 
 
-@dataclass(frozen=True)
-class Proposals:
-    """The boxes of a frame that were looked at more closely: for training."""
-
-    boxes: NDArray[np.float32]  # (n, 4) left, top, right, bottom, px
-    segmentations: NDArray[np.int64]  # (n,) which segmentation found each first
-    features: NDArray[np.float32]  # (n, blob features), not normalised
-    glances: NDArray[np.float32]  # (n, glance features)
-
-
 class FrontEnd:
     """One robot's cameras, taken in turn. The memory of the room starts empty."""
 
@@ -141,7 +128,7 @@ class FrontEnd:
 
         BslamError if the library refuses model, recogniser or cameras.
         """
-        self._library = vision_library()
+        self._library = self._open()
         ffi, lib = self._library.ffi, self._library.lib
         self._cameras = tuple(cameras)
         self._keep: list[Any] = []
@@ -157,11 +144,20 @@ class FrontEnd:
         self._vision = ffi.new("bslam_vision_t *")
         array = ffi.new("bslam_camera_t[]", [self._camera(camera)[0] for camera in cameras])
         self._library.ensure(
-            lib.bslam_vision_init(self._vision, self._model, array, len(self._cameras)),
+            lib.bslam_vision_init_sized(
+                self._vision,
+                *self._library.size_of("bslam_vision_t"),
+                self._model,
+                array,
+                len(self._cameras),
+            ),
             f"the front end refuses its model or one of its {len(self._cameras)} cameras",
         )
-        self._turns = ffi.new("bslam_turns_t *")
-        lib.bslam_turns_init(self._turns, self._vision)
+
+    @staticmethod
+    def _open() -> VisionLibrary:
+        """The build of the library that this front end uses."""
+        return vision_library()
 
     def see(self, rgb: Picture, camera: int = 0, moved: bool = True) -> Seeing:
         """Looks at a picture of a camera by its index: (height, width, 3) uint8, or (height, width) uint16 of
@@ -202,39 +198,9 @@ class FrontEnd:
 
     def _turn(self) -> Turn | None:
         found = self._library.ffi.new("bslam_turn_t *")
-        if not self._library.lib.bslam_turns_see(self._turns, self._vision, found):
+        if not self._library.lib.bslam_vision_turn(self._vision, found):
             return None
         return Turn(**{one.name: getattr(found, one.name) for one in fields(Turn)})
-
-    def signature(self, box: tuple[float, float, float, float]) -> NDArray[np.float32] | None:
-        """The signature (71,) of what a box (left, top, right, bottom, px) in the last frame holds.
-
-        None: none can be taken there, the box is too small, dark or outside.
-        """
-        found = self._measured(box, UNKNOWN)
-        if found is None:
-            return None
-        signature = self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32)
-        return signature if signature.any() else None
-
-    def measure(
-        self, box: tuple[float, float, float, float], kind: BeaconClass = UNKNOWN
-    ) -> Candidate | None:
-        """What is measured of a rough box (left, top, right, bottom, px) in the last frame, of an object of
-        the kind's size and place. It has no class. None: nothing can be measured there.
-        """
-        found = self._measured(box, kind)
-        return None if found is None else self._candidate(found[0])
-
-    def _measured(self, box: tuple[float, float, float, float], kind: BeaconClass) -> Any:
-        library = self._library
-        sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))
-        rough = library.new_filled("bslam_box_t", **sides)
-        sizes = {name: value for name, value in asdict(kind).items() if name != "name"}
-        size = library.new_filled("bslam_size_t", **sizes)
-        found = library.new_filled("bslam_candidate_t", object=-1)
-        status = library.lib.bslam_vision_measure(self._vision, rough, size, found)
-        return found if status == library.lib.BSLAM_OK else None
 
     def threshold(self, camera: int = 0) -> float:
         """The score from which on a box in a camera's pictures is a candidate."""
@@ -248,54 +214,8 @@ class FrontEnd:
 
     def counts(self) -> dict[str, int]:
         """How many frames there were so far, by what came of them."""
-        return {self._reason(number): count for number, count in enumerate(self._vision.frames)}
-
-    def proposals(self) -> Proposals:
-        """The proposals of the last frame."""
-        found = self._vision.proposals
-        items = [found.items[i] for i in range(found.count)]
-        boxes = [self._library.lib.bslam_vision_proposal_box(self._vision, i) for i in range(found.count)]
-        sides = ("left_px", "top_px", "right_px", "bottom_px")
-        features = np.empty((found.count, self._library.lib.BSLAM_BLOB_FEATURES), dtype=np.float32)
-        glances = np.empty((found.count, self._library.lib.BSLAM_GLANCE_FEATURES), dtype=np.float32)
-        for i in range(found.count):
-            self._library.lib.bslam_vision_blob_features(self._vision, i, self._library.floats(features[i]))
-            self._library.lib.bslam_vision_prefilter(self._vision, i, self._library.floats(glances[i]))
-        return Proposals(
-            boxes=np.array([[getattr(box, side) for side in sides] for box in boxes], np.float32).reshape(
-                -1, 4
-            ),
-            segmentations=np.array([item.segmentation for item in items], np.int64),
-            features=features,
-            glances=glances,
-        )
-
-    def close_features(self, chosen: Sequence[int]) -> NDArray[np.uint8]:
-        """What the closer look's machine would be told (n, close features) of chosen proposals of the last
-        frame."""
-        features = np.empty((len(chosen), self._library.lib.BSLAM_CLOSE_FEATURES), dtype=np.uint8)
-        for row, index in zip(features, chosen, strict=True):
-            self._library.lib.bslam_vision_close_features(self._vision, index, self._library.bytes(row))
-        return features
-
-    def cell_features(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.int16]:
-        """Features (n, cell features) of cells of the last frame."""
-        features = np.empty((len(rows), self._library.lib.BSLAM_CELL_FEATURES), dtype=np.int16)
-        write = self._library.lib.bslam_vision_cell_features
-        for i, (row, column) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True)):
-            write(self._vision, row, column, self._library.shorts(features[i]))
-        return features
-
-    def cell_values(self) -> NDArray[np.int8]:
-        """Decision values (rows, columns) of the last frame's cells, 32 steps for 1."""
-        thumbnail = self._vision.thumbnail
-        shape = (thumbnail.height_px // 4, thumbnail.width_px // 4)
-        return self._library.copy_of(thumbnail.notes.values, shape[0] * shape[1], np.int8).reshape(shape)
-
-    def floor_distances(self) -> NDArray[np.float32]:
-        """Distance of the floor line in each column of cells, m; 0: not known."""
-        columns = self._vision.thumbnail.width_px // 4
-        return self._library.copy_of(self._vision.floor_line.distance_m, columns, np.float32)
+        frames = self._library.lib.bslam_vision_counters(self._vision).frames
+        return {self._reason(number): count for number, count in enumerate(frames)}
 
     def _check_picture(self, rgb: Picture, camera: int) -> None:
         if not 0 <= camera < len(self._cameras):
@@ -412,10 +332,3 @@ class FrontEnd:
         )
         keep.append(made)
         return made[0]
-
-
-def feature_counts() -> tuple[int, int, int, int]:
-    """Features of a cell, of a glance at a proposal, of a proposal, and of a closer look at it."""
-    lib = vision_library().lib
-    counts = lib.BSLAM_CELL_FEATURES, lib.BSLAM_GLANCE_FEATURES, lib.BSLAM_BLOB_FEATURES
-    return *map(int, counts), int(lib.BSLAM_CLOSE_FEATURES)  # type: ignore[return-value]

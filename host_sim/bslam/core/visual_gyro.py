@@ -19,7 +19,9 @@ class VisualGyro:
     def __init__(self, least_sd_radps: float) -> None:
         self._library = vision_library()
         self._gyro = self._library.ffi.new("bslam_visual_gyro_t *")
-        self._library.lib.bslam_visual_gyro_init(self._gyro, least_sd_radps)
+        size, sizes_hash = self._library.size_of("bslam_visual_gyro_t")
+        status = self._library.lib.bslam_visual_gyro_init_sized(self._gyro, size, sizes_hash, least_sd_radps)
+        self._library.ensure(status, "a visual gyro")
 
     def advance(self, time_us: int, speed_mps: float, speed_sd_mps: float) -> None:
         """Go on to a time; the forward speed since the time before, by the wheels. BslamError if refused."""

@@ -44,6 +44,56 @@ ROBOT: Final = Robot(
 )
 
 
+# Velocity commands lead the motion that a motion-capture system sees by 0.15-0.20 s (every robot).
+ODOMETRY_LEAD_US: Final = 175_000
+# The stamp of an image is 20-40 ms late.
+_IMAGE_DELAY_US: Final = 30_000
+
+SETTINGS: Final[dict[str, int | float]] = {
+    # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
+    # scales.
+    "scale_states": 1,
+    "scale_sd": 0.3,
+    "scale_walk_sqrt_s": 0.001,
+    # What a robot that follows commands errs by grows with travel and turn. The wheels themselves read
+    # nothing.
+    "left_speed_sd_mps": 0.0,
+    "right_speed_sd_mps": 0.0,
+    "forward_sd_per_sqrt_m": 0.05,
+    "turn_sd_per_sqrt_m": 0.05,
+    "turn_sd_per_sqrt_rad": 0.25,
+    # The scatter is 0.02 rad and 0.02 m + 0.035 r, but successive errors are strongly correlated (0.67; 0.96
+    # for the distance), and each robot's distances are biased by 1-2 %: counted as 0.05 rad and 0.18 r.
+    "bearing_sd_rad": 0.05,
+    "range_sd_floor_m": 0.06,
+    "range_sd_fraction": 0.18,
+    "range_sd_per_m": 0.0,
+    # After a wheel slips a hard gate rejects sightings for good; Huber weights let the estimate come back.
+    "gate_d2": 0,
+    "huber_d": 0.5,
+    "sighting_delay_us": ODOMETRY_LEAD_US + _IMAGE_DELAY_US,
+}
+"""Settings of the core: one set for every robot and recording."""
+
+# SETTINGS suit a filter that counts directions without distance for three times their variance besides
+# (bearing_only_variance_factor), which the smoother does not; its errors are as correlated. Tuned on the
+# fifteen runs: with .05, .07, .15 and .2 rad 1, 0, 0 and 0 of them are lost.
+BEARING_ONLY_SMOOTHER_SETTINGS: Final[dict[str, int | float]] = {"bearing_sd_rad": 0.1}
+"""On top of them, for the smoother by directions alone."""
+
+UNKNOWN_IDENTITY_SETTINGS: Final[dict[str, int | float]] = {
+    "scale_sd": 0.08,
+    "turn_sd_per_sqrt_rad": 0.1,
+    "bearing_sd_rad": 0.03,
+    "range_sd_fraction": 0.06,
+    "huber_d": 1.0,
+    "match_d2": 12.0,
+    "new_d2": 100.0,
+    "confirm_window_us": 3_000_000,
+}
+"""On top of them, with identity unknown: association wants sharp noise where consistency wants it inflated."""
+
+
 @dataclass(frozen=True)
 class _Table:
     """Rows of numbers of one file."""

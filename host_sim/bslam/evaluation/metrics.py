@@ -15,7 +15,7 @@ from bslam.evaluation.failure import NEES_MAX, is_exact, map_one_to_one, was_off
 from bslam.evaluation.trace import SightingCounts, Trace
 from bslam.evaluation.truth import dead_reckoning, is_dense, odometry_increments, truth_at
 from bslam.log import Log
-from bslam.options import RunOptions, recovery_of, uses_velocity_states, wheel_noise
+from bslam.options import RunOptions, presets_of, recovery_of, uses_velocity_states, wheel_noise
 
 WINDOW_S: Final = 50.0  # "first" and "last" 50 s
 NEES_FIRST_STEP: Final = 51  # by then the pose covariance has left its start value of 0
@@ -121,12 +121,15 @@ def _count_figures(counts: SightingCounts) -> dict[str, int]:
 def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
     """What was run, in the words of the command line; without the log, as far as the options say."""
     sigma_mps, velocity_states, noise = options.sigma_mps, options.velocity_states, options.noise
+    presets = options.presets or None
     if log is not None:
+        presets = presets_of(options, log)
         sigma_mps = log.robot.wheel_speed_sigma_mps if sigma_mps is None else sigma_mps
         velocity_states = uses_velocity_states(options, log)
         noise = wheel_noise(options, log)
     words = {
         "seed": options.seed,
+        "presets": presets,
         "sigma_mps": sigma_mps,
         "sensor": options.sensor,
         "rig": options.rig,

@@ -41,7 +41,7 @@ class Follower:
             association="svm", sigma_mps=SIGMA_MPS, recovery="carried" if recovery else "off"
         )
         params = core_params(options, log)
-        self.slam = Slam(params, beacons_max=BEACONS_ROOM, looks=True, seeds=log.seeds, recovery=recovery)
+        self.slam = Slam(params, beacons_max=BEACONS_ROOM, seeds=log.seeds)
         if map_blob is not None:
             self.slam.load_map(map_blob)
         self.log = log

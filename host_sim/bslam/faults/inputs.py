@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 from cobs import cobs
 
-from bslam.core.keeping import force_beacon, force_motion
-from bslam.core.learner import SIGNATURE_SIZE
+from bslam.core.appearance import SIGNATURE_SIZE
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.faults.promise import (
@@ -19,6 +18,7 @@ from bslam.faults.promise import (
     Course,
     Fault,
     Measured,
+    put,
     refusal,
     started,
     state_of,
@@ -32,7 +32,8 @@ def _number_in_odometry(value: float, protected: bool) -> Measured:
     if protected:
         status = refusal(lambda: course.slam.odometry("wheels", 51 * STEP_US, value, 0.0))
     else:
-        force_motion(course.slam, 0.04, value)
+        x_m = course.slam.pose()[0]
+        put(course.slam, x_m, x_m + value)
         status = ""
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
@@ -46,7 +47,7 @@ def _number_in_sighting(value: float, protected: bool) -> Measured:
         polar = ([value], [1.0]) if math.isnan(value) else ([0.1], [value])
         status = refusal(lambda: course.slam.sightings(51 * STEP_US, *polar, [9], [True]))
     else:
-        force_beacon(course.slam, 0.1, value)
+        put(course.slam, course.slam.beacons()[0].x_m, value)
         status = ""
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
@@ -76,7 +77,7 @@ def _number_elsewhere(value: float, protected: bool) -> Measured:
     before = state_of(slam)
     taken = [name for name, call in calls.items() if not (protected and _is_refused(call))]
     if not protected:
-        force_motion(slam, 0.04, value)
+        put(slam, slam.pose()[0], value)
     same = state_of(slam) == before
     text = f"{len(calls) - len(taken)} of {len(calls)} refused, state {'same' if same else 'changed'}"
     return Measured(not taken and same, text)
@@ -84,16 +85,12 @@ def _number_elsewhere(value: float, protected: bool) -> Measured:
 
 def _denormal_odometry(protected: bool) -> Measured:
     """Travel so small is none; only an interval so small would do harm, and time is whole microseconds."""
-    course = started(velocity_states=1)
-    before = course.slam.pose()
-    if protected:
-        status = refusal(lambda: course.slam.odometry("wheels", 51 * STEP_US, 1e-40, -1e-40))
-        plain = started(velocity_states=1).slam
-        plain.odometry("wheels", 51 * STEP_US, 0.0, 0.0)
-        off_m = math.dist(plain.pose()[:2], course.slam.pose()[:2])
-    else:
-        force_motion(course.slam, 1e-40, 0.01)
-        status, off_m = "", math.dist(before[:2], course.slam.pose()[:2])
+    # Unprotected: the least that one may tell of, travel in an interval without any length.
+    travel_m, time_us = (1e-40, 51 * STEP_US) if protected else (2e-5, 50 * STEP_US + 1)
+    course, plain = (started(velocity_states=1) for _ in range(2))
+    status = refusal(lambda: course.slam.odometry("wheels", time_us, travel_m, travel_m))
+    refusal(lambda: plain.slam.odometry("wheels", time_us, 0.0, 0.0))
+    off_m = math.dist(plain.slam.pose()[:2], course.slam.pose()[:2])
     finite = all(map(math.isfinite, (*course.slam.pose(), *course.slam.pose_covariance_lower())))
     state = "finite" if finite else "not finite"
     text = f"{status or 'taken'}, {off_m:.1e} m beside no travel, state {state}"
@@ -103,12 +100,8 @@ def _denormal_odometry(protected: bool) -> Measured:
 def _no_time(step_us: int, protected: bool) -> Measured:
     course = started(velocity_states=1)
     before = state_of(course.slam)
-    if protected:
-        time_us = 50 * STEP_US + step_us
-        status = refusal(lambda: course.slam.odometry("wheels", time_us, 0.01, 0.01))
-    else:
-        force_motion(course.slam, step_us * 1e-6, 0.01)
-        status = ""
+    time_us = 50 * STEP_US + step_us if protected else 51 * STEP_US  # as if it were another reading
+    status = refusal(lambda: course.slam.odometry("wheels", time_us, 0.01, 0.01))
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
 

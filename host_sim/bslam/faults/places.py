@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from bslam.core.learner import SIGNATURE_SIZE
+from bslam.core.appearance import SIGNATURE_SIZE
 from bslam.core.slam import Slam
 from bslam.faults.promise import BEACONS, PARAMS, STEP_US, Course, Fault, Measured
 
@@ -56,7 +56,7 @@ class _Shown(Course):
 
 def _moved(protected: bool) -> Measured:
     off = {} if protected else {"missed_views": 0}
-    course = _Shown(Slam(PARAMS | {"association": 3} | off, looks=True))
+    course = _Shown(Slam(PARAMS | {"association": 3} | off))
     course.slam.sightings(0, [], [], [], [])
     course.go_round(2)
     before = course.mapped_at(_AMID)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -119,3 +120,27 @@ def refusal(call: Callable[[], object]) -> str:
 def state_of(slam: Slam) -> int:
     """A fingerprint of all that the filter knows."""
     return slam.fingerprint(0)
+
+
+# ---- damage ------------------------------------------------------------------------------------------------
+
+
+def places_of(slam: Slam, *values: float) -> list[int]:
+    """Where these numbers stand in the memory of an instance, one after the other."""
+    wanted, memory = struct.pack(f"={len(values)}f", *values), slam.state_bytes
+    found, at = [], memory.find(wanted)
+    while at >= 0:
+        found.append(at)
+        at = memory.find(wanted, at + 1)
+    return found
+
+
+def put(slam: Slam, before: float, after: float) -> None:
+    """A number in the place of another one, past every check."""
+    at = places_of(slam, before)[0]
+    slam.memory[at : at + 4] = struct.pack("=f", after)
+
+
+def flip(slam: Slam, at: int, bit: int) -> None:
+    """Flips a bit of a byte of an instance's memory."""
+    slam.memory[at] ^= 1 << bit

@@ -12,6 +12,7 @@ import numpy as np
 from bslam.errors import BslamError
 from bslam.log import SIGHTING_NUMBERS, TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
 from bslam.parsing.settings import parse_table
+from bslam.core.slam import BY_APPEARANCE
 from bslam.recording.entries import Frame, Reading, Start, TruePose
 from bslam.recording.reader import Recording
 
@@ -38,7 +39,7 @@ def as_log(recording: Recording) -> Log:
     )
 
 
-def start_of(log: Log, params: Mapping[str, int | float], beacons_max: int, looks: bool, real: str) -> Start:
+def start_of(log: Log, params: Mapping[str, int | float], beacons_max: int, real: str) -> Start:
     """The start of a recording of a run over the log."""
     known: tuple[tuple[int, float, float], ...] = ()
     if log.beacons is not None:
@@ -48,8 +49,7 @@ def start_of(log: Log, params: Mapping[str, int | float], beacons_max: int, look
         name=log.name,
         params=dict(params),
         beacons_max=beacons_max,
-        looks=looks,
-        seeds=log.seeds if looks else None,
+        seeds=log.seeds if params["association"] == BY_APPEARANCE else None,
         robot=robot_text(log.robot),
         true_beacons=known,
         real=real,

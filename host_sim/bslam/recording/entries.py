@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.learner import SIGNATURE_SIZE
+from bslam.core.appearance import SIGNATURE_SIZE
 from bslam.core.slam import Account, Beacon
 from bslam.log import ODOMETRY_COLUMNS, SIGHTING_NUMBERS
 
@@ -33,12 +33,10 @@ class Start:
     name: str
     params: dict[str, int | float]  # all of them
     beacons_max: int  # the map has room for
-    looks: bool = False  # it learns what beacons look like
     seeds: NDArray[np.float32] | None = None  # (k, 71) signatures of what is no beacon
     robot: str | None = None  # the text of robot.toml, where the log has one
     true_beacons: tuple[tuple[int, float, float], ...] = ()  # beacon_id, x_m, y_m, where somebody knows them
     real: str = "float"  # the core's scalar type
-    recovery: bool = False  # it notices when it is lost
     kept_map: str | None = None  # the map that it starts in, in base64; None: an empty one
     frozen: bool = False  # that map stays as it is
     about: Json = field(default_factory=dict)  # of the target: image, build

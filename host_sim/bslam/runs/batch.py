@@ -160,7 +160,7 @@ def run_job(
     if isinstance(job.source, RecordingSource):
         trace, comparison = rerun(job.source.recording(), job.options, watcher)
         nameless = not (log.sightings.beacon_id >= 0).any()
-        unknown = dict.fromkeys([*_BY_IDENTITY, "step_us_median"] if nameless else ["step_us_median"])
+        unknown = dict.fromkeys(["presets", "step_us_median", *(_BY_IDENTITY if nameless else ())])
         return trace, unknown | {"recording": asdict(comparison)}
     record = out / f"{job.name}.mcap" if job.record else None
     return run_log(log, job.options, watcher=watcher, record=record, frames=frames), {}

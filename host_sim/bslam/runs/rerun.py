@@ -68,14 +68,7 @@ def rerun(
     start = recording.start
     params, room = dict(options.parameters), start.beacons_max
     if options.target == "host":
-        slam = Slam(
-            params,
-            beacons_max=room,
-            real=start.real,
-            looks=start.looks,
-            seeds=start.seeds,
-            recovery=start.recovery,
-        )
+        slam = Slam(params, beacons_max=room, real=start.real, seeds=start.seeds)
         if start.kept_map is not None:
             slam.load_map(base64.b64decode(start.kept_map), frozen=start.frozen)
         return _Rerun(slam, recording, watcher).finish()
@@ -87,15 +80,7 @@ def rerun(
         raise BslamError(
             f"{recording.path}: real {start.real} with --target {options.target}: allowed is float"
         )
-    with connect(
-        options.target,
-        params,
-        room,
-        fingerprints=True,
-        looks=start.looks,
-        seeds=start.seeds,
-        recovery=start.recovery,
-    ) as remote:
+    with connect(options.target, params, room, fingerprints=True, seeds=start.seeds) as remote:
         return _Rerun(remote, recording, watcher).finish(remote.target_description)
 
 

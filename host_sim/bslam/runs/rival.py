@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.algorithms import Algorithm, Landmark, Setup, Sighting
-from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.evaluation.ledger import Ledger
 from bslam.evaluation.trace import MapBeacon, SightingCounts, Trace
@@ -50,7 +49,7 @@ def setup_for(log: Log, options: RunOptions) -> Setup:
         observation=options.observation,
         identities=options.association == "known",
         beacons_max=beacons_to_hold(log, options),
-        parameters=Slam.defaults() | core_params(options, log),
+        parameters=core_params(options, log),
         real=options.real,
         seeds=log.seeds,
     )

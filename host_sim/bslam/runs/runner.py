@@ -23,7 +23,7 @@ from bslam.evaluation.ledger import Ledger, corrupt_identities
 from bslam.evaluation.trace import MapBeacon, Trace
 from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log, Odometry, Sightings
-from bslam.options import Number, RunOptions, core_params, odometry_lead_us, recovery_of
+from bslam.options import Number, RunOptions, core_params, odometry_lead_us
 from bslam.recording import Recorder, RecordingWriter
 from bslam.recording.aslog import start_of, true_poses
 from bslam.runs.kept import read_blob
@@ -90,15 +90,8 @@ def run_log(
             raise BslamError(f"--map {options.kept_map} with --target {options.target}: allowed is host")
         if options.real != "float":
             raise BslamError(f"--real {options.real} with --target {options.target}: allowed is float")
-        looks = uses_appearance(options)
         with connect(
-            options.target,
-            params,
-            beacons,
-            fingerprints=record is not None,
-            looks=looks,
-            seeds=log.seeds,
-            recovery=recovers(options),
+            options.target, params, beacons, fingerprints=record is not None, seeds=log.seeds
         ) as slam:
             return _run(slam, log, options, frames, watcher, record, slam.target_description)
     factory = slam_factory or partial(_make_slam, options, log)
@@ -118,8 +111,8 @@ def _run(
     if record is None:
         return _Run(slam, log, options, frames, watcher).finish(target and target())
     params = slam.params if target is None else slam.host_params
-    start = start_of(log, params, beacons_to_hold(log, options), uses_appearance(options), options.real)
-    start = replace(start, recovery=recovers(options), frozen=options.frozen, kept_map=_kept_text(options))
+    start = start_of(log, params, beacons_to_hold(log, options), options.real)
+    start = replace(start, frozen=options.frozen, kept_map=_kept_text(options))
     with RecordingWriter(record, start) as writer:
         recorder = Recorder(slam, writer, true_poses(log))
         trace = _Run(recorder, log, options, frames, watcher).finish(target and target())
@@ -128,15 +121,8 @@ def _run(
 
 
 def _make_slam(options: RunOptions, log: Log, params: Mapping[str, Number], beacons_max: int) -> Any:
-    looks, most = uses_appearance(options), SIZE_CLASSES[-1]
-    slam = Slam(
-        params,
-        beacons_max=min(beacons_max, most),
-        real=options.real,
-        looks=looks,
-        seeds=log.seeds,
-        recovery=recovers(options),
-    )
+    most = SIZE_CLASSES[-1]
+    slam = Slam(params, beacons_max=min(beacons_max, most), real=options.real, seeds=log.seeds)
     if options.kept_map is not None:
         slam.load_map(read_blob(Path(options.kept_map)), frozen=options.frozen)
     return LocalMap(slam, most) if beacons_max > most else slam
@@ -150,10 +136,6 @@ def _kept_text(options: RunOptions) -> str | None:
 
 def uses_appearance(options: RunOptions) -> bool:
     return options.association == "svm"
-
-
-def recovers(options: RunOptions) -> bool:
-    return recovery_of(options) != "off"
 
 
 def beacons_to_hold(log: Log, options: RunOptions) -> int:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
 from bslam.core.raw import library
-from bslam.core.slam import Account, Beacon, Slam, told_classes
+from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam, told_classes
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
@@ -38,9 +38,8 @@ class Told:
 class RemoteSlam:
     """A robot at the other end of a line: the calls of `Slam`, the same results to the bit.
 
-    params, beacons_max, looks, seeds, recovery as for `Slam`; guard: it notices when its memory is no longer
-    what it was, and starts over; params None: the robot goes on as it is, with what it
-    knows. `line` is taken over. Raises BslamError for parameters that the library refuses and for an image
+    params, beacons_max, seeds as for `Slam`; params None: the robot goes on as it is, with what it knows.
+    `line` is taken over. Raises BslamError for parameters that the library refuses and for an image
     that is too small or has others, TargetError if the robot does not answer.
     """
 
@@ -51,19 +50,16 @@ class RemoteSlam:
         beacons_max: int,
         *,
         fingerprints: bool = False,
-        looks: bool = False,
         seeds: NDArray[np.float32] | None = None,
-        recovery: bool = False,
-        guard: bool = False,
     ) -> None:
         self._line = line
         self._raw = library("float", 1)
         as_it_is = params is None
         # What the image would refuse is refused here first, in the words of the library.
         self._values = Slam(params, beacons_max=beacons_max).params
-        self._client = Client(line, Wishes(fingerprints, looks, as_it_is, recovery, guard))
-        self._recovery = recovery
-        self._looks = looks
+        learns = not as_it_is and self._values["association"] == BY_APPEARANCE
+        recovers, guards = (not as_it_is and bool(self._values[name]) for name in ("recovery", "guard"))
+        self._client = Client(line, Wishes(fingerprints, learns, as_it_is, recovers, guards))
         self._check_image(beacons_max)
         self._step: Step | None = None
         self._sighted: list[Seen] = []  # of a picture whose report has not come yet
@@ -71,7 +67,7 @@ class RemoteSlam:
         self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
         self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
         self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
-        if looks and seeds is not None:
+        if learns and seeds is not None:
             self._send_signatures(Message.SEEDS, seeds)
         if as_it_is:
             self._values = {name: self._param(number) for number, name in enumerate(self._values)}
@@ -253,15 +249,14 @@ class RemoteSlam:
 
     def counters(self) -> dict[str, int]:
         """As `Slam.counters`."""
-        types = ["bslam_counters_t", "bslam_appearance_counters_t", "bslam_learner_counters_t"]
         values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
-        counts = [{name: next(values) for name, _ in self._raw.ffi.typeof(one).fields} for one in types]
-        found = counts[0] | counts[1] | counts[2] if self._looks else counts[0]
-        if self._recovery:
-            health = self.health()
-            names = ("contradicting", "withheld", "lost", "found")
-            found |= {name: getattr(health, name) for name in names}
-        return found
+        found = {name: next(values) for part in ("slam", "appearance", "learner") for name in self._names(part)}
+        health = self.health()
+        return found | {name: getattr(health, name) for part in ("recovery", "guard") for name in self._names(part)}
+
+    def _names(self, part: str) -> list[str]:
+        """Of the counters of a part of the library."""
+        return [name for name, _ in self._raw.ffi.typeof(f"bslam_{part}_counters_t").fields]
 
     @property
     def is_lost(self) -> bool:
@@ -298,13 +293,13 @@ class RemoteSlam:
         for at in range(0, len(blob), room):
             self._client.ask(Message.MAP_WRITE, messages.map_write(at, blob[at : at + room]))
         answer = self._client.ask(Message.MAP_LOAD, messages.map_load(len(blob), frozen))
-        reason = self._raw.text(self._raw.lib.bslam_map_fault_name(answer.body[0]))
+        reason = self._raw.map_faults[answer.body[0]]
         self._ensure(answer, f"map of {len(blob)} bytes: {reason}")
 
     # ---- what only a target has ----------------------------------------------------------------------------
 
     def fingerprint(self, before: int) -> int:
-        """Of all states so far (`bslam_slam_fingerprint`), as the target has chained them."""
+        """Of all states so far (`bslam_fingerprint`), as the target has chained them."""
         return self._last_step().fingerprint
 
     @property
@@ -440,22 +435,12 @@ def connect(
     beacons_max: int,
     *,
     fingerprints: bool = False,
-    looks: bool = False,
     seeds: NDArray[np.float32] | None = None,
-    recovery: bool = False,
 ) -> RemoteSlam:
     """The pipeline on the target that a word of `--target` names; close it, or use it in a `with`."""
     line = open_line(target)
     try:
-        return RemoteSlam(
-            line,
-            params,
-            beacons_max,
-            fingerprints=fingerprints,
-            looks=looks,
-            seeds=seeds,
-            recovery=recovery,
-        )
+        return RemoteSlam(line, params, beacons_max, fingerprints=fingerprints, seeds=seeds)
     except BaseException:
         line.close()
         raise

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "vision/sighting.h"
+#include "vision/vision.h"
 
 static bslam_candidate_t seen(bool has_range)
 {

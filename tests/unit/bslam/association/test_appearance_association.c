@@ -50,7 +50,7 @@ static bslam_settings_t svm_params(void)
 }
 
 typedef struct decision {
-    bslam_match_t matches[8];
+    bslam_record_t records[8];
 } decision_t;
 
 static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
@@ -59,7 +59,7 @@ static decision_t decide_at(int64_t time_us, const bslam_ekf_t *ekf, const bslam
     const bslam_sighting_frame_t frame = {ekf, settings, &appearance, &on_axle, seen, count, time_us};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
-    bslam_associate_svm(&frame, decision.matches);
+    bslam_associate_svm(&frame, decision.records);
     return decision;
 }
 
@@ -95,8 +95,8 @@ static void test_score_is_equation_47_without_looks(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
-    assert_near(d.matches[0].score, position_score(&settings, 4.1, 0.01), 1e-4);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    assert_near(d.records[0].match.score, position_score(&settings, 4.1, 0.01), 1e-4);
 }
 
 static bslam_settings_t again_params(void)
@@ -118,7 +118,7 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
     const double odds[] = {0, 4.2, 4.2, 0};
     for (int i = 0; i < 4; i++) {
         const decision_t d = decide_at(times_us[i], &ekf, &settings, &seen, 1);
-        assert_near(d.matches[0].score, position_score(&settings, 4.1, 0.01) + odds[i], 1e-4);
+        assert_near(d.records[0].match.score, position_score(&settings, 4.1, 0.01) + odds[i], 1e-4);
     }
 }
 
@@ -133,13 +133,13 @@ static void test_what_was_matched_with_little_is_hardly_held(void **state)
     const double views[] = {-3, 0, 0.5, 2, 50}, odds[] = {0, 0, 1, 4, 4.2};
     for (int i = 0; i < 5; i++) {
         bslam_appearance_note_view(&appearance, 0, real(views[i]));
-        const bslam_match_t just = decide_at(1100000, &ekf, &settings, &seen, 1).matches[0];
+        const bslam_match_t just = decide_at(1100000, &ekf, &settings, &seen, 1).records[0].match;
         assert_near(just.score, alone + odds[i], 1e-4);
         assert_near(just.view_score, views[i] > alone ? views[i] : alone, 1e-4);
     }
     // Out of view for longer than `decision_delay_us` it comes into view anew.
-    assert_near(decide_at(2000000, &ekf, &settings, &seen, 1).matches[0].view_score, 50, 1e-4);
-    assert_near(decide_at(2000001, &ekf, &settings, &seen, 1).matches[0].view_score, alone, 1e-4);
+    assert_near(decide_at(2000000, &ekf, &settings, &seen, 1).records[0].match.view_score, 50, 1e-4);
+    assert_near(decide_at(2000001, &ekf, &settings, &seen, 1).records[0].match.view_score, alone, 1e-4);
 }
 
 /// Called something else it is not seen again.
@@ -152,10 +152,10 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
     bslam_appearance_note_view(&appearance, 0, settings.again_odds);
     bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     seen.beacon_class = 3;
-    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).matches[0].score,
+    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).records[0].match.score,
                 position_score(&settings, 4.1, 0.01) + 4.2, 1e-4);
     seen.beacon_class = 4;
-    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).matches[0].score,
+    assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).records[0].match.score,
                 position_score(&settings, 4.1, 0.01), 1e-4);
 }
 
@@ -173,9 +173,9 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
     seen.range_sd_m = 4;
     const decision_t after_long = decide_at(9000000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&after_long.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&after_long.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     const decision_t again = decide_at(1040000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&again.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&again.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_score_adds_what_looks_say_as_samples_come(void **state)
@@ -186,14 +186,14 @@ static void test_score_adds_what_looks_say_as_samples_come(void **state)
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 0.75, 3);
     // 3 of 3 + 3 samples: half of 4 * 0.75 - 0.5.
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 1.25,
-                0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
+                position_score(&settings, 4, 0) + 1.25, 0.01);
     appearance.learner.classifiers[0].samples = 12;
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 2.0,
-                0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
+                position_score(&settings, 4, 0) + 2.0, 0.01);
     signature[0] = -1.0f;  // 4 * -0.75 - 0.5 = -3.5
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) - 2.8,
-                0.01);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
+                position_score(&settings, 4, 0) - 2.8, 0.01);
 }
 
 static void test_score_of_looks_is_clipped(void **state)
@@ -203,10 +203,10 @@ static void test_score_of_looks_is_clipped(void **state)
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) + 2,
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0) + 2,
                 1e-3);
     signature[0] = -1.0f;
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0) - 4,
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0) - 4,
                 1e-3);
 }
 
@@ -218,7 +218,8 @@ static void test_a_signature_that_is_no_number_is_as_none(void **state)
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f, NAN};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0), 1e-4);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0),
+                1e-4);
 }
 
 static void test_a_machine_without_rivals_says_nothing(void **state)
@@ -229,7 +230,8 @@ static void test_a_machine_without_rivals_says_nothing(void **state)
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
     give_machine(0, 5, 3);
     appearance.learner.classifiers[0].negatives = 0;
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, position_score(&settings, 4, 0), 1e-4);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0),
+                1e-4);
 }
 
 static void test_between_match_and_new_a_sighting_waits(void **state)
@@ -243,9 +245,9 @@ static void test_between_match_and_new_a_sighting_waits(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0, waits_m, -1)};
     const bslam_sighting_t other[] = {unit_polar(0, is_new_m, -1)};
     decision_t d = decide(&ekf, &settings, seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     d = decide(&ekf, &settings, other, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 /// A beacon that the map hardly knows is nearly everything: where a sighting has a place of its own it is
@@ -257,17 +259,17 @@ static void test_what_is_nearly_an_old_beacon_that_does_not_count_is_new(void **
     ekf.beacons[0].confirmed = false;
     bslam_sighting_t seen = unit_polar(0, 4.72, -1);
     decision_t d = decide_at(settings.decision_delay_us, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     ekf.beacons[0].confirmed = true;
     d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     ekf.beacons[0].confirmed = false;
     seen = unit_polar(0.11, 4, -1);
     seen.has_range = false;
     d = decide_at(settings.decision_delay_us + 1, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 /// Nor is it what has a place and is called something else, however well the place fits.
@@ -285,7 +287,7 @@ static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count
         const decision_t d =
             decide_at(settings.decision_delay_us + (is_long_ago ? 1 : 0), &ekf, &settings, &seen, 1);
         const bool is_new = is_long_ago && is_unconfirmed && seen.has_range;
-        unit_assert_decided(&d.matches[0], is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH,
+        unit_assert_decided(&d.records[0].match, is_new ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH,
                             BSLAM_REASON_NONE, is_new ? -1 : 0);
     }
 }
@@ -298,7 +300,7 @@ static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
     give_machine(0, 3, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_a_class_counts_as_its_log_odds_say(void **state)
@@ -308,11 +310,11 @@ static void test_a_class_counts_as_its_log_odds_say(void **state)
     appearance.of[0].seen_as[2] = 10;
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = 3;
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score,
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
                 position_score(&settings, 4, 0) + log(8 * 10.1 / 10.8), 1e-3);
     seen.beacon_class = 4;
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    assert_near(d.matches[0].score, position_score(&settings, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
+    assert_near(d.records[0].match.score, position_score(&settings, 4, 0) + log(8 * 0.1 / 10.8), 1e-3);
 }
 
 /// What the side adds to the score of a beacon at (4, 0) that was seen from the origin and a little aside.
@@ -330,9 +332,9 @@ static double side_score(bslam_ekf_t *ekf, const bslam_pose_t *mount, double bea
     double scores[2];
     for (int i = 0; i < 2; i++) {
         const bslam_sighting_frame_t frame = {ekf, &settings, known[i], mount, &seen, 1, 0};
-        bslam_match_t match;
-        bslam_associate_svm(&frame, &match);
-        scores[i] = (double)match.score;
+        bslam_record_t record;
+        bslam_associate_svm(&frame, &record);
+        scores[i] = (double)record.match.score;
     }
     return scores[1] - scores[0];
 }
@@ -393,15 +395,15 @@ static void test_a_distance_by_another_class_is_not_held_against_it(void **state
     ekf.beacons[0].beacon_class = 3;
     bslam_sighting_t seen = unit_polar(0.01, 2, -1), direction = unit_direction(0.01, -1);
     seen.beacon_class = direction.beacon_class = 4;
-    const double score = (double)decide(&ekf, &settings, &direction, 1).matches[0].score;
+    const double score = (double)decide(&ekf, &settings, &direction, 1).records[0].match.score;
     const double of_distance = log((double)settings.new_per_rad) - log((double)settings.new_per_m2 * 2);
-    assert_near(decide(&ekf, &settings, &seen, 1).matches[0].score, score + of_distance - log(2 * log(9)),
-                1e-3);
-    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE,
-                        0);
+    assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
+                score + of_distance - log(2 * log(9)), 1e-3);
+    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).records[0].match, BSLAM_VERDICT_MATCH,
+                        BSLAM_REASON_NONE, 0);
     seen.beacon_class = 3;
-    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE,
-                        -1);
+    unit_assert_decided(&decide(&ekf, &settings, &seen, 1).records[0].match, BSLAM_VERDICT_NEW,
+                        BSLAM_REASON_NONE, -1);
 }
 
 static void test_far_but_clearly_alike_is_not_new(void **state)
@@ -414,11 +416,11 @@ static void test_far_but_clearly_alike_is_not_new(void **state)
     const bslam_sighting_t plain = seen_with(unit_polar(0.2, 4.4, -1), PLAIN);
     const bslam_sighting_t farther = seen_with(unit_polar(1.5, 4.4, -1), alike);
     decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     d = decide(&ekf, &settings, &plain, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     d = decide(&ekf, &settings, &farther, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another(void **state)
@@ -429,15 +431,15 @@ static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_anot
     bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     give_machine(0, 2, 2);
     decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     appearance.learner.classifiers[0].samples = 16;
     appearance.of[0].seen_as[2] = 10;
     seen.beacon_class = 3;
     d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     seen.beacon_class = 4;
     d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 /// Waited for as long as is waited for anything, it is new, if the robot is where it thinks: another beacon
@@ -454,22 +456,22 @@ static void test_far_but_clearly_alike_is_new_after_a_while(void **state)
     ekf.beacons[1].last_seen_us = 9500000;
     bslam_appearance_note_delay(&appearance, &settings, 0, 9000000);
     decision_t d = decide_at(9999998, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
-    assert_int_equal(d.matches[0].delayed_for, 0);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    assert_int_equal(d.records[0].match.delayed_for, 0);
     d = decide_at(10000000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    assert_int_equal(d.matches[0].delayed_for, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    assert_int_equal(d.records[0].match.delayed_for, -1);
     ekf.beacons[1].last_seen_us = 8900000;
     d = decide_at(10000000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     ekf.beacons[0].confirmed = true;  // that one itself is no witness
     ekf.beacons[0].last_seen_us = 9500000;
     d = decide_at(10000000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
     ekf.beacons[1].last_seen_us = 9500000;
     ekf.beacons[1].confirmed = false;
     d = decide_at(10000000, &ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_APPEARANCE, -1);
 }
 
 /// From where the sensor is it has no direction.
@@ -482,7 +484,7 @@ static void test_alike_but_where_the_robot_stands_is_new(void **state)
     give_machine(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
 // ---- waiting ----------------------------------------------------------------------------------------------
@@ -505,11 +507,11 @@ static void assert_waits(double value, int samples, int32_t decision_delay_us, b
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_machine(0, value, samples);
     const decision_t d = decide_at(9000000, &ekf, &settings, &seen, 1);
-    assert_int_equal(d.matches[0].delayed_for, waits ? 0 : -1);
+    assert_int_equal(d.records[0].match.delayed_for, waits ? 0 : -1);
     if (waits) {
-        unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+        unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     } else {
-        unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+        unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
     }
     bslam_appearance_forget(&appearance, 0, 1);
 }
@@ -532,7 +534,7 @@ static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
     ekf.beacons[0].last_seen_us = 5000000;
     const int64_t times_us[] = {4900000, 5000000, 6000000, 6000001};
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(decide_at(times_us[i], &ekf, &settings, &seen, 1).matches[0].delayed_for,
+        assert_int_equal(decide_at(times_us[i], &ekf, &settings, &seen, 1).records[0].match.delayed_for,
                          i < 3 ? -1 : 0);
     }
 }
@@ -544,9 +546,9 @@ static void test_a_match_that_has_waited_is_made(void **state)
     give_machine(0, -0.1, 2);
     const bslam_sighting_t seen = seen_aside();
     bslam_appearance_note_delay(&appearance, &settings, 0, 9000000);
-    unit_assert_decided(&decide_at(9999998, &ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_DEFER,
+    unit_assert_decided(&decide_at(9999998, &ekf, &settings, &seen, 1).records[0].match, BSLAM_VERDICT_DEFER,
                         BSLAM_REASON_AMBIGUOUS, -1);
-    unit_assert_decided(&decide_at(10000000, &ekf, &settings, &seen, 1).matches[0], BSLAM_VERDICT_MATCH,
+    unit_assert_decided(&decide_at(10000000, &ekf, &settings, &seen, 1).records[0].match, BSLAM_VERDICT_MATCH,
                         BSLAM_REASON_NONE, 0);
 }
 
@@ -557,7 +559,7 @@ static void test_what_matches_no_beacon_waits_for_none(void **state)
     give_machine(0, -0.1, 2);
     const bslam_sighting_t near = seen_with(unit_polar(0.1, 4.4, -1), ALIKE);
     assert_true(position_score(&settings, 4.4, 0.1) < 0.0);
-    assert_int_equal(decide_at(9000000, &ekf, &settings, &near, 1).matches[0].delayed_for, -1);
+    assert_int_equal(decide_at(9000000, &ekf, &settings, &near, 1).records[0].match.delayed_for, -1);
 }
 
 /// A beacon that was not seen for long, and one elsewhere that was seen so long ago: whether a sighting waits
@@ -570,7 +572,7 @@ static bool waits_beside(const bslam_settings_t *settings, int64_t other_ago_us,
     ekf.beacons[1].confirmed = other_counts;
     ekf.beacons[1].last_seen_us = time_us - other_ago_us;
     const bslam_sighting_t seen = unit_polar(0.06, 4, -1);
-    return decide_at(time_us, &ekf, settings, &seen, 1).matches[0].delayed_for == 0;
+    return decide_at(time_us, &ekf, settings, &seen, 1).records[0].match.delayed_for == 0;
 }
 
 /// A robot that another beacon holds in its place loses nothing by waiting.
@@ -604,9 +606,9 @@ static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **sta
     const bslam_sighting_t seen[] = {seen_with(unit_polar(0, 4, -1), ALIKE),
                                      seen_with(unit_polar(0.01, 4, -1), other)};
     const decision_t d = decide_at(9000000, &ekf, &settings, seen, 2);
-    assert_int_not_equal(d.matches[0].verdict, BSLAM_VERDICT_MATCH);
-    assert_int_equal(d.matches[0].delayed_for, -1);
-    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    assert_int_not_equal(d.records[0].match.verdict, BSLAM_VERDICT_MATCH);
+    assert_int_equal(d.records[0].match.delayed_for, -1);
+    unit_assert_decided(&d.records[1].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 // ---- several ----------------------------------------------------------------------------------------------
@@ -619,8 +621,8 @@ static void test_one_to_one_the_clearest_choice_first(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, pair, 2);
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4.02, -1), unit_polar(0, 4, -1)};
     const decision_t d = decide(&ekf, &settings, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
-    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    unit_assert_decided(&d.records[1].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate(void **state)
@@ -630,8 +632,8 @@ static void test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0.05, 4.4, -1), unit_polar(0, 4, -1)};
     assert_true(position_score(&settings, 4.4, 0.05) > 0);
     const decision_t d = decide(&ekf, &settings, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
-    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_REJECT, BSLAM_REASON_DUPLICATE, -1);
+    unit_assert_decided(&d.records[1].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
 static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
@@ -640,8 +642,8 @@ static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4, -1), unit_polar(-0.02, 4, -1)};
     const decision_t d = decide(&ekf, &settings, seen, 2);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
-    unit_assert_decided(&d.matches[1], BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
+    unit_assert_decided(&d.records[1].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
 static void test_looks_decide_between_two_in_the_gate(void **state)
@@ -654,10 +656,10 @@ static void test_looks_decide_between_two_in_the_gate(void **state)
     // Half way between them, a little nearer to the first.
     const bslam_sighting_t seen = seen_with(unit_polar(0.045, 4, -1), signature);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
     bslam_sighting_t blind = seen;
     blind.signature = NULL;
-    assert_int_equal(decide(&ekf, &settings, &blind, 1).matches[0].beacon, 0);
+    assert_int_equal(decide(&ekf, &settings, &blind, 1).records[0].match.beacon, 0);
 }
 
 static void test_sure_enough_to_learn_from(void **state)
@@ -668,19 +670,20 @@ static void test_sure_enough_to_learn_from(void **state)
     const bslam_sighting_t near = seen_with(unit_polar(0, 4, -1), signature);
     const bslam_sighting_t far = seen_with(unit_polar(0.05, 4.4, -1), signature);
     // Young: position alone says so. The farther one does not lead enough.
-    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure == (position_score(&settings, 4, 0) >= 4));
-    assert_false(decide(&ekf, &settings, &far, 1).matches[0].sure);
+    assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure ==
+                (position_score(&settings, 4, 0) >= 4));
+    assert_false(decide(&ekf, &settings, &far, 1).records[0].match.sure);
     give_machine(0, 1, 16);
-    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure);
+    assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure);
     // Grown up, and its machine says no.
     appearance.learner.classifiers[0].weights.unit = -appearance.learner.classifiers[0].weights.unit;
-    assert_false(decide(&ekf, &settings, &near, 1).matches[0].sure);
+    assert_false(decide(&ekf, &settings, &near, 1).records[0].match.sure);
     // Or says yes, but not enough, however much the beacon leads by what else is known of it.
     settings.learn_margin = BSLAM_R(0.5);
     settings.learn_lead = BSLAM_R(-20.0);
-    assert_false(decide(&ekf, &settings, &near, 1).matches[0].sure);
+    assert_false(decide(&ekf, &settings, &near, 1).records[0].match.sure);
     settings.learn_margin = BSLAM_R(-1.5);
-    assert_true(decide(&ekf, &settings, &near, 1).matches[0].sure);
+    assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure);
 }
 
 static void test_directions_alone_have_their_own_density_of_new(void **state)
@@ -694,8 +697,8 @@ static void test_directions_alone_have_their_own_density_of_new(void **state)
     const double expected =
         -0.5 * 0.01 * 0.01 / variance - 0.5 * log(6.283185307179586 * variance) - log(0.3);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
-    assert_near(d.matches[0].score, expected, 1e-4);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
+    assert_near(d.records[0].match.score, expected, 1e-4);
 }
 
 static void test_an_unmappable_sighting_is_rejected(void **state)
@@ -705,7 +708,7 @@ static void test_an_unmappable_sighting_is_rejected(void **state)
     bslam_sighting_t seen = unit_polar(0, 4, -1);
     seen.beacon_class = BSLAM_CLASS_NOT_MAPPABLE;
     const decision_t d = decide(&ekf, &settings, &seen, 1);
-    unit_assert_decided(&d.matches[0], BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
+    unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_REJECT, BSLAM_REASON_CLASS, -1);
 }
 
 /// A heading that is 0.1 rad off displaces all sightings alike: given one, the other is where it should be.

@@ -10,7 +10,7 @@ static const bslam_pose_t on_axle = {0, 0, 0};
 
 /// What a method decided of each sighting of a frame.
 typedef struct decision {
-    bslam_match_t matches[8];
+    bslam_record_t records[8];
 } decision_t;
 
 static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, const bslam_settings_t *settings,
@@ -19,7 +19,7 @@ static decision_t decide(bslam_associate_fn method, const bslam_ekf_t *ekf, cons
     const bslam_sighting_frame_t frame = {ekf, settings, NULL, mount, sightings, count, 0};
     decision_t decision;
     memset(&decision, 0x77, sizeof decision);
-    method(&frame, decision.matches);
+    method(&frame, decision.records);
     return decision;
 }
 
@@ -77,10 +77,10 @@ static void test_known_label_of_the_map_is_a_match_and_another_is_new(void **sta
     const bslam_sighting_t seen[] = {unit_polar(2, 9, 11), unit_polar(0, 4, 7), unit_direction(1, 10),
                                      unit_polar(0, 4, INT32_MAX)};
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-    assert_match(&d.matches[0], 1);
-    assert_new(&d.matches[1]);
-    assert_match(&d.matches[2], 0);
-    assert_new(&d.matches[3]);
+    assert_match(&d.records[0].match, 1);
+    assert_new(&d.records[1].match);
+    assert_match(&d.records[2].match, 0);
+    assert_new(&d.records[3].match);
 }
 
 static void test_known_sighting_without_a_label_is_rejected(void **state)
@@ -89,7 +89,7 @@ static void test_known_sighting_without_a_label_is_rejected(void **state)
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, BSLAM_LABEL_NONE)};
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, 1);
-    assert_rejected(&d.matches[0], BSLAM_REASON_NO_IDENTITY);
+    assert_rejected(&d.records[0].match, BSLAM_REASON_NO_IDENTITY);
 }
 
 static void test_known_repeated_label_leaves_the_first(void **state)
@@ -99,11 +99,11 @@ static void test_known_repeated_label_leaves_the_first(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0, 4, 10), unit_polar(0, 4, 10), unit_polar(0, 4, 7),
                                      unit_polar(0, 5, 7), unit_polar(0, 4, 10)};
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-    assert_match(&d.matches[0], 0);
-    assert_rejected(&d.matches[1], BSLAM_REASON_DUPLICATE);
-    assert_new(&d.matches[2]);
-    assert_rejected(&d.matches[3], BSLAM_REASON_DUPLICATE);
-    assert_rejected(&d.matches[4], BSLAM_REASON_DUPLICATE);
+    assert_match(&d.records[0].match, 0);
+    assert_rejected(&d.records[1].match, BSLAM_REASON_DUPLICATE);
+    assert_new(&d.records[2].match);
+    assert_rejected(&d.records[3].match, BSLAM_REASON_DUPLICATE);
+    assert_rejected(&d.records[4].match, BSLAM_REASON_DUPLICATE);
 }
 
 /// A sighting far from all that a label may be starts another rival, but not without end.
@@ -125,7 +125,7 @@ static void test_known_label_has_so_many_rivals_and_no_more(void **state)
         }
         const bslam_sighting_t far = unit_polar(0, 4, 10);
         const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, &far, 1);
-        assert_int_equal(d.matches[0].verdict,
+        assert_int_equal(d.records[0].match.verdict,
                          negatives < NEGATIVES ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_MATCH);
     }
 }
@@ -142,7 +142,7 @@ static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **st
     }
     const bslam_sighting_t seen = unit_polar(0, 4.1, 10);
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, &seen, 1);
-    assert_match(&d.matches[0], 0);
+    assert_match(&d.records[0].match, 0);
 }
 
 static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **state)
@@ -152,8 +152,8 @@ static void test_known_not_mappable_sighting_does_not_use_its_label_up(void **st
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, 10), BSLAM_CLASS_NOT_MAPPABLE),
                                      unit_polar(0, 4, 10)};
     const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-    assert_rejected(&d.matches[0], BSLAM_REASON_CLASS);
-    assert_match(&d.matches[1], 0);
+    assert_rejected(&d.records[0].match, BSLAM_REASON_CLASS);
+    assert_match(&d.records[1].match, 0);
 }
 
 // ---- what both methods by distance share ------------------------------------------------------------------
@@ -168,8 +168,8 @@ static void test_by_distance_empty_map_makes_everything_new(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_direction(0, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-        assert_new(&d.matches[0]);
-        assert_new(&d.matches[1]);
+        assert_new(&d.records[0].match);
+        assert_new(&d.records[1].match);
     }
 }
 
@@ -180,8 +180,8 @@ static void test_by_distance_not_mappable_sighting_is_rejected(void **state)
     const bslam_sighting_t seen[] = {of_class(unit_polar(0, 4, -1), BSLAM_CLASS_NOT_MAPPABLE)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
-        assert_rejected(&d.matches[0], BSLAM_REASON_CLASS);
-        assert_true(d.matches[0].distance2 < 0);
+        assert_rejected(&d.records[0].match, BSLAM_REASON_CLASS);
+        assert_true(d.records[0].match.distance2 < 0);
     }
 }
 
@@ -193,8 +193,8 @@ static void test_by_distance_nearest_of_two_is_the_match(void **state)
     const bslam_sighting_t seen[] = {unit_polar(0.02, 4.02, -1), unit_polar(0.23, 4.1, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-        assert_match(&d.matches[0], 0);
-        assert_match(&d.matches[1], 2);
+        assert_match(&d.records[0].match, 0);
+        assert_match(&d.records[1].match, 2);
     }
 }
 
@@ -206,9 +206,9 @@ static void test_by_distance_of_several_sightings_the_nearest_keeps_the_beacon(v
                                      unit_polar(1.58, 3, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-        assert_rejected(&d.matches[0], BSLAM_REASON_DUPLICATE);
-        assert_match(&d.matches[1], 1);
-        assert_rejected(&d.matches[2], BSLAM_REASON_DUPLICATE);
+        assert_rejected(&d.records[0].match, BSLAM_REASON_DUPLICATE);
+        assert_match(&d.records[1].match, 1);
+        assert_rejected(&d.records[2].match, BSLAM_REASON_DUPLICATE);
     }
 }
 
@@ -219,8 +219,8 @@ static void test_by_distance_of_equally_near_sightings_the_first_keeps_the_beaco
     const bslam_sighting_t seen[] = {unit_polar(1.6, 3, -1), unit_polar(1.6, 3, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-        assert_match(&d.matches[0], 1);
-        assert_rejected(&d.matches[1], BSLAM_REASON_DUPLICATE);
+        assert_match(&d.records[0].match, 1);
+        assert_rejected(&d.records[1].match, BSLAM_REASON_DUPLICATE);
     }
 }
 
@@ -235,11 +235,11 @@ static void test_by_distance_other_class_is_never_the_match(void **state)
     const bslam_sighting_t unknown[] = {of_class(here, BSLAM_CLASS_NONE)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t other = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
-        assert_new(&other.matches[0]);
+        assert_new(&other.records[0].match);
         const decision_t match = decide(by_distance[m], &ekf, &settings, &on_axle, same, 1);
-        assert_match(&match.matches[0], 1);
+        assert_match(&match.records[0].match, 1);
         const decision_t none = decide(by_distance[m], &ekf, &settings, &on_axle, unknown, 1);
-        assert_match(&none.matches[0], 1);
+        assert_match(&none.records[0].match, 1);
     }
 }
 
@@ -252,9 +252,9 @@ static void test_by_distance_sensor_is_where_its_mount_says(void **state)
     const bslam_sighting_t seen[] = {unit_polar(-0.785398, 2.828427, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &mount, seen, 1);
-        assert_match(&d.matches[0], 1);
+        assert_match(&d.records[0].match, 1);
         // A few roundings of 3 m, squared, in units of a threshold or deviation of 0.02 at least.
-        assert_near(d.matches[0].distance2, 0, 1e-6);
+        assert_near(d.records[0].match.distance2, 0, 1e-6);
     }
 }
 
@@ -269,10 +269,10 @@ static void test_nearest_on_either_side_of_the_threshold(void **state)
     const bslam_sighting_t near[] = {unit_polar(1.570796, 3.499, -1)};
     const bslam_sighting_t far[] = {unit_polar(1.570796, 3.501, -1)};
     const decision_t d_near = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, near, 1);
-    assert_match(&d_near.matches[0], 1);
-    assert_near(d_near.matches[0].distance2, 0.499 * 0.499 / 0.25, 1e-4);
+    assert_match(&d_near.records[0].match, 1);
+    assert_near(d_near.records[0].match.distance2, 0.499 * 0.499 / 0.25, 1e-4);
     const decision_t d_far = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, far, 1);
-    assert_new(&d_far.matches[0]);
+    assert_new(&d_far.records[0].match);
 }
 
 static void test_nearest_direction_on_either_side_of_the_threshold(void **state)
@@ -283,9 +283,9 @@ static void test_nearest_direction_on_either_side_of_the_threshold(void **state)
     const bslam_sighting_t near[] = {unit_direction(-0.099, -1)};
     const bslam_sighting_t far[] = {unit_direction(-0.101, -1)};
     const decision_t d_near = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, near, 1);
-    assert_match(&d_near.matches[0], 0);
+    assert_match(&d_near.records[0].match, 0);
     const decision_t d_far = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, far, 1);
-    assert_new(&d_far.matches[0]);
+    assert_new(&d_far.records[0].match);
 }
 
 static void test_nearest_direction_a_turn_further_is_the_same(void **state)
@@ -294,7 +294,7 @@ static void test_nearest_direction_a_turn_further_is_the_same(void **state)
     const bslam_ekf_t ekf = three_beacons(&settings);
     const bslam_sighting_t seen[] = {unit_direction(1.57 - 6.2831853, -1)};
     const decision_t d = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, seen, 1);
-    assert_match(&d.matches[0], 1);
+    assert_match(&d.records[0].match, 1);
 }
 
 static void test_nearest_known_beacon_is_one_of_the_map(void **state)
@@ -306,7 +306,7 @@ static void test_nearest_known_beacon_is_one_of_the_map(void **state)
     const bslam_sighting_t seen[] = {unit_polar(3.1415, 5, -1)};
     for (int m = 0; m < COUNT_OF(by_distance); m++) {
         const decision_t d = decide(by_distance[m], &ekf, &settings, &on_axle, seen, 1);
-        assert_match(&d.matches[0], index);
+        assert_match(&d.records[0].match, index);
     }
 }
 
@@ -333,16 +333,16 @@ static void test_mahalanobis_match_ambiguous_and_new_by_the_two_thresholds(void 
     settings.match_d2 = real(d2 * 1.001);
     settings.new_d2 = real(d2 * 2);
     const decision_t match = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_match(&match.matches[0], 1);
-    assert_near(match.matches[0].distance2, d2, 0);
+    assert_match(&match.records[0].match, 1);
+    assert_near(match.records[0].match.distance2, d2, 0);
 
     settings.match_d2 = real(d2 * 0.999);
     const decision_t between = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_rejected(&between.matches[0], BSLAM_REASON_AMBIGUOUS);
+    assert_rejected(&between.records[0].match, BSLAM_REASON_AMBIGUOUS);
 
     settings.new_d2 = real(d2 * 0.9995);
     const decision_t new = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_new(&new.matches[0]);
+    assert_new(&new.records[0].match);
 }
 
 static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one(void **state)
@@ -356,9 +356,9 @@ static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one
     // 0.4 m from beacon 0, which is known to 0.1 m, and 0.6 m from beacon 2, known to 2 m.
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1)};
     const decision_t nearest = decide(bslam_associate_nearest, &ekf, &settings, &on_axle, seen, 1);
-    assert_match(&nearest.matches[0], 0);
+    assert_match(&nearest.records[0].match, 0);
     const decision_t mahalanobis = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_match(&mahalanobis.matches[0], 2);
+    assert_match(&mahalanobis.records[0].match, 2);
 }
 
 static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **state)
@@ -371,7 +371,7 @@ static void test_mahalanobis_beacon_without_an_innovation_is_passed_over(void **
     assert_int_equal(bslam_ekf_add_known(&ekf, 0, 0, &index), BSLAM_OK);
     const bslam_sighting_t seen[] = {unit_polar(0, 1, -1)};
     const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_new(&d.matches[0]);
+    assert_new(&d.records[0].match);
 }
 
 static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void **state)
@@ -384,7 +384,7 @@ static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void
     }
     const bslam_sighting_t seen[] = {unit_polar(1.5708, 3, -1)};
     const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
-    assert_true(d.matches[0].beacon != 1);
+    assert_true(d.records[0].match.beacon != 1);
 }
 
 // ---- which method -----------------------------------------------------------------------------------------

@@ -123,11 +123,11 @@ static void test_joint_finds_what_trying_all_pairings_finds(void **state)
         if (close) {
             continue;
         }
-        bslam_match_t matches[SIGHTINGS];
+        bslam_record_t records[SIGHTINGS];
         const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, SIGHTINGS, 0};
-        bslam_associate_joint(&frame, matches);
+        bslam_associate_joint(&frame, records);
         for (int i = 0; i < SIGHTINGS; i++) {
-            assert_int_equal(matches[i].beacon, expected.beacon[i]);
+            assert_int_equal(records[i].match.beacon, expected.beacon[i]);
         }
         compared++;
         pairs += expected.pairs;
@@ -146,14 +146,14 @@ static void test_joint_sees_through_a_wrong_heading(void **state)
     for (int i = 0; i < 3; i++) {
         seen[i] = unit_polar(atan2(places[i][1], places[i][0]) + 0.15, hypot(places[i][0], places[i][1]), -1);
     }
-    bslam_match_t matches[3];
+    bslam_record_t records[3];
     const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 3, 0};
-    bslam_associate_mahalanobis(&frame, matches);
-    assert_int_not_equal(matches[0].beacon, 0);
-    bslam_associate_joint(&frame, matches);
+    bslam_associate_mahalanobis(&frame, records);
+    assert_int_not_equal(records[0].match.beacon, 0);
+    bslam_associate_joint(&frame, records);
     for (int i = 0; i < 3; i++) {
-        assert_int_equal(matches[i].verdict, BSLAM_VERDICT_MATCH);
-        assert_int_equal(matches[i].beacon, i);
+        assert_int_equal(records[i].match.verdict, BSLAM_VERDICT_MATCH);
+        assert_int_equal(records[i].match.beacon, i);
     }
 }
 
@@ -170,10 +170,10 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
     }
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
     const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
-    bslam_match_t matches[2];
-    bslam_associate_joint(&frame, matches);
-    unit_assert_decided(&matches[0], BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
-    unit_assert_decided(&matches[1], BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
+    bslam_record_t records[2];
+    bslam_associate_joint(&frame, records);
+    unit_assert_decided(&records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
+    unit_assert_decided(&records[1].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 1);
 }
 
 static void test_joint_out_of_nodes_still_decides_all(void **state)
@@ -183,12 +183,12 @@ static void test_joint_out_of_nodes_still_decides_all(void **state)
     static const double places[1][2] = {{4, 0}};
     const bslam_ekf_t ekf = map_of(&settings, places, 1);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(2, 4, -1)};
-    bslam_match_t matches[2];
+    bslam_record_t records[2];
     const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
-    bslam_associate_joint(&frame, matches);
-    assert_int_equal(matches[0].verdict, BSLAM_VERDICT_REJECT);
-    assert_int_equal(matches[0].reason, BSLAM_REASON_AMBIGUOUS);
-    assert_int_equal(matches[1].verdict, BSLAM_VERDICT_NEW);
+    bslam_associate_joint(&frame, records);
+    assert_int_equal(records[0].match.verdict, BSLAM_VERDICT_REJECT);
+    assert_int_equal(records[0].match.reason, BSLAM_REASON_AMBIGUOUS);
+    assert_int_equal(records[1].match.verdict, BSLAM_VERDICT_NEW);
 }
 
 static void test_joint_more_sightings_than_are_paired_together(void **state)
@@ -203,13 +203,13 @@ static void test_joint_more_sightings_than_are_paired_together(void **state)
     }
     seen[6] = seen[2];  // the same beacon again, in the second group
     const bslam_ekf_t ekf = map_of(&settings, places, 8);
-    bslam_match_t matches[8];
+    bslam_record_t records[8];
     const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 8, 0};
-    bslam_associate_joint(&frame, matches);
+    bslam_associate_joint(&frame, records);
     for (int i = 0; i < 8; i++) {
-        assert_int_equal(matches[i].beacon, i == 6 ? -1 : i);
+        assert_int_equal(records[i].match.beacon, i == 6 ? -1 : i);
     }
-    assert_int_equal(matches[6].verdict, BSLAM_VERDICT_REJECT);
+    assert_int_equal(records[6].match.verdict, BSLAM_VERDICT_REJECT);
 }
 
 int main(void)

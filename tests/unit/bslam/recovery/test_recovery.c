@@ -100,8 +100,7 @@ static void test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_k
     const bslam_ekf_t before = slam.ekf;
     look_from(1, 2, 2.5, BEACONS);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_DOUBTING);
-    int count;
-    assert_int_equal(bslam_slam_accounts(&slam, &count)[0].reason, BSLAM_REASON_LOST);
+    assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_LOST);
     look_on(7, 1, 2, 2.5, BEACONS);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_LOST);
     bslam_real_t lower[6];
@@ -116,7 +115,7 @@ static void test_recovery_of_a_carried_robot_notices_and_finds_it_with_the_map_k
     }
     look_on(20, 1, 2, 2.5, BEACONS);
     assert_at(1, 2, 2.5);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS);
 }
 
 static void test_recovery_goes_by_the_beacons_own_scales(void **state)
@@ -250,7 +249,7 @@ static void test_recovery_by_one_beacon_is_never_a_guess(void **state)
     look_on(200, 1, 2, -1, 1);
     assert_int_equal(recovery.counters.lost, 1);
     assert_int_equal(recovery.counters.found, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS);
 }
 
 static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
@@ -295,7 +294,7 @@ static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
         assert_memory_equal(unseeing.ekf.covariance, slam.ekf.covariance, sizeof slam.ekf.covariance);
     }
     assert_int_equal(recovery.counters.withheld, 24);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS - 1);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS - 1);
 }
 
 /// A provisional beacon's time may be over when the robot is found again: it leaves with the frame after.
@@ -307,10 +306,10 @@ static void test_recovery_of_a_robot_that_is_found_leaves_the_map_as_it_was(void
     end_time_of(&slam.ekf.beacons[3]);
     while (recovery.counters.found == 0) {
         look_on(1, 1, 2, 2.5, 3);
-        assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+        assert_int_equal(slam.ekf.beacon_count, BEACONS);
     }
     look_on(1, 1, 2, 2.5, 3);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS - 1);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS - 1);
 }
 
 // ---- by looks ---------------------------------------------------------------------------------------------
@@ -419,14 +418,14 @@ static void test_recovery_in_a_map_that_grows_sets_the_robot_where_four_beacons_
     }
     assert_int_equal(recovery.counters.lost, 0);
     assert_int_equal(recovery.counters.withheld, 0);
-    assert_true(bslam_slam_beacon_count(&slam) > BEACONS);  // taken for new ones meanwhile
+    assert_true(slam.ekf.beacon_count > BEACONS);  // taken for new ones meanwhile
     look_alike_from(1, 2, 2.5, BEACONS);
     assert_int_equal(recovery.counters.lost, 1);
     assert_int_equal(recovery.counters.found, 1);
     assert_int_equal(recovery.counters.withheld, 1);
     assert_int_equal(bslam_recovery_state(&recovery, &slam), BSLAM_RECOVERY_FOLLOWING);
     assert_at(1, 2, 2.5);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS);
     for (int b = 0; b < BEACONS; b++) {
         const int at = before.beacons[b].at;
         assert_near(slam.ekf.mean[at], before.mean[at], 1e-3);
@@ -470,13 +469,13 @@ static void test_recovery_in_a_map_that_grows_a_doubt_ends_where_the_robot_is_fo
     bslam_sighting_t seen = unit_polar(0, 2, -1);
     seen.signature = none;
     show(&seen, 1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS + 1);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS + 1);
     for (int k = 0; k < 3; k++) {
         look_alike_from(0, 0, 0, BEACONS);
     }
     assert_int_equal(recovery.counters.found, 2);
     assert_at(0, 0, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BEACONS + 1);
+    assert_int_equal(slam.ekf.beacon_count, BEACONS + 1);
 }
 
 static void test_recovery_in_a_map_that_has_settled_one_beacon_is_enough(void **state)

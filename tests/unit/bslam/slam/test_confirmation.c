@@ -120,9 +120,9 @@ static void test_what_more_speaks_against_than_for_leaves(void **state)
 {
     (void)see(1.0);  // 0.5
     (void)see(0.1);  // 0.1
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
     (void)see(0.1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_int_equal(slam.ekf.beacon_count, 0);
     assert_int_equal(slam.counters.removed, 1);
 }
 
@@ -134,7 +134,7 @@ static void test_a_confirmed_beacon_stays_whatever_it_scores(void **state)
     for (int i = 0; i < 40; i++) {
         assert_int_equal(see(-100).outcome, BSLAM_OUTCOME_MATCHED);
     }
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
 }
 
 static void test_without_scores_a_beacon_is_believed_at_once(void **state)
@@ -152,7 +152,7 @@ static void test_a_score_that_speaks_against_it_starts_no_beacon(void **state)
     assert_int_equal(account.outcome, BSLAM_OUTCOME_DEFERRED);
     assert_int_equal(account.reason, BSLAM_REASON_TENTATIVE);
     assert_false(account.has_beacon);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+    assert_int_equal(slam.ekf.beacon_count, 0);
     assert_int_equal(slam.counters.added, 0);
 }
 
@@ -178,7 +178,7 @@ static void test_a_beacon_on_trial_has_no_time_to_be_confirmed_in(void **state)
     (void)see(0);
     (void)see_at(1.5, 0);
     (void)see_at(1.5, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
 }
 
 static void test_a_sighting_beyond_the_gate_does_not_speak_for_it(void **state)

@@ -56,10 +56,8 @@ static void see_one(bslam_slam_t *slam, int64_t time_us, bslam_sighting_t sighti
 
 static const bslam_account_t *account(const bslam_slam_t *slam, int i)
 {
-    int count;
-    const bslam_account_t *accounts = bslam_slam_accounts(slam, &count);
-    assert_true(i < count);
-    return &accounts[i];
+    assert_true(i < slam->account_count);
+    return &slam->accounts[i];
 }
 
 static bslam_beacon_view_t beacon(const bslam_slam_t *slam, int index)
@@ -106,8 +104,8 @@ static void assert_frame_refused(bslam_slam_t *slam, int64_t time_us, const bsla
     bslam_slam_t before;
     memcpy(&before, slam, sizeof before);
     assert_int_equal(bslam_slam_sightings(slam, time_us, sightings, count), expected);
-    assert_int_equal(bslam_slam_bad_sighting(slam), bad_sighting);
-    assert_int_equal(bslam_slam_counters(slam)->frames_refused, before.counters.frames_refused + 1);
+    assert_int_equal(slam->bad_sighting, bad_sighting);
+    assert_int_equal(slam->counters.frames_refused, before.counters.frames_refused + 1);
     assert_unchanged(slam, &before);
 }
 
@@ -118,8 +116,8 @@ static void assert_odometry_refused(bslam_slam_t *slam, bslam_odometry_reading_t
     memcpy(&before, slam, sizeof before);
     assert_int_equal(bslam_slam_odometry(slam, &reading), expected);
     const uint32_t jumps = expected == BSLAM_E_JUMP ? 1 : 0;
-    assert_int_equal(bslam_slam_counters(slam)->odometry_refused, before.counters.odometry_refused + 1);
-    assert_int_equal(bslam_slam_counters(slam)->jumps, before.counters.jumps + jumps);
+    assert_int_equal(slam->counters.odometry_refused, before.counters.odometry_refused + 1);
+    assert_int_equal(slam->counters.jumps, before.counters.jumps + jumps);
     assert_unchanged(slam, &before);
 }
 
@@ -296,7 +294,7 @@ static void test_sightings_bad_sighting_is_named_and_changes_nothing(void **stat
     }
     // A good frame forgets which sighting was bad.
     see_one(&slam, 11 * STEP_US, unit_polar(0.3, 4, 1));
-    assert_int_equal(bslam_slam_bad_sighting(&slam), -1);
+    assert_int_equal(slam.bad_sighting, -1);
 }
 
 static void test_sightings_at_the_limits_of_their_fields_are_taken(void **state)
@@ -310,7 +308,7 @@ static void test_sightings_at_the_limits_of_their_fields_are_taken(void **state)
     for (int i = 0; i < COUNT_OF(seen); i++) {
         assert_account(&slam, i, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE);
     }
-    assert_int_equal(bslam_slam_counters(&slam)->insane, 0);
+    assert_int_equal(slam.counters.insane, 0);
 }
 
 static void test_sightings_distance_that_a_direction_does_not_have_is_not_what_is_wrong(void **state)
@@ -401,7 +399,7 @@ static void test_sightings_new_and_matched_are_accounted_for(void **state)
     assert_account(&slam, 1, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE);
     assert_int_equal(account(&slam, 1)->beacon_uid, 2);
 
-    const bslam_slam_counters_t *counters = bslam_slam_counters(&slam);
+    const bslam_slam_counters_t *counters = &slam.counters;
     assert_int_equal(counters->frames, 2);
     assert_int_equal(counters->sightings, 4);
     assert_int_equal(counters->added, 3);
@@ -422,7 +420,7 @@ static void test_sightings_rejected_say_why(void **state)
     assert_account(&slam, 1, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_DUPLICATE);
     assert_account(&slam, 2, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_NO_IDENTITY);
     assert_account(&slam, 3, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_CLASS);
-    const bslam_slam_counters_t *counters = bslam_slam_counters(&slam);
+    const bslam_slam_counters_t *counters = &slam.counters;
     assert_int_equal(counters->duplicates, 1);
     assert_int_equal(counters->unidentified, 1);
     assert_int_equal(counters->unmappable, 1);
@@ -432,8 +430,8 @@ static void test_sightings_rejected_say_why(void **state)
     for (int i = 1; i < 4; i++) {
         assert_true(!account(&slam, i)->has_beacon && account(&slam, i)->weight == 0);
     }
-    assert_int_equal(bslam_slam_counters(&slam)->rejected, 4);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.counters.rejected, 4);
+    assert_int_equal(slam.ekf.beacon_count, 2);
 }
 
 static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **state)
@@ -446,8 +444,8 @@ static void test_sightings_matched_to_an_indefinite_state_are_rejected(void **st
     see_one(&slam, 1, unit_polar(0.3, 4, 1));
     assert_account(&slam, 0, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_SINGULAR);
     assert_true(account(&slam, 0)->has_beacon && account(&slam, 0)->weight == 0);
-    assert_int_equal(bslam_slam_counters(&slam)->gated, 0);
-    assert_int_equal(bslam_slam_counters(&slam)->insane, 1);
+    assert_int_equal(slam.counters.gated, 0);
+    assert_int_equal(slam.counters.insane, 1);
 }
 
 static void test_sightings_ambiguous_are_rejected(void **state)
@@ -461,7 +459,7 @@ static void test_sightings_ambiguous_are_rejected(void **state)
     drive(&slam, STEP_US, 0, 0);
     see_one(&slam, STEP_US, unit_polar(0.3, 5, -1));
     assert_account(&slam, 0, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_AMBIGUOUS);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
 }
 
 static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_ratio(void **state)
@@ -478,7 +476,7 @@ static void test_sightings_outside_the_gate_are_rejected_with_their_beacon_and_r
     assert_true(account(&slam, 0)->has_beacon && account(&slam, 0)->beacon_uid == 0);
     assert_true(account(&slam, 0)->test_ratio > 1);
     assert_true(account(&slam, 0)->weight == 0);
-    assert_int_equal(bslam_slam_counters(&slam)->gated, 1);
+    assert_int_equal(slam.counters.gated, 1);
     assert_int_equal(beacon(&slam, 0).sightings, 1);
     const bslam_pose_t after = bslam_slam_pose(&slam);
     assert_memory_equal(&before, &after, sizeof before);
@@ -494,7 +492,7 @@ static void test_sightings_beyond_huber_are_counted_and_weighted(void **state)
     see_one(&slam, STEP_US, unit_polar(0.3, 5, 1));
     assert_account(&slam, 0, BSLAM_OUTCOME_MATCHED, BSLAM_REASON_NONE);
     assert_true(account(&slam, 0)->weight > 0 && account(&slam, 0)->weight < 1);
-    assert_int_equal(bslam_slam_counters(&slam)->down_weighted, 1);
+    assert_int_equal(slam.counters.down_weighted, 1);
 }
 
 static void test_sightings_distance_of_a_sized_beacon_taken_for_another_class_is_not_used(void **state)
@@ -539,8 +537,8 @@ static void test_sightings_beyond_the_maps_room_are_rejected_and_the_first_are_a
         assert_account(&slam, i, fits ? BSLAM_OUTCOME_NEW : BSLAM_OUTCOME_REJECTED,
                        fits ? BSLAM_REASON_NONE : BSLAM_REASON_MAP_FULL);
     }
-    assert_int_equal(bslam_slam_counters(&slam)->map_full, COUNT_OF(seen) - room);
-    assert_int_equal(bslam_slam_beacon_count(&slam), BSLAM_BEACONS_MAX);
+    assert_int_equal(slam.counters.map_full, COUNT_OF(seen) - room);
+    assert_int_equal(slam.ekf.beacon_count, BSLAM_BEACONS_MAX);
 }
 
 static void test_sightings_more_rays_than_room_are_rejected_but_points_are_not(void **state)
@@ -561,10 +559,8 @@ static void test_sightings_empty_frame_is_a_frame(void **state)
 {
     bslam_slam_t slam = running(unit_settings());
     see(&slam, 11 * STEP_US, NULL, 0);
-    int count = -1;
-    (void)bslam_slam_accounts(&slam, &count);
-    assert_int_equal(count, 0);
-    assert_int_equal(bslam_slam_counters(&slam)->frames, 3);
+    assert_int_equal(slam.account_count, 0);
+    assert_int_equal(slam.counters.frames, 3);
 }
 
 static void test_sightings_order_within_a_frame_does_not_matter(void **state)
@@ -659,7 +655,7 @@ static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_b
     drive(&slam, time_us + STEP_US, 0, 0);
     see_one(&slam, time_us + STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
     assert_true(beacon(&slam, 0).confirmed);
-    assert_int_equal(bslam_slam_counters(&slam)->gated, 0);
+    assert_int_equal(slam.counters.gated, 0);
 }
 
 static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it(void **state)
@@ -670,8 +666,8 @@ static void test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_fo
     see_one(&slam, 0, unit_polar(0, 4, 1));
     drive(&slam, STEP_US, 0, 0);
     see_one(&slam, STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
-    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
-    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
+    assert_int_equal(slam.ekf.beacon_count, 0);
+    assert_int_equal(slam.counters.removed, 1);
     drive(&slam, 2 * STEP_US, 0, 0);
     see_one(&slam, 2 * STEP_US, unit_polar(0, BSLAM_R(4.5), 1));
     assert_int_equal(beacon(&slam, 0).uid, 1);
@@ -704,10 +700,10 @@ static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
         see(&slam, (int64_t)i * STEP_US, NULL, 0);
     }
     // The window's last moment is within it.
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     see(&slam, 10 * STEP_US + 1, NULL, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
-    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
+    assert_int_equal(slam.counters.removed, 1);
     assert_int_equal(beacon(&slam, 0).uid, 1);
     // It may come back, under a number of its own.
     drive(&slam, 11 * STEP_US, 0, 0);
@@ -728,12 +724,12 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
         drive(&slam, (int64_t)i * STEP_US, 0, 0);
         see(&slam, (int64_t)i * STEP_US, NULL, 0);
     }
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     drive(&slam, 6 * STEP_US, 0, 0);
     see_one(&slam, 6 * STEP_US, unit_polar(1.3, 9, 1));
     // The other place starts a beacon anew, and the one that it contradicts leaves: its time is up.
-    assert_int_equal(bslam_slam_counters(&slam)->removed, 1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.counters.removed, 1);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(beacon(&slam, 0).uid, 0);
     assert_int_equal(beacon(&slam, 1).uid, 2);
 }
@@ -754,11 +750,11 @@ test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_c
                          i % 2 == 0 || i == 1 ? BSLAM_OUTCOME_NEW : BSLAM_OUTCOME_MATCHED);
     }
     // Of the five of that label the right one is left, and what contradicts it from now on is rejected.
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
     assert_true(beacon(&slam, 0).confirmed);
     assert_int_equal(beacon(&slam, 0).sightings, 4);
     assert_near(beacon(&slam, 0).x_m, 4 * cos(0.5), 0.05);
-    assert_int_equal(bslam_slam_counters(&slam)->removed, 4);
+    assert_int_equal(slam.counters.removed, 4);
     drive(&slam, 8 * (int64_t)STEP_US, 0, 0);
     see_one(&slam, 8 * (int64_t)STEP_US, unit_polar(-1, 9, 1));
     assert_account(&slam, 0, BSLAM_OUTCOME_REJECTED, BSLAM_REASON_GATE);
@@ -775,7 +771,7 @@ static void test_sightings_known_beacon_is_never_removed_but_a_ray_is(void **sta
     assert_int_equal(beacon(&slam, 1).kind, BSLAM_BEACON_RAY);
     drive(&slam, 3 * STEP_US, 0, 0);
     see(&slam, 3 * STEP_US, NULL, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
     assert_int_equal(beacon(&slam, 0).label, 9);
     assert_int_equal(slam.ekf.dim, 3);
     // There is room for as many rays as before.
@@ -788,7 +784,7 @@ static void test_remove_beacon_then_its_label_is_new_again(void **state)
     bslam_slam_t slam = running(unit_settings());
     const uint32_t uid = beacon(&slam, 1).uid;
     assert_int_equal(bslam_slam_remove_beacon(&slam, uid), BSLAM_OK);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(bslam_slam_remove_beacon(&slam, uid), BSLAM_E_NO_BEACON);
     see_one(&slam, 11 * STEP_US, unit_polar(-0.8, 3, 2));
     assert_account(&slam, 0, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE);
@@ -811,7 +807,7 @@ static void test_sightings_ray_seen_from_aside_settles_into_a_point(void **state
         see_one(&slam, (int64_t)i * STEP_US, seen);
         drive(&slam, (int64_t)(i + 1) * STEP_US, 0.02, 0.02);
     }
-    assert_int_equal(bslam_slam_counters(&slam)->settled, 1);
+    assert_int_equal(slam.counters.settled, 1);
     const bslam_beacon_view_t view = beacon(&slam, 0);
     assert_int_equal(view.kind, BSLAM_BEACON_POINT);
     // Odometry and directions are exact here; what is left is the start value's pull.
@@ -1147,7 +1143,7 @@ static void test_resume_odometry_robot_carried_elsewhere_finds_itself_in_its_map
                 seen[i] = look(&truth, places[i][0], places[i][1], i);
             }
             see(&slam, (int64_t)step * STEP_US, seen, 3);
-            assert_int_equal(bslam_slam_counters(&slam)->gated, 0);
+            assert_int_equal(slam.counters.gated, 0);
         }
         // Exact sightings of a map that was made from the origin: what is left is the first linearisation's
         // error.
@@ -1258,13 +1254,11 @@ static void test_init_starts_at_the_origin_with_an_empty_map(void **state)
     const bslam_pose_t origin = {0, 0, 0};
     const bslam_pose_t pose = bslam_slam_pose(&slam);
     assert_memory_equal(&pose, &origin, sizeof pose);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 0);
-    assert_int_equal(bslam_slam_bad_sighting(&slam), -1);
-    int count = -1;
-    (void)bslam_slam_accounts(&slam, &count);
-    assert_int_equal(count, 0);
+    assert_int_equal(slam.ekf.beacon_count, 0);
+    assert_int_equal(slam.bad_sighting, -1);
+    assert_int_equal(slam.account_count, 0);
     const bslam_slam_counters_t none = {0};
-    assert_memory_equal(bslam_slam_counters(&slam), &none, sizeof none);
+    assert_memory_equal(&slam.counters, &none, sizeof none);
     bslam_pose_t at;
     assert_int_equal(bslam_slam_pose_at(&slam, 123, &at), BSLAM_OK);
     assert_memory_equal(&at, &origin, sizeof at);
@@ -1284,10 +1278,10 @@ static void test_pose_covariance_is_the_lower_triangle_of_the_states(void **stat
 static void test_counters_a_state_that_is_not_finite_is_counted(void **state)
 {
     bslam_slam_t slam = running(unit_settings());
-    assert_int_equal(bslam_slam_counters(&slam)->insane, 0);
+    assert_int_equal(slam.counters.insane, 0);
     slam.ekf.mean[BSLAM_STATE_X] = (bslam_real_t)NAN;
     see(&slam, 11 * STEP_US, NULL, 0);
-    assert_int_equal(bslam_slam_counters(&slam)->insane, 1);
+    assert_int_equal(slam.counters.insane, 1);
 }
 
 static void test_set_pose_refuses_each_number_that_is_not_finite_and_changes_nothing(void **state)

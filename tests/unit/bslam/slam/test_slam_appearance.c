@@ -114,7 +114,7 @@ static void test_a_signature_that_is_not_finite_is_refused_and_changes_nothing(v
         memcpy(&before, &slam, sizeof slam);
         memcpy(&looks_before, &appearance, sizeof appearance);
         assert_int_equal(bslam_slam_sightings(&slam, now_us + STEP_US, seen, 2), BSLAM_E_NOT_FINITE);
-        assert_int_equal(bslam_slam_bad_sighting(&slam), 1);
+        assert_int_equal(slam.bad_sighting, 1);
         before.bad_sighting = 1;
         before.counters.frames_refused++;
         assert_memory_equal(&slam, &before, sizeof slam);
@@ -136,8 +136,8 @@ static void test_a_signature_of_large_and_small_numbers_is_taken(void **state)
 static void test_what_is_surely_matched_is_learned(void **state)
 {
     see_two(10);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
-    assert_int_equal(bslam_slam_counters(&slam)->matched, 18);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+    assert_int_equal(slam.counters.matched, 18);
     assert_true(appearance.counters.taught > 10);
     assert_true(bslam_learner_knows(&appearance.learner, appearance.of[0].classifier));
 }
@@ -155,8 +155,8 @@ static void test_without_looks_position_decides(void **state)
 {
     bslam_slam_attach_appearance(&slam, NULL);
     see_two(10);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
-    assert_int_equal(bslam_slam_counters(&slam)->matched, 18);
+    assert_int_equal(slam.ekf.beacon_count, 2);
+    assert_int_equal(slam.counters.matched, 18);
 }
 
 static void test_attaching_again_forgets(void **state)
@@ -179,7 +179,7 @@ static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **s
     assert_int_equal(appearance.of[0].classifier, other);
     assert_int_equal(appearance.of[1].classifier, BSLAM_NO_CLASSIFIER);
     see_two(8);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(bslam_slam_remove_beacon(&slam, view.uid), BSLAM_E_NO_BEACON);
 }
 
@@ -194,7 +194,7 @@ static void see_another_in_its_place(uint32_t retired)
 
 static bool is_in_map(uint32_t uid)
 {
-    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
+    for (int b = 0; b < slam.ekf.beacon_count; b++) {
         bslam_beacon_view_t beacon;
         assert_int_equal(bslam_slam_beacon(&slam, b, &beacon), BSLAM_OK);
         if (beacon.uid == uid) {
@@ -209,7 +209,7 @@ static void test_a_beacon_in_anothers_place_never_seen_with_it_is_retired(void *
     see_two(20);
     drive_on(slam.settings.decision_delay_us);
     see_another_in_its_place(1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(appearance.of[0].ousted, 1);
 }
 
@@ -246,7 +246,7 @@ static void test_a_neighbour_seen_with_the_other_stays(void **state)
         seen[1].signature = signature_of(2, view, c);
         see(seen, 2);
     }
-    assert_int_equal(bslam_slam_beacon_count(&slam), 3);
+    assert_int_equal(slam.ekf.beacon_count, 3);
     assert_int_equal(appearance.counters.retired, 0);
 }
 
@@ -269,7 +269,7 @@ static int beacons_of_two_distances(int times, double bearing_rad, double range_
     for (int view = 0; view < 10; view++) {
         see_away(3, view, bearing_rad, range_m);
     }
-    return bslam_slam_beacon_count(&slam);
+    return slam.ekf.beacon_count;
 }
 
 /// One distance in a thousand is measured much too short, and begins a beacon before the thing itself.
@@ -304,7 +304,7 @@ static void test_a_ray_in_the_direction_of_another_is_retired(void **state)
         seen[k].signature = signature_of(2 + k, 0, signatures[k]);
     }
     see(seen, 2);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(slam.ekf.beacons[0].kind, BSLAM_BEACON_RAY);
     const uint32_t seen_uid = slam.ekf.beacons[1].uid;
     for (int view = 0; view < slam.settings.doubt_sightings; view++) {
@@ -312,7 +312,7 @@ static void test_a_ray_in_the_direction_of_another_is_retired(void **state)
         see_away(3, view, 0.55, 4);
     }
     assert_int_equal(appearance.counters.retired, 1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
     assert_int_equal(slam.ekf.beacons[0].uid, seen_uid);
 }
 
@@ -326,7 +326,7 @@ static void test_a_neighbour_of_another_class_stays_if_never_seen_with_it(void *
         see_as(2, view, 0.1, 6);
     }
     assert_int_equal(appearance.counters.retired, 0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 2);
+    assert_int_equal(slam.ekf.beacon_count, 2);
 }
 
 /// What was first seen beside a beacon turns out to be so near to it that no two things hang or stand so: it
@@ -338,13 +338,13 @@ static void test_what_is_called_of_two_classes_in_one_place_is_one(void **state)
     }
     int view = 0;
     while (appearance.counters.retired == 0 && view < 200) {
-        assert_true(view < 10 || bslam_slam_beacon_count(&slam) == 2);
+        assert_true(view < 10 || slam.ekf.beacon_count == 2);
         see_as(2, view, view < 10 ? 0.1 : 0.02, 6);
         view++;
     }
     assert_true(view > 10);
     assert_int_equal(appearance.counters.retired, 1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), 1);
+    assert_int_equal(slam.ekf.beacon_count, 1);
 }
 
 /// Object 1, where beacon 0 of object 0 has not been seen for long, in this many frames; how many were kept
@@ -427,13 +427,13 @@ static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **s
     start(settings);
     pass_by(0, 0.1, true, 1.0);
     pass_by(4, -0.1, true, 1.0);
-    assert_int_equal(bslam_slam_beacon_count(&slam), THINGS);
+    assert_int_equal(slam.ekf.beacon_count, THINGS);
     assert_int_equal(appearance.counters.vanished, 0);
     const uint32_t deferred = slam.counters.deferred;
     pass_by(0, 0.1, false, 1.0);
     assert_int_equal(slam.counters.deferred - deferred, 40);
     assert_int_equal(appearance.counters.vanished, 1);
-    assert_int_equal(bslam_slam_beacon_count(&slam), THINGS - 1);
+    assert_int_equal(slam.ekf.beacon_count, THINGS - 1);
 }
 
 /// A robot that has turned unseen finds nothing where it should be: its gate must not keep it from all that
@@ -499,7 +499,7 @@ static void test_where_little_speaks_for_its_beacon_a_direction_alone_waits(void
 {
     const int64_t long_us = svm_params().decision_delay_us;
     assert_int_equal(see_after(long_us, 0.009, false, 0).outcome, BSLAM_OUTCOME_MATCHED);
-    const double lead = (double)slam.matches[0].lead;
+    const double lead = (double)slam.records[0].match.lead;
     assert_true(lead > 0);
     assert_int_equal(see_after(long_us, 0.009, false, lead - 0.01).outcome, BSLAM_OUTCOME_MATCHED);
     const bslam_account_t account = see_after(long_us, 0.009, false, lead + 0.01);
@@ -519,7 +519,7 @@ static void test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view(void 
     assert_true(appearance.of[0].view_score >= settings.again_odds);
     drive_on(settings.decision_delay_us);
     see_object(0, 7, 0.06);
-    const bslam_real_t anew = slam.matches[0].score;
+    const bslam_real_t anew = slam.records[0].match.score;
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
     assert_near(appearance.of[0].view_score, anew, 1e-6);
     see_object(0, 8, 0.3);

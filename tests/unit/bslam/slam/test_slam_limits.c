@@ -106,14 +106,14 @@ static void assert_sound(const bslam_slam_t *slam)
 {
     assert_true(bslam_ekf_is_sane(&slam->ekf));
     assert_true(is_definite(&slam->ekf));
-    assert_int_equal(bslam_slam_counters(slam)->insane, 0);
+    assert_int_equal(slam->counters.insane, 0);
     assert_true(slam->ekf.beacon_count <= BSLAM_BEACONS_MAX && slam->ekf.ray_count <= BSLAM_RAYS_MAX);
     assert_true(slam->ekf.dim <= BSLAM_STATE_MAX);
 }
 
 static void assert_accounts_add_up(const bslam_slam_t *slam)
 {
-    const bslam_slam_counters_t *c = bslam_slam_counters(slam);
+    const bslam_slam_counters_t *c = &slam->counters;
     assert_int_equal(c->sightings, c->matched + c->added + c->rejected + c->deferred);
     assert_true(c->gated + c->map_full <= c->rejected);
 }
@@ -168,8 +168,8 @@ static void test_full_map_holds_as_many_as_it_says(void **state)
         move(&drive);
     }
     const int expected = WORLD < BSLAM_BEACONS_MAX ? WORLD : BSLAM_BEACONS_MAX;
-    assert_int_equal(bslam_slam_beacon_count(&drive.slam), expected);
-    assert_int_equal(bslam_slam_counters(&drive.slam)->added, expected);
+    assert_int_equal(drive.slam.ekf.beacon_count, expected);
+    assert_int_equal(drive.slam.counters.added, expected);
 }
 
 static void test_directions_fill_the_room_for_rays_and_no_more(void **state)
@@ -180,8 +180,8 @@ static void test_directions_fill_the_room_for_rays_and_no_more(void **state)
     see(&drive);
     const int seen = BSLAM_SIGHTINGS_MAX < WORLD ? BSLAM_SIGHTINGS_MAX : WORLD;
     const int expected = seen < BSLAM_RAYS_MAX ? seen : BSLAM_RAYS_MAX;
-    assert_int_equal(bslam_slam_beacon_count(&drive.slam), expected);
-    assert_int_equal(bslam_slam_counters(&drive.slam)->map_full, seen - expected);
+    assert_int_equal(drive.slam.ekf.beacon_count, expected);
+    assert_int_equal(drive.slam.counters.map_full, seen - expected);
     assert_sound(&drive.slam);
 }
 
@@ -213,7 +213,7 @@ static void test_removing_at_random_between_frames_stays_sound(void **state)
             drive.directions_only = i % 3 == 1;
             see(&drive);
             move(&drive);
-            const int count = bslam_slam_beacon_count(&drive.slam);
+            const int count = drive.slam.ekf.beacon_count;
             if (count > 0) {
                 bslam_beacon_view_t view;
                 const int index = (int)unit_random(&drive.random, 0, count);
@@ -239,8 +239,8 @@ static void test_window_removes_and_gives_the_room_back(void **state)
         move(&drive);
         assert_sound(&drive.slam);
     }
-    const bslam_slam_counters_t *c = bslam_slam_counters(&drive.slam);
-    assert_int_equal(c->added - c->removed, bslam_slam_beacon_count(&drive.slam));
+    const bslam_slam_counters_t *c = &drive.slam.counters;
+    assert_int_equal(c->added - c->removed, drive.slam.ekf.beacon_count);
     assert_true(c->removed > 0);
 }
 

@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "bslam/model/noise.h"
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 
 static bslam_slam_t slam;
 static bslam_appearance_t appearance;
@@ -25,7 +25,7 @@ static int setup(void **state)
 /// Where the state values begin, and their covariance.
 static uint32_t values_at(void)
 {
-    return BEACONS_AT + BEACON_BYTES * (uint32_t)bslam_slam_beacon_count(&slam);
+    return BEACONS_AT + BEACON_BYTES * (uint32_t)slam.ekf.beacon_count;
 }
 
 static uint32_t covariance_at(void)
@@ -109,8 +109,8 @@ static void load(bslam_map_mode_t mode)
 static void test_map_load_living_gives_beacons_covariance_and_looks_back(void **state)
 {
     load(BSLAM_MAP_LIVING);
-    assert_int_equal(bslam_slam_beacon_count(&other), bslam_slam_beacon_count(&slam));
-    for (int b = 0; b < bslam_slam_beacon_count(&slam); b++) {
+    assert_int_equal(other.ekf.beacon_count, slam.ekf.beacon_count);
+    for (int b = 0; b < slam.ekf.beacon_count; b++) {
         bslam_beacon_view_t was;
         bslam_beacon_view_t is;
         assert_int_equal(bslam_slam_beacon(&slam, b, &was), BSLAM_OK);
@@ -168,7 +168,7 @@ static void test_map_load_leaves_the_robot_without_a_place(void **state)
 static void test_map_load_frozen_changes_no_beacon_and_adds_none(void **state)
 {
     load(BSLAM_MAP_FROZEN);
-    assert_int_equal(bslam_slam_beacon_count(&other), 4);  // the ray has no distance
+    assert_int_equal(other.ekf.beacon_count, 4);  // the ray has no distance
     const bslam_pose_t origin = {0, 0, 0};
     assert_int_equal(bslam_slam_set_pose(&other, &origin, BSLAM_R(0.05), BSLAM_R(0.05)), BSLAM_OK);
     bslam_beacon_view_t before[4];
@@ -186,9 +186,9 @@ static void test_map_load_frozen_changes_no_beacon_and_adds_none(void **state)
         assert_int_equal(bslam_slam_odometry(&other, &still), BSLAM_OK);
         assert_int_equal(bslam_slam_sightings(&other, now_us, seen, 2), BSLAM_OK);
     }
-    assert_true(bslam_slam_counters(&other)->matched > 20);
-    assert_true(bslam_slam_counters(&other)->frozen > 20);
-    assert_int_equal(bslam_slam_beacon_count(&other), 4);
+    assert_true(other.counters.matched > 20);
+    assert_true(other.counters.frozen > 20);
+    assert_int_equal(other.ekf.beacon_count, 4);
     for (int b = 0; b < 4; b++) {
         bslam_beacon_view_t after;
         assert_int_equal(bslam_slam_beacon(&other, b, &after), BSLAM_OK);
@@ -203,10 +203,10 @@ static void test_map_write_leaves_out_provisional_beacons(void **state)
     bslam_sighting_t seen = unit_polar(2.9, 6.0, -1);
     seen.signature = kept_signature(5, 1, signature);
     assert_int_equal(bslam_slam_sightings(&slam, 12 * 40000 + 1, &seen, 1), BSLAM_OK);
-    assert_int_equal(bslam_slam_counters(&slam)->added, 6);
+    assert_int_equal(slam.counters.added, 6);
     size = kept_write(&slam, bytes);
     load(BSLAM_MAP_LIVING);
-    assert_int_equal(bslam_slam_beacon_count(&other), 5);
+    assert_int_equal(other.ekf.beacon_count, 5);
 }
 
 static void test_map_load_gives_the_counts_of_classes_back(void **state)
@@ -255,7 +255,7 @@ static void test_map_load_frozen_keeps_the_scale_of_a_sized_beacon(void **state)
 /// The map as version 1 had it: no counts of classes, no scales.
 static void make_version_1(void)
 {
-    const int count = bslam_slam_beacon_count(&slam);
+    const int count = slam.ekf.beacon_count;
     for (int b = count - 1; b >= 0; b--) {
         const uint32_t end = BEACONS_AT + BEACON_BYTES * (uint32_t)(b + 1);
         memmove(&bytes[end - 8], &bytes[end], size - end);
@@ -271,7 +271,7 @@ static void test_map_load_of_version_1_gives_what_it_had(void **state)
 {
     make_version_1();
     load(BSLAM_MAP_LIVING);
-    assert_int_equal(bslam_slam_beacon_count(&other), bslam_slam_beacon_count(&slam));
+    assert_int_equal(other.ekf.beacon_count, slam.ekf.beacon_count);
     for (int i = slam.ekf.base_dim; i < slam.ekf.dim; i++) {
         assert_near(other.ekf.mean[i], slam.ekf.mean[i], 1e-6);
     }
@@ -562,7 +562,7 @@ static void test_map_load_where_the_source_fails_after_the_check_leaves_no_map(v
         bslam_map_fault_t fault;
         assert_int_equal(bslam_map_load(&slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_E_MAP);
         assert_int_equal(fault, BSLAM_MAP_UNREADABLE);
-        assert_int_equal(bslam_slam_beacon_count(&slam), 0);
+        assert_int_equal(slam.ekf.beacon_count, 0);
         assert_true(slam.is_lost);
     }
 }

@@ -1,4 +1,4 @@
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 #include "kept_map.h"
 
 static bslam_slam_t old_slam;

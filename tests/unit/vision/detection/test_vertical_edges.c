@@ -53,13 +53,13 @@ static void test_edge_outside_the_frame_or_of_no_length_is_none(void **state)
     const bslam_proposal_t box = {.left = 10, .top = 5, .right = 20, .bottom = 30};
     bslam_proposal_t flat = box;
     flat.bottom = flat.top;
-    assert_true(bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, MADE_COLUMNS - 1).step > 0);
-    assert_true(bslam_edge_along(&made.view, &box, BSLAM_SIDE_TOP, MADE_ROWS - 1).step > 0);
-    const bslam_edge_t edges[] = {
-        bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, -1),
-        bslam_edge_along(&made.view, &box, BSLAM_SIDE_LEFT, MADE_COLUMNS),
-        bslam_edge_along(&made.view, &box, BSLAM_SIDE_TOP, MADE_ROWS),
-        bslam_edge_along(&made.view, &flat, BSLAM_SIDE_LEFT, 10),
+    assert_true(bslam_edge_along(&made.view, &box, BSLAM_BOX_LEFT, MADE_COLUMNS - 1).step > 0);
+    assert_true(bslam_edge_along(&made.view, &box, BSLAM_BOX_TOP, MADE_ROWS - 1).step > 0);
+    const bslam_cell_edge_t edges[] = {
+        bslam_edge_along(&made.view, &box, BSLAM_BOX_LEFT, -1),
+        bslam_edge_along(&made.view, &box, BSLAM_BOX_LEFT, MADE_COLUMNS),
+        bslam_edge_along(&made.view, &box, BSLAM_BOX_TOP, MADE_ROWS),
+        bslam_edge_along(&made.view, &flat, BSLAM_BOX_LEFT, 10),
     };
     for (int i = 0; i < COUNT_OF(edges); i++) {
         assert_true(edges[i].step == 0 && edges[i].share == 0);

@@ -28,7 +28,7 @@ static double two_rings(double direction_rad)
     return (int)(10 * (turns - floor(turns))) % 2 == 0 ? NEAR_RING_M : RING_M;
 }
 
-static bslam_vision_t vision;
+static bslam_front_end_t vision;
 static bslam_turns_t turns;
 static unit_picture_t picture;
 

@@ -14,8 +14,13 @@ static bslam_real_t sd_radps;  // of the last rate
 
 static int start(void **state)
 {
-    bslam_visual_gyro_init(&gyro, LEAST_SD);
+    assert_int_equal(bslam_visual_gyro_init(&gyro, LEAST_SD), BSLAM_OK);
     return 0;
+}
+
+static double thought_radps(void)
+{
+    return (double)bslam_gyro_filter(&gyro)->state[0];
 }
 
 static void advance(int step, double speed_mps)
@@ -94,7 +99,7 @@ static void test_rates_sum_up_to_the_turn(void **state)
         }
         assert_true(told);
         told_rad += (double)rate_radps * STEP_S;
-        thought_rad += (double)gyro.state[0] * STEP_S;
+        thought_rad += thought_radps() * STEP_S;
         worst[0] = fmax(worst[0], fabs(told_rad - heading_rad));
         worst[1] = fmax(worst[1], fabs(thought_rad - heading_rad));
     }
@@ -131,7 +136,7 @@ static void test_step_that_was_not_told_is_not_made_up_for(void **state)
     }
     bslam_real_t rate_radps = 0;
     assert_true(bslam_visual_gyro_rate(&gyro, &rate_radps, &sd_radps));
-    assert_near((double)rate_radps, (double)gyro.state[0], 1e-3);
+    assert_near((double)rate_radps, thought_radps(), 1e-3);
     const bslam_real_t first = rate_radps;
     assert_true(bslam_visual_gyro_rate(&gyro, &rate_radps, &sd_radps));  // may be asked again
     assert_near((double)rate_radps, (double)first, 0);
@@ -225,6 +230,19 @@ static void test_bad_input_is_refused_and_nothing_changes(void **state)
     assert_memory_equal(&gyro, &before, sizeof before);
 }
 
+static void test_init_other_sizes_are_refused_and_nothing_is_written(void **state)
+{
+    static bslam_visual_gyro_t before;
+    advance(5, 0.1);
+    before = gyro;
+    assert_int_equal(bslam_visual_gyro_init_sized(&gyro, sizeof gyro + 8, BSLAM_VISION_HASH, 1),
+                     BSLAM_E_SIZE);
+    assert_int_equal(bslam_visual_gyro_init_sized(&gyro, sizeof gyro, BSLAM_VISION_HASH + 1, 1),
+                     BSLAM_E_SIZE);
+    assert_memory_equal(&gyro, &before, sizeof before);
+    assert_true(sizeof gyro <= sizeof(bslam_gyro_filter_t) * 51 / 50);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -236,6 +254,7 @@ int main(void)
         cmocka_unit_test_setup(test_rate_is_that_of_the_camera_that_knows_how_far_things_are, start),
         cmocka_unit_test_setup(test_rate_is_not_told_before_and_long_after_anything_was_seen, start),
         cmocka_unit_test_setup(test_a_lasting_contradiction_is_believed_in_the_end, start),
+        cmocka_unit_test_setup(test_init_other_sizes_are_refused_and_nothing_is_written, start),
         cmocka_unit_test_setup(test_bad_input_is_refused_and_nothing_changes, start),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

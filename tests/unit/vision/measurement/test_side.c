@@ -4,7 +4,7 @@
 #include "picture.h"
 #include "support.h"
 
-#include "vision/measurement/body.h"
+#include "vision/measurement/orientation.h"
 #include "vision/measurement/side.h"
 
 static const bslam_stance_t FLAT = {0.0f, 1e9f, -1e9f};

@@ -1,4 +1,4 @@
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 
 /// What four bits that leave at the bottom put back in.
 static const uint32_t of_nibble[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,

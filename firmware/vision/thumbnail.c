@@ -1,4 +1,4 @@
-#include "vision/pixels/thumbnail.h"
+#include "vision/thumbnail.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
-/// How the colour steps along a line of cells. Inside of proposals.c and glance.c.
-#ifndef BSLAM_VISION_PIXELS_STEPS_H
-#define BSLAM_VISION_PIXELS_STEPS_H
+/// How the colour steps along a line of cells. Inside of proposals.c and prefilter.c.
+#ifndef BSLAM_VISION_DETECTION_STEPS_H
+#define BSLAM_VISION_DETECTION_STEPS_H
 
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"

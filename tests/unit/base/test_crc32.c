@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include "bslam/store/crc32.h"
+#include "base/crc32.h"
 
 static void test_crc32_of_the_catalogues_check_string(void **state)
 {

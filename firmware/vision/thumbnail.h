@@ -1,21 +1,16 @@
 /// Reduces a frame while its rows stream in: cells, half-resolution copy, brightness. No frame is kept.
+/// Internal.
 ///
 /// Everything is summed in one word a pixel pair: the three channels of RGB565, spread so that 16 of them add
 /// without meeting.
-#ifndef BSLAM_VISION_PIXELS_THUMBNAIL_H
-#define BSLAM_VISION_PIXELS_THUMBNAIL_H
+#ifndef BSLAM_VISION_THUMBNAIL_H
+#define BSLAM_VISION_THUMBNAIL_H
 
-#include "base/status.h"
 #include "vision/detection/cells.h"
 
 /// A frame's width is a multiple of this, its height of BSLAM_CELL_PX; both at least BSLAM_IMAGE_SIDE_MIN.
 #define BSLAM_IMAGE_WIDTH_STEP 8
 #define BSLAM_IMAGE_SIDE_MIN 32
-
-typedef enum bslam_pixel_format {
-    BSLAM_PIXELS_RGB565 = 0,  ///< 2 bytes, in the machine's byte order; red in the upper bits
-    BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
-} bslam_pixel_format_t;
 
 /// A row's pairs of pixels.
 #define BSLAM_ROW_SUMS (BSLAM_IMAGE_WIDTH_MAX / 2)

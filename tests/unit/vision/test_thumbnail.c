@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include "vision/pixels/thumbnail.h"
+#include "vision/thumbnail.h"
 
 #define WIDTH 40  // ten cells: of those taken four at a time two are left
 #define HEIGHT 32

@@ -1,6 +1,6 @@
 /// CRC-32 as in Ethernet, zip and PNG: polynomial 0x04c11db7 reflected, start and end inverted.
-#ifndef BSLAM_STORE_CRC32_H
-#define BSLAM_STORE_CRC32_H
+#ifndef BSLAM_BASE_CRC32_H
+#define BSLAM_BASE_CRC32_H
 
 #include <stddef.h>
 #include <stdint.h>

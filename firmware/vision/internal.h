@@ -1,0 +1,9 @@
+/// What training, tests and benches look at beyond vision.h. Not for users.
+#ifndef BSLAM_VISION_INTERNAL_H
+#define BSLAM_VISION_INTERNAL_H
+
+#include "vision/classifiers/recogniser.h"
+#include "vision/gyro/visual_gyro.h"
+#include "vision/instance.h"
+
+#endif
