@@ -61,9 +61,8 @@ static bool goes_on(robot_t *robot)
                       at_most(settings->gap_turn_sd_radps * RESTART_S, HEADING_SD_MAX_RAD)) != BSLAM_OK) {
         return false;
     }
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
     robot->settings = robot->in_force;
-    health_look(&robot->health, &counters, port_time_us());
+    health_look(&robot->health, &robot->slam, port_time_us());
     health_note(&robot->health, HEALTH_RESTARTED, port_time_us());
     return true;
 }
@@ -180,8 +179,7 @@ static bslam_status_t start_cold(robot_t *robot, bool has_cameras, robot_start_t
             status = robot_start_over(robot, &bad_setting);
         }
     }
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
-    health_init(&robot->health, &counters);
+    health_init(&robot->health, &robot->slam);
     return status;
 }
 
@@ -202,8 +200,7 @@ bslam_status_t robot_start(robot_t *robot, robot_start_t *start)
 
 void robot_end_call(robot_t *robot, bslam_status_t status, int64_t time_us)
 {
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
-    health_look(&robot->health, &counters, time_us);
+    health_look(&robot->health, &robot->slam, time_us);
     if (status != BSLAM_E_STATE) {
         return;
     }
