@@ -8,7 +8,7 @@
 #ifndef BSLAM_MODELS_BEACONS_H
 #define BSLAM_MODELS_BEACONS_H
 
-#include "vision/classifiers/beacon_model.h"
+#include "vision/vision.h"
 
 static const bslam_beacon_class_t bslam_beacons_classes[7] = {
     {"extinguisher", 0.600000024f, 0.0f, 1.10000002f, 1.60000002f, 0.00999999978f, 0.180000007f, 0.479999989f,

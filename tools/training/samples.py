@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.learner import rendered_seeds
+from bslam.core.appearance import rendered_seeds
 from bslam.core.vision import BeaconModel, Candidate, FrontEnd
 from bslam.datasets.pictures import Box, Scaled, camera_for, load_picture
 from bslam.errors import BslamError
