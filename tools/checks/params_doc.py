@@ -26,18 +26,7 @@ def settings_tables() -> str:
     parts = []
     for group, title in GROUPS.items():
         rows = [row(raw.text, info) for info in raw.settings_infos() if raw.text(info.group) == group]
-<<<<<<< HEAD
         parts += [f"### {title}", "", *HEAD, *rows, ""]
-=======
-        parts += [
-            f"### {title}",
-            "",
-            "| setting | default | range | meaning |",
-            "|---|---:|---|---|",
-            *rows,
-            "",
-        ]
->>>>>>> main
     return "\n".join(parts)
 
 
