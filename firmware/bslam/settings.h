@@ -185,7 +185,7 @@ typedef enum bslam_preset {
 
 void bslam_settings_preset(bslam_settings_t *settings, bslam_preset_t preset);
 
-/// One line of a table, for tools and parameter servers.
+/// One line of a table, for tools and setting servers.
 typedef struct bslam_setting_info {
     const char *name;
     const char *meaning;  ///< empty without BSLAM_SETTING_MEANINGS

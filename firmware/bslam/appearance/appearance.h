@@ -1,4 +1,4 @@
-/// What the beacons of a map look like: a machine each that learns from their sightings, and which beacons
+/// What the beacons of a map look like: a classifier each that learns from their sightings, and which beacons
 /// share one. The caller owns it and attaches it to a pipeline; who does without pays no RAM for it. MATH
 /// "Position and appearance".
 ///
@@ -14,15 +14,15 @@
 #define BSLAM_NO_CLASSIFIER (-1)
 /// Classes 1 to this many are evidence; what a detector calls higher ones is none.
 #define BSLAM_APPEARANCE_CLASSES 8
-/// Sectors around a beacon from which it may be seen; outlook.h says which is which.
+/// Sectors around a beacon from which it may be seen; viewpoint.h says which is which.
 #define BSLAM_APPEARANCE_SECTORS 16
 
 /// What is known of a beacon's looks. Private.
-typedef struct bslam_beacon_look {
+typedef struct bslam_beacon_appearance {
     int16_t classifier;
-    int16_t twin;        ///< the machine that takes its sightings for its own, too
+    int16_t twin;        ///< the classifier that takes its sightings for its own, too
     uint8_t twin_count;  ///< how often, less how often it did not
-    uint8_t disowned;    ///< how often its own machine, a shared one, refused it, less how often not
+    uint8_t disowned;    ///< how often its own classifier, a shared one, refused it, less how often not
     uint8_t alone;       ///< how often it was seen without near_uid, or that without it
     uint8_t ousted;      ///< how many beacons were retired for being in this one's place
     bool is_trained;
@@ -36,20 +36,20 @@ typedef struct bslam_beacon_look {
     bslam_real_t view_score;                  ///< association.h: as of its last match
     uint32_t delayed_us;                      ///< how long matches with it had waited by then; 0: not
     uint32_t last_delay_us;                   ///< when the last one did, modulo 72 minutes
-} bslam_beacon_look_t;
+} bslam_beacon_appearance_t;
 
 /// What the looks of a sighting say of a beacon.
 typedef struct bslam_opinion {
-    float value;   ///< the machine's decision value
+    float value;   ///< the classifier's decision value
     float weight;  ///< 0: it is not trained yet; towards 1 with the samples it keeps
 } bslam_opinion_t;
 
 /// Private but for the counters.
 typedef struct bslam_appearance {
     bslam_appearance_counters_t counters;
-    bslam_beacon_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
-    bslam_real_t left_rad;                      ///< how far to the left of the robot a beacon was seen
-    bslam_real_t right_rad;                     ///< and to the right, below 0
+    bslam_beacon_appearance_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
+    bslam_real_t left_rad;                            ///< how far to the left of the robot a beacon was seen
+    bslam_real_t right_rad;                           ///< and to the right, below 0
     bslam_learner_t learner;
 } bslam_appearance_t;
 
@@ -60,7 +60,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appear
 /// Forgets all beacons, in time for another map.
 void bslam_appearance_clear(bslam_appearance_t *appearance);
 
-/// What the machine of beacon `index` says of a sample.
+/// What the classifier of beacon `index` says of a sample.
 bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
                                      int index, const bslam_sample_t *sample);
 
@@ -78,8 +78,8 @@ bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearanc
 uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index);
 
 /// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone
-/// travelled_um. Its class is noted and its machine is shown it, unless the last one was a few centimetres
-/// ago; a machine is found for a beacon that has none. O(machines).
+/// travelled_um. Its class is noted and its classifier is shown it, unless the last one was a few centimetres
+/// ago; a classifier is found for a beacon that has none. O(classifiers).
 void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                             int count, uint32_t travelled_um, const bslam_sighting_t *sighting);
 
