@@ -34,13 +34,11 @@
          "a sighting that clearly resembles a beacon up to here, though no candidate, is not new") \
     REAL(learn_d2, 9.0, 0.0, 1e6, "a classifier learns from matches nearer than this") \
     REAL(learn_lead, 4.0, 0.0, 1e3, "whose score is ahead of the next beacon's by this") \
-    REAL(learn_margin, 0.0, -100.0, 100.0, \
-         "and whose decision value is above this, if appearance counts half") \
+    REAL(learn_margin, 0.0, -100.0, 100.0, "and above this decision value, if appearance counts half") \
     REAL(learn_travel_m, 0.1, 0.0, 100.0, "and since whose last one the robot went this far") \
     REAL(share_value, 0.8, -100.0, 100.0, "decision value above which a beacon resembles another one") \
     INTEGER(share_sightings, 12, 1, 250, "so often before it shares that classifier, or leaves one") \
-    INTEGER(doubt_sightings, 25, 1, 250, \
-         "of two beacons in one place seen so often and never both one leaves") \
+    INTEGER(doubt_sightings, 25, 1, 250, "of two beacons in one place, seen so often alone, one leaves") \
     INTEGER(missed_views, 3, 0, 32, "one missed from so many known viewpoints is removed (0: never)") \
     REAL(existence_score, 0.5, -100.0, 100.0, "a detector's score above this is evidence of existence") \
     REAL(existence_sum, 6.5, 0.0, 1e6, "a beacon is neither confirmed nor used below this evidence") \
