@@ -1,8 +1,10 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
-C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/unit/*/*/*.[ch] tests/bench/*.[ch] \
-    tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] tests/soak/*.c)
-ROBOT_FILES := $(wildcard firmware/robot/*.[ch] firmware/bench/*.[ch] firmware/port/*.h firmware/port/*/*.[ch])
+C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/unit/*/*/*.[ch] \
+    tests/bench/*.[ch] tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] \
+    tests/sketches/*.c* tests/soak/*.c)
+ROBOT_FILES := $(wildcard firmware/robot/*.[ch] firmware/robot/rtos/*.c firmware/bench/*.[ch] \
+    firmware/port/*.[ch] firmware/port/*/*.[ch])
 CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)
 CAMERA_HEADERS := $(wildcard host_sim/bslam/world/camera/*.h)
 C_FILES := $(sort $(CORE_SOURCES) $(CORE_HEADERS) $(C_TEST_FILES) $(CAMERA_SOURCES) $(CAMERA_HEADERS) \
