@@ -1,6 +1,6 @@
 # The libraries for a microcontroller: build/<core>/libbslam.a, libvision.a and liblink.a. TARGET picks the
-# core; or a board, and then its images are linked (mk/images.mk). SIZES="-DBSLAM_BEACONS_MAX=50" sets what the
-# application sets, too.
+# core; or a board, and then its images are linked (mk/images.mk). SIZES="-DBSLAM_BEACONS_MAX=50" sets what
+# the application sets, too.
 
 TARGET ?= m4f
 SIZES :=
