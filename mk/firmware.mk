@@ -9,9 +9,8 @@ ARM := arm-none-eabi-
 RISCV := riscv64-unknown-elf-
 TARGET_FLAGS_m0plus := -mcpu=cortex-m0plus
 TARGET_FLAGS_m4f := -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard
-# With what is left out by itself: for the symbols and the stack of all code, and what each costs.
-TARGET_FLAGS_m4f_appearance := $(TARGET_FLAGS_m4f) -DBSLAM_APPEARANCE=1
-TARGET_FLAGS_m4f_whole := $(TARGET_FLAGS_m4f_appearance) -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2
+# With all that is left out by itself: for the symbols, the stack and the sizes of all code.
+TARGET_FLAGS_m4f_whole := $(TARGET_FLAGS_m4f) -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2
 TARGET_FLAGS_m7 := -mcpu=cortex-m7 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m33 := -mcpu=cortex-m33 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 # Without its vector extension (MVE), whose floating point flushes denormals to zero: other bits.

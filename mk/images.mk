@@ -9,9 +9,8 @@ PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # the front end for pictures, turns seen, and the smoother.
-HOST_SIZES := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 \
-    -DSESSION_MAP_BYTES=65536 -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 \
-    -DBSLAM_HISTORY_MAX=128
+HOST_SIZES := -DROBOT_VISION=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
+    -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
@@ -70,7 +69,7 @@ build/microbit/shallow.elf: build/microbit/robot.elf
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DSESSION_MAP_BYTES=65536
+HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
@@ -92,10 +91,9 @@ images: $(BUILT_BOARDS) $(HOST_ROBOT) ## link the images of every board, and che
 selftest: images ## run the self-test of every board that QEMU has
 	@$(PYTHON) -m tools.proofs.run_image selftest
 
-MEASURED_LIBRARIES := library-m4f library-m4f_appearance library-m4f_whole
 .PHONY: sizes-doc check-sizes
-sizes-doc: images $(MEASURED_LIBRARIES) ## measure flash, RAM, stack and instructions, write docs/SIZES.md
+sizes-doc: images library-m4f_whole ## measure flash, RAM, stack and instructions, write docs/SIZES.md
 	@$(PYTHON) -m tools.checks.sizes_doc
 
-check-sizes: images $(MEASURED_LIBRARIES)
+check-sizes: images library-m4f_whole
 	@$(PYTHON) -m tools.checks.sizes_doc --check

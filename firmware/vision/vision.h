@@ -230,6 +230,9 @@ typedef struct bslam_turn {
 /// turned since the picture of the same camera before. False, *turn unchanged: there is none before, one of
 /// the two was unusable (black, say), or it shows nothing but plain walls. Some 9 instructions a pixel.
 bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn);
+
+/// Forgets the pictures of before: where a gyro starts anew. The next one of each camera tells no turn.
+void bslam_vision_forget_turns(bslam_vision_t *vision);
 #endif
 
 /// What the rate of a step errs by at least. Errors of some steps follow each other; this is what their sum

@@ -1,4 +1,4 @@
-"""Prints how much RAM an instance takes, by compiler, number of beacons and what it has.
+"""Prints how much RAM one instance takes, by compiler and number of beacons, with and without its members.
 
 Nothing is run: the size of the struct is read from an object file, so that a cross-compiler does as well.
 """
@@ -10,19 +10,16 @@ import sys
 import tempfile
 from pathlib import Path
 
+MEMBERS = {
+    "as config.h has it": "",
+    "BSLAM_RECOVERY = 0, BSLAM_GUARD = 0": " -DBSLAM_RECOVERY=0 -DBSLAM_GUARD=0",
+    "BSLAM_APPEARANCE = 1": " -DBSLAM_APPEARANCE=1",
+    "BSLAM_SMOOTHER = 1, BSLAM_RAYS_MAX = 0": " -DBSLAM_SMOOTHER=1 -DBSLAM_RAYS_MAX=0",
+}
+"""Flags of the compiler by what they say."""
 PROBE = """#include "{}"
 unsigned char bslam_size_probe[sizeof({})];
 """
-
-
-VARIANTS = {
-    "as it is by itself": "",
-    "without recovery and guard": "-DBSLAM_RECOVERY=0 -DBSLAM_GUARD=0",
-    "BSLAM_GUARD = 2": "-DBSLAM_GUARD=2",
-    "BSLAM_APPEARANCE = 1": "-DBSLAM_APPEARANCE=1",
-    "BSLAM_SMOOTHER = 1": "-DBSLAM_SMOOTHER=1 -DBSLAM_RAYS_MAX=0",
-}
-"""What an application may choose, and how; the smoother needs no rays."""
 
 
 def instance_bytes(
@@ -52,13 +49,18 @@ def main(argv: list[str] | None = None) -> int:
         help="a column: its heading, the compiler with its flags, the nm that goes with it",
     )
     options = parser.parse_args(argv)
-    print("RAM of a bslam_t, bytes")
-    print(f"{'':>28}{'beacons':>8}" + "".join(f"{name:>10}" for name, _, _ in options.compiler))
-    for variant, flags in VARIANTS.items():
-        for count in options.beacons:
-            sizes = [instance_bytes(f"{command} {flags}", nm, count) for _, command, nm in options.compiler]
-            print(f"{variant:<28}{count:>8}" + "".join(f"{size:>10}" for size in sizes))
+    for members, flags in MEMBERS.items():
+        print_table(members, flags, options.beacons, options.compiler)
     return 0
+
+
+def print_table(members: str, flags: str, beacons: list[int], compilers: list[list[str]]) -> None:
+    """A row a map size, a column a compiler: its heading, command and nm."""
+    print(f"RAM of one bslam_t, bytes, by BSLAM_BEACONS_MAX; {members}")
+    print(f"{'beacons':>8}" + "".join(f"{name:>10}" for name, _, _ in compilers))
+    for count in beacons:
+        sizes = [instance_bytes(command + flags, nm, count) for _, command, nm in compilers]
+        print(f"{count:>8}" + "".join(f"{size:>10}" for size in sizes))
 
 
 if __name__ == "__main__":

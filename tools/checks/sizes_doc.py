@@ -17,7 +17,7 @@ import numpy as np
 from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, QEMU, ROOT, emulator_of, qemu_machines
 from tools.checks.check_image import CallGraph, output_of, read_frames, read_functions
 from tools.checks.markdown import Row, table
-from tools.checks.sizes import VARIANTS, instance_bytes
+from tools.checks.sizes import MEMBERS, instance_bytes
 from tools.proofs.run_image import run_image
 from tools.training.render_set import RIGS, camera_of, render_world
 
@@ -35,6 +35,7 @@ COST_BOARDS = {"Cortex-M0+": "mps2_an385", "Cortex-M4F": "mps2_an386", "Cortex-M
 BEACONS = (6, 20, 50)
 M4F = "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"
 COMPILER = f"arm-none-eabi-gcc -std=c11 -ffp-contract=off -I{ROOT / 'firmware'} -mthumb {M4F} -Os"
+NM = "arm-none-eabi-nm"
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
@@ -51,26 +52,27 @@ PARTS = {
 
 
 def flash_by_layer() -> dict[str, int]:
-    """Code and constants of all that the libraries may have, by layer, bytes."""
+    """Code and constants of the libraries with all their members by layer, bytes."""
     found: dict[str, int] = defaultdict(int)
     folder = BUILD_DIR / "m4f_whole"
     for path in sorted(folder.rglob("*.o")):
-        source = path.relative_to(folder).with_suffix(".c")
-        if not (ROOT / source).is_file():
+        if not (ROOT / path.relative_to(folder)).with_suffix(".c").is_file():
             continue  # of a source that is gone
         text, data = output_of("arm-none-eabi-size", str(path)).splitlines()[1].split()[:2]
-        found[source.parent.relative_to("firmware").as_posix()] += int(text) + int(data)
+        found[str(path.parent.relative_to(folder / "firmware"))] += int(text) + int(data)
     return found
 
 
-def linked_bytes(core: str, flags: str) -> int:
-    """Code and constants that tests/bench/link_core.c takes of build/<core>/libbslam.a and of libc."""
-    options = f"-fno-math-errno -ffunction-sections -fdata-sections -nostartfiles {flags}"
+def linked_bytes(flags: str) -> int:
+    """Code and constants that tests/bench/link_core.c takes of the estimator and of libc."""
+    options = "-fno-math-errno -ffunction-sections -fdata-sections -nostartfiles"
     link = "--specs=nano.specs --specs=nosys.specs -Wl,--gc-sections,--entry=main,--no-warn-rwx-segments -lm"
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder) / "core.elf"
-        files = [str(ROOT / "tests" / "bench" / "link_core.c"), str(BUILD_DIR / core / "libbslam.a")]
-        output_of(*COMPILER.split(), *options.split(), *files, *link.split(), "-o", str(image))
+        sources = [path for part in ("base", "bslam") for path in (ROOT / "firmware" / part).rglob("*.c")]
+        files = [str(path) for path in (ROOT / "tests" / "bench" / "link_core.c", *sorted(sources))]
+        words = f"{COMPILER} {options} -DBSLAM_SETTING_MEANINGS=0 {flags}".split()
+        output_of(*words, *files, *link.split(), "-o", str(image))
         text, data = output_of("arm-none-eabi-size", str(image)).splitlines()[1].split()[:2]
         symbols = output_of("arm-none-eabi-nm", "--portability", str(image)).splitlines()
         own = sum(int(line.split()[3], 16) for line in symbols if line.split()[0] in ("main", "robot_step"))
@@ -78,12 +80,8 @@ def linked_bytes(core: str, flags: str) -> int:
 
 
 def linked_rows() -> Iterator[Row]:
-    appearance = "-DBSLAM_APPEARANCE=1"
-    whole = f"{appearance} -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2 -DKEEPS_MAP=1"
-    yield "as it is by itself: recovery and guard, association by position", linked_bytes("m4f", "")
-    yield "the same, and its map is kept in flash", linked_bytes("m4f", "-DKEEPS_MAP=1")
-    yield "the first, and classifiers that learn appearance", linked_bytes("m4f_appearance", appearance)
-    yield "all of these, the smoother, and a copy of the state", linked_bytes("m4f_whole", whole)
+    for members, flags in MEMBERS.items():
+        yield members, linked_bytes(flags)
 
 
 def image_sections(path: Path) -> tuple[int, int]:
@@ -156,25 +154,17 @@ def budget(filter_costs: dict[tuple[str, int], int], frames: dict[str, int]) -> 
         yield (f"all, {lens}", rest + frame, share(rest + frame))
 
 
-def flash_rows() -> Iterator[Row]:
+def flash_rows() -> list[Row]:
     flash = flash_by_layer()
-    yield from ((name, flash[name]) for name in sorted(flash))
-    for library in ("bslam", "vision", "link"):
-        total = sum(size for name, size in flash.items() if name.split("/")[0] in ("base", library))
-        yield (f"all of {library}, with base", total)
+    estimator = sum(size for name, size in flash.items() if name.split("/")[0] in ("base", "bslam"))
+    return [*((name, flash[name]) for name in sorted(flash)), ("base and bslam, all of it", estimator)]
 
 
 def ram_rows() -> Iterator[Row]:
-    for variant, flags in VARIANTS.items():
-        compiler = f"{COMPILER} {flags}"
-        yield (variant, *(instance_bytes(compiler, "arm-none-eabi-nm", n) for n in BEACONS))
-
-
-def vision_rows_of_ram() -> Iterator[Row]:
-    for cameras in (1, 4):
-        compiler = f"{COMPILER} -DBSLAM_CAMERAS_MAX={cameras}"
-        size = instance_bytes(compiler, "arm-none-eabi-nm", 20, "bslam_vision_t", "vision/vision.h")
-        yield (cameras, size)
+    for members, flags in MEMBERS.items():
+        yield (f"`bslam_t`, {members}", *(instance_bytes(COMPILER + flags, NM, n) for n in BEACONS))
+    sizes = (instance_bytes(COMPILER, NM, n, "bslam_vision_t", "vision/vision.h") for n in BEACONS)
+    yield ("`bslam_vision_t`, QVGA, four cameras", *sizes)
 
 
 def image_rows() -> Iterator[Row]:
@@ -227,22 +217,20 @@ cores are emulated. Compiler: {output_of("arm-none-eabi-gcc", "--version").split
 
 ## Flash
 
-Code and constants of all that the libraries may have, for a Cortex-M4F, `-Os`, by layer, bytes. A linker \
-with `--gc-sections` takes only what is called.
+Code and constants of the libraries for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
+takes only what is called.
 
 {table(("layer", "bytes"), flash_rows())}
-What a robot without a camera links of it and of libc, bytes (tests/bench/link_core.c).
+What a robot without a camera links of the estimator and of libc, bytes, by the members that config.h \
+switches: odometry, sightings with and without distance, pose, covariance, map (tests/bench/link_core.c).
 
 {table(("linked", "bytes"), linked_rows())}
 ## RAM
 
-A `bslam_t`, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults, but for the \
-smoother, which needs no rays. `make sizes` prints it for this computer, too.
+Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. `make sizes` \
+prints them for the host, too.
 
 {table(("instance", *BEACONS), ram_rows())}
-A `bslam_vision_t` for QVGA, bytes:
-
-{table(("cameras", "bytes"), vision_rows_of_ram())}
 ## Images
 
 `robot.elf`, `-O2`, bytes; RAM without stack. MPS2 boards have room for 80 beacons, microbit for 6. \

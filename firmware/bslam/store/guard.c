@@ -42,11 +42,6 @@ static uint32_t checksum_of(const bslam_slam_t *slam)
     return add(sum, &slam->odometry, rest);
 }
 
-void bslam_guard_init(bslam_guard_t *guard, bslam_slam_t *copy)
-{
-    *guard = (bslam_guard_t){.copy = copy};
-}
-
 void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam)
 {
     guard->checksum = checksum_of(slam);
