@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
 from bslam.core import CoreError
-from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution, rendered_seeds
+from bslam.core.appearance import SIGNATURE_SIZE, encode, rendered_seeds
 from bslam.errors import BslamError
+from internals import Learner, Solution, internals
 
 REALS = pytest.mark.parametrize("real", ["float", "double"])
 COST = 10.0
