@@ -51,8 +51,7 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
 /// Of the mean of two wheels that err independently.
 static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
 {
-    const bslam_real_t sd_mps =
-        ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
+    const bslam_real_t sd_mps = ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
     if (sd_mps > SPEED_SD_MOST_MPS) {
         return SPEED_SD_MOST_MPS;
     }
@@ -66,8 +65,8 @@ bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *cameras, const bslam_set
     const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
     const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
     wait->reading = *reading;
-    if (jumped || bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) !=
-                      BSLAM_OK) {
+    if (jumped ||
+        bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) != BSLAM_OK) {
         gyro_wait_start(wait, cameras);
         return false;
     }

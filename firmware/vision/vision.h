@@ -88,6 +88,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera)
 /// kind's height is not 0 to 10 m. BSLAM_E_NOT_FINITE, BSLAM_E_PARAMETER: a camera or the model.
 #define bslam_vision_init(vision, model, cameras, camera_count) \
     bslam_vision_init_sized((vision), sizeof *(vision), BSLAM_VISION_HASH, (model), (cameras), (camera_count))
+#if BSLAM_REAL_DOUBLE  // library and application of two scalar types do not link
+#define bslam_vision_init_sized bslam_vision_init_double
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, size_t vision_bytes,
                                                         uint32_t sizes_hash,
                                                         const bslam_beacon_model_t *model,
@@ -257,6 +260,9 @@ typedef union bslam_visual_gyro {
 /// bslam_vision_init.
 #define bslam_visual_gyro_init(gyro, least_sd_radps) \
     bslam_visual_gyro_init_sized((gyro), sizeof *(gyro), BSLAM_VISION_HASH, (least_sd_radps))
+#if BSLAM_REAL_DOUBLE
+#define bslam_visual_gyro_init_sized bslam_visual_gyro_init_double
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_visual_gyro_init_sized(bslam_visual_gyro_t *gyro, size_t gyro_bytes,
                                                              uint32_t sizes_hash,
                                                              bslam_real_t least_sd_radps);
