@@ -25,7 +25,14 @@ def settings_tables() -> str:
     parts = []
     for group, title in GROUPS.items():
         rows = [row(raw.text, info) for info in raw.settings_infos() if raw.text(info.group) == group]
-        parts += [f"### {title}", "", "| setting | default | range | meaning |", "|---|---:|---|---|", *rows, ""]
+        parts += [
+            f"### {title}",
+            "",
+            "| setting | default | range | meaning |",
+            "|---|---:|---|---|",
+            *rows,
+            "",
+        ]
     return "\n".join(parts)
 
 

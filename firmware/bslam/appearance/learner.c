@@ -10,8 +10,7 @@ static bool exists(const bslam_learner_t *learner, int32_t classifier)
     return classifier >= 0 && classifier < BSLAM_LEARNER_SLOTS && learner->classifiers[classifier].used;
 }
 
-// ---- machines
-// -------------------------------------------------------------------------------------------------
+// ---- machines ---------------------------------------------------------------------------------------------
 
 bslam_status_t bslam_learner_init(bslam_learner_t *learner, const bslam_sample_t *seeds, int32_t seed_count)
 {
@@ -69,8 +68,7 @@ bslam_status_t bslam_learner_remove(bslam_learner_t *learner, int32_t classifier
     return BSLAM_OK;
 }
 
-// ---- samples
-// --------------------------------------------------------------------------------------------------
+// ---- samples ----------------------------------------------------------------------------------------------
 
 /// Which of a full store matters least: the one with the smallest dual variable, of equals the nearest to the
 /// new sample.
@@ -184,18 +182,4 @@ bool bslam_learner_knows(const bslam_learner_t *learner, int32_t classifier)
 {
     return exists(learner, classifier) && learner->classifiers[classifier].trained &&
            learner->classifiers[classifier].negatives > 0;
-}
-
-// ---- decisions
-// ------------------------------------------------------------------------------------------------
-
-bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t classifier,
-                                    const bslam_sample_t *sample, float *value)
-{
-    if (!exists(learner, classifier)) {
-        learner->counters.refused_no_machine++;
-        return BSLAM_E_NO_BEACON;
-    }
-    *value = bslam_sample_decide(&learner->classifiers[classifier].weights, sample);
-    return BSLAM_OK;
 }

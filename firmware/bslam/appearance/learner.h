@@ -105,11 +105,6 @@ BSLAM_MUST_CHECK bslam_status_t bslam_learner_show(bslam_learner_t *learner, int
 /// goes on after the others that wait, up to 20 times. True if work is left.
 bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 
-/// Decision value of a sample (bslam_sample_encode): above 0 is "this beacon", 1 and -1 are the margins. 0
-/// before the first training ends. BSLAM_E_NO_BEACON; *value is unchanged then.
-BSLAM_MUST_CHECK bslam_status_t bslam_learner_decide(bslam_learner_t *learner, int32_t classifier,
-                                                     const bslam_sample_t *sample, float *value);
-
 /// True if a machine has been trained with rivals: its decision values mean something.
 bool bslam_learner_knows(const bslam_learner_t *learner, int32_t classifier);
 

@@ -28,8 +28,7 @@ static bslam_classifier_t *machine_in_training(bslam_learner_t *learner)
     return &learner->classifiers[learner->training.classifier];
 }
 
-// ---- putting off
-// ----------------------------------------------------------------------------------------------
+// ---- putting off ------------------------------------------------------------------------------------------
 
 static uint16_t pack_alpha(float alpha)
 {
@@ -83,8 +82,7 @@ void bslam_training_pause_if_used(bslam_learner_t *learner, int32_t first, int32
     }
 }
 
-// ---- beginning
-// ------------------------------------------------------------------------------------------------
+// ---- beginning --------------------------------------------------------------------------------------------
 
 /// Weights that say how near a sample is to a machine's first one, which they give 1; a zero sample gets -1.
 static void look_by_first_sample(const bslam_sample_t *first, bslam_weights_t *look)
@@ -140,8 +138,7 @@ static void begin(bslam_learner_t *learner, int32_t m)
     training->block = training->first_block;
 }
 
-// ---- choosing rivals
-// ------------------------------------------------------------------------------------------
+// ---- choosing rivals --------------------------------------------------------------------------------------
 
 static int32_t block_count(const bslam_learner_t *learner)
 {
@@ -253,8 +250,7 @@ static void choose(bslam_learner_t *learner, const bslam_samples_t *samples)
     training->block += training->block_step;
 }
 
-// ---- solving
-// --------------------------------------------------------------------------------------------------
+// ---- solving ----------------------------------------------------------------------------------------------
 
 /// Ends a training; one that has not converged asks for another, a few times.
 static void finish(bslam_learner_t *learner, bool converged)

@@ -13,8 +13,7 @@ static const bslam_real_t VIEW_WORTH = 2;
 /// A sighting against a beacon.
 typedef struct candidate {
     bslam_real_t score;  ///< log odds of this beacon against a new one
-    bslam_real_t view_score;
-    bslam_real_t distance2;
+    bslam_real_t view_score, distance2;
     bslam_opinion_t opinion;
 } candidate_t;
 

@@ -34,14 +34,7 @@ enum { RIVALS_MAX = 8 };
 static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                  int beacon)
 {
-    bslam_innovation_t innovation;
-    bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, sighting, beacon, &innovation) !=
-            BSLAM_OK ||
-        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
-        return -1;
-    }
-    return d2;
+    return bslam_ekf_sighting_distance2(frame->ekf, frame->settings, frame->mount, sighting, beacon);
 }
 
 /// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
@@ -49,15 +42,13 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
                                int beacon)
 {
     const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
-    bslam_real_t x;
-    bslam_real_t y;
+    bslam_real_t x, y;
     bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
     if (sighting->has_range) {
         const bslam_sighted_point_t seen =
             bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
         const bslam_real_t limit = frame->settings->nearest_threshold_m;
-        const bslam_real_t dx = (seen.x_m - x) / limit;
-        const bslam_real_t dy = (seen.y_m - y) / limit;
+        const bslam_real_t dx = (seen.x_m - x) / limit, dy = (seen.y_m - y) / limit;
         return dx * dx + dy * dy;
     }
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);

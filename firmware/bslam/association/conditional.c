@@ -59,8 +59,7 @@ bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf, bslam_conditional
     if (!pushed) {
         return BSLAM_E_SINGULAR;
     }
-    bslam_real_t distance2 = 0;
-    bslam_real_t root = 1;
+    bslam_real_t distance2 = 0, root = 1;
     for (int32_t i = before; i < after; i++) {
         distance2 += conditional->white[i] * conditional->white[i];
         root *= conditional->factor[row_at(i) + i];

@@ -25,8 +25,7 @@ static bool has_place(const bslam_beacon_t *beacon)
 static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b,
                          bslam_real_t apart_m)
 {
-    const int at = ekf->beacons[a].at;
-    const int bt = ekf->beacons[b].at;
+    const int at = ekf->beacons[a].at, bt = ekf->beacons[b].at;
     if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b])) {
         return false;
     }

@@ -15,9 +15,7 @@ typedef struct search {
     int32_t choice[BSLAM_GIVEN_MAX];  ///< a beacon, or -1
     int32_t scalars[BSLAM_GIVEN_MAX + 1];
     int32_t pairs[BSLAM_GIVEN_MAX + 1];
-    int32_t best[BSLAM_GIVEN_MAX];
-    int32_t count;
-    int32_t best_pairs;
+    int32_t best[BSLAM_GIVEN_MAX], count, best_pairs;
     bslam_real_t best_distance2;
 } search_t;
 
@@ -122,12 +120,9 @@ static void run(const bslam_sighting_frame_t *frame, const bslam_record_t *recor
 static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_match_t *match)
 {
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
-        bslam_innovation_t innovation;
-        bslam_real_t distance2;
-        if (!bslam_ekf_classes_differ(&frame->ekf->beacons[b], &frame->sightings[i]) &&
-            bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, &frame->sightings[i], b,
-                                 &innovation) == BSLAM_OK &&
-            bslam_ekf_distance2(frame->ekf, &innovation, &distance2) == BSLAM_OK &&
+        const bslam_real_t distance2 =
+            bslam_ekf_sighting_distance2(frame->ekf, frame->settings, frame->mount, &frame->sightings[i], b);
+        if (!bslam_ekf_classes_differ(&frame->ekf->beacons[b], &frame->sightings[i]) && distance2 >= 0 &&
             (match->distance2 < 0 || distance2 < match->distance2)) {
             match->distance2 = distance2;
         }

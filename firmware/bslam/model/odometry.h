@@ -8,7 +8,7 @@
 #include "bslam/bslam.h"
 #include "base/types.h"
 
-/// What the next reading is compared with.
+/// What the next reading is compared with. All zero: no reading yet; the first one starts the clock.
 typedef struct bslam_odometry {
     int64_t time_us;  ///< of the last reading
     uint32_t left_ticks;
@@ -16,9 +16,6 @@ typedef struct bslam_odometry {
     bool has_time;
     bool has_ticks;  ///< false: the next tick reading only sets the reference
 } bslam_odometry_t;
-
-/// No reading yet. The first one starts the clock; wheel travel and velocities then count from start_us.
-void bslam_odometry_init(bslam_odometry_t *odometry);
 
 /// Starts the clock, if nothing has: intervals count from here.
 void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);

@@ -40,11 +40,6 @@ enum {
     CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
 };
 
-void bslam_recovery_init(bslam_recovery_t *recovery)
-{
-    *recovery = (bslam_recovery_t){0};
-}
-
 void bslam_recovery_restart(bslam_recovery_t *recovery)
 {
     *recovery = (bslam_recovery_t){.counters = recovery->counters};
@@ -63,8 +58,7 @@ typedef struct view {
     int64_t time_us;
     bslam_pose_t mount;
     const bslam_sighting_t *sightings;
-    int count;
-    int who[BSLAM_SIGHTINGS_MAX];
+    int count, who[BSLAM_SIGHTINGS_MAX];
 } view_t;
 
 // ---- clues ------------------------------------------------------------------------------------------------
@@ -139,19 +133,10 @@ static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memo
     return clue;
 }
 
-static int place_of(const bslam_ekf_t *ekf, uint32_t uid)
-{
-    int beacon = 0;
-    while (beacon < ekf->beacon_count && ekf->beacons[beacon].uid != uid) {
-        beacon++;
-    }
-    return beacon < ekf->beacon_count ? beacon : BSLAM_NOBODY;
-}
-
 /// Adds the clues that a sighting is: one for each beacon that it may show. None if there is no room for all.
 static int add_clues(const bslam_slam_t *slam, const bslam_memory_t *memory, bslam_clue_t *clues, int count)
 {
-    const int who = place_of(&slam->ekf, memory->uid);
+    const int who = bslam_slam_find_beacon(slam, memory->uid);
     int added = 0;
     for (int b = 0; b < slam->ekf.beacon_count && who >= 0; b++) {
         if (bslam_may_be(slam, who, b)) {
@@ -180,22 +165,15 @@ static int recall(const bslam_recovery_t *recovery, const bslam_slam_t *slam, bs
 
 /// What a frame says of the pose.
 typedef struct verdict {
-    int agreeing;
-    int contradicting;
-    int recognised;
+    int agreeing, contradicting, recognised;
     uint32_t uid;  ///< of one that contradicts
 } verdict_t;
 
-/// Squared distance of a sighting from a beacon; -1: it has none.
+/// Squared distance of a sighting from a beacon; negative: it has none.
 static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *mount,
                                  const bslam_sighting_t *sighting, int beacon)
 {
-    bslam_innovation_t innovation;
-    bslam_real_t distance2;
-    const bool has =
-        bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, sighting, beacon, &innovation) == BSLAM_OK &&
-        bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK;
-    return has ? distance2 : -1;
+    return bslam_ekf_sighting_distance2(&slam->ekf, &slam->settings, mount, sighting, beacon);
 }
 
 /// Of the beacons that a sighting may show, the squared distance from the nearest; -1: it has none.
@@ -356,7 +334,7 @@ static void forget_old(bslam_recovery_t *recovery, const bslam_slam_t *slam, int
     for (int m = 0; m < recovery->memory_count; m++) {
         const bslam_memory_t *memory = &recovery->memories[m];
         const int64_t age_us = memory->sighting.has_range ? CLUE_AGE_US : DIRECTION_AGE_US;
-        if (place_of(&slam->ekf, memory->uid) >= 0 && time_us - memory->time_us <= age_us) {
+        if (bslam_slam_find_beacon(slam, memory->uid) >= 0 && time_us - memory->time_us <= age_us) {
             recovery->memories[kept] = *memory;
             kept++;
         }
@@ -395,8 +373,7 @@ static bool is_same(const bslam_recovery_t *recovery, const bslam_pose_t *robot,
         return false;
     }
     const bslam_pose_t carried = bslam_pose_compose(&recovery->last_fix, robot);
-    const bslam_real_t dx = carried.x_m - fix->pose.x_m;
-    const bslam_real_t dy = carried.y_m - fix->pose.y_m;
+    const bslam_real_t dx = carried.x_m - fix->pose.x_m, dy = carried.y_m - fix->pose.y_m;
     const bslam_real_t turn = bslam_abs(bslam_angle_wrap(carried.theta_rad - fix->pose.theta_rad));
     const bslam_real_t place = SAME_PLACE_M + 2 * fix->position_sd_m;
     return dx * dx + dy * dy <= place * place && turn <= SAME_HEADING_RAD + 2 * fix->heading_sd_rad;

@@ -21,8 +21,7 @@ enum { REFINEMENTS = 4, WITHOUT_RANGE_MIN = 3, WITH_RANGE_MIN = 2 };
 typedef struct residual {
     bslam_observation_t seen;
     bslam_real_t bearing_rad;  ///< measured less predicted
-    bslam_real_t range_m;
-    bslam_real_t distance2;
+    bslam_real_t range_m, distance2;
 } residual_t;
 
 static bool compare(const bslam_clue_t *clue, const bslam_pose_t *pose, residual_t *residual)
@@ -66,8 +65,7 @@ static int agreeing_clue(const bslam_clue_t *clues, int first, int end, const bs
 
 /// Agreement of all sightings with a pose.
 typedef struct vote {
-    int32_t agreeing;
-    int32_t beacons;
+    int32_t agreeing, beacons;
     int32_t with_range;  ///< beacons
     bslam_real_t distance2;
     uint32_t who;  ///< a bit for each clue by which one agrees
@@ -117,8 +115,7 @@ static bool is_better(const vote_t *a, const vote_t *b)
 /// The point that a clue with a distance shows, in the robot's frame.
 static void point_of(const bslam_clue_t *clue, bslam_real_t *x, bslam_real_t *y)
 {
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(clue->sensor.theta_rad + clue->bearing_rad, &sine, &cosine);
     *x = clue->sensor.x_m + clue->range_m * cosine;
     *y = clue->sensor.y_m + clue->range_m * sine;
@@ -127,23 +124,17 @@ static void point_of(const bslam_clue_t *clue, bslam_real_t *x, bslam_real_t *y)
 /// The motion that brings two points of the robot's frame to two beacons: turn, then meet in the middle.
 static bool pose_of_two(const bslam_clue_t *a, const bslam_clue_t *b, bslam_pose_t *pose)
 {
-    bslam_real_t ax;
-    bslam_real_t ay;
-    bslam_real_t bx;
-    bslam_real_t by;
+    bslam_real_t ax, ay, bx, by;
     point_of(a, &ax, &ay);
     point_of(b, &bx, &by);
-    const bslam_real_t map_x = b->x_m - a->x_m;
-    const bslam_real_t map_y = b->y_m - a->y_m;
+    const bslam_real_t map_x = b->x_m - a->x_m, map_y = b->y_m - a->y_m;
     if (map_x * map_x + map_y * map_y < BASE_MIN_M * BASE_MIN_M) {
         return false;
     }
     pose->theta_rad = bslam_angle_wrap(bslam_atan2(map_y, map_x) - bslam_atan2(by - ay, bx - ax));
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(pose->theta_rad, &sine, &cosine);
-    const bslam_real_t x = (ax + bx) / 2;
-    const bslam_real_t y = (ay + by) / 2;
+    const bslam_real_t x = (ax + bx) / 2, y = (ay + by) / 2;
     pose->x_m = (a->x_m + b->x_m) / 2 - cosine * x + sine * y;
     pose->y_m = (a->y_m + b->y_m) / 2 - sine * x - cosine * y;
     return true;
@@ -156,8 +147,7 @@ static bslam_real_t direction_of(const bslam_clue_t *clue)
 
 static bool cotangent(bslam_real_t angle_rad, bslam_real_t *value)
 {
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(bslam_angle_wrap(angle_rad), &sine, &cosine);
     *value = cosine / sine;
     return bslam_abs(sine) > SINE_MIN;
@@ -168,17 +158,14 @@ static bool cotangent(bslam_real_t angle_rad, bslam_real_t *value)
 static bool pose_of_three(const bslam_clue_t *a, const bslam_clue_t *b, const bslam_clue_t *c,
                           bslam_pose_t *pose)
 {
-    bslam_real_t t12;
-    bslam_real_t t23;
+    bslam_real_t t12, t23;
     if (!cotangent(direction_of(b) - direction_of(a), &t12) ||
         !cotangent(direction_of(c) - direction_of(b), &t23) || bslam_abs(t12 + t23) < SINE_MIN) {
         return false;
     }
     const bslam_real_t t31 = (1 - t12 * t23) / (t12 + t23);
-    const bslam_real_t x1 = a->x_m - b->x_m;
-    const bslam_real_t y1 = a->y_m - b->y_m;
-    const bslam_real_t x3 = c->x_m - b->x_m;
-    const bslam_real_t y3 = c->y_m - b->y_m;
+    const bslam_real_t x1 = a->x_m - b->x_m, y1 = a->y_m - b->y_m;
+    const bslam_real_t x3 = c->x_m - b->x_m, y3 = c->y_m - b->y_m;
     const bslam_real_t x12 = x1 + t12 * y1;
     const bslam_real_t y12 = y1 - t12 * x1;
     const bslam_real_t x23 = x3 - t23 * y3;
@@ -203,8 +190,7 @@ static bool pose_of_three(const bslam_clue_t *a, const bslam_clue_t *b, const bs
 
 /// The normal equations of all clues that agree: lower triangle xx, yx, yy, tx, ty, tt, and the right side.
 typedef struct normal {
-    bslam_real_t n[6];
-    bslam_real_t g[3];
+    bslam_real_t n[6], g[3];
 } normal_t;
 
 static void add_scalar(normal_t *normal, const bslam_real_t by[3], bslam_real_t error, bslam_real_t variance)

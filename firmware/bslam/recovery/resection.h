@@ -17,8 +17,7 @@ typedef struct bslam_clue {
     bslam_real_t x_m;  ///< where it is in the map
     bslam_real_t y_m;
     bslam_pose_t sensor;  ///< where the sensor was, in the robot's present frame
-    bslam_real_t bearing_rad;
-    bslam_real_t range_m;
+    bslam_real_t bearing_rad, range_m;
     bslam_real_t bearing_var_rad2;  ///< of the sighting, of the beacon's place, and of the way since
     bslam_real_t range_var_m2;
     bool has_range;

@@ -40,7 +40,7 @@ static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_mo
 {
     const int32_t steps = slam->settings.history_steps;
     const int32_t room = steps < BSLAM_HISTORY_MAX ? steps : BSLAM_HISTORY_MAX;
-    if (bslam_history_is_full(&slam->history, room)) {
+    if (slam->history.filter.waiting >= room) {
         predict_step(slam, 0);
     }
     bslam_history_add(&slam->history, room, duration_us, motion);

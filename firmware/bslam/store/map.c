@@ -23,45 +23,6 @@ static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_WAY_UM = 1000000000u;
 
-const char *bslam_map_fault_name(bslam_map_fault_t fault)
-{
-    static const char *const names[BSLAM_MAP_FAULT_COUNT] = {
-        "fine",    "truncated", "too long",   "no map",  "other byte order", "other version", "bad crc",
-        "beacons", "machines",  "not finite", "content", "covariance",       "unreadable",    "no room",
-    };
-    return (unsigned)fault < (unsigned)BSLAM_MAP_FAULT_COUNT ? names[fault] : "unknown fault";
-}
-
-// ---- memory -----------------------------------------------------------------------------------------------
-
-static bool write_memory(void *context, const void *bytes, uint32_t count)
-{
-    bslam_map_memory_t *memory = context;
-    if (count > memory->capacity - memory->count) {
-        return false;
-    }
-    memcpy(&memory->bytes[memory->count], bytes, count);
-    memory->count += count;
-    return true;
-}
-
-static bool read_memory(const void *context, uint32_t at, void *bytes, uint32_t count)
-{
-    const uint8_t *from = context;
-    memcpy(bytes, &from[at], count);
-    return true;
-}
-
-bslam_map_sink_t bslam_map_to_memory(bslam_map_memory_t *memory)
-{
-    return (bslam_map_sink_t){write_memory, memory};
-}
-
-bslam_map_source_t bslam_map_from_memory(const uint8_t *bytes, uint32_t size)
-{
-    return (bslam_map_source_t){read_memory, bytes, size};
-}
-
 // ---- header -----------------------------------------------------------------------------------------------
 
 typedef struct header {
@@ -79,9 +40,8 @@ static void move_header(bslam_codec_t *codec, header_t *header)
     const uint32_t order = bslam_codec_whole(codec, ORDER, 2);
     bslam_codec_require(codec, order != ORDER_SWAPPED, BSLAM_MAP_BYTE_ORDER);
     bslam_codec_require(codec, order == ORDER, BSLAM_MAP_NO_MAP);
-    codec->version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
-    bslam_codec_require(codec, codec->version >= 1 && codec->version <= BSLAM_MAP_VERSION,
-                        BSLAM_MAP_OTHER_VERSION);
+    const uint32_t version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
+    bslam_codec_require(codec, version == BSLAM_MAP_VERSION, BSLAM_MAP_OTHER_VERSION);
     header->length = bslam_codec_whole(codec, header->length, 4);
     header->beacons = bslam_codec_whole(codec, header->beacons, 2);
     header->values = bslam_codec_whole(codec, header->values, 2);
@@ -104,8 +64,7 @@ typedef struct record {
     bslam_beacon_t beacon;
     uint32_t classifier;
     bslam_real_t scale;  ///< 0: nobody knows
-    bslam_real_t x_m;
-    bslam_real_t y_m;
+    bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } record_t;
 
@@ -122,11 +81,7 @@ static void move_record(bslam_codec_t *codec, record_t *record)
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
     record->x_m = bslam_codec_real(codec, record->x_m);
     record->y_m = bslam_codec_real(codec, record->y_m);
-    if (codec->version >= 2) {
-        bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
-    } else {  // version 1 knew neither
-        bslam_codec_require(codec, record->scale == 0, BSLAM_MAP_CONTENT);
-    }
+    bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
@@ -293,8 +248,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
 
 /// Saved values in their order: the next state value after `place` of a saved beacon.
 typedef struct place {
-    int beacon;
-    int value;
+    int beacon, value;
 } place_t;
 
 /// Moves on to the next saved state value; false: there is none.

@@ -88,6 +88,7 @@ def declarations(macros: Macros, header: str) -> str:
         for libc_header in LIBC_HEADERS:
             Path(empty, libc_header).touch()
         defines = [f"-D{name}={value}" for name, value in macros]
+        defines.append("-Dbslam_init_double=bslam_init_sized")  # one name for both scalar types
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
         command += [*defines, "-D__attribute__(x)=", "-DINT_MAX=2147483647", str(FIRMWARE_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
