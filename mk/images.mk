@@ -9,7 +9,7 @@ PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # the front end for pictures, turns seen, and the smoother.
-HOST_SIZES := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
+HOST_SIZES := -DROBOT_VISION=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
@@ -67,7 +67,7 @@ build/microbit/shallow.elf: build/microbit/robot.elf
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DSESSION_MAP_BYTES=65536
+HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)

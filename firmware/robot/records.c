@@ -84,9 +84,7 @@ void record_put_health(bslam_link_writer_t *out, const health_t *health, const b
     bslam_link_put_u8(out, (uint8_t)state);
     bslam_link_put_u8(out, (uint8_t)health->trouble);
     bslam_link_put_u64(out, (uint64_t)health->trouble_us);
-    record_put_counters(out, &health->recovery, sizeof health->recovery);
-    record_put_counters(out, &health->guard, sizeof health->guard);
-    bslam_link_put_u32(out, health->insane);
+    record_put_counters(out, &health->counts, sizeof health->counts);
 }
 
 void record_put_sighting(bslam_link_writer_t *out, const bslam_sighting_t *sighting, bool with_signature)

@@ -84,8 +84,10 @@ typedef struct session {
     uint32_t replayed;  ///< older messages, which were dropped
     uint32_t ticks;     ///< that the last message took to apply; a look with all of its pixels
     uint64_t fingerprint;
-    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
-    uint8_t out[BSLAM_LINK_FRAME_MAX];
+    union {
+        bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];  ///< while a message is applied
+        uint8_t out[BSLAM_LINK_FRAME_MAX];                ///< while a frame is sent
+    };
 } session_t;
 
 /// Starts a session over a robot, whose memory stays where it is, and reports that it is ready, and with

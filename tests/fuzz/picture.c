@@ -74,6 +74,7 @@ static void require_candidate(const bslam_vision_t *vision, const bslam_candidat
 {
     const int32_t classes = bslam_const_vision_instance(vision)->front_end.model->class_count;
     const bslam_box_t *box = &candidate->outline;
+    const int32_t classes = bslam_const_vision_instance(vision)->front_end.model->class_count;
     fuzz_require(isfinite((double)box->left_px) && isfinite((double)box->right_px));
     fuzz_require(box->left_px <= box->right_px && box->top_px <= box->bottom_px);
     fuzz_require(isfinite((double)candidate->score) && isfinite((double)candidate->class_margin));

@@ -137,7 +137,7 @@ static void note_class(bslam_beacon_look_t *look, uint8_t beacon_class)
     if (!is_evidence(beacon_class)) {
         return;
     }
-    if (look->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
+    if (look->seen_as[beacon_class - 1] >= SEEN_AS_MAX) {  // a loaded map may have more
         for (int k = 0; k < BSLAM_APPEARANCE_CLASSES; k++) {
             look->seen_as[k] /= 2;
         }
