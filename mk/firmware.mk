@@ -82,6 +82,6 @@ firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the imag
 
 .PHONY: sizes
 sizes: ## print how much RAM an instance takes, by number of beacons
-	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 --learner 6 32 64 \
+	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm

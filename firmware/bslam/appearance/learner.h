@@ -100,8 +100,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_learner_show(bslam_learner_t *learner, int
                                                    const float signature[BSLAM_SAMPLE_FEATURES]);
 
 /// Goes on with the training under way, or begins the next one asked for: at most `budget` pieces, of which
-/// each is a dual step, or a look at BSLAM_SAMPLES_PER_CLASSIFIER samples. docs/EXPERIMENTS.md says what a
-/// piece takes. A training ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it
+/// each is a dual step, or a look at BSLAM_SAMPLES_PER_CLASSIFIER samples. docs/SIZES.md says what a
+/// training takes. One ends after BSLAM_LEARNER_STEPS_MAX dual steps; where that does not suffice, it
 /// goes on after the others that wait, up to 20 times. True if work is left.
 bool bslam_learner_work(bslam_learner_t *learner, int32_t budget);
 

@@ -22,9 +22,10 @@ def test_a_program_links_the_library(tmp_path):
         "target_compile_definitions(bslam PUBLIC BSLAM_BEACONS_MAX=7)\n"
     )
     (tmp_path / "main.c").write_text(
-        '#include "bslam/bslam.h"\nstatic bslam_slam_t slam;\n'
-        "int main(void)\n{\n    bslam_settings_t params;\n    int bad_id;\n    bslam_settings_default(&params);\n"
-        "    const bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);\n"
+        '#include "bslam/bslam.h"\nstatic bslam_t robot;\n'
+        "int main(void)\n{\n    bslam_settings_t settings;\n    int bad;\n"
+        "    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);\n"
+        "    const bslam_status_t status = bslam_init(&robot, &settings, &bad);\n"
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
     cmake("-S", tmp_path, "-B", tmp_path / "build")
