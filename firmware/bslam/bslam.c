@@ -54,7 +54,7 @@ static bslam_slam_t *begin_step(bslam_t *robot)
     bslam_instance_t *instance = bslam_instance(robot);
 #if BSLAM_GUARD
     // Neither of the two flags that say so can be damaged unnoticed while the other is good.
-    if (instance->slam.settings.guard != 0 || instance->guard.is_sealed) {
+    if (instance->slam.settings.guard != 0 || bslam_guard_is_sealed(&instance->guard)) {
         if (bslam_guard_check(&instance->guard, &instance->slam) != BSLAM_OK) {
             return NULL;
         }
@@ -103,10 +103,10 @@ static bslam_status_t begin_members(bslam_instance_t *robot)
 {
     bslam_status_t status = BSLAM_OK;
 #if BSLAM_RECOVERY
-    bslam_recovery_init(&robot->recovery);
+    robot->recovery = (bslam_recovery_t){0};
 #endif
 #if BSLAM_GUARD
-    bslam_guard_init(&robot->guard, copy_of(robot));
+    robot->guard = (bslam_guard_t){.copy = copy_of(robot)};
 #endif
 #if BSLAM_APPEARANCE
     const bslam_settings_t *settings = &robot->slam.settings;
@@ -349,6 +349,5 @@ bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash,
 {
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE
-                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }

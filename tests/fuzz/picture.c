@@ -4,6 +4,7 @@
 
 #include "base/trig.h"
 #include "base/scalar.h"
+#include "vision/internal.h"
 
 bslam_camera_t fuzz_camera(bslam_lens_kind_t lens)
 {
