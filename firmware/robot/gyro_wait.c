@@ -4,6 +4,7 @@
 
 #define SPEED_SD_LEAST_MPS 0.01f  // where the settings say that the wheels hardly err
 #define SPEED_SD_MOST_MPS 100.0f
+#define PAUSE_US 5000000  // longer than the visual gyro goes on over
 #define TURN_RAD 6.2831853f
 #define ROOT_HALF 0.70710678f
 
@@ -32,12 +33,12 @@ static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, 
                              bslam_real_t radius_m)
 {
     const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
-    const int64_t scaled = (int32_t)((after - before) << unused_bits);
-    const bslam_real_t ticks = (bslam_real_t)(scaled / (INT64_C(1) << unused_bits));
+    const int32_t scaled = (int32_t)((after - before) << unused_bits);
+    const bslam_real_t ticks = (bslam_real_t)scaled / (bslam_real_t)(UINT32_C(1) << unused_bits);
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 
-/// Forward, mean since the reading before.
+/// Forward, mean since the reading before, not long ago.
 static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odometry_reading_t *before,
                               const bslam_odometry_reading_t *now)
 {
@@ -45,7 +46,7 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
         travel_m(settings, before->left_ticks, now->left_ticks, settings->left_radius_m);
     const bslam_real_t right_m =
         travel_m(settings, before->right_ticks, now->right_ticks, settings->right_radius_m);
-    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(now->time_us - before->time_us);
+    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(int32_t)(now->time_us - before->time_us);
 }
 
 /// Of the mean of two wheels that err independently.
@@ -61,7 +62,8 @@ static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
 bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *input, const bslam_settings_t *settings,
                      const bslam_odometry_reading_t *reading)
 {
-    const bool follows = wait->is_running && reading->time_us > wait->reading.time_us;
+    const int64_t passed_us = reading->time_us - wait->reading.time_us;
+    const bool follows = wait->is_running && passed_us > 0 && passed_us < PAUSE_US;
     const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
     const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
     wait->reading = *reading;
