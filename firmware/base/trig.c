@@ -90,8 +90,7 @@ void bslam_sin_cos(bslam_real_t angle_rad, bslam_real_t *sine, bslam_real_t *cos
 {
     int32_t quadrant;
     const bslam_real_t x = reduce_to_quadrant(angle_rad, &quadrant);
-    const bslam_real_t s = sin_polynomial(x);
-    const bslam_real_t c = cos_polynomial(x);
+    const bslam_real_t s = sin_polynomial(x), c = cos_polynomial(x);
     switch ((uint32_t)quadrant & 3u) {
     case 0u:
         *sine = s;
@@ -145,8 +144,7 @@ static bslam_real_t atan_unit(bslam_real_t ratio)
 
 bslam_real_t bslam_atan2(bslam_real_t y, bslam_real_t x)
 {
-    const bslam_real_t ax = bslam_abs(x);
-    const bslam_real_t ay = bslam_abs(y);
+    const bslam_real_t ax = bslam_abs(x), ay = bslam_abs(y);
     if (ax == 0 && ay == 0) {
         return 0;
     }

@@ -79,10 +79,10 @@ static bslam_status_t begin_members(bslam_instance_t *robot)
 {
     bslam_status_t status = BSLAM_OK;
 #if BSLAM_RECOVERY
-    bslam_recovery_init(&robot->recovery);
+    robot->recovery = (bslam_recovery_t){0};
 #endif
 #if BSLAM_GUARD
-    bslam_guard_init(&robot->guard, copy_of(robot));
+    robot->guard = (bslam_guard_t){.copy = copy_of(robot)};
 #endif
 #if BSLAM_APPEARANCE
     const bslam_settings_t *settings = &robot->slam.settings;
@@ -319,6 +319,5 @@ bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash,
 {
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE
-                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }

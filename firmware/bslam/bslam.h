@@ -30,7 +30,7 @@
 #include "base/types.h"
 
 #define BSLAM_VERSION_MAJOR 0
-#define BSLAM_VERSION_MINOR 2
+#define BSLAM_VERSION_MINOR 1
 #define BSLAM_VERSION_PATCH 0
 
 #ifdef __cplusplus
@@ -49,9 +49,13 @@ typedef union bslam {
 
 /// Robot at the origin, empty map. The settings are copied. BSLAM_E_PARAMETER: *bad_setting is the first
 /// setting outside its range, or that contradicts another (bslam_settings_info). BSLAM_E_SIZE: library and
-/// application were compiled with other sizes (config.h); nothing was written then. O(memory).
+/// application were compiled with other sizes (config.h); nothing was written then. BSLAM_E_COUNT: more seeds
+/// than BSLAM_SEEDS_MAX. O(memory).
 #define bslam_init(robot, settings, bad_setting) \
     bslam_init_sized((robot), sizeof *(robot), BSLAM_SIZES_HASH, (settings), (bad_setting))
+#if BSLAM_REAL_DOUBLE
+#define bslam_init_sized bslam_init_double  // library and application of two scalar types do not link
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t sizes_hash,
                                                  const bslam_settings_t *settings, int *bad_setting);
 

@@ -108,4 +108,10 @@ bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn)
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
     return bslam_turns_see(&instance->turns, &instance->front_end, turn);
 }
+
+void bslam_vision_forget_turns(bslam_vision_t *vision)
+{
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    bslam_turns_init(&instance->turns, &instance->front_end);
+}
 #endif

@@ -2,7 +2,7 @@
 #ifndef FUZZ_PICTURE_H
 #define FUZZ_PICTURE_H
 
-#include "vision/vision.h"
+#include "vision/internal.h"
 #include "fuzz.h"
 #include "base/scalar.h"
 

@@ -68,8 +68,8 @@ void kept_clear_unused(bslam_slam_t *slam)
 
 uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX])
 {
-    bslam_map_memory_t memory = {bytes, KEPT_BYTES_MAX, 0};
-    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    map_memory_t memory = {bytes, KEPT_BYTES_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
     bslam_map_fault_t fault;
     assert_int_equal(bslam_map_write(slam, &sink, &fault), BSLAM_OK);
     assert_int_equal(fault, BSLAM_MAP_FINE);

@@ -2,6 +2,7 @@
 #ifndef UNIT_KEPT_MAP_H
 #define UNIT_KEPT_MAP_H
 
+#include "map_memory.h"
 #include "bslam/store/slots.h"
 #include "support.h"
 

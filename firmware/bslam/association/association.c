@@ -27,21 +27,14 @@ static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_record_t 
 
 // ---- known identity ---------------------------------------------------------------------------------------
 
-// Provisional beacons of one label. More than a few in a second are no more than the false sightings there
+// Tentative beacons of one label. More than a few in a second are no more than the false sightings there
 // are.
-enum { RIVALS_MAX = 8 };
+enum { COMPETITORS_MAX = 8 };
 
 static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                  int beacon)
 {
-    bslam_innovation_t innovation;
-    bslam_real_t d2;
-    if (bslam_ekf_innovation(frame->ekf, frame->settings, frame->mount, sighting, beacon, &innovation) !=
-            BSLAM_OK ||
-        bslam_ekf_distance2(frame->ekf, &innovation, &d2) != BSLAM_OK) {
-        return -1;
-    }
-    return d2;
+    return bslam_ekf_sighting_distance2(frame->ekf, frame->settings, frame->mount, sighting, beacon);
 }
 
 /// Squared distance in units of the threshold: in the map, or of the directions where there is no distance.
@@ -49,15 +42,13 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
                                int beacon)
 {
     const bslam_pose_t pose = bslam_ekf_pose(frame->ekf);
-    bslam_real_t x;
-    bslam_real_t y;
+    bslam_real_t x, y;
     bslam_ekf_beacon_position(frame->ekf, beacon, &x, &y);
     if (sighting->has_range) {
         const bslam_sighted_point_t seen =
             bslam_locate_point(&pose, frame->mount, sighting->range_m, sighting->bearing_rad);
         const bslam_real_t limit = frame->settings->nearest_threshold_m;
-        const bslam_real_t dx = (seen.x_m - x) / limit;
-        const bslam_real_t dy = (seen.y_m - y) / limit;
+        const bslam_real_t dx = (seen.x_m - x) / limit, dy = (seen.y_m - y) / limit;
         return dx * dx + dy * dy;
     }
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, frame->mount);
@@ -69,12 +60,12 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
 }
 
 /// The beacon that a label tells. Until it is confirmed any sighting may be the false one, the first as well
-/// as those that contradict it: each of these starts a rival of the same label, and the first that is
+/// as those that contradict it: each of these starts a competitor of the same label, and the first that is
 /// confirmed stays. So the nearest, and a new one if the gate has that one out and it is not even near.
 static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                         bslam_match_t *match)
 {
-    int negatives = 0;
+    int competitors = 0;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &frame->ekf->beacons[b];
         if (beacon->label != sighting->label) {
@@ -86,16 +77,16 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
             return;
         }
         const bslam_real_t d2 = mahalanobis2(frame, sighting, b);
-        if (negatives == 0 || (d2 >= 0 && d2 < match->distance2)) {
+        if (competitors == 0 || (d2 >= 0 && d2 < match->distance2)) {
             match->beacon = b;
             match->distance2 = d2;
         }
-        negatives++;
+        competitors++;
     }
     const bslam_real_t gate_d2 = frame->settings->gate_d2;
     const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
-    const bool may_rival = is_out && sighting->has_range && negatives < RIVALS_MAX;
-    if (negatives == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
+    const bool may_compete = is_out && sighting->has_range && competitors < COMPETITORS_MAX;
+    if (competitors == 0 || (may_compete && euclidean2(frame, sighting, match->beacon) > 1)) {
         match->verdict = BSLAM_VERDICT_NEW;
         match->beacon = -1;
     }

@@ -59,8 +59,7 @@ bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf, bslam_conditional
     if (!pushed) {
         return BSLAM_E_SINGULAR;
     }
-    bslam_real_t distance2 = 0;
-    bslam_real_t root = 1;
+    bslam_real_t distance2 = 0, root = 1;
     for (int32_t i = before; i < after; i++) {
         distance2 += conditional->white[i] * conditional->white[i];
         root *= conditional->factor[row_at(i) + i];
@@ -74,7 +73,7 @@ bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditio
                            const bslam_innovation_t *innovation)
 {
     const int32_t before = conditional->count;
-    if (before + 2 > 2 * BSLAM_GIVEN_MAX || !push_innovation(ekf, conditional, innovation)) {
+    if (before + 2 > 2 * BSLAM_CONDITIONAL_MAX || !push_innovation(ekf, conditional, innovation)) {
         conditional->count = before;
         return false;
     }

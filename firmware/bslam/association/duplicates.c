@@ -25,8 +25,7 @@ static bool has_place(const bslam_beacon_t *beacon)
 static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b,
                          bslam_real_t apart_m)
 {
-    const int at = ekf->beacons[a].at;
-    const int bt = ekf->beacons[b].at;
+    const int at = ekf->beacons[a].at, bt = ekf->beacons[b].at;
     if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b])) {
         return false;
     }
@@ -79,7 +78,7 @@ static bool are_of_two_classes(const bslam_appearance_t *appearance, int a, int 
 }
 
 /// Of a pair in one place, what the frame adds. True if one of them must leave.
-static bool count_pair(bslam_beacon_look_t *younger, uint32_t older_uid, bool together, int32_t limit)
+static bool count_pair(bslam_beacon_appearance_t *younger, uint32_t older_uid, bool together, int32_t limit)
 {
     if (younger->near_uid != older_uid || together) {
         younger->near_uid = older_uid;

@@ -4,15 +4,11 @@
 bool bslam_is_mappable(const bslam_sighting_t *sighting, bslam_match_t *match)
 {
     const bool mappable = sighting->beacon_class != BSLAM_CLASS_NOT_MAPPABLE;
-    match->verdict = BSLAM_VERDICT_REJECT;
-    match->reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS;
-    match->beacon = -1;
-    match->distance2 = -1;
-    match->score = 0;
-    match->view_score = 0;
-    match->lead = 0;
-    match->sure = false;
-    match->delayed_for = -1;
+    *match = (bslam_match_t){.verdict = BSLAM_VERDICT_REJECT,
+                             .reason = mappable ? BSLAM_REASON_NONE : BSLAM_REASON_CLASS,
+                             .beacon = -1,
+                             .distance2 = -1,
+                             .delayed_for = -1};
     return mappable;
 }
 

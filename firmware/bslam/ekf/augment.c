@@ -19,8 +19,7 @@ static const bslam_real_t SCALE_VAR_MIN = BSLAM_R(1e-6);
 /// A new state value: its derivatives by the robot's pose, and the variance that the sighting adds.
 typedef struct new_value {
     const bslam_real_t *by_pose;
-    bslam_real_t mean;
-    bslam_real_t own_var;
+    bslam_real_t mean, own_var;
 } new_value_t;
 
 /// Writes the value and its row of P at the end of the state.
@@ -225,8 +224,7 @@ static void doubt_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int 
     const bslam_real_t left_var = ekf->covariance[bslam_symmat_at(at, at)];
     bslam_real_t var = scale_var > left_var ? scale_var : left_var;
     var = var > SCALE_VAR_MIN ? var : SCALE_VAR_MIN;
-    const bslam_row_t row = {.other = {1}, .at = (uint16_t)at, .dim = 1};
-    bslam_ekf_apply_scalar(ekf, &row, 0, -(var + var * var / more_var));
+    bslam_ekf_pin(ekf, at, 0, -(var + var * var / more_var));
     bslam_ekf_correct(ekf, settings);
 }
 
@@ -299,8 +297,7 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_settings_t *settin
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
     const bslam_ray_point_t point = bslam_ray_to_point(ray);
-    const bslam_real_t dx = point.x_m - sensor.pose.x_m;
-    const bslam_real_t dy = point.y_m - sensor.pose.y_m;
+    const bslam_real_t dx = point.x_m - sensor.pose.x_m, dy = point.y_m - sensor.pose.y_m;
     const bslam_real_t square = dx * dx + dy * dy;
     const bslam_real_t along = bslam_abs((point.x_m - ray[0]) * dx + (point.y_m - ray[1]) * dy) * inverse;
     const bslam_real_t distance_sd = bslam_sqrt(variance) / (inverse * inverse);
@@ -308,16 +305,15 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_settings_t *settin
 }
 
 /// A point by what the state has: how it goes with that, and what it errs besides.
-typedef struct place {
-    bslam_real_t x_m;
-    bslam_real_t y_m;
+typedef struct located {
+    bslam_real_t x_m, y_m;
     bslam_row_t x_row;
     bslam_row_t y_row;
     bslam_sym2_t own;
-} place_t;
+} located_t;
 
 /// The values at `at` and behind it become the point.
-static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
+static void set_place(bslam_ekf_t *ekf, int at, const located_t *place)
 {
     bslam_real_t *x_column = ekf->pending[0];
     bslam_real_t *y_column = ekf->pending[1];
@@ -339,7 +335,7 @@ static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
 /// Where on the ray at `at` a sighting's distance ends, MATH (38), and how that goes with the
 /// distance. False: nowhere, or so much across the ray that the distance does not tell.
 static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t range_m, int at,
-                         place_t *place, bslam_real_t by_range[2])
+                         located_t *place, bslam_real_t by_range[2])
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
@@ -347,8 +343,7 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
     bslam_sin_cos(ekf->mean[at + 2], &uy, &ux);
     const bslam_real_t wx = ekf->mean[at] - sensor.pose.x_m;
     const bslam_real_t wy = ekf->mean[at + 1] - sensor.pose.y_m;
-    const bslam_real_t across = ux * wy - uy * wx;
-    const bslam_real_t square = range_m * range_m - across * across;
+    const bslam_real_t across = ux * wy - uy * wx, square = range_m * range_m - across * across;
     if (!(square > range_m * range_m * ALONG_MIN * ALONG_MIN)) {
         return false;
     }
@@ -362,7 +357,7 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
     const bslam_real_t turn = length_m * (uy * ex - ux * ey) / c;  // d length / d direction
     by_range[0] = ux / c;
     by_range[1] = uy / c;
-    *place = (place_t){.x_m = ekf->mean[at] + length_m * ux, .y_m = ekf->mean[at + 1] + length_m * uy};
+    *place = (located_t){.x_m = ekf->mean[at] + length_m * ux, .y_m = ekf->mean[at + 1] + length_m * uy};
     const bslam_real_t by_theta = ex * sensor.x_by_theta + ey * sensor.y_by_theta;
     place->x_row = (bslam_row_t){
         .base = {by_range[0] * ex, by_range[0] * ey, by_range[0] * by_theta},
@@ -385,7 +380,7 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, c
     bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
     const bslam_real_t range_m = sighting->range_m;
-    place_t place;
+    located_t place;
     bslam_real_t by_range[2];
     if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, mount, range_m, at, &place, by_range)) {
         return false;
@@ -414,7 +409,7 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, co
         return false;
     }
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
-    place_t place = {.x_m = point.x_m, .y_m = point.y_m};
+    located_t place = {.x_m = point.x_m, .y_m = point.y_m};
     place.x_row = (bslam_row_t){.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
     place.y_row = place.x_row;
     memcpy(place.x_row.other, point.x_by_ray, sizeof place.x_row.other);

@@ -54,10 +54,8 @@ typedef struct bslam_beacon {
     int32_t label;
     bslam_beacon_kind_t kind;
     int32_t at;  ///< its first state value, if it has one
-    bslam_real_t known_x_m;
-    bslam_real_t known_y_m;
-    int64_t first_seen_us;
-    int64_t last_seen_us;
+    bslam_real_t known_x_m, known_y_m;
+    int64_t first_seen_us, last_seen_us;
     uint32_t sightings;     ///< that were matched with it, the one that started it included
     uint32_t gated;         ///< sightings taken for it that its gate rejected
     uint32_t travelled_um;  ///< that the robot had gone when it was fused last, modulo 4.3 km
@@ -78,15 +76,12 @@ typedef struct bslam_ekf {
     bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX)];
     int32_t dim;
     int32_t base_dim;  ///< 3, or 5 with velocity or scale states
-    int32_t beacon_count;
-    int32_t ray_count;
-    int32_t sized_count;
+    int32_t beacon_count, ray_count, sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
     // Scratch: holds nothing between calls.
     bslam_real_t pending[BSLAM_PENDING_MAX][BSLAM_STATE_PADDED];
-    bslam_real_t pending_scale[BSLAM_PENDING_MAX];
-    bslam_real_t correction[BSLAM_STATE_PADDED];
+    bslam_real_t pending_scale[BSLAM_PENDING_MAX], correction[BSLAM_STATE_PADDED];
     int32_t pending_count;
     bool has_correction;
 } bslam_ekf_t;
@@ -169,6 +164,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
                                                     const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
 
+/// The same of a sighting if it shows beacon `index`; negative: it has none. O(1).
+bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting,
+                                          int index);
+
 /// a P bᵀ for two rows, from the covariance as it stands: how alike the errors of two predictions are. O(1).
 bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b);
 
@@ -205,9 +205,7 @@ typedef struct bslam_transition {
 /// stretched. By how much it then still misses the next point, times doubt_of_miss, is its standard
 /// deviation.
 typedef struct bslam_bend {
-    bslam_real_t turned_rad;
-    bslam_real_t stretch;
-    bslam_real_t doubt_of_miss;
+    bslam_real_t turned_rad, stretch, doubt_of_miss;
 } bslam_bend_t;
 
 /// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the
@@ -224,7 +222,7 @@ void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_settings_t *settings
 /// The state value at `at` is its mean and this much more, up to `variance`.
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance);
 
-/// Brings the stored covariance up to date, the correction still waiting.
+/// Brings the stored covariance up to date, in one pass for all that waits; the correction still waits.
 void bslam_ekf_settle(bslam_ekf_t *ekf);
 
 // ---- map --------------------------------------------------------------------------------------------------

@@ -3,34 +3,19 @@
 #define BSLAM_EKF_EKF_INTERNAL_H
 
 #include "bslam/ekf/ekf.h"
+#include "bslam/linalg/four.h"
 
 #define POSE_DIM 3
 
 /// A ray is taken for a point no farther off than this, 1 km.
 #define BSLAM_FAR_INVERSE_PER_M BSLAM_R(1e-3)
 
-/// y[0..n) += factor x. Four at once, which the compiler takes together: up to the next multiple of four,
-/// what stands behind n is written, too.
+/// y[0..n) += factor x; up to the next multiple of four, what stands behind n is written, too.
 static inline void bslam_ekf_add_scaled(bslam_real_t *restrict y, bslam_real_t factor,
                                         const bslam_real_t *restrict x, int n)
 {
     for (int i = 0; i < n; i += 4) {
-        y[i] += factor * x[i];
-        y[i + 1] += factor * x[i + 1];
-        y[i + 2] += factor * x[i + 2];
-        y[i + 3] += factor * x[i + 3];
-    }
-}
-
-/// x[0..n) = 0, and what stands behind n up to the next multiple of four. A loop of its own: the memset of
-/// small C libraries goes byte by byte.
-static inline void bslam_ekf_clear(bslam_real_t *x, int n)
-{
-    for (int i = 0; i < n; i += 4) {
-        x[i] = 0;
-        x[i + 1] = 0;
-        x[i + 2] = 0;
-        x[i + 3] = 0;
+        *(bslam_four_at_t *)(y + i) += factor * bslam_four(x + i);
     }
 }
 

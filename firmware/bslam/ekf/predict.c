@@ -15,8 +15,7 @@ typedef struct moving {
     bslam_real_t *covariance;
     bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
     bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
-    int base_dim;
-    int dim;
+    int base_dim, dim;
 } moving_t;
 
 /// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
@@ -60,13 +59,6 @@ static void move_correction(const moving_t *state, const bslam_transition_t *tra
     }
     memcpy(state->correction, moved, sizeof moved);
 }
-
-/// Where size is asked for, the general way serves the pose alone, too.
-#ifdef __OPTIMIZE_SIZE__
-enum { IS_SMALL = 1 };
-#else
-enum { IS_SMALL = 0 };
-#endif
 
 /// The robot's block of F P Fᵀ where it has nothing but its pose: theta moves x and y.
 static void move_pose_block(bslam_real_t *p, bslam_real_t x_theta, bslam_real_t y_theta)
@@ -113,7 +105,7 @@ static void move_covariance(const moving_t *state, const bslam_transition_t *tra
     if (state->noted != NULL) {
         *state->noted = *transition;
     }
-    if (!IS_SMALL && base == POSE_DIM) {
+    if (base == POSE_DIM) {
         move_pose_block(state->covariance, transition->by[0][BSLAM_STATE_THETA],
                         transition->by[1][BSLAM_STATE_THETA]);
     } else {
@@ -244,8 +236,7 @@ static bool read_speedometers(const bslam_real_t *mean, const bslam_settings_t *
         return false;
     }
     const bslam_real_t rate = 1 / motion->dt_s;
-    const bslam_real_t forward_weight = 1 / (noise.xx * rate);
-    const bslam_real_t turn_weight = 1 / (noise.yy * rate);
+    const bslam_real_t forward_weight = 1 / (noise.xx * rate), turn_weight = 1 / (noise.yy * rate);
     const bslam_real_t carried = -noise.yx / noise.xx * turn_weight;
     const bslam_real_t forward =
         motion->forward_m * settings->forward_scale * rate - mean[BSLAM_STATE_FORWARD];
@@ -356,7 +347,7 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
 
 /// A walk of v makes the way no more doubtful than this, which is as good as unknown: beside more, the few
 /// millimetres that are known of it would be rounded away.
-static const bslam_real_t WAY_SD_MAX_M = BSLAM_R(1.5);
+static const bslam_real_t TRAVEL_SD_MAX_M = BSLAM_R(1.5);
 
 /// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
 static void drive_about(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s,
@@ -369,7 +360,7 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
     const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
     const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
     const bslam_real_t v_var = v_walk * v_walk * dt_s;
-    const bslam_real_t v_sd_max = WAY_SD_MAX_M / dt_s;
+    const bslam_real_t v_sd_max = TRAVEL_SD_MAX_M / dt_s;
     walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_var < v_sd_max * v_sd_max ? v_var : v_sd_max * v_sd_max);
     walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
     for (int i = BSLAM_STATE_FORWARD; i <= BSLAM_STATE_TURN; i++) {
@@ -385,7 +376,7 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
 }
 
 /// The way is as doubtful as it misses the next point, times `share`, both axes.
-static void doubt_way(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
+static void doubt_travel(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
 {
     const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
     const bslam_real_t y_m = share * (ekf->mean[BSLAM_STATE_Y] - next[BSLAM_STATE_Y]);
@@ -410,7 +401,7 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings,
         drive_about(&state, settings, motion->dt_s, bend->stretch, next);
     }
     ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
-    doubt_way(ekf, next, bend->doubt_of_miss);
+    doubt_travel(ekf, next, bend->doubt_of_miss);
     for (int i = 0; i < ekf->base_dim; i++) {
         const bslam_real_t left = ekf->mean[i] - next[i];
         ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;
@@ -449,9 +440,8 @@ void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings,
 
 bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot)
 {
-    const bslam_pose_t pose = {robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
-                               robot->mean[BSLAM_STATE_THETA]};
-    return pose;
+    return (bslam_pose_t){robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
+                          robot->mean[BSLAM_STATE_THETA]};
 }
 
 // ---- after an interruption --------------------------------------------------------------------------------

@@ -17,11 +17,9 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
     const bslam_real_t *others = vector + row->at;
-#ifndef __OPTIMIZE_SIZE__
     if (row->dim == 2) {  // a beacon that is a point
         return sum + row->other[0] * others[0] + row->other[1] * others[1];
     }
-#endif
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
     }
@@ -234,6 +232,18 @@ bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovatio
     return bslam_sym2_mahalanobis(&s, innovation->range_m, innovation->bearing_rad, distance2);
 }
 
+bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                          const bslam_pose_t *mount, const bslam_sighting_t *sighting,
+                                          int index)
+{
+    bslam_innovation_t innovation;
+    bslam_real_t distance2;
+    return bslam_ekf_innovation(ekf, settings, mount, sighting, index, &innovation) == BSLAM_OK &&
+                   bslam_ekf_distance2(ekf, &innovation, &distance2) == BSLAM_OK
+               ? distance2
+               : -1;
+}
+
 bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
     return quadratic(ekf, a, b).ab;
@@ -252,8 +262,7 @@ static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t *terms, int c
     }
 }
 
-/// Brings the stored covariance up to date: one pass over the triangle for all that waits.
-static void flush(bslam_ekf_t *ekf)
+void bslam_ekf_settle(bslam_ekf_t *ekf)
 {
     if (ekf->pending_count > 0) {
         bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
@@ -283,7 +292,7 @@ static gain_t gain_of(bslam_real_t innovation, bslam_real_t s)
 static void begin_correction(bslam_ekf_t *ekf)
 {
     if (!ekf->has_correction) {
-        bslam_ekf_clear(ekf->correction, ekf->dim);
+        memset(ekf->correction, 0, sizeof ekf->correction);
         ekf->has_correction = true;
     }
 }
@@ -297,34 +306,16 @@ static void accept_column(bslam_ekf_t *ekf, gain_t gain)
     ekf->pending_count++;
 }
 
-/// The range's column becomes that of the range given the bearing, and both go into the correction. Four at
-/// once, which the compiler takes together; what stands behind n up to the next multiple of four is written,
-/// too. Where size is asked for, one at once.
+/// The range's column becomes that of the range given the bearing, and both go into the correction.
 static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *restrict by_bearing,
                          bslam_real_t *restrict by_range, int n, const gain_t gains[2], bslam_real_t share)
 {
     const bslam_real_t by = gains[0].step, to = gains[1].step;
-    int i = 0;
-#ifndef __OPTIMIZE_SIZE__
-    for (; i < n; i += 4) {
-        const bslam_real_t a = by_bearing[i], own_a = by_range[i] - share * a;
-        const bslam_real_t b = by_bearing[i + 1], own_b = by_range[i + 1] - share * b;
-        const bslam_real_t c = by_bearing[i + 2], own_c = by_range[i + 2] - share * c;
-        const bslam_real_t d = by_bearing[i + 3], own_d = by_range[i + 3] - share * d;
-        by_range[i] = own_a;
-        by_range[i + 1] = own_b;
-        by_range[i + 2] = own_c;
-        by_range[i + 3] = own_d;
-        correction[i] = correction[i] + by * a + to * own_a;
-        correction[i + 1] = correction[i + 1] + by * b + to * own_b;
-        correction[i + 2] = correction[i + 2] + by * c + to * own_c;
-        correction[i + 3] = correction[i + 3] + by * d + to * own_d;
-    }
-#endif
-    for (; i < n; i++) {
-        const bslam_real_t of_bearing = by_bearing[i], own = by_range[i] - share * of_bearing;
-        by_range[i] = own;
-        correction[i] = correction[i] + by * of_bearing + to * own;
+    for (int i = 0; i < n; i += 4) {
+        const bslam_four_t bearing = bslam_four(by_bearing + i);
+        const bslam_four_t own = bslam_four(by_range + i) - share * bearing;
+        *(bslam_four_at_t *)(by_range + i) = own;
+        *(bslam_four_at_t *)(correction + i) = bslam_four(correction + i) + by * bearing + to * own;
     }
 }
 
@@ -345,7 +336,7 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
                             bslam_real_t variance)
 {
     if (ekf->pending_count == BSLAM_PENDING_MAX) {
-        flush(ekf);
+        bslam_ekf_settle(ekf);
     }
     bslam_real_t *column = ekf->pending[ekf->pending_count];
     (void)bslam_ekf_project(ekf, row, column);
@@ -385,7 +376,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
                               const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
     if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
-        flush(ekf);
+        bslam_ekf_settle(ekf);
     }
     const bslam_row_t *bearing_row = &innovation->bearing_row;
     bslam_real_t *bearing_column = ekf->pending[ekf->pending_count];
@@ -489,7 +480,7 @@ static void transport_covariance(bslam_ekf_t *ekf)
     const bslam_real_t *shift = ekf->correction;
     bslam_real_t *mirror = ekf->pending[BSLAM_PENDING_MAX - 1];
     if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
-        flush(ekf);
+        bslam_ekf_settle(ekf);
     }
     bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, mirror);
     add_pending(ekf, &theta_row, mirror);
@@ -502,11 +493,6 @@ static void transport_covariance(bslam_ekf_t *ekf)
     terms[behind + 1] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
     bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, behind + 2);
     ekf->pending_count = 0;
-}
-
-void bslam_ekf_settle(bslam_ekf_t *ekf)
-{
-    flush(ekf);
 }
 
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance)
@@ -525,7 +511,7 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings)
     if (invariant) {
         transport_covariance(ekf);
     } else {
-        flush(ekf);
+        bslam_ekf_settle(ekf);
     }
     ekf->has_correction = false;
 }

@@ -8,9 +8,7 @@
 
 /// [[xx, 0], [yx, yy]].
 typedef struct bslam_lower2 {
-    bslam_real_t xx;
-    bslam_real_t yx;
-    bslam_real_t yy;
+    bslam_real_t xx, yx, yy;
 } bslam_lower2_t;
 
 /// Lower triangle L with L Lᵀ = m. BSLAM_E_SINGULAR if m is not positive definite; then *l is unchanged.

@@ -1,4 +1,5 @@
 #include "bslam/linalg/symmat.h"
+#include "bslam/linalg/four.h"
 #include "base/scalar.h"
 
 #include <string.h>
@@ -12,17 +13,6 @@ extern inline size_t bslam_symmat_filled(int i);
 /// A function whose callers name constants: each has a copy without tests of them.
 #define COPIED __attribute__((always_inline)) static inline
 
-/// Four neighbouring values: one register where a processor takes four at once, else four. Each element has
-/// the same sum everywhere, and so the same bits.
-#pragma GCC diagnostic ignored "-Wpsabi"  // none crosses a border of this file
-typedef bslam_real_t four_t __attribute__((vector_size(4 * sizeof(bslam_real_t))));
-typedef four_t four_anywhere_t __attribute__((aligned(sizeof(bslam_real_t)), may_alias));
-
-static inline four_t read_four(const bslam_real_t *from)
-{
-    return *(const four_anywhere_t *)from;
-}
-
 // ---- products ---------------------------------------------------------------------------------------------
 
 /// One row or two that look at the same places, and where what they make of a line goes.
@@ -32,34 +22,34 @@ typedef struct lanes {
 } lanes_t;
 
 /// What four lines, one behind the other and of the same length, have in a column.
-static inline four_t column_of(const bslam_real_t *line, size_t length)
+static inline bslam_four_t column_of(const bslam_real_t *line, size_t length)
 {
-    return (four_t){line[0], line[length], line[2 * length], line[3 * length]};
+    return (bslam_four_t){line[0], line[length], line[2 * length], line[3 * length]};
 }
 
 /// The same where the diagonal crosses: the first `above` of them, 1 to 3, have it in the column's own row,
 /// by symmetry.
-static inline four_t column_across(const bslam_real_t *line, size_t length, const bslam_real_t *row,
-                                   int above)
+static inline bslam_four_t column_across(const bslam_real_t *line, size_t length, const bslam_real_t *row,
+                                         int above)
 {
     const bslam_real_t *second = above > 1 ? row + 1 : line + length;
     const bslam_real_t *third = above > 2 ? row + 2 : line + 2 * length;
-    return (four_t){row[0], *second, *third, line[3 * length]};
+    return (bslam_four_t){row[0], *second, *third, line[3 * length]};
 }
 
 /// row · each of the lines; out has four.
-static inline void put_four(const bslam_row_t *row, const int count, const four_t base[3],
-                            const four_t others[BSLAM_ROW_OTHERS_MAX], bslam_real_t *out)
+static inline void put_four(const bslam_row_t *row, const int count, const bslam_four_t base[3],
+                            const bslam_four_t others[BSLAM_ROW_OTHERS_MAX], bslam_real_t *out)
 {
-    four_t sum = row->base[0] * base[0] + row->base[1] * base[1] + row->base[2] * base[2];
+    bslam_four_t sum = row->base[0] * base[0] + row->base[1] * base[1] + row->base[2] * base[2];
     if (count > 0) {
-        four_t rest = row->other[0] * others[0];
+        bslam_four_t rest = row->other[0] * others[0];
         for (int k = 1; k < count; k++) {
             rest += row->other[k] * others[k];
         }
         sum += rest;
     }
-    *(four_anywhere_t *)out = sum;
+    *(bslam_four_at_t *)out = sum;
 }
 
 /// One pass over what one row or two look at. Whether there are two, and their count of others, the compiler
@@ -70,18 +60,19 @@ COPIED void times(const bslam_real_t *m, int n, const lanes_t *given, const bool
     const bslam_real_t *line = m;
     for (int i = 0; i < n; i += 4) {
         const size_t length = bslam_symmat_filled(i);
-        four_t base[3] = {column_of(line, length), column_of(line + 1, length), column_of(line + 2, length)};
+        bslam_four_t base[3] = {column_of(line, length), column_of(line + 1, length),
+                                column_of(line + 2, length)};
         if (i == 0) {
             base[1][0] = m[4];
             base[2][0] = m[8];
             base[2][1] = m[9];
         }
-        four_t others[BSLAM_ROW_OTHERS_MAX];
+        bslam_four_t others[BSLAM_ROW_OTHERS_MAX];
         for (int k = 0; k < count; k++) {
             const int column = lanes.a.at + k;
             const bslam_real_t *row = m + bslam_symmat_row(column);
             if (i + 3 <= column) {
-                others[k] = read_four(row + i);
+                others[k] = bslam_four(row + i);
             } else if (i > column) {
                 others[k] = column_of(line + column, length);
             } else {
@@ -136,10 +127,10 @@ void bslam_symmat_column(const bslam_real_t *m, int n, int j, bslam_real_t *out)
 // ---- the sum of terms -------------------------------------------------------------------------------------
 
 /// row_factors[i] of a term, four times.
-static inline four_t factor_of(const bslam_symmat_term_t *term, int i)
+static inline bslam_four_t factor_of(const bslam_symmat_term_t *term, int i)
 {
     const bslam_real_t factor = term->scale * term->row_factors[i];
-    return (four_t){factor, factor, factor, factor};
+    return (bslam_four_t){factor, factor, factor, factor};
 }
 
 /// Rows i and i + 1, of the same length: what the terms have in a column is read once for both.
@@ -148,23 +139,23 @@ COPIED void add_two_rows(bslam_real_t *restrict row, size_t length, int i, const
 {
     const bslam_real_t *restrict c0 = terms[0].columns, *restrict c1 = terms[1].columns;
     const bslam_real_t *restrict c2 = terms[2].columns, *restrict c3 = terms[3].columns;
-    const four_t f0 = factor_of(&terms[0], i), g0 = factor_of(&terms[0], i + 1);
-    const four_t f1 = factor_of(&terms[1], i), g1 = factor_of(&terms[1], i + 1);
+    const bslam_four_t f0 = factor_of(&terms[0], i), g0 = factor_of(&terms[0], i + 1);
+    const bslam_four_t f1 = factor_of(&terms[1], i), g1 = factor_of(&terms[1], i + 1);
     if (count == 2) {
         for (size_t j = 0; j < length; j += 4) {
-            const four_t a = read_four(c0 + j), b = read_four(c1 + j);
-            *(four_anywhere_t *)(row + j) += f0 * a + f1 * b;
-            *(four_anywhere_t *)(row + length + j) += g0 * a + g1 * b;
+            const bslam_four_t a = bslam_four(c0 + j), b = bslam_four(c1 + j);
+            *(bslam_four_at_t *)(row + j) += f0 * a + f1 * b;
+            *(bslam_four_at_t *)(row + length + j) += g0 * a + g1 * b;
         }
         return;
     }
-    const four_t f2 = factor_of(&terms[2], i), g2 = factor_of(&terms[2], i + 1);
-    const four_t f3 = factor_of(&terms[3], i), g3 = factor_of(&terms[3], i + 1);
+    const bslam_four_t f2 = factor_of(&terms[2], i), g2 = factor_of(&terms[2], i + 1);
+    const bslam_four_t f3 = factor_of(&terms[3], i), g3 = factor_of(&terms[3], i + 1);
     for (size_t j = 0; j < length; j += 4) {
-        const four_t a = read_four(c0 + j), b = read_four(c1 + j);
-        const four_t c = read_four(c2 + j), d = read_four(c3 + j);
-        *(four_anywhere_t *)(row + j) += f0 * a + f1 * b + f2 * c + f3 * d;
-        *(four_anywhere_t *)(row + length + j) += g0 * a + g1 * b + g2 * c + g3 * d;
+        const bslam_four_t a = bslam_four(c0 + j), b = bslam_four(c1 + j);
+        const bslam_four_t c = bslam_four(c2 + j), d = bslam_four(c3 + j);
+        *(bslam_four_at_t *)(row + j) += f0 * a + f1 * b + f2 * c + f3 * d;
+        *(bslam_four_at_t *)(row + length + j) += g0 * a + g1 * b + g2 * c + g3 * d;
     }
 }
 

@@ -57,8 +57,7 @@ inline size_t bslam_symmat_filled(int i)
 
 /// A sparse row: not zero only at 0, 1, 2 and at `dim` neighbouring places from `at` on, at >= 3.
 typedef struct bslam_row {
-    bslam_real_t base[3];
-    bslam_real_t other[BSLAM_ROW_OTHERS_MAX];
+    bslam_real_t base[3], other[BSLAM_ROW_OTHERS_MAX];
     uint16_t at;
     uint16_t dim;
 } bslam_row_t;

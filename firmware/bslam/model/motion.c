@@ -12,8 +12,7 @@ static void sinc(bslam_real_t h, bslam_real_t *value, bslam_real_t *slope)
         *slope = -h / 3 * (1 - z / 10 * (1 - z / 28 * (1 - z / 54 * (1 - z / 88))));
         return;
     }
-    bslam_real_t s;
-    bslam_real_t c;
+    bslam_real_t s, c;
     bslam_sin_cos(h, &s, &c);
     *value = s / h;
     *slope = (c - *value) / h;
@@ -25,13 +24,11 @@ bslam_pose_t bslam_motion_step(bslam_motion_kind_t kind, const bslam_pose_t *pos
     // An arc is its chord, in the heading at half way: length forward * sinc(turn/2).
     const bool arc = kind == BSLAM_MOTION_ARC;
     const bslam_real_t half_rad = arc ? turn_rad / 2 : 0;
-    bslam_real_t ratio = 1;
-    bslam_real_t ratio_slope = 0;
+    bslam_real_t ratio = 1, ratio_slope = 0;
     if (arc) {
         sinc(half_rad, &ratio, &ratio_slope);
     }
-    bslam_real_t s;
-    bslam_real_t c;
+    bslam_real_t s, c;
     bslam_sin_cos(bslam_angle_wrap(pose->theta_rad + half_rad), &s, &c);
     const bslam_real_t chord_m = forward_m * ratio;
     const bslam_real_t dx_m = chord_m * c;
@@ -46,10 +43,9 @@ bslam_pose_t bslam_motion_step(bslam_motion_kind_t kind, const bslam_pose_t *pos
     jacobian->x_turn = stretch * c - swing * dy_m;
     jacobian->y_turn = stretch * s + swing * dx_m;
 
-    const bslam_pose_t result = {
+    return (bslam_pose_t){
         .x_m = pose->x_m + dx_m,
         .y_m = pose->y_m + dy_m,
         .theta_rad = bslam_angle_wrap(pose->theta_rad + turn_rad),
     };
-    return result;
 }

@@ -13,12 +13,7 @@ typedef enum bslam_motion_kind {
 /// Derivatives of the new pose (x, y, theta). Those not listed are 0 or, d theta/d theta and d theta/d
 /// turn, 1.
 typedef struct bslam_motion_jacobian {
-    bslam_real_t x_theta;
-    bslam_real_t y_theta;
-    bslam_real_t x_forward;
-    bslam_real_t y_forward;
-    bslam_real_t x_turn;
-    bslam_real_t y_turn;
+    bslam_real_t x_theta, y_theta, x_forward, y_forward, x_turn, y_turn;
 } bslam_motion_jacobian_t;
 
 /// The pose after going forward_m along the path while turning by turn_rad. Pure.

@@ -1,4 +1,4 @@
-/// Noise of a sighting: its own if the detector gives one, else that of the parameters. MATH "Observation".
+/// Noise of a sighting: its own if the detector gives one, else that of the settings. MATH "Observation".
 #ifndef BSLAM_MODEL_NOISE_H
 #define BSLAM_MODEL_NOISE_H
 
@@ -41,8 +41,8 @@ static inline bslam_real_t bslam_unknown_scale_var(const bslam_settings_t *setti
     return sd * sd;
 }
 
-/// Variance of a measured direction; larger where no distance comes with it (docs/DESIGN.md, "Direction
-/// only").
+/// Variance of a measured direction; larger where no distance comes with it (MATH
+/// "Bearing-only").
 static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_settings_t *settings,
                                                        const bslam_sighting_t *sighting)
 {

@@ -15,8 +15,7 @@
 /// A predicted sighting with its derivatives, the rows of H in paper equation (8). Those by values that a
 /// point does not have are 0.
 typedef struct bslam_observation {
-    bslam_real_t range_m;
-    bslam_real_t bearing_rad;
+    bslam_real_t range_m, bearing_rad;
     bslam_real_t range_by_pose[3];                ///< d range / d (x, y, theta)
     bslam_real_t bearing_by_pose[3];              ///< d bearing / d (x, y, theta)
     bslam_real_t range_by_beacon[BSLAM_RAY_DIM];  ///< d range / d beacon, in the order of its state values
@@ -45,22 +44,16 @@ BSLAM_MUST_CHECK bslam_status_t bslam_observe_ray(const bslam_pose_t *pose, cons
 /// The sensor in the map, and how it moves with the robot's heading.
 typedef struct bslam_sensor {
     bslam_pose_t pose;
-    bslam_real_t x_by_theta;
-    bslam_real_t y_by_theta;
+    bslam_real_t x_by_theta, y_by_theta;
 } bslam_sensor_t;
 
 bslam_sensor_t bslam_sensor_at(const bslam_pose_t *pose, const bslam_pose_t *mount);
 
 /// The point that a sighting (range_m, bearing_rad) shows: the inverse of bslam_observe_point.
 typedef struct bslam_sighted_point {
-    bslam_real_t x_m;
-    bslam_real_t y_m;
+    bslam_real_t x_m, y_m;
     bslam_real_t x_by_theta;  ///< d x / d theta of the robot; d x / d x = d y / d y = 1
-    bslam_real_t y_by_theta;
-    bslam_real_t x_by_range;
-    bslam_real_t y_by_range;
-    bslam_real_t x_by_bearing;
-    bslam_real_t y_by_bearing;
+    bslam_real_t y_by_theta, x_by_range, y_by_range, x_by_bearing, y_by_bearing;
 } bslam_sighted_point_t;
 
 bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_pose_t *mount,
@@ -68,10 +61,7 @@ bslam_sighted_point_t bslam_locate_point(const bslam_pose_t *pose, const bslam_p
 
 /// A ray's point, and its derivatives by the ray's four values. The inverse distance is positive.
 typedef struct bslam_ray_point {
-    bslam_real_t x_m;
-    bslam_real_t y_m;
-    bslam_real_t x_by_ray[BSLAM_RAY_DIM];
-    bslam_real_t y_by_ray[BSLAM_RAY_DIM];
+    bslam_real_t x_m, y_m, x_by_ray[BSLAM_RAY_DIM], y_by_ray[BSLAM_RAY_DIM];
 } bslam_ray_point_t;
 
 bslam_ray_point_t bslam_ray_to_point(const bslam_real_t ray[BSLAM_RAY_DIM]);

@@ -8,7 +8,7 @@
 #include "bslam/bslam.h"
 #include "base/types.h"
 
-/// What the next reading is compared with.
+/// What the next reading is compared with. All zero: no reading yet; the first one starts the clock.
 typedef struct bslam_odometry {
     int64_t time_us;  ///< of the last reading
     uint32_t left_ticks;
@@ -16,9 +16,6 @@ typedef struct bslam_odometry {
     bool has_time;
     bool has_ticks;  ///< false: the next tick reading only sets the reference
 } bslam_odometry_t;
-
-/// No reading yet. The first one starts the clock; wheel travel and velocities then count from start_us.
-void bslam_odometry_init(bslam_odometry_t *odometry);
 
 /// Starts the clock, if nothing has: intervals count from here.
 void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);
@@ -29,7 +26,7 @@ void bslam_odometry_restart(bslam_odometry_t *odometry);
 /// The motion since the reading before, into *motion. O(1).
 /// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 4 s. BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, a noise of it that is not 0
-/// and outside the limits of the parameter, an unknown source),
+/// and outside the limits of the setting, an unknown source),
 /// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
 /// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
 /// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.

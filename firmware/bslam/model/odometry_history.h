@@ -9,11 +9,7 @@
 /// One motion: as odometry reported it while it waits, as the filter took it from then on.
 typedef struct bslam_history_step {
     int32_t duration_us;
-    bslam_real_t forward_m;
-    bslam_real_t turn_rad;
-    bslam_real_t forward_var_m2;
-    bslam_real_t turn_var_rad2;
-    bslam_real_t forward_turn_cov_mrad;
+    bslam_real_t forward_m, turn_rad, forward_var_m2, turn_var_rad2, forward_turn_cov_mrad;
 } bslam_history_step_t;
 
 /// A moment within the waiting motions.
@@ -33,10 +29,8 @@ typedef struct bslam_history {
     bslam_real_t gone_turn_rad;
 } bslam_history_t;
 
-/// True if as many motions wait as there is room for: one must be taken before the next is added.
-bool bslam_history_is_full(const bslam_history_t *history, int32_t room);
-
-/// Remembers a motion of this duration, which now waits; forgets the oldest if there is no room.
+/// Remembers a motion of this duration, which now waits, of fewer than `room` then; forgets the oldest if there
+/// is no room.
 void bslam_history_add(bslam_history_t *history, int32_t room, int32_t duration_us,
                        const bslam_motion_t *motion);
 

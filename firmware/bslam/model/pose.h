@@ -18,15 +18,13 @@ typedef struct bslam_turning {
 
 bslam_turning_t bslam_turning(bslam_real_t turn_rad);
 
+/// An increment (x, y), made while the frame turns, as a displacement in the frame before: the translation of
+/// SE(2)'s exponential map.
 static inline void bslam_turning_apply(const bslam_turning_t *turning, bslam_real_t *x, bslam_real_t *y)
 {
     const bslam_real_t x_before = *x;
     *x = turning->along * x_before - turning->across * *y;
     *y = turning->across * x_before + turning->along * *y;
 }
-
-/// V(turn): an increment (x, y), made while the frame turns by turn_rad, as a displacement in the frame
-/// before. The translation of SE(2)'s exponential map. MATH "Right-invariant error".
-void bslam_pose_exp_translation(bslam_real_t turn_rad, bslam_real_t *x, bslam_real_t *y);
 
 #endif

@@ -1,21 +1,14 @@
-/// Notices that the robot is not where the filter has it, and finds it again in the same map: after it was
-/// carried away or slipped, and after switching on in a kept map. MATH "Recovery".
+/// Notices that the robot is not where the filter has it, and finds it again in the same map. MATH
+/// "Recovery".
 ///
-///     bslam_recovery_init(&recovery);
-///     bslam_recovery_sightings(&recovery, &slam, time_us, seen, count);    in place of bslam_slam_sightings
-///
-/// It lives on identities that do not come from position: labels, or looks. A sighting contradicts if it
+/// It lives on identities that do not come from position: labels, or appearance. A sighting contradicts if it
 /// shows a beacon that is clearly elsewhere by the present pose. A frame in which more contradict than agree
-/// is not used, but remembered; after some of them the robot is lost. Then no sighting is fused and the map
-/// stays as it is, until two beacons or more agree on a pose, and a third, or time, confirms it. Nothing
-/// jumps silently: state and counters say what happened, and the pose's covariance is 30 m and 3.2 rad
-/// meanwhile.
+/// is not used, but remembered; after some of them the robot is lost. Then no sighting is fused until two
+/// beacons or more agree on a pose, and a third, or time, confirms it.
 ///
-/// In a map that still grows, identities by looks are less sure: what is new there may look like a beacon of
-/// the map. Until nothing has begun for `settled_us`, every frame is used, and only another pose, by which
-/// much more of what is recognised is where it is seen, says that the robot is elsewhere; it is set there.
-///
-/// Without labels and without looks nothing can contradict: association alone decides.
+/// In a map that still grows, what is new may look like a beacon of the map. Until nothing has begun for
+/// `settled_us`, every frame is used. Only another pose, which explains much more of what is recognised, says
+/// that the robot is elsewhere; it is set there. Without labels and appearance nothing can contradict.
 #ifndef BSLAM_RECOVERY_RECOVERY_H
 #define BSLAM_RECOVERY_RECOVERY_H
 
@@ -23,7 +16,7 @@
 #include "bslam/recovery/resection.h"
 #include "bslam/slam/slam.h"
 
-/// A recognised beacon, when and from where it was seen last, with a distance or without. Private.
+/// A recognised beacon, when and from where it was seen last, with a distance or without.
 typedef struct bslam_memory {
     uint32_t uid;
     int64_t time_us;
@@ -33,7 +26,7 @@ typedef struct bslam_memory {
     bslam_real_t heading_var_rad2;
 } bslam_memory_t;
 
-/// All memory of the recovery, 1 KB. Private but for the counters.
+/// All zero: nothing is known against the pose.
 typedef struct bslam_recovery {
     bslam_recovery_counters_t counters;
     int32_t evidence;
@@ -55,20 +48,15 @@ typedef struct bslam_recovery {
     int64_t fix_us;
 } bslam_recovery_t;
 
-/// Nothing is known against the pose.
-void bslam_recovery_init(bslam_recovery_t *recovery);
-
 /// The filter starts over: what is known against its pose is forgotten, counts stay.
 void bslam_recovery_restart(bslam_recovery_t *recovery);
 
-/// bslam_slam_sightings with a look at whether the robot is where the filter has it. Sightings of a frame
-/// that is not used have the account "deferred", reason "lost". The same statuses; of what is refused nothing
-/// changes. O(count machines) more, and while lost or contradicted O(clues³).
+/// bslam_slam_sightings with a look at whether the robot is where the filter has it. O(count classifiers)
+/// more, and while lost or contradicted O(clues³).
 BSLAM_MUST_CHECK bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam,
                                                          int64_t time_us, const bslam_sighting_t *sightings,
                                                          int count);
 
-/// How the robot is doing. O(1).
 bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, const bslam_slam_t *slam);
 
 #endif

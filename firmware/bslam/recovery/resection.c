@@ -9,7 +9,7 @@
 // A clue agrees with a pose up to this squared distance: of two values one in 3000 does not.
 static const bslam_real_t AGREE_D2 = BSLAM_R(16.0);
 // Which beacon a sighting shows of several is told if by any other all that agree are so much farther off.
-static const bslam_real_t TOLD_D2 = BSLAM_R(9.0);
+static const bslam_real_t AMBIGUOUS_D2 = BSLAM_R(9.0);
 // Beacons closer together give no heading.
 static const bslam_real_t BASE_MIN_M = BSLAM_R(0.3);
 static const bslam_real_t SINE_MIN = BSLAM_R(0.02);
@@ -21,8 +21,7 @@ enum { REFINEMENTS = 4, WITHOUT_RANGE_MIN = 3, WITH_RANGE_MIN = 2 };
 typedef struct residual {
     bslam_observation_t seen;
     bslam_real_t bearing_rad;  ///< measured less predicted
-    bslam_real_t range_m;
-    bslam_real_t distance2;
+    bslam_real_t range_m, distance2;
 } residual_t;
 
 static bool compare(const bslam_clue_t *clue, const bslam_pose_t *pose, residual_t *residual)
@@ -66,8 +65,7 @@ static int agreeing_clue(const bslam_clue_t *clues, int first, int end, const bs
 
 /// Agreement of all sightings with a pose.
 typedef struct vote {
-    int32_t agreeing;
-    int32_t beacons;
+    int32_t agreeing, beacons;
     int32_t with_range;  ///< beacons
     bslam_real_t distance2;
     uint32_t who;  ///< a bit for each clue by which one agrees
@@ -117,8 +115,7 @@ static bool is_better(const vote_t *a, const vote_t *b)
 /// The point that a clue with a distance shows, in the robot's frame.
 static void point_of(const bslam_clue_t *clue, bslam_real_t *x, bslam_real_t *y)
 {
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(clue->sensor.theta_rad + clue->bearing_rad, &sine, &cosine);
     *x = clue->sensor.x_m + clue->range_m * cosine;
     *y = clue->sensor.y_m + clue->range_m * sine;
@@ -127,23 +124,17 @@ static void point_of(const bslam_clue_t *clue, bslam_real_t *x, bslam_real_t *y)
 /// The motion that brings two points of the robot's frame to two beacons: turn, then meet in the middle.
 static bool pose_of_two(const bslam_clue_t *a, const bslam_clue_t *b, bslam_pose_t *pose)
 {
-    bslam_real_t ax;
-    bslam_real_t ay;
-    bslam_real_t bx;
-    bslam_real_t by;
+    bslam_real_t ax, ay, bx, by;
     point_of(a, &ax, &ay);
     point_of(b, &bx, &by);
-    const bslam_real_t map_x = b->x_m - a->x_m;
-    const bslam_real_t map_y = b->y_m - a->y_m;
+    const bslam_real_t map_x = b->x_m - a->x_m, map_y = b->y_m - a->y_m;
     if (map_x * map_x + map_y * map_y < BASE_MIN_M * BASE_MIN_M) {
         return false;
     }
     pose->theta_rad = bslam_angle_wrap(bslam_atan2(map_y, map_x) - bslam_atan2(by - ay, bx - ax));
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(pose->theta_rad, &sine, &cosine);
-    const bslam_real_t x = (ax + bx) / 2;
-    const bslam_real_t y = (ay + by) / 2;
+    const bslam_real_t x = (ax + bx) / 2, y = (ay + by) / 2;
     pose->x_m = (a->x_m + b->x_m) / 2 - cosine * x + sine * y;
     pose->y_m = (a->y_m + b->y_m) / 2 - sine * x - cosine * y;
     return true;
@@ -156,8 +147,7 @@ static bslam_real_t direction_of(const bslam_clue_t *clue)
 
 static bool cotangent(bslam_real_t angle_rad, bslam_real_t *value)
 {
-    bslam_real_t sine;
-    bslam_real_t cosine;
+    bslam_real_t sine, cosine;
     bslam_sin_cos(bslam_angle_wrap(angle_rad), &sine, &cosine);
     *value = cosine / sine;
     return bslam_abs(sine) > SINE_MIN;
@@ -168,17 +158,14 @@ static bool cotangent(bslam_real_t angle_rad, bslam_real_t *value)
 static bool pose_of_three(const bslam_clue_t *a, const bslam_clue_t *b, const bslam_clue_t *c,
                           bslam_pose_t *pose)
 {
-    bslam_real_t t12;
-    bslam_real_t t23;
+    bslam_real_t t12, t23;
     if (!cotangent(direction_of(b) - direction_of(a), &t12) ||
         !cotangent(direction_of(c) - direction_of(b), &t23) || bslam_abs(t12 + t23) < SINE_MIN) {
         return false;
     }
     const bslam_real_t t31 = (1 - t12 * t23) / (t12 + t23);
-    const bslam_real_t x1 = a->x_m - b->x_m;
-    const bslam_real_t y1 = a->y_m - b->y_m;
-    const bslam_real_t x3 = c->x_m - b->x_m;
-    const bslam_real_t y3 = c->y_m - b->y_m;
+    const bslam_real_t x1 = a->x_m - b->x_m, y1 = a->y_m - b->y_m;
+    const bslam_real_t x3 = c->x_m - b->x_m, y3 = c->y_m - b->y_m;
     const bslam_real_t x12 = x1 + t12 * y1;
     const bslam_real_t y12 = y1 - t12 * x1;
     const bslam_real_t x23 = x3 - t23 * y3;
@@ -203,8 +190,7 @@ static bool pose_of_three(const bslam_clue_t *a, const bslam_clue_t *b, const bs
 
 /// The normal equations of all clues that agree: lower triangle xx, yx, yy, tx, ty, tt, and the right side.
 typedef struct normal {
-    bslam_real_t n[6];
-    bslam_real_t g[3];
+    bslam_real_t n[6], g[3];
 } normal_t;
 
 static void add_scalar(normal_t *normal, const bslam_real_t by[3], bslam_real_t error, bslam_real_t variance)
@@ -294,30 +280,30 @@ static bool refine(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
 
 // ---- the best ---------------------------------------------------------------------------------------------
 
-typedef struct search {
+typedef struct pose_search {
     const bslam_clue_t *clues;
     int count;
     bslam_pose_t best;
     vote_t vote;
-    vote_t negative;  ///< the best by other beacons
-} search_t;
+    vote_t competitor;  ///< the best by other beacons
+} pose_search_t;
 
-static void try_pose(search_t *search, const bslam_pose_t *pose)
+static void try_pose(pose_search_t *search, const bslam_pose_t *pose)
 {
     const vote_t vote = vote_on(search->clues, search->count, pose);
     const bool is_best = is_better(&vote, &search->vote);
     const vote_t second = is_best ? search->vote : vote;
     if (is_best) {
-        search->negative = search->negative.who == vote.who ? (vote_t){0} : search->negative;
+        search->competitor = search->competitor.who == vote.who ? (vote_t){0} : search->competitor;
         search->vote = vote;
         search->best = *pose;
     }
-    if (second.who != search->vote.who && is_better(&second, &search->negative)) {
-        search->negative = second;
+    if (second.who != search->vote.who && is_better(&second, &search->competitor)) {
+        search->competitor = second;
     }
 }
 
-static void try_all(search_t *search)
+static void try_all(pose_search_t *search)
 {
     const bslam_clue_t *clues = search->clues;
     const int count = search->count;
@@ -338,11 +324,11 @@ static void try_all(search_t *search)
 }
 
 /// Whether no pose by other beacons is about as good.
-static bool is_told(const search_t *search)
+static bool is_unambiguous(const pose_search_t *search)
 {
-    return search->negative.beacons < search->vote.beacons ||
-           search->negative.agreeing < search->vote.agreeing ||
-           search->negative.distance2 > search->vote.distance2 + TOLD_D2;
+    return search->competitor.beacons < search->vote.beacons ||
+           search->competitor.agreeing < search->vote.agreeing ||
+           search->competitor.distance2 > search->vote.distance2 + AMBIGUOUS_D2;
 }
 
 static bool is_enough(const vote_t *vote)
@@ -352,10 +338,10 @@ static bool is_enough(const vote_t *vote)
 
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
 {
-    search_t search = {.clues = clues, .count = count};
+    pose_search_t search = {.clues = clues, .count = count};
     try_all(&search);
     bslam_fix_t found = {.pose = search.best};
-    if (!is_enough(&search.vote) || !is_told(&search) || !refine(clues, count, &found)) {
+    if (!is_enough(&search.vote) || !is_unambiguous(&search) || !refine(clues, count, &found)) {
         return false;
     }
     const vote_t vote = vote_on(clues, count, &found.pose);

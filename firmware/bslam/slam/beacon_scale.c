@@ -20,13 +20,10 @@ static bool fits(const bslam_slam_t *slam, const bslam_pose_t *mount, int index,
                  const bslam_sighting_t *sighting, bool with_range)
 {
     bslam_sighting_t looked_at = *sighting;
-    bslam_innovation_t innovation;
-    bslam_real_t distance2;
     looked_at.has_range = looked_at.has_range && with_range;
-    return bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &looked_at, index, &innovation) ==
-               BSLAM_OK &&
-           bslam_ekf_distance2(&slam->ekf, &innovation, &distance2) == BSLAM_OK &&
-           (!(slam->settings.gate_d2 > 0) || distance2 <= slam->settings.gate_d2);
+    const bslam_real_t distance2 =
+        bslam_ekf_sighting_distance2(&slam->ekf, &slam->settings, mount, &looked_at, index);
+    return distance2 >= 0 && (!(slam->settings.gate_d2 > 0) || distance2 <= slam->settings.gate_d2);
 }
 
 bool bslam_slam_begin_scale(bslam_slam_t *slam, const bslam_pose_t *mount, int index,

@@ -20,7 +20,6 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *setti
     slam->settings = copy;
     slam->bad_sighting = -1;
     bslam_ekf_init(&slam->ekf, &slam->settings);
-    bslam_odometry_init(&slam->odometry);
     return BSLAM_OK;
 }
 

@@ -13,10 +13,7 @@ static const bslam_real_t UNSEEN_VARIANCE_M2 = BSLAM_R(100.0);
 /// How a place, seen from the base's robot, turns and stretches to become another: a complex number, and its
 /// logarithm.
 typedef struct similarity {
-    bslam_real_t re;
-    bslam_real_t im;
-    bslam_real_t log_re;
-    bslam_real_t log_im;
+    bslam_real_t re, im, log_re, log_im;
 } similarity_t;
 
 /// False if there is none to speak of.
@@ -40,8 +37,7 @@ static bool find_similarity(const bslam_real_t from[2], const bslam_real_t to[2]
 /// p + g (m - p) for two vectors.
 static void turn_and_stretch(const similarity_t *g, const bslam_real_t p[2], bslam_real_t m[2])
 {
-    const bslam_real_t dx = m[0] - p[0];
-    const bslam_real_t dy = m[1] - p[1];
+    const bslam_real_t dx = m[0] - p[0], dy = m[1] - p[1];
     m[0] = p[0] + g->re * dx - g->im * dy;
     m[1] = p[1] + g->im * dx + g->re * dy;
 }

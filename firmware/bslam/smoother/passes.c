@@ -64,8 +64,7 @@ static bslam_real_t smaller(bslam_real_t a, bslam_real_t b)
 
 static bslam_real_t square_between(const bslam_real_t a[2], const bslam_real_t b[2])
 {
-    const bslam_real_t dx = a[0] - b[0];
-    const bslam_real_t dy = a[1] - b[1];
+    const bslam_real_t dx = a[0] - b[0], dy = a[1] - b[1];
     return dx * dx + dy * dy;
 }
 
@@ -88,18 +87,17 @@ static bslam_real_t share_of_step(const bslam_smoother_t *smoother, int b)
     const bslam_ekf_t *run = &smoother->run;
     const int at = run->beacons[b].at;
     const bslam_real_t *step = &run->correction[at];
-    const bslam_real_t way2 = step[0] * step[0] + step[1] * step[1];
+    const bslam_real_t step2 = step[0] * step[0] + step[1] * step[1];
     const bslam_real_t far2 = square_between(&run->mean[at], &run->mean[BSLAM_STATE_X]);
     const bslam_real_t most2 =
         smaller(STEP_MAX * STEP_MAX * far2, NEAREST_STEP_MAX * NEAREST_STEP_MAX * smoother->nearest_m2[b]);
-    return way2 > most2 ? bslam_sqrt(most2 / way2) : 1;
+    return step2 > most2 ? bslam_sqrt(most2 / step2) : 1;
 }
 
 /// Where a point is linearised about: where it is, or behind that where the robot is too near.
 static void keep_off(const bslam_ekf_t *run, bslam_real_t place[2])
 {
-    const bslam_real_t dx = place[0] - run->mean[BSLAM_STATE_X];
-    const bslam_real_t dy = place[1] - run->mean[BSLAM_STATE_Y];
+    const bslam_real_t dx = place[0] - run->mean[BSLAM_STATE_X], dy = place[1] - run->mean[BSLAM_STATE_Y];
     const bslam_real_t distance_m = bslam_sqrt(dx * dx + dy * dy);
     if (distance_m > BSLAM_SMOOTHER_RANGE_MIN_M && distance_m < NEAR_MIN_M) {
         place[0] += dx * (NEAR_MIN_M / distance_m - 1);

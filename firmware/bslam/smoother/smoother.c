@@ -85,14 +85,13 @@ static bool has_range(const bslam_smoother_line_t *line)
 
 static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
 {
-    const bslam_smoother_seen_t range = {
+    return (bslam_smoother_seen_t){
         .value =
             (uint16_t)(line->ranges > 0 ? bslam_smoother_units(mean_range_m(line) / BSLAM_SMOOTHER_RANGE_M)
                                         : 0),
         .weight = (uint8_t)(line->ranges > 0 ? line->ranges : BSLAM_SMOOTHER_FIRST),
         .beacon = BSLAM_SMOOTHER_RANGE,
     };
-    return range;
 }
 
 /// The line through a beacon's bearings, at the block's middle. Its slope is about that of the turn.
@@ -109,13 +108,12 @@ static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
     const bslam_real_t sloped = s2 + 1 / (SLOPE_SD_RADPS * SLOPE_SD_RADPS);
     const bslam_real_t determinant = s0 * sloped - s1 * s1;
     const bslam_real_t bearing_rad = line->first_rad + (sloped * y - s1 * ty) / determinant;
-    const bslam_smoother_seen_t direction = {
+    return (bslam_smoother_seen_t){
         // Half a turn to the left is half a turn to the right.
         .value = (uint16_t)bslam_smoother_units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
         .weight = bslam_smoother_weight(bslam_sqrt(sloped / determinant)),
         .beacon = (uint8_t)beacon,
     };
-    return direction;
 }
 
 /// How many directions and distances the open block has.
@@ -260,8 +258,7 @@ bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf, 
 /// What was seen of a beacon is forgotten, and those behind it move up.
 static void forget_seen(bslam_smoother_t *smoother, int index)
 {
-    int from = 0;
-    int to = 0;
+    int from = 0, to = 0;
     bool is_gone = false;  // the direction last met
     for (int n = 0; n < smoother->node_count; n++) {
         bslam_smoother_node_t *node = bslam_smoother_node(smoother, n);

@@ -65,13 +65,9 @@ typedef struct bslam_smoother_node {
 typedef struct bslam_smoother_line {
     bslam_real_t first_rad;
     bslam_real_t weight;  ///< sums of w, w t, w t², w y, w y t
-    bslam_real_t weight_t;
-    bslam_real_t weight_tt;
-    bslam_real_t weight_y;
-    bslam_real_t weight_ty;
+    bslam_real_t weight_t, weight_tt, weight_y, weight_ty;
     bslam_real_t range_m;  ///< sum
-    int32_t ranges;
-    int32_t count;
+    int32_t ranges, count;
     bool is_first;  ///< nothing was known of the beacon before
 } bslam_smoother_line_t;
 
@@ -110,8 +106,7 @@ typedef struct bslam_smoother {
     int32_t anchors;                        ///< the oldest nodes that are one of the first frames each
     int32_t anchors_to_come;                ///< frames that will be such nodes yet
     int32_t levels[BSLAM_SMOOTHER_LEVELS];  ///< nodes of each behind these, the newest ones' first
-    int32_t first_seen;
-    int32_t seen_count;
+    int32_t first_seen, seen_count;
     bslam_smoother_phase_t phase;
     int32_t at;       ///< the next node of the phase
     int32_t at_seen;  ///< its first beacon, counted from the oldest

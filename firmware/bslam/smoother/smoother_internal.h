@@ -41,13 +41,12 @@ static inline bslam_real_t bslam_smoother_bearing_rad(const bslam_smoother_seen_
 
 static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node)
 {
-    const bslam_bend_t bend = {
+    return (bslam_bend_t){
         .turned_rad = node->turned * BSLAM_SMOOTHER_BEND,
         .stretch = 1 + node->stretched * BSLAM_SMOOTHER_BEND,
         .doubt_of_miss = node->motion.dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S ? BSLAM_SMOOTHER_JOINED_DOUBT
                                                                         : BSLAM_SMOOTHER_BLOCK_DOUBT,
     };
-    return bend;
 }
 
 static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *direction)

@@ -28,8 +28,7 @@ typedef struct pair {
 
 static bslam_pose_t pose_at(const bslam_real_t *at)
 {
-    const bslam_pose_t pose = {at[BSLAM_STATE_X], at[BSLAM_STATE_Y], at[BSLAM_STATE_THETA]};
-    return pose;
+    return (bslam_pose_t){at[BSLAM_STATE_X], at[BSLAM_STATE_Y], at[BSLAM_STATE_THETA]};
 }
 
 // ---- the way ----------------------------------------------------------------------------------------------
@@ -48,26 +47,25 @@ static void arc_to(const bslam_settings_t *model, const bslam_smoother_node_t *n
 }
 
 /// How the chord from `from` to the node differs from that of the arc that its speeds or odometry tell.
-static void bend_way(const bslam_settings_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
+static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
 {
-    bslam_real_t forward_m;
-    bslam_real_t turn_rad;
+    bslam_real_t forward_m, turn_rad;
     arc_to(model, node, &forward_m, &turn_rad);
     const bslam_pose_t start = pose_at(from);
     bslam_motion_jacobian_t unused;
     const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, forward_m, turn_rad, &unused);
     const bslam_real_t arc[2] = {end.x_m - start.x_m, end.y_m - start.y_m};
-    const bslam_real_t way[2] = {node->at[BSLAM_STATE_X] - start.x_m, node->at[BSLAM_STATE_Y] - start.y_m};
-    const bslam_real_t arc2 = arc[0] * arc[0] + arc[1] * arc[1];
-    const bslam_real_t way2 = way[0] * way[0] + way[1] * way[1];
+    const bslam_real_t chord[2] = {node->at[BSLAM_STATE_X] - start.x_m, node->at[BSLAM_STATE_Y] - start.y_m};
+    const bslam_real_t arc2 = arc[0] * arc[0] + arc[1] * arc[1],
+                       chord2 = chord[0] * chord[0] + chord[1] * chord[1];
     node->turned = 0;
     node->stretched = 0;
-    if (!(arc2 > CHORD_MIN_M * CHORD_MIN_M && way2 > CHORD_MIN_M * CHORD_MIN_M)) {
+    if (!(arc2 > CHORD_MIN_M * CHORD_MIN_M && chord2 > CHORD_MIN_M * CHORD_MIN_M)) {
         return;
     }
     const bslam_real_t turned =
-        bslam_atan2(arc[0] * way[1] - arc[1] * way[0], arc[0] * way[0] + arc[1] * way[1]);
-    const bslam_real_t stretched = bslam_sqrt(way2 / arc2) - 1;
+        bslam_atan2(arc[0] * chord[1] - arc[1] * chord[0], arc[0] * chord[0] + arc[1] * chord[1]);
+    const bslam_real_t stretched = bslam_sqrt(chord2 / arc2) - 1;
     if (turned < TURNED_MAX_RAD && turned > -TURNED_MAX_RAD && stretched < STRETCHED_MAX &&
         stretched > -STRETCHED_MAX) {
         node->turned = (int16_t)bslam_smoother_units(turned / BSLAM_SMOOTHER_BEND);
@@ -87,7 +85,7 @@ static void lengthen(bslam_smoother_node_t *node, const bslam_motion_t *motion, 
 
 static bslam_motion_t half_of(const bslam_motion_t *motion)
 {
-    const bslam_motion_t half = {
+    return (bslam_motion_t){
         .dt_s = motion->dt_s / 2,
         .forward_m = motion->forward_m / 2,
         .turn_rad = motion->turn_rad / 2,
@@ -95,7 +93,6 @@ static bslam_motion_t half_of(const bslam_motion_t *motion)
         .turn_var_rad2 = motion->turn_var_rad2 / 2,
         .forward_turn_cov_mrad = motion->forward_turn_cov_mrad / 2,
     };
-    return half;
 }
 
 /// Half way between two poses, where what was seen from both is seen from: what each of them errs by at
@@ -134,10 +131,8 @@ static void carry(const bslam_smoother_t *smoother, const pair_t *pair, int whic
 {
     const bslam_settings_t *model = &smoother->model;
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
-    bslam_real_t x_m;
-    bslam_real_t y_m;
-    bslam_observation_t before;
-    bslam_observation_t after;
+    bslam_real_t x_m, y_m;
+    bslam_observation_t before, after;
     bslam_ekf_beacon_position(&smoother->base, seen[0].beacon, &x_m, &y_m);
     if (bslam_observe_point(&pair->pose[which], &mount, x_m, y_m, &before) != BSLAM_OK ||
         bslam_observe_point(&pair->mean, &mount, x_m, y_m, &after) != BSLAM_OK) {
@@ -226,10 +221,7 @@ static int join_seen(bslam_smoother_t *smoother, const pair_t *pair, int beacon,
 /// Where nodes and what was seen are read and written while the window closes its gaps: never ahead of what
 /// is still to be read.
 typedef struct closing {
-    int32_t node;
-    int32_t seen;
-    int32_t to_node;
-    int32_t to_seen;
+    int32_t node, seen, to_node, to_seen;
     bslam_real_t from[BSLAM_ROBOT_DIM_MAX];  ///< the robot at the node before
     bslam_motion_t ahead;                    ///< from there to where the next node's way begins, if anywhere
     bslam_real_t speeds[SPEEDS];             ///< on that way
@@ -241,7 +233,7 @@ static bslam_smoother_node_t read_node(bslam_smoother_t *smoother, closing_t *at
     bslam_smoother_node_t node = *bslam_smoother_node(smoother, at->node);
     if (at->ahead.dt_s > 0) {
         lengthen(&node, &at->ahead, at->speeds);
-        bend_way(&smoother->model, at->from, &node);
+        bend_path(&smoother->model, at->from, &node);
         at->ahead = (bslam_motion_t){0};
     }
     at->node++;
@@ -292,7 +284,7 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
     memcpy(at->speeds, &joined.at[BSLAM_STATE_FORWARD], sizeof at->speeds);
     joined.motion = at->ahead;
     lengthen(&joined, &older.motion, &older.at[BSLAM_STATE_FORWARD]);
-    bend_way(&smoother->model, at->from, &joined);
+    bend_path(&smoother->model, at->from, &joined);
     joined.seen = (int16_t)count;
     write_node(smoother, at, &joined);
 }

@@ -7,12 +7,11 @@
 #include "bslam/store/map.h"
 
 /// Where the passage through a blob stands. The sink is NULL while reading; both are while measuring.
-typedef struct codec {
+typedef struct bslam_codec {
     const bslam_map_sink_t *sink;
     const bslam_map_source_t *source;
     uint32_t at;
     uint32_t crc;
-    uint32_t version;
     bslam_map_fault_t fault;  ///< the first that was found; nothing moves after it
 } bslam_codec_t;
 

@@ -21,46 +21,7 @@ static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
-static const uint32_t LONG_WAY_UM = 1000000000u;
-
-const char *bslam_map_fault_name(bslam_map_fault_t fault)
-{
-    static const char *const names[BSLAM_MAP_FAULT_COUNT] = {
-        "fine",    "truncated", "too long",   "no map",  "other byte order", "other version", "bad crc",
-        "beacons", "machines",  "not finite", "content", "covariance",       "unreadable",    "no room",
-    };
-    return (unsigned)fault < (unsigned)BSLAM_MAP_FAULT_COUNT ? names[fault] : "unknown fault";
-}
-
-// ---- memory -----------------------------------------------------------------------------------------------
-
-static bool write_memory(void *context, const void *bytes, uint32_t count)
-{
-    bslam_map_memory_t *memory = context;
-    if (count > memory->capacity - memory->count) {
-        return false;
-    }
-    memcpy(&memory->bytes[memory->count], bytes, count);
-    memory->count += count;
-    return true;
-}
-
-static bool read_memory(const void *context, uint32_t at, void *bytes, uint32_t count)
-{
-    const uint8_t *from = context;
-    memcpy(bytes, &from[at], count);
-    return true;
-}
-
-bslam_map_sink_t bslam_map_to_memory(bslam_map_memory_t *memory)
-{
-    return (bslam_map_sink_t){write_memory, memory};
-}
-
-bslam_map_source_t bslam_map_from_memory(const uint8_t *bytes, uint32_t size)
-{
-    return (bslam_map_source_t){read_memory, bytes, size};
-}
+static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
 // ---- header -----------------------------------------------------------------------------------------------
 
@@ -79,9 +40,8 @@ static void move_header(bslam_codec_t *codec, header_t *header)
     const uint32_t order = bslam_codec_whole(codec, ORDER, 2);
     bslam_codec_require(codec, order != ORDER_SWAPPED, BSLAM_MAP_BYTE_ORDER);
     bslam_codec_require(codec, order == ORDER, BSLAM_MAP_NO_MAP);
-    codec->version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
-    bslam_codec_require(codec, codec->version >= 1 && codec->version <= BSLAM_MAP_VERSION,
-                        BSLAM_MAP_OTHER_VERSION);
+    const uint32_t version = bslam_codec_whole(codec, BSLAM_MAP_VERSION, 2);
+    bslam_codec_require(codec, version == BSLAM_MAP_VERSION, BSLAM_MAP_OTHER_VERSION);
     header->length = bslam_codec_whole(codec, header->length, 4);
     header->beacons = bslam_codec_whole(codec, header->beacons, 2);
     header->values = bslam_codec_whole(codec, header->values, 2);
@@ -100,16 +60,15 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 
 /// What the blob has of a beacon. Its position is for who reads the map; where it has state values they
 /// count.
-typedef struct record {
+typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
     bslam_real_t scale;  ///< 0: nobody knows
-    bslam_real_t x_m;
-    bslam_real_t y_m;
+    bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
-} record_t;
+} stored_beacon_t;
 
-static void move_record(bslam_codec_t *codec, record_t *record)
+static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
     bslam_beacon_t *beacon = &record->beacon;
     beacon->uid = bslam_codec_whole(codec, beacon->uid, 4);
@@ -122,11 +81,7 @@ static void move_record(bslam_codec_t *codec, record_t *record)
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
     record->x_m = bslam_codec_real(codec, record->x_m);
     record->y_m = bslam_codec_real(codec, record->y_m);
-    if (codec->version >= 2) {
-        bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
-    } else {  // version 1 knew neither
-        bslam_codec_require(codec, record->scale == 0, BSLAM_MAP_CONTENT);
-    }
+    bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
@@ -159,7 +114,7 @@ static bool is_taken(const target_t *target, const bslam_beacon_t *beacon)
     return target != NULL && (target->mode == BSLAM_MAP_LIVING || beacon->kind != BSLAM_BEACON_RAY);
 }
 
-static void take_record(const target_t *target, const record_t *record)
+static void take_record(const target_t *target, const stored_beacon_t *record)
 {
     bslam_ekf_t *ekf = &target->slam->ekf;
     const int index = ekf->beacon_count++;
@@ -170,7 +125,7 @@ static void take_record(const target_t *target, const record_t *record)
     beacon->distance_lead = BSLAM_LEAD_MAX;
     beacon->known_x_m = record->x_m;
     beacon->known_y_m = record->y_m;
-    beacon->travelled_um = target->slam->travelled_um - LONG_WAY_UM;
+    beacon->travelled_um = target->slam->travelled_um - LONG_TRAVEL_UM;
     if (target->mode == BSLAM_MAP_FROZEN) {
         beacon->kind = BSLAM_BEACON_KNOWN;
     }
@@ -180,10 +135,10 @@ static void take_record(const target_t *target, const record_t *record)
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
     ekf->dim += bslam_beacon_dim(beacon->kind);
     if (bslam_slam_learns(target->slam)) {
-        bslam_beacon_look_t *look = &target->slam->appearance->of[index];
-        look->classifier =
-            record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
-        memcpy(look->seen_as, record->seen_as, sizeof look->seen_as);
+        bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
+        known->classifier =
+            record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : known->classifier;
+        memcpy(known->seen_as, record->seen_as, sizeof known->seen_as);
     }
 }
 
@@ -193,7 +148,7 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
     uint32_t further = 0;  // beyond two a beacon
     uint32_t least_uid = 0;
     for (uint32_t b = 0; b < header->beacons && codec->fault == BSLAM_MAP_FINE; b++) {
-        record_t record = {.classifier = BSLAM_MAP_NO_CLASSIFIER};
+        stored_beacon_t record = {.classifier = BSLAM_MAP_NO_CLASSIFIER};
         move_record(codec, &record);
         values += (uint32_t)bslam_beacon_dim(record.beacon.kind);
         further += record.beacon.kind == BSLAM_BEACON_RAY     ? 2u
@@ -204,13 +159,14 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
         bslam_codec_require(
             codec, record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
             BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec, values <= header->values, BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
         least_uid = uid + 1;
-        if (is_taken(target, &record.beacon)) {
+        if (codec->fault == BSLAM_MAP_FINE && is_taken(target, &record.beacon)) {
             take_record(target, &record);
         }
     }
     bslam_codec_require(codec, values == header->values, BSLAM_MAP_CONTENT);
-    bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
 }
 
 // ---- mean and covariance ----------------------------------------------------------------------------------
@@ -292,13 +248,12 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
 }
 
 /// Saved values in their order: the next state value after `place` of a saved beacon.
-typedef struct place {
-    int beacon;
-    int value;
-} place_t;
+typedef struct saved_value {
+    int beacon, value;
+} saved_value_t;
 
 /// Moves on to the next saved state value; false: there is none.
-static bool next_value(const bslam_ekf_t *ekf, place_t *place)
+static bool next_value(const bslam_ekf_t *ekf, saved_value_t *place)
 {
     place->value++;
     while (place->beacon < ekf->beacon_count &&
@@ -310,18 +265,18 @@ static bool next_value(const bslam_ekf_t *ekf, place_t *place)
     return place->beacon < ekf->beacon_count;
 }
 
-static int state_at(const bslam_ekf_t *ekf, const place_t *place)
+static int state_at(const bslam_ekf_t *ekf, const saved_value_t *place)
 {
     return ekf->beacons[place->beacon].at + place->value;
 }
 
 static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf)
 {
-    for (place_t i = {0, -1}; next_value(ekf, &i);) {
+    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
         (void)bslam_codec_real(codec, ekf->mean[state_at(ekf, &i)]);
     }
-    for (place_t i = {0, -1}; next_value(ekf, &i);) {
-        place_t j = {0, -1};
+    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
+        saved_value_t j = {0, -1};
         do {
             (void)next_value(ekf, &j);
             (void)bslam_codec_real(codec,
@@ -356,12 +311,12 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
     move_header(codec, &header);
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (bslam_map_saves(ekf, b)) {
-            record_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
+            stored_beacon_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
             record.scale = scale_of(ekf, &ekf->beacons[b]);
             if (bslam_slam_learns(slam)) {
-                const bslam_beacon_look_t *look = &slam->appearance->of[b];
-                record.classifier = bslam_map_classifier_number(slam, look->classifier);
-                memcpy(record.seen_as, look->seen_as, sizeof record.seen_as);
+                const bslam_beacon_appearance_t *known = &slam->appearance->of[b];
+                record.classifier = bslam_map_classifier_number(slam, known->classifier);
+                memcpy(record.seen_as, known->seen_as, sizeof record.seen_as);
             }
             bslam_ekf_beacon_position(ekf, b, &record.x_m, &record.y_m);
             move_record(codec, &record);
@@ -392,26 +347,30 @@ bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t 
     return codec.fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
 }
 
-static void read_all(bslam_codec_t *codec, const target_t *target, const room_t *room)
+/// All of a blob whose CRC was `crc` when its frame was checked. Flash that is worn, or a line, may read
+/// otherwise now: nothing of this reading is to be believed before its own CRC is the same.
+static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target, const room_t *room)
 {
     header_t header = {0};
     move_header(codec, &header);
-    if (target != NULL) {
-        target->slam->ekf.next_uid = header.next_uid;
-    }
     read_beacons(codec, &header, target);
+    if (codec->fault != BSLAM_MAP_FINE) {
+        return;  // counts are not to be believed
+    }
     read_values(codec, &header, target, room);
     const bool learns = target != NULL && bslam_slam_learns(target->slam);
     bslam_map_read_classifiers(codec, header.classifiers, learns ? &target->slam->appearance->learner : NULL);
-    const uint32_t body = codec->at;
-    (void)bslam_codec_whole(codec, 0, CRC_BYTES);
-    bslam_codec_require(codec, body + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, codec->at + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
     bslam_codec_require(codec, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
+    if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
+        target->slam->ekf.next_uid = header.next_uid;
+    }
 }
 
-/// The frame of a blob: it begins as a map, is as long as it says, and its CRC is right. All else is looked
-/// at only then, so that damage is called damage.
-static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
+/// The frame of a blob: it begins as a map, is as long as it says, and its CRC, *crc, is right. All else is
+/// looked at only then, so that damage is called damage.
+static bslam_map_fault_t check_frame(const bslam_map_source_t *source, uint32_t *crc)
 {
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
     header_t header = {0};
@@ -432,25 +391,26 @@ static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
         const uint32_t left = header.length - CRC_BYTES - codec.at;
         bslam_codec_bytes(&codec, bytes, left < sizeof bytes ? left : sizeof bytes);
     }
-    const uint32_t crc = ~codec.crc;
-    bslam_codec_require(&codec, bslam_codec_whole(&codec, 0, CRC_BYTES) == crc, BSLAM_MAP_BAD_CRC);
+    *crc = ~codec.crc;
+    bslam_codec_require(&codec, bslam_codec_whole(&codec, 0, CRC_BYTES) == *crc, BSLAM_MAP_BAD_CRC);
     return codec.fault;
 }
 
-static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room)
+static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room, uint32_t *crc)
 {
-    const bslam_map_fault_t fault = check_frame(source);
+    const bslam_map_fault_t fault = check_frame(source, crc);
     if (fault != BSLAM_MAP_FINE) {
         return fault;
     }
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, NULL, room);
+    read_all(&codec, *crc, NULL, room);
     return codec.fault;
 }
 
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
 {
-    return check(source, NULL);
+    uint32_t crc;
+    return check(source, NULL, &crc);
 }
 
 bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source, bslam_map_mode_t mode,
@@ -459,10 +419,11 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     // Behind the rows of its own covariance the pipeline's memory holds nothing.
     const size_t own = bslam_symmat_row(slam->ekf.dim);
     room_t room = {slam->ekf.covariance + own, BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - own, 0};
-    *fault = check(source, &room);
+    uint32_t crc;
+    *fault = check(source, &room, &crc);
     if (*fault == BSLAM_MAP_COVARIANCE) {
         room.raise = SHORTFALL_MAX;
-        *fault = check(source, &room);
+        *fault = check(source, &room, &crc);
     }
     memset(room.factor, 0, room.length * sizeof *room.factor);
     if (*fault != BSLAM_MAP_FINE) {
@@ -472,7 +433,7 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     slam->is_frozen = mode == BSLAM_MAP_FROZEN;
     const target_t target = {slam, mode, room.raise};
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, &target, NULL);
+    read_all(&codec, crc, &target, NULL);
     *fault = codec.fault;
     if (*fault != BSLAM_MAP_FINE) {
         bslam_slam_forget_map(slam);

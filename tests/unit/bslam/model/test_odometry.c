@@ -53,7 +53,7 @@ static bslam_odometry_reading_t with_gyro(bslam_odometry_reading_t reading, doub
 static bslam_odometry_t started(void)
 {
     bslam_odometry_t odometry;
-    bslam_odometry_init(&odometry);
+    odometry = (bslam_odometry_t){0};
     bslam_odometry_start(&odometry, START_US);
     return odometry;
 }
@@ -62,7 +62,7 @@ static bslam_odometry_t started(void)
 static bslam_odometry_t started_at_ticks(const bslam_settings_t *settings, uint32_t left, uint32_t right)
 {
     bslam_odometry_t odometry;
-    bslam_odometry_init(&odometry);
+    odometry = (bslam_odometry_t){0};
     const bslam_odometry_reading_t first = ticks(START_US, left, right);
     bslam_motion_t motion;
     assert_int_equal(bslam_odometry_read(&odometry, settings, &first, &motion), BSLAM_OK);
@@ -138,7 +138,7 @@ static void test_read_first_reading_without_a_clock_has_no_interval(void **state
                                               velocity(START_US, 3, 4), wheels(0, 1, 1)};
     for (int i = 0; i < COUNT_OF(first); i++) {
         bslam_odometry_t odometry;
-        bslam_odometry_init(&odometry);
+        odometry = (bslam_odometry_t){0};
         const bslam_motion_t motion = read_ok(&odometry, &settings, first[i]);
         const bslam_motion_t nothing = {0};
         assert_memory_equal(&motion, &nothing, sizeof motion);
@@ -160,7 +160,7 @@ static void test_read_interval_is_exact_however_late_the_clock(void **state)
     const bslam_settings_t settings = unit_settings();
     const int64_t late_us = INT64_MAX / 2 - 1;
     bslam_odometry_t odometry;
-    bslam_odometry_init(&odometry);
+    odometry = (bslam_odometry_t){0};
     (void)read_ok(&odometry, &settings, wheels(late_us, 0, 0));
     const bslam_motion_t motion = read_ok(&odometry, &settings, wheels(late_us + 1, 0, 0));
     assert_near(motion.dt_s, 1e-6, rounding_of(1e-6));
@@ -195,7 +195,7 @@ static void test_read_first_time_out_of_range_is_refused(void **state)
     const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry;
     memset(&odometry, 0, sizeof odometry);
-    bslam_odometry_init(&odometry);
+    odometry = (bslam_odometry_t){0};
     static const int64_t times[] = {-1, INT64_MIN, INT64_MAX, INT64_MAX / 2 + 1};
     for (int i = 0; i < COUNT_OF(times); i++) {
         assert_refused(&odometry, &settings, wheels(times[i], 0, 0), BSLAM_E_TIME);

@@ -24,7 +24,7 @@ static int setup(void **state)
     settings.right_speed_sd_mps = BSLAM_R(0.01);
     int bad_id;
     assert_int_equal(bslam_slam_init(&slam, &settings, &bad_id), BSLAM_OK);
-    bslam_recovery_init(&recovery);
+    recovery = (bslam_recovery_t){0};
     now_us = 0;
     return 0;
 }
@@ -498,7 +498,7 @@ static void test_recovery_takes_a_kept_map_for_settled(void **state)
         go_by_own_looks();
         slam.is_frozen = frozen != 0;
         if (!slam.is_frozen) {
-            bslam_recovery_init(&recovery);
+            recovery = (bslam_recovery_t){0};
             slam.counters.added = 0;
         }
         look_alike_from(1, 2, 2.5, 1);

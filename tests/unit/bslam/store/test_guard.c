@@ -11,7 +11,7 @@ static bslam_guard_t guard;
 static int setup(void **state)
 {
     kept_make(&slam, NULL, 3);
-    bslam_guard_init(&guard, &copy);
+    guard = (bslam_guard_t){.copy = &copy};
     bslam_guard_seal(&guard, &slam);
     sealed = slam;
     return 0;
@@ -84,10 +84,10 @@ static void test_guard_restore_of_a_damaged_copy_is_refused(void **state)
     flip(&copy, offsetof(bslam_slam_t, ekf) + 16, 1);
     assert_int_equal(bslam_guard_restore(&guard, &slam), BSLAM_E_STATE);
     assert_memory_equal(&slam, &before, sizeof slam);
-    bslam_guard_init(&guard, &copy);
+    guard = (bslam_guard_t){.copy = &copy};
     assert_int_equal(bslam_guard_restore(&guard, &slam), BSLAM_E_STATE);  // nothing was sealed
     assert_memory_equal(&slam, &before, sizeof slam);
-    bslam_guard_init(&guard, NULL);
+    guard = (bslam_guard_t){.copy = NULL};
     assert_int_equal(bslam_guard_check(&guard, &slam), BSLAM_E_STATE);
     bslam_guard_seal(&guard, &slam);
     assert_int_equal(bslam_guard_restore(&guard, &slam), BSLAM_E_STATE);

@@ -42,7 +42,7 @@ static bool loads_new(void)
 static uint32_t make_kept(bslam_slam_t *slam, int objects, uint8_t bytes[KEPT_BYTES_MAX])
 {
     kept_make(slam, NULL, objects);
-    const bslam_map_source_t source = bslam_map_from_memory(bytes, kept_write(slam, bytes));
+    const bslam_map_source_t source = map_from_memory(bytes, kept_write(slam, bytes));
     bslam_map_fault_t fault;
     assert_int_equal(bslam_map_load(slam, &source, BSLAM_MAP_LIVING, &fault), BSLAM_OK);
     return kept_write(slam, bytes);
