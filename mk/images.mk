@@ -45,7 +45,8 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
 build/$(1)/robot.elf: build/$(1)/firmware/robot/main.o
-$$(filter-out build/$(1)/robot.elf,$$(BOARD_ALL_$(1):%=build/$(1)/%.elf)): build/$(1)/%.elf: build/$(1)/firmware/bench/%.o
+$$(filter-out build/$(1)/robot.elf,$$(BOARD_ALL_$(1):%=build/$(1)/%.elf)): build/$(1)/%.elf: \
+    build/$(1)/firmware/bench/%.o
 $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
     firmware/port/sections.ld tools/checks/check_image.py
 	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
@@ -55,7 +56,8 @@ $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 
--include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
+-include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d \
+    $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
@@ -90,8 +92,8 @@ selftest: images ## run the self-test of every board that QEMU has
 	@$(PYTHON) -m tools.proofs.run_image selftest
 
 .PHONY: sizes-doc check-sizes
-sizes-doc: images library-m4f ## measure flash, RAM, stack and instructions anew, write docs/SIZES.md
+sizes-doc: images library-m4f_whole ## measure flash, RAM, stack and instructions, write docs/SIZES.md
 	@$(PYTHON) -m tools.checks.sizes_doc
 
-check-sizes: images library-m4f
+check-sizes: images library-m4f_whole
 	@$(PYTHON) -m tools.checks.sizes_doc --check

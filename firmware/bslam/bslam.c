@@ -319,6 +319,5 @@ bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash,
 {
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE
-                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }

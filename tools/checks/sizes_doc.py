@@ -52,9 +52,9 @@ PARTS = {
 
 
 def flash_by_layer() -> dict[str, int]:
-    """Code and constants of build/m4f/libbslam.a by layer, bytes."""
+    """Code and constants of the libraries with all their members by layer, bytes."""
     found: dict[str, int] = defaultdict(int)
-    folder = BUILD_DIR / "m4f"
+    folder = BUILD_DIR / "m4f_whole"
     for path in sorted(folder.rglob("*.o")):
         if not (ROOT / path.relative_to(folder)).with_suffix(".c").is_file():
             continue  # of a source that is gone
@@ -217,7 +217,7 @@ cores are emulated. Compiler: {output_of("arm-none-eabi-gcc", "--version").split
 
 ## Flash
 
-Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
+Code and constants of the libraries for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
 takes only what is called.
 
 {table(("layer", "bytes"), flash_rows())}
