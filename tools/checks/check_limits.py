@@ -22,9 +22,10 @@ LONG_SENTENCE = 35
 
 # The word that a reader of the field looks for, and ours for it where it can be told from common English.
 WORDS = {
-    "appearance": r"looks(?! (like|at|into|for|up|to|as)\b)",
-    "classifier": r"(?<!support vector )(?<!state )(?<!this )(?<!one )(?<!another )(?<!-like )machines?",
-    "known data association": r"told",
+    "appearance": r"(by|the|its|their|what|of|and|once|no) looks(?! (like|at|for)\b)|looks (count|speak)",
+    "classifier": r"(?<!\bvector )(?<!\b(?:this|your|time) )(?<!\bone )(?<!` )(?<!-like )(?<!\bstate )"
+    r"(?<!\bevery )(?<!\banother )machines?(?!'s byte| learning)",
+    "known data association": r"told(?! apart)",
     "trained": r"taught",
     "bearing-only": r"directions? only",
     "relative to known association": r"against known",
