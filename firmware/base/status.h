@@ -17,10 +17,10 @@ typedef enum bslam_status {
     BSLAM_E_MAP_FULL,    ///< the map holds BSLAM_BEACONS_MAX beacons, or BSLAM_RAYS_MAX rays
     BSLAM_E_NO_BEACON,   ///< no such beacon in the map
     BSLAM_E_DUPLICATE,   ///< the map already holds a beacon of that label
-    BSLAM_E_PARAMETER,   ///< a parameter is outside its range, or contradicts another
+    BSLAM_E_PARAMETER,   ///< a setting is outside its range, or contradicts another
     BSLAM_E_SINGULAR,    ///< a covariance is not positive definite where it must be
     BSLAM_E_MAP,         ///< a stored map is refused, or cannot be stored: the fault beside it says why
-    BSLAM_E_STATE,       ///< the pipeline's memory is not as it was sealed (store/guard.h)
+    BSLAM_E_STATE,       ///< the pipeline's memory is not as it was sealed
     BSLAM_E_SIZE,        ///< library and application were compiled with other sizes
     BSLAM_STATUS_COUNT
 } bslam_status_t;

@@ -42,14 +42,15 @@ typedef struct bslam_motion {
 typedef struct bslam_sighting {
     bslam_real_t bearing_rad;     ///< direction in the sensor's frame, positive to the left
     bslam_real_t range_m;         ///< distance from the sensor; read only if has_range
-    bslam_real_t bearing_sd_rad;  ///< what the detector says of this direction's noise; 0: as the parameters
-    bslam_real_t range_sd_m;      ///< and of this distance's; 0: as the parameters
-    bslam_real_t range_scale_sd;  ///< part by which all the thing's distances err alike; 0: as parameters
-    bslam_real_t score;      ///< how sure the detector is that this is a beacon at all; 0: it does not say
-    bool has_range;          ///< false: direction only, paper equation (15)
-    uint8_t beacon_class;    ///< BSLAM_CLASS_NONE, BSLAM_CLASS_NOT_MAPPABLE, or the detector's own
-    int32_t label;           ///< identity >= 0 if the detector knows it, else BSLAM_LABEL_NONE
-    const float *signature;  ///< how it looks, BSLAM_SAMPLE_FEATURES values (appearance/sample.h); NULL: none
+    bslam_real_t bearing_sd_rad;  ///< what the detector says of this direction's noise; 0: as the settings
+    bslam_real_t range_sd_m;      ///< and of this distance's; 0: as the settings
+    bslam_real_t range_scale_sd;  ///< part by which all the thing's distances err alike; 0: as settings
+    bslam_real_t score;    ///< how sure the detector is that this is a beacon at all; 0: it does not say
+    bool has_range;        ///< false: bearing-only, paper equation (15)
+    uint8_t beacon_class;  ///< BSLAM_CLASS_NONE, BSLAM_CLASS_NOT_MAPPABLE, or the detector's own
+    int32_t label;         ///< identity >= 0 if the detector knows it, else BSLAM_LABEL_NONE
+    const float
+        *signature;  ///< its appearance, BSLAM_SAMPLE_FEATURES values (appearance/sample.h); NULL: none
 } bslam_sighting_t;
 
 #endif

@@ -64,7 +64,7 @@ static void start(int beacons, int association)
         time_us++;
     }
     slam.settings.association = association;
-    measure_need(bslam_slam_beacon_count(&slam) == beacons);
+    measure_need(slam.ekf.beacon_count == beacons);
 }
 
 // ---- what is measured -------------------------------------------------------------------------------------

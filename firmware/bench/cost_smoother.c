@@ -97,7 +97,7 @@ static void measure(int beacons, int most)
         worst = ticks > worst ? ticks : worst;
         sum += step >= STEPS_BEFORE ? ticks : 0;
     }
-    measure_need(bslam_slam_beacon_count(&slam) == beacons && smoother.cycles > 10 && smoother.insane == 0);
+    measure_need(slam.ekf.beacon_count == beacons && smoother.cycles > 10 && smoother.insane == 0);
     measure_report("mean", beacons, (uint32_t)(sum / STEPS));
     measure_report("worst", beacons, worst);
     measure_report("state", beacons, (uint32_t)bslam_slam_fingerprint(&slam, BSLAM_FINGERPRINT_START));

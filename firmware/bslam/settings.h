@@ -32,17 +32,14 @@ extern "C" {
     REAL(mount_y_m, 0.0, -100.0, 100.0, "sensor on the robot, to the left") \
     REAL(mount_yaw_rad, 0.0, -3.2, 3.2, "sensor on the robot, turned to the left") \
     /* odometry */ \
-    INTEGER(velocity_states, 0, 0, 1, \
-         "1: v and omega are states and the wheels measure them: a speedometer's noise (0: not)") \
-    INTEGER(scale_states, 0, 0, 1, \
-         "1: the scale factors of odometry are states; not together with velocity_states") \
+    INTEGER(velocity_states, 0, 0, 1, "1: v and omega are states, which the wheels measure (0: not)") \
+    INTEGER(scale_states, 0, 0, 1, "1: odometry's scale factors are states; not with velocity_states") \
     REAL(scale_sd, 0.2, 1e-6, 1.0, "standard deviation of both scale factors at the start") \
-    REAL(left_speed_sd_mps, 0.05, 0.0, 100.0, \
-         "noise of the left wheel's speed reading, independent at each step") \
-    REAL(right_speed_sd_mps, 0.05, 0.0, 100.0, \
-         "noise of the right wheel's speed reading, independent at each step") \
-    REAL(forward_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of forward motion that grows with the way") \
-    REAL(turn_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of the heading that grows with the way") \
+    REAL(left_speed_sd_mps, 0.05, 0.0, 100.0, "noise of the left wheel's speed, independent at each step") \
+    REAL(right_speed_sd_mps, 0.05, 0.0, 100.0, "noise of the right wheel's speed, independent at each step") \
+    REAL(forward_sd_per_sqrt_m, 0.0, 0.0, 10.0, \
+         "noise of forward motion that grows with the distance travelled") \
+    REAL(turn_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of the heading that grows with the distance travelled") \
     REAL(turn_sd_per_sqrt_rad, 0.0, 0.0, 10.0, "noise of the heading that grows with the turn") \
     REAL(gyro_sd_radps, 0.02, 1e-6, 100.0, "noise of the gyro rate, independent at each step") \
     REAL(speed_max_mps, 20.0, 1e-3, 1000.0, "a wheel reading faster than this is refused as a jump") \
@@ -55,29 +52,24 @@ extern "C" {
          "noise of the distance: sd^2 = floor^2 + (fraction r)^2 + (per_m r^2)^2") \
     REAL(range_sd_fraction, 0.02, 0.0, 10.0, "noise of the distance in proportion to it") \
     REAL(range_sd_per_m, 0.009, 0.0, 10.0, "noise of the distance from apparent size: proportional to r^2") \
-    REAL(range_scale_sd, 0.0, 0.0, 1.0, \
-         "all distances of a beacon are too long or too short by so much, as is its size (0: no)") \
+    REAL(range_scale_sd, 0.0, 0.0, 1.0, "all distances of a beacon err alike by this part of them (0: no)") \
     REAL(correlation_m, 0.0, 0.0, 100.0, \
-         "the errors of a beacon's sightings are alike until the robot has gone so far (0: they are not)") \
-    INTEGER(sighting_delay_us, 0, -1000000, 10000000, \
-         "a sighting stamped t shows what odometry has at t - delay") \
+         "a beacon's errors are alike until the robot has gone this far (0: no)") \
+    INTEGER(sighting_delay_us, 0, -1000000, 10000000, "a sighting stamped t shows odometry's t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
     /* map */ \
     INTEGER(filter, 1, 0, 2, "0 standard EKF (paper equations (4)-(11)), 1 right-invariant, 2 smoother") \
     INTEGER(motion, 1, 0, 1, "0 Euler step (paper equation (2)), 1 exact arc") \
-    REAL(gate_d2, 13.8, 0.0, 1e6, \
-         "a sighting with a larger squared Mahalanobis distance is rejected (13.8: one in 1000; 0: none)") \
+    REAL(gate_d2, 13.8, 0.0, 1e6, "squared Mahalanobis distance of the gate (13.8: one in 1000; 0: none)") \
     REAL(huber_d, 0.0, 0.0, 1e3, "beyond this Mahalanobis distance a sighting counts less (Huber; 0: off)") \
-    INTEGER(association, 0, 0, 4, \
-         "0 known identity, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint") \
+    INTEGER(association, 0, 0, 4, "0 known, 1 nearest (paper's baseline), 2 Mahalanobis, 3 svm, 4 joint") \
     REAL(nearest_threshold_m, 1.0, 1e-3, 100.0, "nearest: farther than this from any beacon is a new one") \
-    REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, direction only: the same as an angle") \
+    REAL(nearest_threshold_rad, 0.2, 1e-4, 3.2, "nearest, bearing-only: the same as an angle") \
     REAL(match_d2, 13.8, 1e-3, 1e6, "mahalanobis: nearer than this is a match") \
-    REAL(new_d2, 40.0, 1e-3, 1e6, \
-         "mahalanobis: farther than this from any beacon is a new one, between: rejected") \
-    INTEGER(confirm_sightings, 4, 1, 1000, "a provisional beacon is confirmed by this many sightings") \
+    REAL(new_d2, 40.0, 1e-3, 1e6, "mahalanobis: farther from any beacon is a new one; between: rejected") \
+    INTEGER(confirm_sightings, 4, 1, 1000, "a tentative beacon is confirmed by this many sightings") \
     INTEGER(confirm_window_us, 1000000, 0, 1000000000, \
-         "one not confirmed by then is removed (of told identity: if contradicted); 0: none") \
+         "one not confirmed by then is removed (known data association: if contradicted); 0: none") \
     INTEGER(learn_budget, 600, 0, 1000000, "svm: pieces of training after each frame") \
     /* recovery */ \
     INTEGER(recovery, 0, 0, 1, "1: notices that the robot is lost, and finds it again (0: not)") \
@@ -87,45 +79,33 @@ extern "C" {
 
 /// For who knows the filter.
 #define BSLAM_EXPERT(REAL, INTEGER) \
-    REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, \
-         "standard deviation of v at the start (the robot stands still)") \
+    REAL(velocity_sd_mps, 0.02, 1e-6, 100.0, "standard deviation of v at the start, at a standstill") \
     REAL(velocity_walk_mps_sqrt_s, 0.15, 0.0, 100.0, "v changes by this much in a second (random walk)") \
-    REAL(path_walk_mps_sqrt_s, 0.6, 0.0, 100.0, \
-         "smoother: the same along the path where it linearises, which is to be smooth") \
+    REAL(path_walk_mps_sqrt_s, 0.6, 0.0, 100.0, "smoother: the same along the path where it linearises") \
     REAL(velocity_decay_s, 1e6, 1e-3, 1e6, "v decays to 0 with this time constant (1e6: not)") \
-    REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, \
-         "standard deviation of omega at the start (the robot stands still)") \
-    REAL(turn_rate_walk_radps_sqrt_s, 0.8, 0.0, 100.0, \
-         "omega changes by this much in a second (random walk)") \
+    REAL(turn_rate_sd_radps, 0.05, 1e-6, 100.0, "standard deviation of omega at the start") \
+    REAL(turn_rate_walk_radps_sqrt_s, 0.8, 0.0, 100.0, "omega changes by this in a second (random walk)") \
     REAL(turn_rate_decay_s, 1e6, 1e-3, 1e6, "omega decays to 0 with this time constant (1e6: not)") \
     REAL(forward_scale, 1.0, 0.1, 10.0, \
-         "true over measured forward motion; with scale_states its start value") \
-    REAL(turn_scale, 1.0, 0.1, 10.0, "true over measured turn; with scale_states its start value") \
-    REAL(scale_walk_sqrt_s, 0.002, 0.0, 1.0, \
-         "a scale factor changes by this much in a second (random walk)") \
+         "true over measured forward motion, or the start value of its state") \
+    REAL(turn_scale, 1.0, 0.1, 10.0, "true over measured turn, or the start value of its state") \
+    REAL(scale_walk_sqrt_s, 0.002, 0.0, 1.0, "a scale factor changes by this in a second (random walk)") \
     REAL(travel_sd_per_sqrt_m, 0.0, 0.0, 10.0, "noise of a wheel's travel that grows with the travel") \
     REAL(forward_sd_per_sqrt_s, 0.0, 0.0, 10.0, \
-         "noise of forward motion that grows with time while the robot moves") \
-    REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, \
-         "noise of the heading that grows with time while the robot moves") \
-    INTEGER(history_steps, 1024, 1, 1024, \
-         "odometry readings that may wait for a late sighting, at most BSLAM_HISTORY_MAX of them") \
+         "noise of forward motion that grows with the time of moving") \
+    REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, "noise of the heading that grows with the time of moving") \
+    INTEGER(history_steps, 1024, 1, 1024, "readings that wait for a late sighting, to BSLAM_HISTORY_MAX") \
     REAL(bearing_only_variance_factor, 3.0, 1.0, 1000.0, \
-         "direction variance times this where no distance comes") \
-    REAL(bearing_only_curvature_factor, 100.0, 0.0, 1e6, \
-         "and plus this times the bend of the model, MATH 24") \
-    REAL(ray_inverse_distance_per_m, 0.2, 1e-4, 100.0, \
-         "start value of a direction-only beacon's inverse distance") \
+         "bearing-only: the direction's variance times this") \
+    REAL(bearing_only_curvature_factor, 100.0, 0.0, 1e6, "and plus this times the curvature of the model") \
+    REAL(ray_inverse_distance_per_m, 0.2, 1e-4, 100.0, "bearing-only: a new beacon's inverse distance") \
     REAL(ray_inverse_distance_sd_per_m, 0.1, 1e-4, 100.0, "its standard deviation") \
-    REAL(ray_linear_limit, 0.1, 1e-4, 10.0, \
-         "a ray becomes a point when its linearity index falls below this") \
+    REAL(ray_linear_limit, 0.1, 1e-4, 10.0, "a ray becomes a point when its linearity index is below this") \
     REAL(joint_sd, 3.09, 0.0, 10.0, \
-         "joint: sightings fit together up to this many normal deviations (3.09: one in 1000 does not)") \
+         "joint: normal deviations that fit together (3.09: one in 1000 does not)") \
     INTEGER(joint_nodes, 3000, 1, 10000000, "joint: choices that are tried for at most 5 sightings") \
-    REAL(confirm_travel_m, 0.0, 0.0, 100.0, \
-         "of which one counts when the robot has gone this far since the last that did") \
-    REAL(confirm_d2, 1e6, 1e-3, 1e6, \
-         "and against it beyond this squared Mahalanobis distance; it leaves with as many against as for")
+    REAL(confirm_travel_m, 0.0, 0.0, 100.0, "a sighting confirms only this far from the last that did") \
+    REAL(confirm_d2, 1e6, 1e-3, 1e6, "one beyond this squared Mahalanobis distance counts against")
 // clang-format on
 
 /// Values of `filter`.
@@ -185,7 +165,7 @@ typedef enum bslam_preset {
 
 void bslam_settings_preset(bslam_settings_t *settings, bslam_preset_t preset);
 
-/// One line of a table, for tools and parameter servers.
+/// One line of a table, for tools and setting servers.
 typedef struct bslam_setting_info {
     const char *name;
     const char *meaning;  ///< empty without BSLAM_SETTING_MEANINGS

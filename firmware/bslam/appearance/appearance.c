@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-static const bslam_beacon_look_t BLANK = {.classifier = BSLAM_NO_CLASSIFIER, .twin = BSLAM_NO_CLASSIFIER};
+static const bslam_beacon_appearance_t BLANK = {.classifier = BSLAM_NO_CLASSIFIER,
+                                                .twin = BSLAM_NO_CLASSIFIER};
 static const uint32_t MICROMETRES_PER_M = 1000000;
 
 enum { SEEN_AS_MAX = 32 };
@@ -29,7 +30,7 @@ bslam_status_t bslam_appearance_init(bslam_appearance_t *appearance, const bslam
     return status;
 }
 
-/// True if a beacon other than `index` has this machine.
+/// True if a beacon other than `index` has this classifier.
 static bool has_other_owner(const bslam_appearance_t *appearance, int index, int count, int16_t classifier)
 {
     for (int b = 0; b < count; b++) {
@@ -40,7 +41,7 @@ static bool has_other_owner(const bslam_appearance_t *appearance, int index, int
     return false;
 }
 
-/// Takes a beacon's machine away, and out of the learner if no other beacon has it.
+/// Takes a beacon's classifier away, and out of the learner if no other beacon has it.
 static void release(bslam_appearance_t *appearance, int index, int count)
 {
     const int16_t classifier = appearance->of[index].classifier;
@@ -132,17 +133,17 @@ uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index)
 }
 
 /// Counts; what was long ago counts less.
-static void note_class(bslam_beacon_look_t *look, uint8_t beacon_class)
+static void note_class(bslam_beacon_appearance_t *known, uint8_t beacon_class)
 {
     if (!is_evidence(beacon_class)) {
         return;
     }
-    if (look->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
+    if (known->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
         for (int k = 0; k < BSLAM_APPEARANCE_CLASSES; k++) {
-            look->seen_as[k] /= 2;
+            known->seen_as[k] /= 2;
         }
     }
-    look->seen_as[beacon_class - 1]++;
+    known->seen_as[beacon_class - 1]++;
 }
 
 // ---- sides ------------------------------------------------------------------------------------------------
@@ -185,21 +186,22 @@ void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam
 // ---- waiting ----------------------------------------------------------------------------------------------
 
 /// How long matches with a beacon have waited; 0 if not, or if none did within the last decision_delay_us.
-static uint32_t delayed_us(const bslam_beacon_look_t *look, const bslam_settings_t *settings, int64_t time_us)
+static uint32_t delayed_us(const bslam_beacon_appearance_t *known, const bslam_settings_t *settings,
+                           int64_t time_us)
 {
-    const uint32_t pause_us = (uint32_t)time_us - look->last_delay_us;
-    return look->delayed_us == 0 || pause_us > (uint32_t)settings->decision_delay_us
+    const uint32_t pause_us = (uint32_t)time_us - known->last_delay_us;
+    return known->delayed_us == 0 || pause_us > (uint32_t)settings->decision_delay_us
                ? 0
-               : look->delayed_us + pause_us;
+               : known->delayed_us + pause_us;
 }
 
 void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                                  int64_t time_us)
 {
-    bslam_beacon_look_t *look = &appearance->of[index];
-    const uint32_t so_far_us = delayed_us(look, settings, time_us);
-    look->delayed_us = so_far_us > 0 ? so_far_us : 1;  // 0 says that none waits
-    look->last_delay_us = (uint32_t)time_us;
+    bslam_beacon_appearance_t *known = &appearance->of[index];
+    const uint32_t so_far_us = delayed_us(known, settings, time_us);
+    known->delayed_us = so_far_us > 0 ? so_far_us : 1;  // 0 says that none waits
+    known->last_delay_us = (uint32_t)time_us;
 }
 
 bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
@@ -210,7 +212,8 @@ bool bslam_appearance_is_due(const bslam_appearance_t *appearance, const bslam_s
 
 // ---- learning ---------------------------------------------------------------------------------------------
 
-/// Another machine than `own` that takes a sample for its own, the surest; BSLAM_NO_CLASSIFIER if none does.
+/// Another classifier than `own` that takes a sample for its own, the surest; BSLAM_NO_CLASSIFIER if none
+/// does.
 static int16_t find_twin(const bslam_appearance_t *appearance, const bslam_settings_t *settings, int16_t own,
                          const bslam_sample_t *sample, float at_least)
 {
@@ -239,79 +242,79 @@ static bool persists(uint8_t *count, bool holds, int32_t limit)
     return *count >= limit;
 }
 
-/// Whether another machine takes this beacon for its own again and again, as surely as the beacon's machine
-/// does: then they look alike, and two machines would be trained to contradict each other.
+/// Whether another classifier takes this beacon for its own again and again, as surely as the beacon's
+/// classifier does: then they look alike, and two classifiers would be trained to contradict each other.
 static bool has_twin(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
-                     bslam_beacon_look_t *look, const bslam_sample_t *sample)
+                     bslam_beacon_appearance_t *known, const bslam_sample_t *sample)
 {
-    const bslam_opinion_t own = opinion_of(appearance, settings, look->classifier, sample);
+    const bslam_opinion_t own = opinion_of(appearance, settings, known->classifier, sample);
     const float least = (float)settings->share_value;
     const float at_least = own.weight > 0.0f && own.value > least ? own.value : least;
-    const int16_t twin = find_twin(appearance, settings, look->classifier, sample, at_least);
-    if (twin != BSLAM_NO_CLASSIFIER && twin != look->twin && look->twin_count == 0) {
-        look->twin = twin;
+    const int16_t twin = find_twin(appearance, settings, known->classifier, sample, at_least);
+    if (twin != BSLAM_NO_CLASSIFIER && twin != known->twin && known->twin_count == 0) {
+        known->twin = twin;
     }
-    const bool again = twin != BSLAM_NO_CLASSIFIER && twin == look->twin;
-    return persists(&look->twin_count, again, settings->share_sightings);
+    const bool again = twin != BSLAM_NO_CLASSIFIER && twin == known->twin;
+    return persists(&known->twin_count, again, settings->share_sightings);
 }
 
-/// A machine of its own for a beacon, if there is one left.
-static void give_machine(bslam_appearance_t *appearance, bslam_beacon_look_t *look)
+/// A classifier of its own for a beacon, if there is one left.
+static void give_classifier(bslam_appearance_t *appearance, bslam_beacon_appearance_t *known)
 {
     int32_t classifier;
     if (bslam_learner_add(&appearance->learner, &classifier) == BSLAM_OK) {
-        look->classifier = (int16_t)classifier;
+        known->classifier = (int16_t)classifier;
     } else {
         appearance->counters.no_slot++;
     }
 }
 
-/// Decides which machine a beacon has; false while that is open, when nothing is to be learned.
-static bool settle_machine(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
-                           int count, const bslam_sample_t *sample)
+/// Decides which classifier a beacon has; false while that is open, when nothing is to be learned.
+static bool settle_classifier(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
+                              int count, const bslam_sample_t *sample)
 {
-    bslam_beacon_look_t *look = &appearance->of[index];
-    const bool is_shared = look->classifier != BSLAM_NO_CLASSIFIER &&
-                           has_other_owner(appearance, index, count, look->classifier);
+    bslam_beacon_appearance_t *known = &appearance->of[index];
+    const bool is_shared = known->classifier != BSLAM_NO_CLASSIFIER &&
+                           has_other_owner(appearance, index, count, known->classifier);
     if (is_shared) {
-        const bslam_opinion_t own = opinion_of(appearance, settings, look->classifier, sample);
+        const bslam_opinion_t own = opinion_of(appearance, settings, known->classifier, sample);
         const bool refused = own.weight > 0.0f && own.value < 0.0f;
-        if (persists(&look->disowned, refused, settings->share_sightings)) {
-            look->disowned = 0;
+        if (persists(&known->disowned, refused, settings->share_sightings)) {
+            known->disowned = 0;
             release(appearance, index, count);
-            give_machine(appearance, look);
+            give_classifier(appearance, known);
             appearance->counters.parted++;
         }
-        return look->classifier != BSLAM_NO_CLASSIFIER;
+        return known->classifier != BSLAM_NO_CLASSIFIER;
     }
-    if (has_twin(appearance, settings, look, sample)) {
-        const int16_t twin = look->twin;
-        look->twin = BSLAM_NO_CLASSIFIER;
-        look->twin_count = 0;
+    if (has_twin(appearance, settings, known, sample)) {
+        const int16_t twin = known->twin;
+        known->twin = BSLAM_NO_CLASSIFIER;
+        known->twin_count = 0;
         release(appearance, index, count);
-        look->classifier = twin;
+        known->classifier = twin;
         appearance->counters.shared++;
-    } else if (look->classifier == BSLAM_NO_CLASSIFIER && look->twin_count == 0) {
-        give_machine(appearance, look);
+    } else if (known->classifier == BSLAM_NO_CLASSIFIER && known->twin_count == 0) {
+        give_classifier(appearance, known);
     }
-    return look->classifier != BSLAM_NO_CLASSIFIER;
+    return known->classifier != BSLAM_NO_CLASSIFIER;
 }
 
 void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                             int count, uint32_t travelled_um, const bslam_sighting_t *sighting)
 {
-    bslam_beacon_look_t *look = &appearance->of[index];
+    bslam_beacon_appearance_t *known = &appearance->of[index];
     const uint32_t least_um = (uint32_t)(settings->learn_travel_m * (bslam_real_t)MICROMETRES_PER_M);
     bslam_sample_t sample;
-    if (look->is_trained && travelled_um - look->trained_um < least_um) {
+    if (known->is_trained && travelled_um - known->trained_um < least_um) {
         return;
     }
-    look->is_trained = true;
-    look->trained_um = travelled_um;
-    note_class(look, sighting->beacon_class);
+    known->is_trained = true;
+    known->trained_um = travelled_um;
+    note_class(known, sighting->beacon_class);
     if (sighting->signature != NULL && bslam_sample_encode(sighting->signature, &sample) == BSLAM_OK &&
-        settle_machine(appearance, settings, index, count, &sample) &&
-        bslam_learner_show(&appearance->learner, look->classifier, sighting->signature) == BSLAM_OK) {
+        settle_classifier(appearance, settings, index, count, &sample) &&
+        bslam_learner_show(&appearance->learner, known->classifier, sighting->signature) == BSLAM_OK) {
         appearance->counters.taught++;
     }
 }

@@ -1,9 +1,5 @@
-/// What the beacons of a map look like: a machine each that learns from their sightings, and which beacons
-/// share one. The caller owns it and attaches it to a pipeline; who does without pays no RAM for it. MATH
-/// "Position and appearance".
-///
-///     bslam_appearance_init(&looks, seeds, seed_count)
-///     bslam_slam_attach_appearance(&slam, &looks)      and association = 3
+/// What the beacons of a map look like: a classifier each that learns from their sightings, and which beacons
+/// share one. MATH "Position and appearance".
 #ifndef BSLAM_APPEARANCE_APPEARANCE_H
 #define BSLAM_APPEARANCE_APPEARANCE_H
 
@@ -14,42 +10,41 @@
 #define BSLAM_NO_CLASSIFIER (-1)
 /// Classes 1 to this many are evidence; what a detector calls higher ones is none.
 #define BSLAM_APPEARANCE_CLASSES 8
-/// Sectors around a beacon from which it may be seen; outlook.h says which is which.
+/// Sectors around a beacon from which it may be seen; viewpoint.h says which is which.
 #define BSLAM_APPEARANCE_SECTORS 16
 
-/// What is known of a beacon's looks. Private.
-typedef struct bslam_beacon_look {
+/// What is known of a beacon's appearance.
+typedef struct bslam_beacon_appearance {
     int16_t classifier;
-    int16_t twin;        ///< the machine that takes its sightings for its own, too
+    int16_t twin;        ///< the classifier that takes its sightings for its own, too
     uint8_t twin_count;  ///< how often, less how often it did not
-    uint8_t disowned;    ///< how often its own machine, a shared one, refused it, less how often not
+    uint8_t disowned;    ///< how often its own classifier, a shared one, refused it, less how often not
     uint8_t alone;       ///< how often it was seen without near_uid, or that without it
     uint8_t ousted;      ///< how many beacons were retired for being in this one's place
     bool is_trained;
     uint32_t near_uid;                          ///< an older beacon in the same place
-    uint32_t trained_um;                        ///< the robot's way when it was taught last
+    uint32_t trained_um;                        ///< distance travelled when it was trained last
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];  ///< how often as which class, from 1 on
-    uint32_t missed_um;                         ///< the robot's way when it was seen last, or not expected
+    uint32_t missed_um;                         ///< distance travelled when it was seen last, or not expected
     uint8_t missed;                             ///< from how many directions, since it was seen last
     uint8_t
         seen_from[BSLAM_APPEARANCE_SECTORS];  ///< how far off it was last, decimetres; 0: not seen from there
     bslam_real_t view_score;                  ///< association.h: as of its last match
     uint32_t delayed_us;                      ///< how long matches with it had waited by then; 0: not
     uint32_t last_delay_us;                   ///< when the last one did, modulo 72 minutes
-} bslam_beacon_look_t;
+} bslam_beacon_appearance_t;
 
-/// What the looks of a sighting say of a beacon.
+/// What a sighting's appearance says of a beacon.
 typedef struct bslam_opinion {
-    float value;   ///< the machine's decision value
+    float value;   ///< the classifier's decision value
     float weight;  ///< 0: it is not trained yet; towards 1 with the samples it keeps
 } bslam_opinion_t;
 
-/// Private but for the counters.
 typedef struct bslam_appearance {
     bslam_appearance_counters_t counters;
-    bslam_beacon_look_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
-    bslam_real_t left_rad;                      ///< how far to the left of the robot a beacon was seen
-    bslam_real_t right_rad;                     ///< and to the right, below 0
+    bslam_beacon_appearance_t of[BSLAM_BEACONS_MAX];  ///< in the order of the map
+    bslam_real_t left_rad;                            ///< how far to the left of the robot a beacon was seen
+    bslam_real_t right_rad;                           ///< and to the right, below 0
     bslam_learner_t learner;
 } bslam_appearance_t;
 
@@ -60,26 +55,23 @@ BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appear
 /// Forgets all beacons, in time for another map.
 void bslam_appearance_clear(bslam_appearance_t *appearance);
 
-/// What the machine of beacon `index` says of a sample.
+/// What the classifier of beacon `index` says of a sample.
 bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
                                      int index, const bslam_sample_t *sample);
 
-/// Log odds that beacon `index` is seen as this class, against a beacon of which nothing is known; 0 for a
-/// class that is no evidence.
+/// Log odds that beacon `index` is seen as this class, against an unknown one; 0: the class is no evidence.
 bslam_real_t bslam_appearance_class_odds(const bslam_appearance_t *appearance,
                                          const bslam_settings_t *settings, int index, uint8_t beacon_class);
 
-/// Log odds that beacon `index` is seen from this sector, against one that is not in the map: by those from
-/// which it was seen so far. 0 if none is known. MATH (43). O(sectors).
+/// Log odds that beacon `index` is seen from this sector, against one that is not in the map. MATH (43).
 bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearance,
                                              const bslam_settings_t *settings, int index, int sector);
 
 /// The class that beacon `index` was surely seen as most often; BSLAM_CLASS_NONE: it never was.
 uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index);
 
-/// A sighting that surely shows beacon `index` of the `count` there are, when the robot had gone
-/// travelled_um. Its class is noted and its machine is shown it, unless the last one was a few centimetres
-/// ago; a machine is found for a beacon that has none. O(machines).
+/// A sighting that surely shows beacon `index` of the `count` there are. Its class is noted and its
+/// classifier is shown it, unless the last one was a few centimetres ago. O(classifiers).
 void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                             int count, uint32_t travelled_um, const bslam_sighting_t *sighting);
 

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// Trainings that a machine may ask for itself when BSLAM_LEARNER_STEPS_MAX did not suffice.
+// Trainings that a classifier may ask for itself when BSLAM_LEARNER_STEPS_MAX did not suffice.
 enum { AGAIN = 20 };
 
 static bool exists(const bslam_learner_t *learner, int32_t classifier)
@@ -10,7 +10,8 @@ static bool exists(const bslam_learner_t *learner, int32_t classifier)
     return classifier >= 0 && classifier < BSLAM_LEARNER_SLOTS && learner->classifiers[classifier].used;
 }
 
-// ---- machines ---------------------------------------------------------------------------------------------
+// ---- classifiers
+// ---------------------------------------------------------------------------------------------
 
 bslam_status_t bslam_learner_init(bslam_learner_t *learner, const bslam_sample_t *seeds, int32_t seed_count)
 {
@@ -36,7 +37,7 @@ bslam_status_t bslam_learner_add(bslam_learner_t *learner, int32_t *classifier)
     return BSLAM_E_MAP_FULL;
 }
 
-/// Takes samples that are gone out of a machine's list.
+/// Takes samples that are gone out of a classifier's list.
 static void strike(bslam_classifier_t *classifier, int32_t first, int32_t count)
 {
     uint16_t kept = 0;
@@ -60,10 +61,10 @@ bslam_status_t bslam_learner_remove(bslam_learner_t *learner, int32_t classifier
     if (learner->training.classifier == classifier) {
         bslam_training_pause(learner);
     }
-    bslam_training_pause_if_used(learner, classifier * BSLAM_PER_MACHINE, BSLAM_PER_MACHINE);
+    bslam_training_pause_if_used(learner, classifier * BSLAM_PER_CLASSIFIER, BSLAM_PER_CLASSIFIER);
     memset(&learner->classifiers[classifier], 0, sizeof learner->classifiers[classifier]);
     for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
-        strike(&learner->classifiers[m], classifier * BSLAM_PER_MACHINE, BSLAM_PER_MACHINE);
+        strike(&learner->classifiers[m], classifier * BSLAM_PER_CLASSIFIER, BSLAM_PER_CLASSIFIER);
     }
     return BSLAM_OK;
 }
@@ -75,14 +76,14 @@ bslam_status_t bslam_learner_remove(bslam_learner_t *learner, int32_t classifier
 static int32_t least(const bslam_learner_t *learner, int32_t classifier, const bslam_sample_t *fresh)
 {
     const uint16_t *alpha = learner->classifiers[classifier].own_alpha;
-    const bslam_sample_t *samples = &learner->samples[classifier * BSLAM_PER_MACHINE];
+    const bslam_sample_t *samples = &learner->samples[classifier * BSLAM_PER_CLASSIFIER];
     uint16_t smallest = UINT16_MAX;
-    for (int32_t i = 0; i < BSLAM_PER_MACHINE; i++) {
+    for (int32_t i = 0; i < BSLAM_PER_CLASSIFIER; i++) {
         smallest = alpha[i] < smallest ? alpha[i] : smallest;
     }
     int32_t best = -1;
     float best_distance2 = 0.0f;
-    for (int32_t i = 0; i < BSLAM_PER_MACHINE; i++) {
+    for (int32_t i = 0; i < BSLAM_PER_CLASSIFIER; i++) {
         if (alpha[i] == smallest) {
             const float distance2 = bslam_sample_distance2(&samples[i], fresh);
             if (best < 0 || distance2 < best_distance2) {
@@ -94,8 +95,8 @@ static int32_t least(const bslam_learner_t *learner, int32_t classifier, const b
     return best;
 }
 
-/// Puts a sample on a machine's list, if it is not there; on a full one in place of what matters least.
-static void list_rival(bslam_classifier_t *classifier, int32_t sample)
+/// Puts a sample on a classifier's list, if it is not there; on a full one in place of what matters least.
+static void list_negative(bslam_classifier_t *classifier, int32_t sample)
 {
     int32_t place = 0;
     for (int32_t i = 0; i < classifier->negatives; i++) {
@@ -118,8 +119,8 @@ static void ask_for_training(bslam_classifier_t *classifier)
     classifier->again = AGAIN;
 }
 
-/// Tells the other machines of a new sample: one that has it inside its margin will train with it, one that
-/// takes it for its own asks for a training.
+/// Tells the other classifiers of a new sample: one that has it inside its margin will train with it, one
+/// that takes it for its own asks for a training.
 static void warn_others(bslam_learner_t *learner, int32_t classifier, int32_t sample)
 {
     for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
@@ -132,7 +133,7 @@ static void warn_others(bslam_learner_t *learner, int32_t classifier, int32_t sa
             if (m == learner->training.classifier) {
                 bslam_training_pause(learner);
             }
-            list_rival(other, sample);
+            list_negative(other, sample);
             if (value > 0.0f) {
                 ask_for_training(other);
             }
@@ -155,21 +156,21 @@ bslam_status_t bslam_learner_show(bslam_learner_t *learner, int32_t classifier,
     }
     bslam_classifier_t *m = &learner->classifiers[classifier];
     int32_t place = m->samples;
-    if (place == BSLAM_PER_MACHINE) {
+    if (place == BSLAM_PER_CLASSIFIER) {
         if (m->trained && bslam_sample_decide(&m->weights, &fresh) >= 1.0f) {
             learner->counters.dropped++;
             return BSLAM_OK;
         }
         place = least(learner, classifier, &fresh);
-        bslam_training_pause_if_used(learner, classifier * BSLAM_PER_MACHINE + place, 1);
+        bslam_training_pause_if_used(learner, classifier * BSLAM_PER_CLASSIFIER + place, 1);
     } else {
         m->samples++;
     }
-    learner->samples[classifier * BSLAM_PER_MACHINE + place] = fresh;
+    learner->samples[classifier * BSLAM_PER_CLASSIFIER + place] = fresh;
     m->own_alpha[place] = 0;
     ask_for_training(m);
     learner->counters.kept++;
-    warn_others(learner, classifier, classifier * BSLAM_PER_MACHINE + place);
+    warn_others(learner, classifier, classifier * BSLAM_PER_CLASSIFIER + place);
     return BSLAM_OK;
 }
 

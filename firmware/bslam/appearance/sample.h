@@ -1,5 +1,5 @@
-/// A sample: what a machine that learns on the robot keeps of one signature. Features are rounded to 8 bits,
-/// or kept as float32 where BSLAM_SAMPLE_FLOAT is set; a constant 1 stands after them, so that a weight
+/// A sample: what a classifier that learns on the robot keeps of one signature. Features are rounded to 8
+/// bits, or kept as float32 where BSLAM_SAMPLE_FLOAT is set; a constant 1 stands after them, so that a weight
 /// vector holds its bias too.
 ///
 /// A float x is stored as q = x / BSLAM_SAMPLE_UNIT. Weights stand for q, not for x: a decision value is w .

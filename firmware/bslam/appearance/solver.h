@@ -33,7 +33,7 @@ typedef struct bslam_solver_row {
     float alpha;     ///< dual variable, >= 0
     float diagonal;  ///< x . x + 1 / 2C; 0 until it is needed
     uint16_t sample;
-    bool positive;  ///< y is 1, not -1 as a rival's
+    bool positive;  ///< y is 1, not -1 as a competitor's
 } bslam_solver_row_t;
 
 typedef struct bslam_solver {

@@ -15,15 +15,16 @@ static const float LOWEST = -1.3f;
 static const float BINS_PER_UNIT = 40.0f;
 
 enum {
-    NO_RIVAL = 0,  // bin of what is below LOWEST, or not looked at
+    NO_NEGATIVE = 0,  // bin of what is below LOWEST, or not looked at
     HARDEST = BSLAM_BINS - 1,
-    LISTED = UINT8_MAX,  // in place of a bin: on the machine's list, a row anyhow
-    // A machine that has been trained looks through every so-manieth of the others. Samples that came since
-    // its last training were listed when they came, so only those are missed that its own change made hard.
+    LISTED = UINT8_MAX,  // in place of a bin: on the classifier's list, a row anyhow
+    // A classifier that has been trained looks through every so-manieth of the others. Samples that came
+    // since its last training were listed when they came, so only those are missed that its own change made
+    // hard.
     TURNS = 4
 };
 
-static bslam_classifier_t *machine_in_training(bslam_learner_t *learner)
+static bslam_classifier_t *in_training(bslam_learner_t *learner)
 {
     return &learner->classifiers[learner->training.classifier];
 }
@@ -36,17 +37,17 @@ static uint16_t pack_alpha(float alpha)
     return (uint16_t)(units < ALPHAS ? units : ALPHAS);
 }
 
-/// Keeps the dual variables for the next start; rivals at 0 only if asked.
+/// Keeps the dual variables for the next start; competitors at 0 only if asked.
 static void keep_alphas(bslam_learner_t *learner, bool with_zeros)
 {
-    bslam_classifier_t *classifier = machine_in_training(learner);
+    bslam_classifier_t *classifier = in_training(learner);
     const bslam_solver_t *solver = &learner->training.solver;
     classifier->negatives = 0;
     for (int32_t i = 0; i < solver->count; i++) {
         const bslam_solver_row_t *row = &solver->rows[i];
         const uint16_t alpha = pack_alpha(row->alpha);
         if (row->positive) {
-            classifier->own_alpha[row->sample - learner->training.classifier * BSLAM_PER_MACHINE] = alpha;
+            classifier->own_alpha[row->sample - learner->training.classifier * BSLAM_PER_CLASSIFIER] = alpha;
         } else if (alpha > 0 || with_zeros) {
             classifier->negative[classifier->negatives] = row->sample;
             classifier->negative_alpha[classifier->negatives] = alpha;
@@ -63,7 +64,7 @@ void bslam_training_pause(bslam_learner_t *learner)
     if (learner->training.stage == BSLAM_STAGE_SOLVE) {
         keep_alphas(learner, true);
     }
-    machine_in_training(learner)->waiting = true;
+    in_training(learner)->waiting = true;
     learner->training.stage = BSLAM_STAGE_IDLE;
     learner->counters.interrupted++;
 }
@@ -84,8 +85,9 @@ void bslam_training_pause_if_used(bslam_learner_t *learner, int32_t first, int32
 
 // ---- beginning --------------------------------------------------------------------------------------------
 
-/// Weights that say how near a sample is to a machine's first one, which they give 1; a zero sample gets -1.
-static void look_by_first_sample(const bslam_sample_t *first, bslam_weights_t *look)
+/// Weights that say how near a sample is to a classifier's first one, which they give 1; a zero sample gets
+/// -1.
+static void rank_by_first_sample(const bslam_sample_t *first, bslam_weights_t *rank)
 {
     float q[BSLAM_SAMPLE_SIZE];
     bslam_sample_unpack(first, q);
@@ -97,10 +99,10 @@ static void look_by_first_sample(const bslam_sample_t *first, bslam_weights_t *l
         q[i] *= 2.0f / length2;
     }
     q[BSLAM_SAMPLE_FEATURES] -= BSLAM_SAMPLE_UNIT;
-    bslam_weights_round(q, look);
+    bslam_weights_round(q, rank);
 }
 
-/// The next machine that waits, in turn; -1 if none does.
+/// The next classifier that waits, in turn; -1 if none does.
 static int32_t next_waiting(const bslam_learner_t *learner)
 {
     int32_t m = learner->training.classifier;
@@ -121,7 +123,7 @@ static void begin(bslam_learner_t *learner, int32_t m)
     training->classifier = m;
     training->stage = BSLAM_STAGE_SCAN;
     memset(training->histogram, 0, sizeof training->histogram);
-    memset(training->bins, NO_RIVAL, sizeof training->bins);
+    memset(training->bins, NO_NEGATIVE, sizeof training->bins);
     for (int32_t i = 0; i < classifier->negatives; i++) {
         training->bins[classifier->negative[i]] = LISTED;
     }
@@ -129,36 +131,37 @@ static void begin(bslam_learner_t *learner, int32_t m)
         classifier->turn = (uint8_t)((classifier->turn + 1) % TURNS);
         training->first_block = classifier->turn;
         training->block_step = TURNS;
-        training->look = classifier->weights;
+        training->rank = classifier->weights;
     } else {
         training->first_block = 0;
         training->block_step = 1;
-        look_by_first_sample(&learner->samples[m * BSLAM_PER_MACHINE], &training->look);
+        rank_by_first_sample(&learner->samples[m * BSLAM_PER_CLASSIFIER], &training->rank);
     }
     training->block = training->first_block;
 }
 
-// ---- choosing rivals --------------------------------------------------------------------------------------
+// ---- choosing competitors
+// --------------------------------------------------------------------------------------
 
 static int32_t block_count(const bslam_learner_t *learner)
 {
-    return BSLAM_LEARNER_SLOTS + (learner->seed_count + BSLAM_PER_MACHINE - 1) / BSLAM_PER_MACHINE;
+    return BSLAM_LEARNER_SLOTS + (learner->seed_count + BSLAM_PER_CLASSIFIER - 1) / BSLAM_PER_CLASSIFIER;
 }
 
-/// Samples of a block that may be rivals.
+/// Samples of a block that may be competitors.
 static int32_t samples_in_block(const bslam_learner_t *learner, int32_t block)
 {
     if (block < BSLAM_LEARNER_SLOTS) {
         return block == learner->training.classifier ? 0 : learner->classifiers[block].samples;
     }
-    const int32_t left = learner->seed_count - (block - BSLAM_LEARNER_SLOTS) * BSLAM_PER_MACHINE;
-    return left < BSLAM_PER_MACHINE ? left : BSLAM_PER_MACHINE;
+    const int32_t left = learner->seed_count - (block - BSLAM_LEARNER_SLOTS) * BSLAM_PER_CLASSIFIER;
+    return left < BSLAM_PER_CLASSIFIER ? left : BSLAM_PER_CLASSIFIER;
 }
 
 static uint8_t bin_of(float value)
 {
     const float place = (value - LOWEST) * BINS_PER_UNIT;
-    const float inside = place < (float)NO_RIVAL ? (float)NO_RIVAL : place;
+    const float inside = place < (float)NO_NEGATIVE ? (float)NO_NEGATIVE : place;
     return (uint8_t)(inside < (float)HARDEST ? inside : (float)HARDEST);
 }
 
@@ -166,12 +169,12 @@ static uint8_t bin_of(float value)
 static void set_limit(bslam_training_t *training, int32_t room)
 {
     int32_t bin = BSLAM_BINS;
-    while (bin > NO_RIVAL + 1 && training->histogram[bin - 1] <= room) {
+    while (bin > NO_NEGATIVE + 1 && training->histogram[bin - 1] <= room) {
         bin--;
         room -= training->histogram[bin];
     }
     training->hard = bin;
-    training->spare = bin > NO_RIVAL + 1 ? room : 0;
+    training->spare = bin > NO_NEGATIVE + 1 ? room : 0;
 }
 
 /// One piece: sorts the samples of a block into bins.
@@ -179,18 +182,18 @@ static void scan(bslam_learner_t *learner, const bslam_samples_t *samples)
 {
     bslam_training_t *training = &learner->training;
     if (training->block >= block_count(learner)) {
-        set_limit(training, BSLAM_NEGATIVES_MAX - machine_in_training(learner)->negatives);
+        set_limit(training, BSLAM_NEGATIVES_MAX - in_training(learner)->negatives);
         bslam_solver_begin(&training->solver, COST, TOLERANCE, false);
         training->stage = BSLAM_STAGE_RECALL;
         training->own_recalled = 0;
-        training->rivals_recalled = 0;
+        training->negatives_recalled = 0;
         return;
     }
-    const int32_t first = training->block * BSLAM_PER_MACHINE;
+    const int32_t first = training->block * BSLAM_PER_CLASSIFIER;
     const int32_t end = first + samples_in_block(learner, training->block);
     for (int32_t i = first; i < end; i++) {
         if (training->bins[i] != LISTED) {
-            const uint8_t bin = bin_of(bslam_sample_decide(&training->look, bslam_sample_at(samples, i)));
+            const uint8_t bin = bin_of(bslam_sample_decide(&training->rank, bslam_sample_at(samples, i)));
             training->bins[i] = bin;
             training->histogram[bin]++;
         }
@@ -198,17 +201,17 @@ static void scan(bslam_learner_t *learner, const bslam_samples_t *samples)
     training->block += training->block_step;
 }
 
-/// One piece: makes the next of the machine's own samples or of its list a row, with its dual variable.
+/// One piece: makes the next of the classifier's own samples or of its list a row, with its dual variable.
 static void recall(bslam_learner_t *learner, const bslam_samples_t *samples)
 {
     bslam_training_t *training = &learner->training;
-    const bslam_classifier_t *classifier = machine_in_training(learner);
+    const bslam_classifier_t *classifier = in_training(learner);
     if (training->own_recalled < classifier->samples) {
         const int32_t own = training->own_recalled++;
-        bslam_solver_add(&training->solver, samples, training->classifier * BSLAM_PER_MACHINE + own, true,
+        bslam_solver_add(&training->solver, samples, training->classifier * BSLAM_PER_CLASSIFIER + own, true,
                          ALPHA_UNIT * (float)classifier->own_alpha[own]);
-    } else if (training->rivals_recalled < classifier->negatives) {
-        const int32_t listed = training->rivals_recalled++;
+    } else if (training->negatives_recalled < classifier->negatives) {
+        const int32_t listed = training->negatives_recalled++;
         bslam_solver_add(&training->solver, samples, classifier->negative[listed], false,
                          ALPHA_UNIT * (float)classifier->negative_alpha[listed]);
     } else {
@@ -240,7 +243,7 @@ static void choose(bslam_learner_t *learner, const bslam_samples_t *samples)
         training->steps_left = BSLAM_LEARNER_STEPS_MAX;
         return;
     }
-    const int32_t first = training->block * BSLAM_PER_MACHINE;
+    const int32_t first = training->block * BSLAM_PER_CLASSIFIER;
     const int32_t end = first + samples_in_block(learner, training->block);
     for (int32_t i = first; i < end; i++) {
         if (is_hard(training, i)) {
@@ -255,7 +258,7 @@ static void choose(bslam_learner_t *learner, const bslam_samples_t *samples)
 /// Ends a training; one that has not converged asks for another, a few times.
 static void finish(bslam_learner_t *learner, bool converged)
 {
-    bslam_classifier_t *classifier = machine_in_training(learner);
+    bslam_classifier_t *classifier = in_training(learner);
     keep_alphas(learner, false);
     bslam_weights_round(learner->training.solver.weights, &classifier->weights);
     classifier->trained = true;

@@ -36,7 +36,7 @@ static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting
 }
 
 /// What looks add to the score.
-static bslam_real_t looks_score(const bslam_settings_t *settings, const bslam_opinion_t *opinion)
+static bslam_real_t appearance_score(const bslam_settings_t *settings, const bslam_opinion_t *opinion)
 {
     const bslam_real_t odds =
         settings->appearance_slope * (bslam_real_t)opinion->value + settings->appearance_offset;
@@ -59,9 +59,9 @@ static bslam_real_t viewpoint_odds(const bslam_sighting_frame_t *frame, int beac
     if (frame->appearance == NULL || !bslam_has_viewpoint(&frame->ekf->beacons[beacon])) {
         return 0;
     }
-    const bslam_viewpoint_t outlook = bslam_viewpoint_of(frame->ekf, beacon);
-    return outlook.is_sure
-               ? bslam_appearance_viewpoint_odds(frame->appearance, frame->settings, beacon, outlook.sector)
+    const bslam_viewpoint_t viewpoint = bslam_viewpoint_of(frame->ekf, beacon);
+    return viewpoint.is_sure
+               ? bslam_appearance_viewpoint_odds(frame->appearance, frame->settings, beacon, viewpoint.sector)
                : 0;
 }
 
@@ -105,8 +105,8 @@ static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_
 }
 
 /// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
-/// not count the map hardly knows where it stands, and its machine knows little, so that most things may be
-/// it: what has a place of its own and is called something else is another.
+/// not count the map hardly knows where it stands, and its classifier knows little, so that most things may
+/// be it: what has a place of its own and is called something else is another.
 static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
 {
     const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
@@ -135,7 +135,7 @@ static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *cond
         found->opinion = bslam_appearance_ask(frame->appearance, frame->settings, beacon, sample);
     }
     found->score = weight.log_density + log_lost(&taken, sighting) - log_new(frame->settings, sighting) +
-                   looks_score(frame->settings, &found->opinion) + class_odds(frame, sighting, beacon);
+                   appearance_score(frame->settings, &found->opinion) + class_odds(frame, sighting, beacon);
     if (weight.distance2 <= frame->settings->candidate_d2) {  // beyond, nobody asks the score
         found->score += viewpoint_odds(frame, beacon);
     }
@@ -165,21 +165,21 @@ static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int 
     return sample;
 }
 
-/// Whether a machine may learn from a match: it is near, no other beacon comes close, and it looks like it,
-/// if that is known.
+/// Whether a classifier may learn from a match: it is near, no other beacon comes close, and it looks like
+/// it, if that is known.
 static bool is_sure(const bslam_settings_t *settings, const candidate_t *best, bslam_real_t lead)
 {
-    const bool looks_right =
+    const bool is_alike =
         best->opinion.weight < 0.5f || (bslam_real_t)best->opinion.value >= settings->learn_margin;
-    return best->distance2 <= settings->learn_d2 && lead >= settings->learn_lead && looks_right;
+    return best->distance2 <= settings->learn_d2 && lead >= settings->learn_lead && is_alike;
 }
 
-/// Whether a machine of few samples is against a match. It may be another beacon that stands near, and the
-/// two are told apart once both are in view; or else the machine has not seen that side of its beacon yet.
+/// Whether a classifier of few samples is against a match. It may be another beacon that stands near, and the
+/// two are told apart once both are in view; or else the classifier has not seen that side of its beacon yet.
 static bool is_doubted(const bslam_sighting_frame_t *frame, const candidate_t *best)
 {
     return best->opinion.weight < 0.5f && best->score < frame->settings->learn_lead &&
-           looks_score(frame->settings, &best->opinion) < 0;
+           appearance_score(frame->settings, &best->opinion) < 0;
 }
 
 /// Whether a match that little speaks for can wait: another beacon in view holds the robot in its place.
@@ -318,8 +318,8 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *con
 /// it is no candidate: the map has it in the wrong place, rather than that there is a new one; -1: there is
 /// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
 /// it will never be found.
-static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                              const bslam_record_t *records)
+static int resembles_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                             const bslam_record_t *records)
 {
     bslam_sample_t buffer;
     const bslam_sample_t *sample = sample_of(frame, i, &buffer);
@@ -328,7 +328,7 @@ static int looks_like_another(const bslam_sighting_frame_t *frame, bslam_conditi
         if (!is_taken(frame, records, b) && weigh(frame, conditional, i, b, sample, &one) &&
             one.distance2 <= frame->settings->far_d2 && one.opinion.weight >= 0.5f &&
             class_odds(frame, &frame->sightings[i], b) >= 0 &&
-            looks_score(frame->settings, &one.opinion) >= 0.5f * frame->settings->appearance_high &&
+            appearance_score(frame->settings, &one.opinion) >= 0.5f * frame->settings->appearance_high &&
             !(bslam_is_placed(frame->ekf, frame->settings->decision_delay_us, b, frame->time_us) &&
               bslam_appearance_is_due(frame->appearance, frame->settings, b, frame->time_us))) {
             return b;
@@ -362,7 +362,7 @@ static void decide_rest(const bslam_sighting_frame_t *frame, bslam_conditional_t
         match->verdict = BSLAM_VERDICT_REJECT;
         match->reason = BSLAM_REASON_DUPLICATE;
     } else if (!waits) {
-        match->delayed_for = looks_like_another(frame, conditional, i, records);
+        match->delayed_for = resembles_another(frame, conditional, i, records);
         match->verdict = match->delayed_for < 0 ? BSLAM_VERDICT_NEW : BSLAM_VERDICT_DEFER;
         match->reason = match->delayed_for < 0 ? BSLAM_REASON_NONE : BSLAM_REASON_APPEARANCE;
     }

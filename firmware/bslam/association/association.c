@@ -27,9 +27,9 @@ static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_record_t 
 
 // ---- known identity ---------------------------------------------------------------------------------------
 
-// Provisional beacons of one label. More than a few in a second are no more than the false sightings there
+// Tentative beacons of one label. More than a few in a second are no more than the false sightings there
 // are.
-enum { RIVALS_MAX = 8 };
+enum { COMPETITORS_MAX = 8 };
 
 static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                  int beacon)
@@ -60,12 +60,12 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
 }
 
 /// The beacon that a label tells. Until it is confirmed any sighting may be the false one, the first as well
-/// as those that contradict it: each of these starts a rival of the same label, and the first that is
+/// as those that contradict it: each of these starts a competitor of the same label, and the first that is
 /// confirmed stays. So the nearest, and a new one if the gate has that one out and it is not even near.
 static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                         bslam_match_t *match)
 {
-    int negatives = 0;
+    int competitors = 0;
     for (int b = 0; b < frame->ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &frame->ekf->beacons[b];
         if (beacon->label != sighting->label) {
@@ -77,16 +77,16 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
             return;
         }
         const bslam_real_t d2 = mahalanobis2(frame, sighting, b);
-        if (negatives == 0 || (d2 >= 0 && d2 < match->distance2)) {
+        if (competitors == 0 || (d2 >= 0 && d2 < match->distance2)) {
             match->beacon = b;
             match->distance2 = d2;
         }
-        negatives++;
+        competitors++;
     }
     const bslam_real_t gate_d2 = frame->settings->gate_d2;
     const bool is_out = gate_d2 > 0 && match->distance2 > gate_d2;
-    const bool may_rival = is_out && sighting->has_range && negatives < RIVALS_MAX;
-    if (negatives == 0 || (may_rival && euclidean2(frame, sighting, match->beacon) > 1)) {
+    const bool may_compete = is_out && sighting->has_range && competitors < COMPETITORS_MAX;
+    if (competitors == 0 || (may_compete && euclidean2(frame, sighting, match->beacon) > 1)) {
         match->verdict = BSLAM_VERDICT_NEW;
         match->beacon = -1;
     }

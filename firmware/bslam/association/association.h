@@ -62,14 +62,13 @@ void bslam_associate_nearest(const bslam_sighting_frame_t *frame, bslam_record_t
 /// Mahalanobis nearest neighbour with two thresholds, match_d2 and new_d2. O(count * beacons).
 void bslam_associate_mahalanobis(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
-/// The paper's two steps: candidates by position, then their machines decide between match, new and wait.
-/// Without looks or signatures by position alone. O(count * beacons), and again where two sightings want one
-/// beacon.
+/// The paper's two steps: candidates by position, then classifiers decide. Without appearance or signatures
+/// by position alone. O(count * beacons), and again where two sightings want one beacon.
 void bslam_associate_svm(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
-/// Joint compatibility branch and bound: the pairing that explains the most sightings together, within
-/// match_d2 each; what is in no pair is new beyond new_d2. At most BSLAM_GIVEN_MAX sightings are paired
-/// together, the next after them, and at most joint_nodes choices are tried for each such group.
+/// Joint compatibility branch and bound: the pairing that explains the most sightings together. At most
+/// BSLAM_CONDITIONAL_MAX sightings are paired together, and joint_nodes choices are tried for each such
+/// group.
 void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_record_t *records);
 
 /// Whether some beacon that counts, other than one (-1: whichever), was where it should be within the last

@@ -73,7 +73,7 @@ bool bslam_conditional_add(const bslam_ekf_t *ekf, bslam_conditional_t *conditio
                            const bslam_innovation_t *innovation)
 {
     const int32_t before = conditional->count;
-    if (before + 2 > 2 * BSLAM_GIVEN_MAX || !push_innovation(ekf, conditional, innovation)) {
+    if (before + 2 > 2 * BSLAM_CONDITIONAL_MAX || !push_innovation(ekf, conditional, innovation)) {
         conditional->count = before;
         return false;
     }

@@ -7,15 +7,16 @@
 #include "bslam/ekf/ekf.h"
 
 /// Sightings that may be given.
-#define BSLAM_GIVEN_MAX 5
-#define BSLAM_GIVEN_SCALARS (2 * BSLAM_GIVEN_MAX + 2)
+#define BSLAM_CONDITIONAL_MAX 5
+#define BSLAM_CONDITIONAL_SCALARS (2 * BSLAM_CONDITIONAL_MAX + 2)
 
 /// What is given. Private.
 typedef struct bslam_conditional {
     int32_t count;  ///< scalars
-    bslam_row_t rows[BSLAM_GIVEN_SCALARS];
-    bslam_real_t factor[BSLAM_GIVEN_SCALARS * (BSLAM_GIVEN_SCALARS + 1) / 2];  ///< L, L Lᵀ = S, row by row
-    bslam_real_t white[BSLAM_GIVEN_SCALARS];                                   ///< L⁻¹ y
+    bslam_row_t rows[BSLAM_CONDITIONAL_SCALARS];
+    bslam_real_t
+        factor[BSLAM_CONDITIONAL_SCALARS * (BSLAM_CONDITIONAL_SCALARS + 1) / 2];  ///< L, L Lᵀ = S, row by row
+    bslam_real_t white[BSLAM_CONDITIONAL_SCALARS];                                ///< L⁻¹ y
 } bslam_conditional_t;
 
 /// An innovation, given what is given.

@@ -78,7 +78,7 @@ static bool are_of_two_classes(const bslam_appearance_t *appearance, int a, int 
 }
 
 /// Of a pair in one place, what the frame adds. True if one of them must leave.
-static bool count_pair(bslam_beacon_look_t *younger, uint32_t older_uid, bool together, int32_t limit)
+static bool count_pair(bslam_beacon_appearance_t *younger, uint32_t older_uid, bool together, int32_t limit)
 {
     if (younger->near_uid != older_uid || together) {
         younger->near_uid = older_uid;

@@ -7,17 +7,18 @@
 #include "bslam/association/association_internal.h"
 #include "base/scalar.h"
 
-/// A search through the pairings of up to BSLAM_GIVEN_MAX sightings: level i chooses for the i-th of them.
-typedef struct search {
+/// A search through the pairings of up to BSLAM_CONDITIONAL_MAX sightings: level i chooses for the i-th of
+/// them.
+typedef struct pairing_search {
     bslam_conditional_t conditional;
-    int32_t sightings[BSLAM_GIVEN_MAX];
-    int32_t next[BSLAM_GIVEN_MAX];    ///< what a level tries next: a beacon, or none at all
-    int32_t choice[BSLAM_GIVEN_MAX];  ///< a beacon, or -1
-    int32_t scalars[BSLAM_GIVEN_MAX + 1];
-    int32_t pairs[BSLAM_GIVEN_MAX + 1];
-    int32_t best[BSLAM_GIVEN_MAX], count, best_pairs;
+    int32_t sightings[BSLAM_CONDITIONAL_MAX];
+    int32_t next[BSLAM_CONDITIONAL_MAX];    ///< what a level tries next: a beacon, or none at all
+    int32_t choice[BSLAM_CONDITIONAL_MAX];  ///< a beacon, or -1
+    int32_t scalars[BSLAM_CONDITIONAL_MAX + 1];
+    int32_t pairs[BSLAM_CONDITIONAL_MAX + 1];
+    int32_t best[BSLAM_CONDITIONAL_MAX], count, best_pairs;
     bslam_real_t best_distance2;
-} search_t;
+} pairing_search_t;
 
 /// The chi-squared value of `freedoms` that is exceeded as rarely as the normal deviation joint_sd
 /// (Wilson and Hilferty).
@@ -30,7 +31,7 @@ static bslam_real_t joint_limit(const bslam_settings_t *settings, int32_t freedo
 }
 
 static bool is_free(const bslam_sighting_frame_t *frame, const bslam_record_t *records,
-                    const search_t *search, int32_t level, int32_t beacon)
+                    const pairing_search_t *search, int32_t level, int32_t beacon)
 {
     for (int32_t i = 0; i < level; i++) {
         if (search->choice[i] == beacon) {
@@ -46,7 +47,7 @@ static bool is_free(const bslam_sighting_frame_t *frame, const bslam_record_t *r
 }
 
 /// Pairs the sighting of a level with a beacon, if both alone and with the pairs before it that is possible.
-static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t level, int32_t beacon)
+static bool pair(const bslam_sighting_frame_t *frame, pairing_search_t *search, int32_t level, int32_t beacon)
 {
     const bslam_sighting_t *sighting = &frame->sightings[search->sightings[level]];
     bslam_innovation_t innovation;
@@ -65,7 +66,7 @@ static bool pair(const bslam_sighting_frame_t *frame, search_t *search, int32_t 
 
 /// Keeps the pairing at hand if it has more pairs than the best so far, or as many that fit better: one of
 /// fewer does not come so far (try_next).
-static void keep_if_better(search_t *search)
+static void keep_if_better(pairing_search_t *search)
 {
     const int32_t pairs = search->pairs[search->count];
     const bslam_real_t distance2 = bslam_conditional_distance2(&search->conditional);
@@ -77,8 +78,8 @@ static void keep_if_better(search_t *search)
 }
 
 /// Tries the next choice of a level. True if the search may go one level deeper.
-static bool try_next(const bslam_sighting_frame_t *frame, const bslam_record_t *records, search_t *search,
-                     int32_t level)
+static bool try_next(const bslam_sighting_frame_t *frame, const bslam_record_t *records,
+                     pairing_search_t *search, int32_t level)
 {
     const int32_t beacon = search->next[level]++;
     const int32_t left = search->count - level - 1;
@@ -98,7 +99,7 @@ static bool try_next(const bslam_sighting_frame_t *frame, const bslam_record_t *
 }
 
 /// Depth first, until all is tried or joint_nodes choices were.
-static void run(const bslam_sighting_frame_t *frame, const bslam_record_t *records, search_t *search)
+static void run(const bslam_sighting_frame_t *frame, const bslam_record_t *records, pairing_search_t *search)
 {
     int32_t level = 0;
     search->next[0] = 0;
@@ -133,14 +134,14 @@ static void decide_rest(const bslam_sighting_frame_t *frame, int32_t i, bslam_ma
 }
 
 /// Searches for the sightings that were gathered, and writes down what was found.
-static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_record_t *records)
+static void settle(const bslam_sighting_frame_t *frame, pairing_search_t *search, bslam_record_t *records)
 {
     bslam_conditional_init(&search->conditional);
     search->scalars[0] = 0;
     search->pairs[0] = 0;
     search->best_pairs = 0;
     search->best_distance2 = 0;
-    for (int32_t k = 0; k < BSLAM_GIVEN_MAX; k++) {
+    for (int32_t k = 0; k < BSLAM_CONDITIONAL_MAX; k++) {
         search->best[k] = -1;
     }
     run(frame, records, search);
@@ -158,7 +159,7 @@ static void settle(const bslam_sighting_frame_t *frame, search_t *search, bslam_
 
 void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_record_t *records)
 {
-    search_t search;
+    pairing_search_t search;
     search.count = 0;
     for (int i = 0; i < frame->count; i++) {
         (void)bslam_is_mappable(&frame->sightings[i], &records[i].match);
@@ -169,7 +170,7 @@ void bslam_associate_joint(const bslam_sighting_frame_t *frame, bslam_record_t *
         }
         search.sightings[search.count] = i;
         search.count++;
-        if (search.count == BSLAM_GIVEN_MAX) {
+        if (search.count == BSLAM_CONDITIONAL_MAX) {
             settle(frame, &search, records);
         }
     }

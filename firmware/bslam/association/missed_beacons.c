@@ -18,27 +18,28 @@ static const bslam_real_t MISSED_M = BSLAM_R(0.3);
 
 enum { STEPS_MAX = UINT8_MAX };
 
-static void note_seen(bslam_appearance_t *appearance, int index, const bslam_viewpoint_t *outlook)
+static void note_seen(bslam_appearance_t *appearance, int index, const bslam_viewpoint_t *viewpoint)
 {
-    bslam_beacon_look_t *look = &appearance->of[index];
-    const bslam_real_t steps = outlook->range_m * STEPS_PER_M + 1;
-    look->seen_from[outlook->sector] = (uint8_t)(steps < STEPS_MAX ? steps : STEPS_MAX);
-    look->missed = 0;
+    bslam_beacon_appearance_t *known = &appearance->of[index];
+    const bslam_real_t steps = viewpoint->range_m * STEPS_PER_M + 1;
+    known->seen_from[viewpoint->sector] = (uint8_t)(steps < STEPS_MAX ? steps : STEPS_MAX);
+    known->missed = 0;
     appearance->left_rad =
-        outlook->bearing_rad > appearance->left_rad ? outlook->bearing_rad : appearance->left_rad;
+        viewpoint->bearing_rad > appearance->left_rad ? viewpoint->bearing_rad : appearance->left_rad;
     appearance->right_rad =
-        outlook->bearing_rad < appearance->right_rad ? outlook->bearing_rad : appearance->right_rad;
+        viewpoint->bearing_rad < appearance->right_rad ? viewpoint->bearing_rad : appearance->right_rad;
 }
 
 /// Whether a beacon that stands where the map has it would be seen.
 static bool is_expected(const bslam_appearance_t *appearance, const bslam_ekf_t *ekf, int index,
-                        const bslam_viewpoint_t *outlook)
+                        const bslam_viewpoint_t *viewpoint)
 {
-    const bslam_real_t seen_m = (bslam_real_t)appearance->of[index].seen_from[outlook->sector] / STEPS_PER_M;
-    const bslam_real_t off_m = bslam_abs(outlook->range_m - seen_m);
-    return off_m <= SAME_PLACE * seen_m && outlook->bearing_rad < INSIDE * appearance->left_rad &&
-           outlook->bearing_rad > INSIDE * appearance->right_rad &&
-           bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && outlook->is_sure;
+    const bslam_real_t seen_m =
+        (bslam_real_t)appearance->of[index].seen_from[viewpoint->sector] / STEPS_PER_M;
+    const bslam_real_t off_m = bslam_abs(viewpoint->range_m - seen_m);
+    return off_m <= SAME_PLACE * seen_m && viewpoint->bearing_rad < INSIDE * appearance->left_rad &&
+           viewpoint->bearing_rad > INSIDE * appearance->right_rad &&
+           bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && viewpoint->is_sure;
 }
 
 int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
@@ -46,26 +47,26 @@ int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t 
                               bool judges)
 {
     const uint32_t least_um = (uint32_t)(MISSED_M * MICROMETRES_PER_M);
-    int vanished = BSLAM_NO_MISSED_BEACON;
+    int missed = BSLAM_NO_MISSED_BEACON;
     for (int b = 0; b < ekf->beacon_count && settings->missed_views > 0; b++) {
-        bslam_beacon_look_t *look = &appearance->of[b];
+        bslam_beacon_appearance_t *known = &appearance->of[b];
         if (!bslam_has_viewpoint(&ekf->beacons[b])) {
             continue;
         }
-        const bslam_viewpoint_t outlook = bslam_viewpoint_of(ekf, b);
+        const bslam_viewpoint_t viewpoint = bslam_viewpoint_of(ekf, b);
         const bool is_seen = ekf->beacons[b].last_seen_us == time_us;
         if (is_seen) {
-            note_seen(appearance, b, &outlook);
+            note_seen(appearance, b, &viewpoint);
         }
-        if (is_seen || !is_expected(appearance, ekf, b, &outlook)) {
-            look->missed_um = travelled_um;
-        } else if (judges && travelled_um - look->missed_um >= least_um) {
-            look->missed_um = travelled_um;
-            look->seen_from[outlook.sector] = 0;
-            look->missed++;
-            vanished = look->missed >= settings->missed_views ? b : vanished;
+        if (is_seen || !is_expected(appearance, ekf, b, &viewpoint)) {
+            known->missed_um = travelled_um;
+        } else if (judges && travelled_um - known->missed_um >= least_um) {
+            known->missed_um = travelled_um;
+            known->seen_from[viewpoint.sector] = 0;
+            known->missed++;
+            missed = known->missed >= settings->missed_views ? b : missed;
         }
     }
-    appearance->counters.vanished += vanished != BSLAM_NO_MISSED_BEACON ? 1u : 0u;
-    return vanished;
+    appearance->counters.vanished += missed != BSLAM_NO_MISSED_BEACON ? 1u : 0u;
+    return missed;
 }

@@ -16,7 +16,7 @@ typedef struct bslam_viewpoint {
 /// the map's: 0 to BSLAM_APPEARANCE_SECTORS - 1.
 int bslam_viewpoint_sector(bslam_real_t direction_rad);
 
-/// Whether a beacon has a place of its own in the map, so that it has an outlook.
+/// Whether a beacon has a place of its own in the map, so that it has a viewpoint.
 bool bslam_has_viewpoint(const bslam_beacon_t *beacon);
 
 /// Of beacon `index`, which has one. O(1).

@@ -305,15 +305,15 @@ static bool ray_is_linear(const bslam_ekf_t *ekf, const bslam_settings_t *settin
 }
 
 /// A point by what the state has: how it goes with that, and what it errs besides.
-typedef struct place {
+typedef struct located {
     bslam_real_t x_m, y_m;
     bslam_row_t x_row;
     bslam_row_t y_row;
     bslam_sym2_t own;
-} place_t;
+} located_t;
 
 /// The values at `at` and behind it become the point.
-static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
+static void set_place(bslam_ekf_t *ekf, int at, const located_t *place)
 {
     bslam_real_t *x_column = ekf->pending[0];
     bslam_real_t *y_column = ekf->pending[1];
@@ -335,7 +335,7 @@ static void set_place(bslam_ekf_t *ekf, int at, const place_t *place)
 /// Where on the ray at `at` a sighting's distance ends, MATH (38), and how that goes with the
 /// distance. False: nowhere, or so much across the ray that the distance does not tell.
 static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t range_m, int at,
-                         place_t *place, bslam_real_t by_range[2])
+                         located_t *place, bslam_real_t by_range[2])
 {
     const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
@@ -357,7 +357,7 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
     const bslam_real_t turn = length_m * (uy * ex - ux * ey) / c;  // d length / d direction
     by_range[0] = ux / c;
     by_range[1] = uy / c;
-    *place = (place_t){.x_m = ekf->mean[at] + length_m * ux, .y_m = ekf->mean[at + 1] + length_m * uy};
+    *place = (located_t){.x_m = ekf->mean[at] + length_m * ux, .y_m = ekf->mean[at + 1] + length_m * uy};
     const bslam_real_t by_theta = ex * sensor.x_by_theta + ey * sensor.y_by_theta;
     place->x_row = (bslam_row_t){
         .base = {by_range[0] * ex, by_range[0] * ey, by_range[0] * by_theta},
@@ -380,7 +380,7 @@ bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, c
     bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
     const bslam_real_t range_m = sighting->range_m;
-    place_t place;
+    located_t place;
     bslam_real_t by_range[2];
     if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, mount, range_m, at, &place, by_range)) {
         return false;
@@ -409,7 +409,7 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, co
         return false;
     }
     const bslam_ray_point_t point = bslam_ray_to_point(&ekf->mean[at]);
-    place_t place = {.x_m = point.x_m, .y_m = point.y_m};
+    located_t place = {.x_m = point.x_m, .y_m = point.y_m};
     place.x_row = (bslam_row_t){.at = (uint16_t)at, .dim = BSLAM_RAY_DIM};
     place.y_row = place.x_row;
     memcpy(place.x_row.other, point.x_by_ray, sizeof place.x_row.other);

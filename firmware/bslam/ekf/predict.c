@@ -347,7 +347,7 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
 
 /// A walk of v makes the way no more doubtful than this, which is as good as unknown: beside more, the few
 /// millimetres that are known of it would be rounded away.
-static const bslam_real_t WAY_SD_MAX_M = BSLAM_R(1.5);
+static const bslam_real_t TRAVEL_SD_MAX_M = BSLAM_R(1.5);
 
 /// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
 static void drive_about(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s,
@@ -360,7 +360,7 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
     const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
     const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
     const bslam_real_t v_var = v_walk * v_walk * dt_s;
-    const bslam_real_t v_sd_max = WAY_SD_MAX_M / dt_s;
+    const bslam_real_t v_sd_max = TRAVEL_SD_MAX_M / dt_s;
     walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_var < v_sd_max * v_sd_max ? v_var : v_sd_max * v_sd_max);
     walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
     for (int i = BSLAM_STATE_FORWARD; i <= BSLAM_STATE_TURN; i++) {
@@ -376,7 +376,7 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
 }
 
 /// The way is as doubtful as it misses the next point, times `share`, both axes.
-static void doubt_way(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
+static void doubt_travel(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
 {
     const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
     const bslam_real_t y_m = share * (ekf->mean[BSLAM_STATE_Y] - next[BSLAM_STATE_Y]);
@@ -401,7 +401,7 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings,
         drive_about(&state, settings, motion->dt_s, bend->stretch, next);
     }
     ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
-    doubt_way(ekf, next, bend->doubt_of_miss);
+    doubt_travel(ekf, next, bend->doubt_of_miss);
     for (int i = 0; i < ekf->base_dim; i++) {
         const bslam_real_t left = ekf->mean[i] - next[i];
         ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;

@@ -1,4 +1,4 @@
-/// Noise of a sighting: its own if the detector gives one, else that of the parameters. MATH "Observation".
+/// Noise of a sighting: its own if the detector gives one, else that of the settings. MATH "Observation".
 #ifndef BSLAM_MODEL_NOISE_H
 #define BSLAM_MODEL_NOISE_H
 

@@ -10,7 +10,7 @@ static const int64_t TIME_MAX_US = INT64_MAX / 2;
 static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
 /// More than this in one interval is no motion of a robot: 16 turns.
 static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
-/// Limits of a reading's own gyro noise, as of the parameter gyro_sd_radps.
+/// Limits of a reading's own gyro noise, as of the setting gyro_sd_radps.
 static const bslam_real_t GYRO_SD_MIN_RADPS = BSLAM_R(1e-6), GYRO_SD_MAX_RADPS = BSLAM_R(100.0);
 
 /// Travel of both wheels in one interval.
@@ -111,12 +111,12 @@ static void travel_to_motion(const bslam_settings_t *settings, const wheel_trave
     motion->turn_var_rad2 = (left_var + right_var) / (base * base);
     motion->forward_turn_cov_mrad = (right_var - left_var) / (2 * base);
 
-    const bslam_real_t way = bslam_abs(motion->forward_m), turn = bslam_abs(motion->turn_rad);
-    const bslam_real_t moving_s = way > 0 || turn > 0 ? dt_s : 0;
-    motion->forward_var_m2 +=
-        square(settings->forward_sd_per_sqrt_s) * moving_s + square(settings->forward_sd_per_sqrt_m) * way;
+    const bslam_real_t travel_m = bslam_abs(motion->forward_m), turn = bslam_abs(motion->turn_rad);
+    const bslam_real_t moving_s = travel_m > 0 || turn > 0 ? dt_s : 0;
+    motion->forward_var_m2 += square(settings->forward_sd_per_sqrt_s) * moving_s +
+                              square(settings->forward_sd_per_sqrt_m) * travel_m;
     motion->turn_var_rad2 += square(settings->turn_sd_per_sqrt_s) * moving_s +
-                             square(settings->turn_sd_per_sqrt_m) * way +
+                             square(settings->turn_sd_per_sqrt_m) * travel_m +
                              square(settings->turn_sd_per_sqrt_rad) * turn;
     motion->forward_var_m2 += square(settings->gap_speed_sd_mps * gap_s);
     motion->turn_var_rad2 += square(settings->gap_turn_sd_radps * gap_s);

@@ -26,7 +26,7 @@ void bslam_odometry_restart(bslam_odometry_t *odometry);
 /// The motion since the reading before, into *motion. O(1).
 /// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 4 s. BSLAM_E_NOT_FINITE,
 /// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, a noise of it that is not 0
-/// and outside the limits of the parameter, an unknown source),
+/// and outside the limits of the setting, an unknown source),
 /// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
 /// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
 /// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.

@@ -1,6 +1,6 @@
 #include "bslam/recovery/identity.h"
 
-// A machine recognises what it puts this far above 0, and this far above what the next machine says.
+// A classifier recognises what it puts this far above 0, and this far above what the next classifier says.
 static const float RECOGNISE_WEIGHT = 0.8f;
 static const float RECOGNISE_VALUE = 0.3f;
 static const float RECOGNISE_LEAD = 0.5f;
@@ -10,27 +10,27 @@ enum { FINDABLE_MIN = 2 };
 static int find_label(const bslam_ekf_t *ekf, int32_t label)
 {
     for (int b = 0; b < ekf->beacon_count && label != BSLAM_LABEL_NONE; b++) {
-        if (ekf->beacons[b].label == label && ekf->beacons[b].confirmed) {  // not one of its rivals
+        if (ekf->beacons[b].label == label && ekf->beacons[b].confirmed) {  // not one of its competitors
             return b;
         }
     }
     return BSLAM_NOBODY;
 }
 
-static bool looks_alike(const bslam_slam_t *slam, int a, int b)
+static bool share_classifier(const bslam_slam_t *slam, int a, int b)
 {
     return slam->appearance->of[a].classifier == slam->appearance->of[b].classifier;
 }
 
-/// The first beacon of the machine that takes a sample for its own, if no other one comes near.
-static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
+/// The first beacon of the classifier that takes a sample for its own, if no other one comes near.
+static int find_classifier(const bslam_slam_t *slam, const bslam_sample_t *sample)
 {
     int best = BSLAM_NOBODY;
     float best_value = RECOGNISE_VALUE;
     float next_value = RECOGNISE_VALUE - RECOGNISE_LEAD;
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
         const bslam_opinion_t opinion = bslam_appearance_ask(slam->appearance, &slam->settings, b, sample);
-        if (opinion.weight < RECOGNISE_WEIGHT || (best >= 0 && looks_alike(slam, b, best))) {
+        if (opinion.weight < RECOGNISE_WEIGHT || (best >= 0 && share_classifier(slam, b, best))) {
             continue;
         }
         if (opinion.value > best_value) {
@@ -44,16 +44,16 @@ static int find_machine(const bslam_slam_t *slam, const bslam_sample_t *sample)
     return best_value - next_value >= RECOGNISE_LEAD ? best : BSLAM_NOBODY;
 }
 
-static int find_looks(const bslam_slam_t *slam, const float *signature)
+static int find_by_appearance(const bslam_slam_t *slam, const float *signature)
 {
     bslam_sample_t sample;
     if (!bslam_slam_learns(slam) || signature == NULL ||
         bslam_sample_encode(signature, &sample) != BSLAM_OK) {
         return BSLAM_NOBODY;
     }
-    const int best = find_machine(slam, &sample);
+    const int best = find_classifier(slam, &sample);
     for (int b = best; b >= 0 && b < slam->ekf.beacon_count; b++) {
-        if (slam->ekf.beacons[b].confirmed && looks_alike(slam, b, best)) {
+        if (slam->ekf.beacons[b].confirmed && share_classifier(slam, b, best)) {
             return b;
         }
     }
@@ -65,8 +65,9 @@ static int find(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
     if (sighting->beacon_class == BSLAM_CLASS_NOT_MAPPABLE) {
         return BSLAM_NOBODY;
     }
-    return slam->settings.association == BSLAM_ASSOCIATION_KNOWN ? find_label(&slam->ekf, sighting->label)
-                                                                 : find_looks(slam, sighting->signature);
+    return slam->settings.association == BSLAM_ASSOCIATION_KNOWN
+               ? find_label(&slam->ekf, sighting->label)
+               : find_by_appearance(slam, sighting->signature);
 }
 
 static bool is_seen_once(const int *who, int count, int i)
@@ -92,9 +93,10 @@ void bslam_identify(const bslam_slam_t *slam, const bslam_sighting_t *sightings,
 
 bool bslam_may_be(const bslam_slam_t *slam, int who, int beacon)
 {
-    const bool by_looks = slam->settings.association != BSLAM_ASSOCIATION_KNOWN && bslam_slam_learns(slam);
+    const bool by_appearance =
+        slam->settings.association != BSLAM_ASSOCIATION_KNOWN && bslam_slam_learns(slam);
     return beacon == who ||
-           (by_looks && slam->ekf.beacons[beacon].confirmed && looks_alike(slam, beacon, who));
+           (by_appearance && slam->ekf.beacons[beacon].confirmed && share_classifier(slam, beacon, who));
 }
 
 static bool is_known(const bslam_slam_t *slam, int beacon)

@@ -17,7 +17,7 @@ static const bslam_real_t FIT_D2 = BSLAM_R(9.0);
 static const bslam_real_t SAME_PLACE_M = BSLAM_R(0.25);
 static const bslam_real_t SAME_HEADING_RAD = BSLAM_R(0.15);
 // Of the way since a clue was seen.
-static const bslam_real_t WAY_SD = BSLAM_R(0.15);
+static const bslam_real_t TRAVEL_SD = BSLAM_R(0.15);
 // The fix's doubt is that of its clues, which share the beacons' errors and the way since: so much wider.
 static const bslam_real_t DOUBT_FACTOR = BSLAM_R(1.5);
 static const bslam_real_t DOUBT_M = BSLAM_R(0.05);
@@ -120,9 +120,10 @@ static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memo
     bslam_ekf_beacon_position(ekf, beacon, &clue.x_m, &clue.y_m);
     const bslam_sym2_t place = bslam_ekf_beacon_covariance(ekf, beacon);
     const bslam_real_t turn_var = growth(heading_var(ekf), memory->heading_var_rad2);
-    const bslam_real_t way2_m2 = robot.x_m * robot.x_m + robot.y_m * robot.y_m;
+    const bslam_real_t travel2_m2 = robot.x_m * robot.x_m + robot.y_m * robot.y_m;
     // A heading that drifts evenly bends the way by its deviation over the root of 3.
-    const bslam_real_t drift_m2 = way2_m2 * (WAY_SD * WAY_SD + turn_var / 3) + (place.xx + place.yy) / 2;
+    const bslam_real_t drift_m2 =
+        travel2_m2 * (TRAVEL_SD * TRAVEL_SD + turn_var / 3) + (place.xx + place.yy) / 2;
     const bslam_real_t range_m = sighting->has_range && sighting->range_m > 1 ? sighting->range_m : 1;
     clue.bearing_var_rad2 =
         bslam_bearing_variance_rad2(&slam->settings, sighting) + turn_var + drift_m2 / (range_m * range_m);
@@ -164,10 +165,10 @@ static int recall(const bslam_recovery_t *recovery, const bslam_slam_t *slam, bs
 // ---- noticing ---------------------------------------------------------------------------------------------
 
 /// What a frame says of the pose.
-typedef struct verdict {
+typedef struct tally {
     int agreeing, contradicting, recognised;
     uint32_t uid;  ///< of one that contradicts
-} verdict_t;
+} tally_t;
 
 /// Squared distance of a sighting from a beacon; negative: it has none.
 static bslam_real_t distance2_of(const bslam_slam_t *slam, const bslam_pose_t *mount,
@@ -205,10 +206,10 @@ static bool fits_any(const bslam_slam_t *slam, const bslam_pose_t *mount, const 
 /// What was recognised agrees or contradicts. What stands where some beacon is agrees, too, and does not
 /// contradict: it may be that one, and look like another from here. But not in doubt: then the pose is
 /// odometry's alone and grows vague, by which anything stands somewhere, so that identities alone count.
-static verdict_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view)
+static tally_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view)
 {
     const bool in_doubt = recovery->evidence > 0;
-    verdict_t verdict = {0, 0, 0, 0};
+    tally_t verdict = {0, 0, 0, 0};
     for (int i = 0; i < view->count; i++) {
         const bslam_sighting_t *sighting = &view->sightings[i];
         const int who = view->who[i];
@@ -259,7 +260,7 @@ static void get_lost(bslam_recovery_t *recovery, bslam_slam_t *slam)
     recovery->evidence = 0;
 }
 
-static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, int64_t time_us)
+static void add_evidence(bslam_recovery_t *recovery, const tally_t *verdict, int64_t time_us)
 {
     if (recovery->evidence == 0) {
         recovery->doubted_us = time_us;
@@ -275,7 +276,7 @@ static void add_evidence(bslam_recovery_t *recovery, const verdict_t *verdict, i
 
 /// A frame that does not speak against the pose. A doubt that one beacon raised ends when another agrees, for
 /// then it is that one that is odd, and when nothing was recognised for a moment.
-static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const verdict_t *verdict)
+static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const tally_t *verdict)
 {
     if (verdict->agreeing > verdict->contradicting) {
         recovery->evidence--;
@@ -293,7 +294,7 @@ static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const ver
 
 /// True if the frame may be used. In doubt it may not, unless more agree: a robot that was carried would
 /// learn from it that its beacons' looks are those of new ones.
-static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const verdict_t *verdict)
+static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const tally_t *verdict)
 {
     recovery->counters.contradicting += (uint32_t)verdict->contradicting;
     if (verdict->contradicting > verdict->agreeing) {
@@ -468,7 +469,7 @@ static bool is_elsewhere(bslam_recovery_t *recovery, const bslam_slam_t *slam, i
 
 /// A frame of a robot in a map that grows. True if it shows that the robot is elsewhere: at *fix.
 static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view,
-                        const verdict_t *verdict, bslam_fix_t *fix)
+                        const tally_t *verdict, bslam_fix_t *fix)
 {
     (void)remember(recovery, slam, view);
     if (verdict->contradicting == 0) {
@@ -484,7 +485,7 @@ static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, co
 }
 
 /// A frame of a robot in a map that has settled, or in doubt. True if it may be used.
-static bool look_again(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t *view, verdict_t *verdict)
+static bool look_again(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t *view, tally_t *verdict)
 {
     if (recovery->evidence == 0) {
         forget_all(recovery);  // what was remembered while the map grew
@@ -511,7 +512,7 @@ static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t 
                    bslam_fix_t *fix)
 {
     note_growth(recovery, slam, view->time_us);
-    verdict_t verdict = weigh(recovery, slam, view);
+    tally_t verdict = weigh(recovery, slam, view);
     if (recovery->evidence > 0 || !is_growing(recovery, slam, view->time_us)) {
         return look_again(recovery, slam, view, &verdict);
     }

@@ -9,7 +9,7 @@
 // A clue agrees with a pose up to this squared distance: of two values one in 3000 does not.
 static const bslam_real_t AGREE_D2 = BSLAM_R(16.0);
 // Which beacon a sighting shows of several is told if by any other all that agree are so much farther off.
-static const bslam_real_t TOLD_D2 = BSLAM_R(9.0);
+static const bslam_real_t AMBIGUOUS_D2 = BSLAM_R(9.0);
 // Beacons closer together give no heading.
 static const bslam_real_t BASE_MIN_M = BSLAM_R(0.3);
 static const bslam_real_t SINE_MIN = BSLAM_R(0.02);
@@ -280,30 +280,30 @@ static bool refine(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
 
 // ---- the best ---------------------------------------------------------------------------------------------
 
-typedef struct search {
+typedef struct pose_search {
     const bslam_clue_t *clues;
     int count;
     bslam_pose_t best;
     vote_t vote;
-    vote_t negative;  ///< the best by other beacons
-} search_t;
+    vote_t competitor;  ///< the best by other beacons
+} pose_search_t;
 
-static void try_pose(search_t *search, const bslam_pose_t *pose)
+static void try_pose(pose_search_t *search, const bslam_pose_t *pose)
 {
     const vote_t vote = vote_on(search->clues, search->count, pose);
     const bool is_best = is_better(&vote, &search->vote);
     const vote_t second = is_best ? search->vote : vote;
     if (is_best) {
-        search->negative = search->negative.who == vote.who ? (vote_t){0} : search->negative;
+        search->competitor = search->competitor.who == vote.who ? (vote_t){0} : search->competitor;
         search->vote = vote;
         search->best = *pose;
     }
-    if (second.who != search->vote.who && is_better(&second, &search->negative)) {
-        search->negative = second;
+    if (second.who != search->vote.who && is_better(&second, &search->competitor)) {
+        search->competitor = second;
     }
 }
 
-static void try_all(search_t *search)
+static void try_all(pose_search_t *search)
 {
     const bslam_clue_t *clues = search->clues;
     const int count = search->count;
@@ -324,11 +324,11 @@ static void try_all(search_t *search)
 }
 
 /// Whether no pose by other beacons is about as good.
-static bool is_told(const search_t *search)
+static bool is_unambiguous(const pose_search_t *search)
 {
-    return search->negative.beacons < search->vote.beacons ||
-           search->negative.agreeing < search->vote.agreeing ||
-           search->negative.distance2 > search->vote.distance2 + TOLD_D2;
+    return search->competitor.beacons < search->vote.beacons ||
+           search->competitor.agreeing < search->vote.agreeing ||
+           search->competitor.distance2 > search->vote.distance2 + AMBIGUOUS_D2;
 }
 
 static bool is_enough(const vote_t *vote)
@@ -338,10 +338,10 @@ static bool is_enough(const vote_t *vote)
 
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix)
 {
-    search_t search = {.clues = clues, .count = count};
+    pose_search_t search = {.clues = clues, .count = count};
     try_all(&search);
     bslam_fix_t found = {.pose = search.best};
-    if (!is_enough(&search.vote) || !is_told(&search) || !refine(clues, count, &found)) {
+    if (!is_enough(&search.vote) || !is_unambiguous(&search) || !refine(clues, count, &found)) {
         return false;
     }
     const vote_t vote = vote_on(clues, count, &found.pose);

@@ -36,8 +36,8 @@ typedef struct bslam_fix {
 } bslam_fix_t;
 
 /// The pose that most beacons of `count` <= BSLAM_CLUES_MAX clues agree with. False, and *fix unchanged:
-/// fewer than two with distance agree on any, nor three without, or as many agree on another pose by taking
-/// a sighting for another beacon. O(count³), or O(count⁴) without distances.
+/// fewer than two with distance agree on any, nor three without, or it is ambiguous. O(count³), O(count⁴)
+/// without distances.
 bool bslam_relocate(const bslam_clue_t *clues, int count, bslam_fix_t *fix);
 
 /// How many beacons of the clues, at most BSLAM_CLUES_MAX of them, are where this pose has them. O(count²).

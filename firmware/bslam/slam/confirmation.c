@@ -91,7 +91,7 @@ static bool knows_few(const bslam_slam_t *slam)
     return confirmed < slam->settings.existence_beacons;
 }
 
-static bool is_on_trial(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
+static bool is_tentative(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
 {
     const bslam_settings_t *settings = &slam->settings;
     return !beacon->confirmed && beacon->has_scores &&
@@ -104,10 +104,10 @@ void bslam_slam_mark_tentative(bslam_slam_t *slam, int count)
         const bslam_sighting_t *sighting = slam->records[i].sighting;
         bslam_match_t *match = &slam->records[i].match;
         slam->measures_distance = slam->measures_distance || sighting->has_range;
-        const bool is_tried =
-            match->verdict == BSLAM_VERDICT_MATCH && is_on_trial(slam, &slam->ekf.beacons[match->beacon]);
+        const bool is_unproven =
+            match->verdict == BSLAM_VERDICT_MATCH && is_tentative(slam, &slam->ekf.beacons[match->beacon]);
         const bool is_refuted = match->verdict == BSLAM_VERDICT_NEW && has_score(slam, sighting) &&
                                 sighting->score < slam->settings.existence_score;
-        match->verdict = is_tried || is_refuted ? BSLAM_VERDICT_TENTATIVE : match->verdict;
+        match->verdict = is_unproven || is_refuted ? BSLAM_VERDICT_TENTATIVE : match->verdict;
     }
 }

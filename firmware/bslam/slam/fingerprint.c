@@ -32,7 +32,7 @@ static uint64_t add_state(uint64_t hash, const bslam_ekf_t *ekf)
     return hash;
 }
 
-static uint64_t add_machines(uint64_t hash, const bslam_learner_t *learner)
+static uint64_t add_classifiers(uint64_t hash, const bslam_learner_t *learner)
 {
     for (uint32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
         const bslam_classifier_t *classifier = &learner->classifiers[m];
@@ -71,5 +71,5 @@ uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
     if (bslam_slam_smooths(slam)) {
         hash = add_smoother(hash, slam->smoother);
     }
-    return bslam_slam_learns(slam) ? add_machines(hash, &slam->appearance->learner) : hash;
+    return bslam_slam_learns(slam) ? add_classifiers(hash, &slam->appearance->learner) : hash;
 }

@@ -110,13 +110,13 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_record_t *reco
 
 /// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
 /// that one does it.
-static void note_rivals(bslam_slam_t *slam, int index)
+static void note_competitors(bslam_slam_t *slam, int index)
 {
     bslam_beacon_t *beacons = slam->ekf.beacons;
     for (int b = 0; b < index && slam->settings.association == BSLAM_ASSOCIATION_KNOWN; b++) {
-        const uint32_t negatives = beacons[b].label == beacons[index].label ? 1 : 0;
-        beacons[b].gated += negatives;
-        beacons[index].gated += negatives;
+        const uint32_t against = beacons[b].label == beacons[index].label ? 1 : 0;
+        beacons[b].gated += against;
+        beacons[index].gated += against;
     }
 }
 
@@ -142,7 +142,7 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->sightings = 1;
     beacon->travelled_um = slam->travelled_um;
     bslam_slam_confirm_new(slam, beacon, sighting);
-    note_rivals(slam, index);
+    note_competitors(slam, index);
     if (bslam_slam_smooths(slam)) {
         bslam_smoother_see(slam->smoother, sighting, index);
     }
@@ -290,7 +290,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 
 // ---- learning ---------------------------------------------------------------------------------------------
 
-static bool was_tried(const bslam_account_t *account)
+static bool was_tentative(const bslam_account_t *account)
 {
     return account->reason == BSLAM_REASON_TENTATIVE && account->has_beacon;
 }
@@ -306,7 +306,7 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
             bslam_appearance_note_view(slam->appearance, bslam_slam_find_beacon(slam, account->beacon_uid),
                                        slam->settings.again_odds);
-        } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account)) {
+        } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account)) {
             bslam_appearance_note_view(slam->appearance, match->beacon, match->view_score);
         }
     }
@@ -325,7 +325,7 @@ static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *s
     for (int i = 0; i < count; i++) {
         const bslam_account_t *account = slam->records[i].account;
         const bool is_new = account->outcome == BSLAM_OUTCOME_NEW;
-        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || was_tried(account);
+        const bool is_matched = account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account);
         all_matched = all_matched && is_matched;
         if (!is_new && !is_matched) {
             continue;
@@ -342,17 +342,17 @@ static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *s
     if (leaves != BSLAM_NO_DUPLICATE) {
         bslam_slam_drop_beacon(slam, leaves);
     }
-    const int vanished = bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->settings, time_us,
-                                                   slam->travelled_um, all_matched);
-    if (vanished != BSLAM_NO_MISSED_BEACON) {
-        bslam_slam_drop_beacon(slam, vanished);
+    const int missed = bslam_missed_beacons_find(slam->appearance, &slam->ekf, &slam->settings, time_us,
+                                                 slam->travelled_um, all_matched);
+    if (missed != BSLAM_NO_MISSED_BEACON) {
+        bslam_slam_drop_beacon(slam, missed);
     }
     (void)bslam_learner_work(&slam->appearance->learner, slam->settings.learn_budget);
 }
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
-/// A provisional beacon leaves when its time is up, or as much spoke against it as for it. Where its identity
+/// A tentative beacon leaves when its time is up, or as much spoke against it as for it. Where its identity
 /// was told, leaving the view early is no reason against it: it leaves if sightings contradicted it.
 static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_t *beacon, int64_t time_us)
 {
@@ -371,10 +371,10 @@ static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_
 }
 
 /// The first that is confirmed of several with one told label stays, the others leave.
-static void drop_rivals(bslam_slam_t *slam)
+static void drop_competitors(bslam_slam_t *slam)
 {
-    const bool is_told = slam->settings.association == BSLAM_ASSOCIATION_KNOWN;
-    for (int b = slam->ekf.beacon_count - 1; b >= 0 && is_told; b--) {
+    const bool is_known = slam->settings.association == BSLAM_ASSOCIATION_KNOWN;
+    for (int b = slam->ekf.beacon_count - 1; b >= 0 && is_known; b--) {
         const bslam_beacon_t *beacon = &slam->ekf.beacons[b];
         for (int i = 0; i < slam->ekf.beacon_count && !beacon->confirmed; i++) {
             if (slam->ekf.beacons[i].confirmed && slam->ekf.beacons[i].label == beacon->label) {
@@ -401,7 +401,7 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
         }
     }
     if (slam->confirmed_now) {
-        drop_rivals(slam);
+        drop_competitors(slam);
     }
 }
 

@@ -2,16 +2,16 @@
 #include "bslam/slam/slam_internal.h"
 #include "base/scalar.h"
 
-static const bslam_real_t WAY_MAX_M = BSLAM_R(1000.0);
+static const bslam_real_t TRAVEL_MAX_M = BSLAM_R(1000.0);
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 
 /// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
 /// filter's own speed has no bound that would keep the conversion defined.
 static uint32_t whole_micrometres(bslam_real_t forward_m)
 {
-    return bslam_in_range(forward_m, -WAY_MAX_M, WAY_MAX_M)
+    return bslam_in_range(forward_m, -TRAVEL_MAX_M, TRAVEL_MAX_M)
                ? (uint32_t)(bslam_abs(forward_m) * MICROMETRES_PER_M)
-               : (uint32_t)(WAY_MAX_M * MICROMETRES_PER_M);
+               : (uint32_t)(TRAVEL_MAX_M * MICROMETRES_PER_M);
 }
 
 /// The filter goes through one waiting motion, or its part before the moment until_us before the newest end.

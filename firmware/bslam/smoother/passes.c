@@ -87,11 +87,11 @@ static bslam_real_t share_of_step(const bslam_smoother_t *smoother, int b)
     const bslam_ekf_t *run = &smoother->run;
     const int at = run->beacons[b].at;
     const bslam_real_t *step = &run->correction[at];
-    const bslam_real_t way2 = step[0] * step[0] + step[1] * step[1];
+    const bslam_real_t step2 = step[0] * step[0] + step[1] * step[1];
     const bslam_real_t far2 = square_between(&run->mean[at], &run->mean[BSLAM_STATE_X]);
     const bslam_real_t most2 =
         smaller(STEP_MAX * STEP_MAX * far2, NEAREST_STEP_MAX * NEAREST_STEP_MAX * smoother->nearest_m2[b]);
-    return way2 > most2 ? bslam_sqrt(most2 / way2) : 1;
+    return step2 > most2 ? bslam_sqrt(most2 / step2) : 1;
 }
 
 /// Where a point is linearised about: where it is, or behind that where the robot is too near.

@@ -47,7 +47,7 @@ static void arc_to(const bslam_settings_t *model, const bslam_smoother_node_t *n
 }
 
 /// How the chord from `from` to the node differs from that of the arc that its speeds or odometry tell.
-static void bend_way(const bslam_settings_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
+static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, bslam_smoother_node_t *node)
 {
     bslam_real_t forward_m, turn_rad;
     arc_to(model, node, &forward_m, &turn_rad);
@@ -55,16 +55,17 @@ static void bend_way(const bslam_settings_t *model, const bslam_real_t *from, bs
     bslam_motion_jacobian_t unused;
     const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, forward_m, turn_rad, &unused);
     const bslam_real_t arc[2] = {end.x_m - start.x_m, end.y_m - start.y_m};
-    const bslam_real_t way[2] = {node->at[BSLAM_STATE_X] - start.x_m, node->at[BSLAM_STATE_Y] - start.y_m};
-    const bslam_real_t arc2 = arc[0] * arc[0] + arc[1] * arc[1], way2 = way[0] * way[0] + way[1] * way[1];
+    const bslam_real_t chord[2] = {node->at[BSLAM_STATE_X] - start.x_m, node->at[BSLAM_STATE_Y] - start.y_m};
+    const bslam_real_t arc2 = arc[0] * arc[0] + arc[1] * arc[1],
+                       chord2 = chord[0] * chord[0] + chord[1] * chord[1];
     node->turned = 0;
     node->stretched = 0;
-    if (!(arc2 > CHORD_MIN_M * CHORD_MIN_M && way2 > CHORD_MIN_M * CHORD_MIN_M)) {
+    if (!(arc2 > CHORD_MIN_M * CHORD_MIN_M && chord2 > CHORD_MIN_M * CHORD_MIN_M)) {
         return;
     }
     const bslam_real_t turned =
-        bslam_atan2(arc[0] * way[1] - arc[1] * way[0], arc[0] * way[0] + arc[1] * way[1]);
-    const bslam_real_t stretched = bslam_sqrt(way2 / arc2) - 1;
+        bslam_atan2(arc[0] * chord[1] - arc[1] * chord[0], arc[0] * chord[0] + arc[1] * chord[1]);
+    const bslam_real_t stretched = bslam_sqrt(chord2 / arc2) - 1;
     if (turned < TURNED_MAX_RAD && turned > -TURNED_MAX_RAD && stretched < STRETCHED_MAX &&
         stretched > -STRETCHED_MAX) {
         node->turned = (int16_t)bslam_smoother_units(turned / BSLAM_SMOOTHER_BEND);
@@ -232,7 +233,7 @@ static bslam_smoother_node_t read_node(bslam_smoother_t *smoother, closing_t *at
     bslam_smoother_node_t node = *bslam_smoother_node(smoother, at->node);
     if (at->ahead.dt_s > 0) {
         lengthen(&node, &at->ahead, at->speeds);
-        bend_way(&smoother->model, at->from, &node);
+        bend_path(&smoother->model, at->from, &node);
         at->ahead = (bslam_motion_t){0};
     }
     at->node++;
@@ -283,7 +284,7 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
     memcpy(at->speeds, &joined.at[BSLAM_STATE_FORWARD], sizeof at->speeds);
     joined.motion = at->ahead;
     lengthen(&joined, &older.motion, &older.at[BSLAM_STATE_FORWARD]);
-    bend_way(&smoother->model, at->from, &joined);
+    bend_path(&smoother->model, at->from, &joined);
     joined.seen = (int16_t)count;
     write_node(smoother, at, &joined);
 }

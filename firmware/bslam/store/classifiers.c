@@ -102,8 +102,8 @@ uint32_t bslam_map_classifier_number(const bslam_slam_t *slam, int32_t slot)
     return number;
 }
 
-/// A rival as the blob names it: machine << 8 | sample, or SEED << 8 | seed. False: it is not saved.
-static bool name_rival(const bslam_slam_t *slam, uint16_t sample, uint32_t *name)
+/// A competitor as the blob names it: classifier << 8 | sample, or SEED << 8 | seed. False: it is not saved.
+static bool name_negative(const bslam_slam_t *slam, uint16_t sample, uint32_t *name)
 {
     const int32_t own = BSLAM_LEARNER_SLOTS * BSLAM_SAMPLES_PER_CLASSIFIER;
     if (sample >= own) {
@@ -115,12 +115,12 @@ static bool name_rival(const bslam_slam_t *slam, uint16_t sample, uint32_t *name
     return classifier != BSLAM_MAP_NO_CLASSIFIER;
 }
 
-static uint32_t saved_rivals(const bslam_slam_t *slam, const bslam_classifier_t *classifier)
+static uint32_t saved_negatives(const bslam_slam_t *slam, const bslam_classifier_t *classifier)
 {
     uint32_t count = 0;
     uint32_t unused;
     for (int r = 0; r < classifier->negatives; r++) {
-        count += name_rival(slam, classifier->negative[r], &unused) ? 1u : 0u;
+        count += name_negative(slam, classifier->negative[r], &unused) ? 1u : 0u;
     }
     return count;
 }
@@ -131,7 +131,7 @@ void bslam_map_write_classifier(bslam_codec_t *codec, const bslam_slam_t *slam, 
     const bslam_classifier_t *classifier = &learner->classifiers[slot];
     (void)bslam_codec_whole(codec, classifier->samples, 1);
     (void)bslam_codec_whole(codec, classifier->trained ? 1 : 0, 1);
-    (void)bslam_codec_whole(codec, saved_rivals(slam, classifier), 2);
+    (void)bslam_codec_whole(codec, saved_negatives(slam, classifier), 2);
     bslam_weights_t weights = classifier->weights;
     move_weights(codec, &weights);
     for (int s = 0; s < classifier->samples; s++) {
@@ -141,21 +141,21 @@ void bslam_map_write_classifier(bslam_codec_t *codec, const bslam_slam_t *slam, 
     }
     for (int r = 0; r < classifier->negatives; r++) {
         uint32_t name;
-        if (name_rival(slam, classifier->negative[r], &name)) {
+        if (name_negative(slam, classifier->negative[r], &name)) {
             (void)bslam_codec_whole(codec, name, 2);
             (void)bslam_codec_whole(codec, classifier->negative_alpha[r], 2);
         }
     }
 }
 
-/// Samples that each machine has, and the first that nobody may name, to be held against each other.
+/// Samples that each classifier has, and the first that nobody may name, to be held against each other.
 typedef struct named {
     uint8_t samples[BSLAM_LEARNER_SLOTS];
     uint8_t end[BSLAM_LEARNER_SLOTS];
 } named_t;
 
-static void read_rival(bslam_codec_t *codec, uint32_t classifiers, named_t *named, bslam_learner_t *learner,
-                       bslam_classifier_t *classifier)
+static void read_negative(bslam_codec_t *codec, uint32_t classifiers, named_t *named,
+                          bslam_learner_t *learner, bslam_classifier_t *classifier)
 {
     const uint32_t name = bslam_codec_whole(codec, 0, 2);
     const uint32_t alpha = bslam_codec_whole(codec, 0, 2);
@@ -180,8 +180,8 @@ static void read_rival(bslam_codec_t *codec, uint32_t classifiers, named_t *name
     }
 }
 
-static void read_machine(bslam_codec_t *codec, uint32_t classifiers, named_t *named, uint32_t slot,
-                         bslam_learner_t *learner)
+static void read_classifier(bslam_codec_t *codec, uint32_t classifiers, named_t *named, uint32_t slot,
+                            bslam_learner_t *learner)
 {
     bslam_classifier_t *classifier = learner != NULL ? &learner->classifiers[slot] : NULL;
     const uint32_t samples = bslam_codec_whole(codec, 0, 1);
@@ -209,7 +209,7 @@ static void read_machine(bslam_codec_t *codec, uint32_t classifiers, named_t *na
         }
     }
     for (uint32_t r = 0; r < negatives && codec->fault == BSLAM_MAP_FINE; r++) {
-        read_rival(codec, classifiers, named, learner, classifier);
+        read_negative(codec, classifiers, named, learner, classifier);
     }
 }
 
@@ -217,7 +217,7 @@ void bslam_map_read_classifiers(bslam_codec_t *codec, uint32_t classifiers, bsla
 {
     named_t named = {{0}, {0}};
     for (uint32_t m = 0; m < classifiers && codec->fault == BSLAM_MAP_FINE; m++) {
-        read_machine(codec, classifiers, &named, m, learner);
+        read_classifier(codec, classifiers, &named, m, learner);
     }
     for (uint32_t m = 0; m < classifiers && codec->fault == BSLAM_MAP_FINE; m++) {
         bslam_codec_require(codec, named.end[m] <= named.samples[m], BSLAM_MAP_CONTENT);

@@ -21,7 +21,7 @@ static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
-static const uint32_t LONG_WAY_UM = 1000000000u;
+static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
 // ---- header -----------------------------------------------------------------------------------------------
 
@@ -60,15 +60,15 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 
 /// What the blob has of a beacon. Its position is for who reads the map; where it has state values they
 /// count.
-typedef struct record {
+typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
-} record_t;
+} stored_beacon_t;
 
-static void move_record(bslam_codec_t *codec, record_t *record)
+static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
     bslam_beacon_t *beacon = &record->beacon;
     beacon->uid = bslam_codec_whole(codec, beacon->uid, 4);
@@ -114,7 +114,7 @@ static bool is_taken(const target_t *target, const bslam_beacon_t *beacon)
     return target != NULL && (target->mode == BSLAM_MAP_LIVING || beacon->kind != BSLAM_BEACON_RAY);
 }
 
-static void take_record(const target_t *target, const record_t *record)
+static void take_record(const target_t *target, const stored_beacon_t *record)
 {
     bslam_ekf_t *ekf = &target->slam->ekf;
     const int index = ekf->beacon_count++;
@@ -125,7 +125,7 @@ static void take_record(const target_t *target, const record_t *record)
     beacon->distance_lead = BSLAM_LEAD_MAX;
     beacon->known_x_m = record->x_m;
     beacon->known_y_m = record->y_m;
-    beacon->travelled_um = target->slam->travelled_um - LONG_WAY_UM;
+    beacon->travelled_um = target->slam->travelled_um - LONG_TRAVEL_UM;
     if (target->mode == BSLAM_MAP_FROZEN) {
         beacon->kind = BSLAM_BEACON_KNOWN;
     }
@@ -135,10 +135,10 @@ static void take_record(const target_t *target, const record_t *record)
     beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
     ekf->dim += bslam_beacon_dim(beacon->kind);
     if (bslam_slam_learns(target->slam)) {
-        bslam_beacon_look_t *look = &target->slam->appearance->of[index];
-        look->classifier =
-            record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : look->classifier;
-        memcpy(look->seen_as, record->seen_as, sizeof look->seen_as);
+        bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
+        known->classifier =
+            record->classifier != BSLAM_MAP_NO_CLASSIFIER ? (int16_t)record->classifier : known->classifier;
+        memcpy(known->seen_as, record->seen_as, sizeof known->seen_as);
     }
 }
 
@@ -148,7 +148,7 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
     uint32_t further = 0;  // beyond two a beacon
     uint32_t least_uid = 0;
     for (uint32_t b = 0; b < header->beacons && codec->fault == BSLAM_MAP_FINE; b++) {
-        record_t record = {.classifier = BSLAM_MAP_NO_CLASSIFIER};
+        stored_beacon_t record = {.classifier = BSLAM_MAP_NO_CLASSIFIER};
         move_record(codec, &record);
         values += (uint32_t)bslam_beacon_dim(record.beacon.kind);
         further += record.beacon.kind == BSLAM_BEACON_RAY     ? 2u
@@ -247,12 +247,12 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
 }
 
 /// Saved values in their order: the next state value after `place` of a saved beacon.
-typedef struct place {
+typedef struct saved_value {
     int beacon, value;
-} place_t;
+} saved_value_t;
 
 /// Moves on to the next saved state value; false: there is none.
-static bool next_value(const bslam_ekf_t *ekf, place_t *place)
+static bool next_value(const bslam_ekf_t *ekf, saved_value_t *place)
 {
     place->value++;
     while (place->beacon < ekf->beacon_count &&
@@ -264,18 +264,18 @@ static bool next_value(const bslam_ekf_t *ekf, place_t *place)
     return place->beacon < ekf->beacon_count;
 }
 
-static int state_at(const bslam_ekf_t *ekf, const place_t *place)
+static int state_at(const bslam_ekf_t *ekf, const saved_value_t *place)
 {
     return ekf->beacons[place->beacon].at + place->value;
 }
 
 static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf)
 {
-    for (place_t i = {0, -1}; next_value(ekf, &i);) {
+    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
         (void)bslam_codec_real(codec, ekf->mean[state_at(ekf, &i)]);
     }
-    for (place_t i = {0, -1}; next_value(ekf, &i);) {
-        place_t j = {0, -1};
+    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
+        saved_value_t j = {0, -1};
         do {
             (void)next_value(ekf, &j);
             (void)bslam_codec_real(codec,
@@ -310,12 +310,12 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
     move_header(codec, &header);
     for (int b = 0; b < ekf->beacon_count; b++) {
         if (bslam_map_saves(ekf, b)) {
-            record_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
+            stored_beacon_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
             record.scale = scale_of(ekf, &ekf->beacons[b]);
             if (bslam_slam_learns(slam)) {
-                const bslam_beacon_look_t *look = &slam->appearance->of[b];
-                record.classifier = bslam_map_classifier_number(slam, look->classifier);
-                memcpy(record.seen_as, look->seen_as, sizeof record.seen_as);
+                const bslam_beacon_appearance_t *known = &slam->appearance->of[b];
+                record.classifier = bslam_map_classifier_number(slam, known->classifier);
+                memcpy(record.seen_as, known->seen_as, sizeof record.seen_as);
             }
             bslam_ekf_beacon_position(ekf, b, &record.x_m, &record.y_m);
             move_record(codec, &record);

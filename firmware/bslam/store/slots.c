@@ -47,7 +47,7 @@ static bslam_map_source_t source_of(const slot_t *slot)
     return (bslam_map_source_t){read_map, slot, slot->length};
 }
 
-static slot_t look_at(const bslam_flash_t *flash, int number)
+static slot_t read_slot(const bslam_flash_t *flash, int number)
 {
     slot_t slot = {.flash = flash, .number = number, .fault = BSLAM_MAP_NO_MAP};
     uint8_t head[HEAD_BYTES] = {0};
@@ -74,10 +74,10 @@ static bool is_newer(const slot_t *a, const slot_t *b)
 }
 
 /// Both slots, the newer one first.
-static void look(const bslam_flash_t *flash, slot_t slots[BSLAM_SLOTS])
+static void find_slots(const bslam_flash_t *flash, slot_t slots[BSLAM_SLOTS])
 {
-    slots[0] = look_at(flash, 0);
-    slots[1] = look_at(flash, 1);
+    slots[0] = read_slot(flash, 0);
+    slots[1] = read_slot(flash, 1);
     if (is_newer(&slots[1], &slots[0])) {
         const slot_t swap = slots[0];
         slots[0] = slots[1];
@@ -138,7 +138,7 @@ bslam_status_t bslam_slots_save(const bslam_flash_t *flash, const bslam_slam_t *
                                 bslam_map_fault_t *fault)
 {
     slot_t slots[BSLAM_SLOTS];
-    look(flash, slots);
+    find_slots(flash, slots);
     const bool newer_is_whole = slots[0].fault == BSLAM_MAP_FINE;
     slot_t *slot = newer_is_whole || slots[1].fault != BSLAM_MAP_FINE ? &slots[1] : &slots[0];
     const uint32_t sequence = slots[0].has_head ? slots[0].sequence + 1 : 1;
@@ -162,7 +162,7 @@ bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam, 
                                 bslam_map_fault_t *fault)
 {
     slot_t slots[BSLAM_SLOTS];
-    look(flash, slots);
+    find_slots(flash, slots);
     bslam_status_t status = BSLAM_E_MAP;
     // One that looks whole may be refused yet: for its covariance, or because it can no longer be read.
     for (int s = 0; s < BSLAM_SLOTS && status != BSLAM_OK; s++) {

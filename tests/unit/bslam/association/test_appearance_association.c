@@ -14,7 +14,7 @@ static const float PLAIN[BSLAM_SAMPLE_FEATURES] = {0.0f};
 
 static bslam_appearance_t appearance;
 
-static void give_machine(int index, double value, int samples)
+static void give_classifier(int index, double value, int samples)
 {
     unit_give_machine(&appearance, index, value, samples);
 }
@@ -169,7 +169,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     ekf.beacons[0].confirmed = true;
     bslam_appearance_note_view(&appearance, 0, settings.again_odds);
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
-    give_machine(0, 3.0, 1);
+    give_classifier(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
     seen.range_sd_m = 4;
     const decision_t after_long = decide_at(9000000, &ekf, &settings, &seen, 1);
@@ -184,7 +184,7 @@ static void test_score_adds_what_looks_say_as_samples_come(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
-    give_machine(0, 0.75, 3);
+    give_classifier(0, 0.75, 3);
     // 3 of 3 + 3 samples: half of 4 * 0.75 - 0.5.
     assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score,
                 position_score(&settings, 4, 0) + 1.25, 0.01);
@@ -202,7 +202,7 @@ static void test_score_of_looks_is_clipped(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
-    give_machine(0, 5, 3);
+    give_classifier(0, 5, 3);
     assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0) + 2,
                 1e-3);
     signature[0] = -1.0f;
@@ -217,7 +217,7 @@ static void test_a_signature_that_is_no_number_is_as_none(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f, NAN};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
-    give_machine(0, 5, 3);
+    give_classifier(0, 5, 3);
     assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0),
                 1e-4);
 }
@@ -228,7 +228,7 @@ static void test_a_machine_without_rivals_says_nothing(void **state)
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
     const bslam_sighting_t seen = seen_with(unit_polar(0, 4, -1), signature);
-    give_machine(0, 5, 3);
+    give_classifier(0, 5, 3);
     appearance.learner.classifiers[0].negatives = 0;
     assert_near(decide(&ekf, &settings, &seen, 1).records[0].match.score, position_score(&settings, 4, 0),
                 1e-4);
@@ -297,7 +297,7 @@ static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
-    give_machine(0, 3, 16);
+    give_classifier(0, 3, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.06, 4.45, -1), signature);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -411,7 +411,7 @@ static void test_far_but_clearly_alike_is_not_new(void **state)
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
-    give_machine(0, 2, 16);
+    give_classifier(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     const bslam_sighting_t plain = seen_with(unit_polar(0.2, 4.4, -1), PLAIN);
     const bslam_sighting_t farther = seen_with(unit_polar(1.5, 4.4, -1), alike);
@@ -429,7 +429,7 @@ static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_anot
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
     bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
-    give_machine(0, 2, 2);
+    give_classifier(0, 2, 2);
     decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
     appearance.learner.classifiers[0].samples = 16;
@@ -450,7 +450,7 @@ static void test_far_but_clearly_alike_is_new_after_a_while(void **state)
     const double two[2][2] = {{4, 0}, {0, 4}};
     bslam_ekf_t ekf = unit_map_of(&settings, two, 2);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
-    give_machine(0, 2, 16);
+    give_classifier(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     ekf.beacons[1].confirmed = true;
     ekf.beacons[1].last_seen_us = 9500000;
@@ -481,7 +481,7 @@ static void test_alike_but_where_the_robot_stands_is_new(void **state)
     const double here[1][2] = {{0, 0}};
     const bslam_ekf_t ekf = unit_map_of(&settings, here, 1);
     const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
-    give_machine(0, 2, 16);
+    give_classifier(0, 2, 16);
     const bslam_sighting_t seen = seen_with(unit_polar(0.2, 4.4, -1), alike);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
     unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
@@ -505,7 +505,7 @@ static void assert_waits(double value, int samples, int32_t decision_delay_us, b
     bslam_settings_t settings = svm_params();
     settings.decision_delay_us = decision_delay_us;
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
-    give_machine(0, value, samples);
+    give_classifier(0, value, samples);
     const decision_t d = decide_at(9000000, &ekf, &settings, &seen, 1);
     assert_int_equal(d.records[0].match.delayed_for, waits ? 0 : -1);
     if (waits) {
@@ -529,7 +529,7 @@ static void test_a_match_does_not_wait_for_what_is_in_view(void **state)
 {
     const bslam_settings_t settings = svm_params();
     bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
-    give_machine(0, -0.1, 2);
+    give_classifier(0, -0.1, 2);
     const bslam_sighting_t seen = seen_aside();
     ekf.beacons[0].last_seen_us = 5000000;
     const int64_t times_us[] = {4900000, 5000000, 6000000, 6000001};
@@ -543,7 +543,7 @@ static void test_a_match_that_has_waited_is_made(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
-    give_machine(0, -0.1, 2);
+    give_classifier(0, -0.1, 2);
     const bslam_sighting_t seen = seen_aside();
     bslam_appearance_note_delay(&appearance, &settings, 0, 9000000);
     unit_assert_decided(&decide_at(9999998, &ekf, &settings, &seen, 1).records[0].match, BSLAM_VERDICT_DEFER,
@@ -556,7 +556,7 @@ static void test_what_matches_no_beacon_waits_for_none(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
-    give_machine(0, -0.1, 2);
+    give_classifier(0, -0.1, 2);
     const bslam_sighting_t near = seen_with(unit_polar(0.1, 4.4, -1), ALIKE);
     assert_true(position_score(&settings, 4.4, 0.1) < 0.0);
     assert_int_equal(decide_at(9000000, &ekf, &settings, &near, 1).records[0].match.delayed_for, -1);
@@ -602,7 +602,7 @@ static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **sta
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const float other[BSLAM_SAMPLE_FEATURES] = {-1.0f};
-    give_machine(0, -1.5, 2);
+    give_classifier(0, -1.5, 2);
     const bslam_sighting_t seen[] = {seen_with(unit_polar(0, 4, -1), ALIKE),
                                      seen_with(unit_polar(0.01, 4, -1), other)};
     const decision_t d = decide_at(9000000, &ekf, &settings, seen, 2);
@@ -651,8 +651,8 @@ static void test_looks_decide_between_two_in_the_gate(void **state)
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, pair, 2);
     const float signature[BSLAM_SAMPLE_FEATURES] = {1.0f};
-    give_machine(0, -1.5, 16);
-    give_machine(1, 1.5, 16);
+    give_classifier(0, -1.5, 16);
+    give_classifier(1, 1.5, 16);
     // Half way between them, a little nearer to the first.
     const bslam_sighting_t seen = seen_with(unit_polar(0.045, 4, -1), signature);
     const decision_t d = decide(&ekf, &settings, &seen, 1);
@@ -673,7 +673,7 @@ static void test_sure_enough_to_learn_from(void **state)
     assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure ==
                 (position_score(&settings, 4, 0) >= 4));
     assert_false(decide(&ekf, &settings, &far, 1).records[0].match.sure);
-    give_machine(0, 1, 16);
+    give_classifier(0, 1, 16);
     assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure);
     // Grown up, and its machine says no.
     appearance.learner.classifiers[0].weights.unit = -appearance.learner.classifiers[0].weights.unit;
@@ -752,11 +752,11 @@ static void test_given_takes_no_more_than_it_has_room_for(void **state)
     assert_int_equal(bslam_ekf_innovation(&ekf, &settings, &on_axle, &seen, 0, &innovation), BSLAM_OK);
     static bslam_conditional_t conditional;
     bslam_conditional_init(&conditional);
-    for (int i = 0; i < BSLAM_GIVEN_MAX; i++) {
+    for (int i = 0; i < BSLAM_CONDITIONAL_MAX; i++) {
         assert_true(bslam_conditional_add(&ekf, &conditional, &innovation));
     }
     assert_false(bslam_conditional_add(&ekf, &conditional, &innovation));
-    assert_int_equal(conditional.count, 2 * BSLAM_GIVEN_MAX);
+    assert_int_equal(conditional.count, 2 * BSLAM_CONDITIONAL_MAX);
     bslam_weight_t weight;
     assert_int_equal(bslam_conditional_weigh(&ekf, &conditional, &innovation, &weight), BSLAM_OK);
 }

@@ -94,12 +94,12 @@ static void test_given_a_singular_innovation_is_refused_and_nothing_changes(void
 static void test_given_there_is_room_for_so_many_and_one_to_weigh(void **state)
 {
     const bslam_innovation_t one = innovation_of(unit_polar(0.35, 2.2, 1), 0);
-    for (int i = 0; i < BSLAM_GIVEN_MAX; i++) {
+    for (int i = 0; i < BSLAM_CONDITIONAL_MAX; i++) {
         assert_true(bslam_conditional_add(&slam.ekf, &conditional, &one));
     }
     bslam_weight_t weight;
     assert_false(bslam_conditional_add(&slam.ekf, &conditional, &one));
-    assert_int_equal(conditional.count, 2 * BSLAM_GIVEN_MAX);
+    assert_int_equal(conditional.count, 2 * BSLAM_CONDITIONAL_MAX);
     assert_int_equal(bslam_conditional_weigh(&slam.ekf, &conditional, &one, &weight), BSLAM_OK);
 }
 

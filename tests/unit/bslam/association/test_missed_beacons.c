@@ -26,7 +26,7 @@ static int setup(void **state)
 }
 
 /// The robot goes a decimetre along a circle of radius 4 m round beacon 0, which it has to its left; a frame
-/// shows the beacons that are named. Answers what has vanished.
+/// shows the beacons that are named. Answers what has missed.
 static int go(double angle_rad, double radius_m, bool sees_first, bool judges)
 {
     const bslam_pose_t pose = {(bslam_real_t)(radius_m * cos(angle_rad)),
@@ -42,16 +42,16 @@ static int go(double angle_rad, double radius_m, bool sees_first, bool judges)
     return bslam_missed_beacons_find(&appearance, &ekf, &settings, now_us, travelled_um, judges);
 }
 
-/// Once round; how many frames said that beacon 0 has vanished.
+/// Once round; how many frames said that beacon 0 has missed.
 static int go_round(double radius_m, bool sees_first, bool judges)
 {
-    int vanished = 0;
+    int missed = 0;
     for (int k = 0; k < 252; k++) {
         const int found = go(0.0249 * k, radius_m, sees_first, judges);
         assert_true(found == BSLAM_NO_MISSED_BEACON || found == 0);
-        vanished += found == 0 ? 1 : 0;
+        missed += found == 0 ? 1 : 0;
     }
-    return vanished;
+    return missed;
 }
 
 static void test_one_that_is_missed_from_where_it_was_seen_vanishes(void **state)
