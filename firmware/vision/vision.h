@@ -246,7 +246,7 @@ void bslam_vision_forget_turns(bslam_vision_t *vision);
 ///
 /// A small Kalman filter of its own, so that a picture's turn, which spans several steps, need not wait in
 /// the map's filter: turn rate, speed, the turn since each camera's picture before, how much nearer than the
-/// floor line said is what each camera sees, and by how much the heading has turned from what was told.
+/// floor line said is what each camera sees, and by how much the heading differs from the rates given.
 typedef union bslam_visual_gyro {
     unsigned char bytes[BSLAM_VISUAL_GYRO_BYTES];
     int64_t alignment_of_times;
@@ -275,10 +275,10 @@ BSLAM_MUST_CHECK bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro
                                                        const bslam_turn_t *turn);
 
 /// The turn rate of the last step, positive to the left, and its noise. The rate brings the heading to where
-/// it is thought to be, with what steps before were told wrongly, so that the sum over steps is right; the
+/// it is thought to be, and makes up for the errors of steps before, so that the sum over steps is right; the
 /// noise is what the heading's variance grew by of late. False, both unchanged, where too little was seen to
-/// know the rate to about 0.4 rad/s. It may be asked after each picture of a step; the last answer counts as
-/// told.
+/// know the rate to about 0.4 rad/s. It may be asked after each picture of a step; the last answer
+/// counts.
 bool bslam_visual_gyro_rate(bslam_visual_gyro_t *gyro, bslam_real_t *rate_radps, bslam_real_t *sd_radps);
 
 #ifdef __cplusplus

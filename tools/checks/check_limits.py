@@ -156,8 +156,8 @@ def figures(root: Path) -> Iterator[tuple[str, float]]:
 
 
 def found_words(text: str) -> Iterator[tuple[int, str]]:
-    """Line number and the field's word for each of ours in a text."""
-    running = text.replace("\n", " ")
+    """Line number and the field's word for each of ours in a text; what stands as code is a name."""
+    running = re.sub(r"`[^`\n]*`", lambda code: "x" * len(code[0]), text).replace("\n", " ")
     for word, ours in WORDS.items():
         for match in re.finditer(rf"\b(?:{ours})\b", running, re.IGNORECASE):
             yield text.count("\n", 0, match.start()) + 1, word

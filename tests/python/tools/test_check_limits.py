@@ -91,7 +91,7 @@ no sentence. At all.
             "The twin, a glance, two rivals.",
             ["competitor, negative sample", "pre-filter", "double-precision build"],
         ),
-        ("Measured by hand.", ["(no such figure)"]),
+        ("Measured by hand, with `told`.", ["(no such figure)"]),
         ("By handing it over, in trusted code, untold, 2 parts, a double.", []),
     ],
 )
