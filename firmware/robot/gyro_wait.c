@@ -18,8 +18,9 @@ static bslam_real_t least_sd_radps(const camera_input_t *input)
     return BSLAM_VISUAL_GYRO_SD_RADPS;
 }
 
-void gyro_wait_start(gyro_wait_t *wait, const camera_input_t *input)
+void gyro_wait_start(gyro_wait_t *wait, camera_input_t *input)
 {
+    bslam_vision_forget_turns(&input->vision);
     const bslam_status_t status = bslam_visual_gyro_init(&wait->gyro, least_sd_radps(input));
     (void)status;  // of sizes that differ the front end tells
     wait->is_running = false;
@@ -50,23 +51,22 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
 /// Of the mean of two wheels that err independently.
 static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
 {
-    const bslam_real_t sd_mps =
-        ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
+    const bslam_real_t sd_mps = ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
     if (sd_mps > SPEED_SD_MOST_MPS) {
         return SPEED_SD_MOST_MPS;
     }
     return sd_mps < SPEED_SD_LEAST_MPS ? SPEED_SD_LEAST_MPS : sd_mps;
 }
 
-bool gyro_wait_begin(gyro_wait_t *wait, const camera_input_t *input, const bslam_settings_t *settings,
+bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *input, const bslam_settings_t *settings,
                      const bslam_odometry_reading_t *reading)
 {
     const bool follows = wait->is_running && reading->time_us > wait->reading.time_us;
     const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
     const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
     wait->reading = *reading;
-    if (jumped || bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) !=
-                      BSLAM_OK) {
+    if (jumped ||
+        bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) != BSLAM_OK) {
         gyro_wait_start(wait, input);
         return false;
     }

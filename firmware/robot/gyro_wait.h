@@ -18,11 +18,11 @@ typedef struct gyro_wait {
 } gyro_wait_t;
 
 /// For these cameras. No reading waits.
-void gyro_wait_start(gyro_wait_t *wait, const camera_input_t *input);
+void gyro_wait_start(gyro_wait_t *wait, camera_input_t *input);
 
 /// A reading of the encoders begins to wait. False, and it does not: it came too long after the one before,
 /// or the wheels jumped.
-bool gyro_wait_begin(gyro_wait_t *wait, const camera_input_t *input, const bslam_settings_t *settings,
+bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *input, const bslam_settings_t *settings,
                      const bslam_odometry_reading_t *reading);
 
 /// The front end has finished a camera's picture of that moment. If a reading of the same moment waits, it

@@ -8,10 +8,10 @@
 /// What the last trouble was.
 typedef enum health_trouble {
     HEALTH_NONE = 0,
-    HEALTH_LOST,      ///< the robot was not where the filter had it
-    HEALTH_FOUND,     ///< and found itself again
-    HEALTH_CORRUPT,   ///< the memory was no longer what it was: the filter started over
-    HEALTH_INSANE,    ///< a variance is negative, or the state not finite: it goes on, and is not to be trusted
+    HEALTH_LOST,     ///< the robot was not where the filter had it
+    HEALTH_FOUND,    ///< and found itself again
+    HEALTH_CORRUPT,  ///< the memory was no longer what it was: the filter started over
+    HEALTH_INSANE,  ///< a variance is negative, or the state not finite: it goes on, and is not to be trusted
     HEALTH_RESTARTED  ///< the program started anew; the memory was good, so that the filter goes on
 } health_trouble_t;
 

@@ -51,8 +51,8 @@ static bslam_real_t at_most(bslam_real_t value, bslam_real_t most)
     return value < most ? value : most;
 }
 
-/// With the state that a reset left, if it is good. Time stamps and the counters of wheels begin anew, and the
-/// robot may have rolled on meanwhile.
+/// With the state that a reset left, if it is good. Time stamps and the counters of wheels begin anew, and
+/// the robot may have rolled on meanwhile.
 static bool goes_on(robot_t *robot)
 {
     const bslam_settings_t *settings = &robot->in_force;

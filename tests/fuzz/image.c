@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/trig.h"
+#include "vision/internal.h"
 
 #include "models/beacons.h"
 #include "picture.h"
@@ -68,7 +69,9 @@ static void give_frame(fuzz_input_t *input)
     const unsigned flags = fuzz_u8(input);
     const int32_t camera = (int32_t)(flags & 3u) - 1;
     const bslam_pixel_format_t format = (bslam_pixel_format_t)(flags >> 2 & 3u);
-    const bslam_camera_t *lens = camera >= 0 && camera < BSLAM_CAMERAS_MAX ? &bslam_vision_instance(&vision)->front_end.cameras[camera] : NULL;
+    const bslam_camera_t *lens = camera >= 0 && camera < BSLAM_CAMERAS_MAX
+                                     ? &bslam_vision_instance(&vision)->front_end.cameras[camera]
+                                     : NULL;
     const int32_t width_px = lens != NULL ? lens->width_px : BSLAM_IMAGE_WIDTH_MAX;
     const int32_t height_px = lens != NULL ? lens->height_px : BSLAM_IMAGE_HEIGHT_MAX;
     memcpy(&before, &vision, sizeof before);

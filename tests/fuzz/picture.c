@@ -72,7 +72,6 @@ void fuzz_room_row(int32_t y, uint8_t row[FUZZ_ROW_BYTES])
 
 static void require_candidate(const bslam_vision_t *vision, const bslam_candidate_t *candidate)
 {
-    const int32_t classes = bslam_const_vision_instance(vision)->front_end.model->class_count;
     const bslam_box_t *box = &candidate->outline;
     const int32_t classes = bslam_const_vision_instance(vision)->front_end.model->class_count;
     fuzz_require(isfinite((double)box->left_px) && isfinite((double)box->right_px));

@@ -138,7 +138,7 @@ static void note_class(bslam_beacon_appearance_t *known, uint8_t beacon_class)
     if (!is_evidence(beacon_class)) {
         return;
     }
-    if (known->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
+    if (known->seen_as[beacon_class - 1] >= SEEN_AS_MAX) {  // a loaded map may have more
         for (int k = 0; k < BSLAM_APPEARANCE_CLASSES; k++) {
             known->seen_as[k] /= 2;
         }

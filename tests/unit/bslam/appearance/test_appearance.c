@@ -255,6 +255,20 @@ static void test_a_class_seen_for_long_is_unlearned_again(void **state)
     assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) > 1);
 }
 
+/// As a map may have it that another build wrote.
+static void test_a_class_count_beyond_the_limit_comes_down_and_never_wraps(void **state)
+{
+    for (int count = 0; count <= UINT8_MAX; count++) {
+        appearance.of[0].seen_as[2] = (uint8_t)count;
+        for (int view = 0; view < 20; view++) {
+            see_class(3, 1);
+            assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 3) > 0);
+            assert_int_equal(bslam_appearance_class(&appearance, 0), 3);
+        }
+        assert_true(appearance.of[0].seen_as[2] <= 33);
+    }
+}
+
 static const double TURN_RAD = 6.283185307179586;
 
 static int sector_at(double turns)
@@ -391,6 +405,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_class_odds_are_of_counts_with_a_little_doubt, setup),
         cmocka_unit_test_setup(test_a_class_seen_for_long_is_unlearned_again, setup),
+        cmocka_unit_test_setup(test_a_class_count_beyond_the_limit_comes_down_and_never_wraps, setup),
         cmocka_unit_test_setup(test_sectors_are_equal_parts_of_a_turn, setup),
         cmocka_unit_test_setup(test_side_odds_fall_with_the_angle_to_where_it_was_seen_from, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
