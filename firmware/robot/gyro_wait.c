@@ -45,7 +45,7 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
         travel_m(settings, before->left_ticks, now->left_ticks, settings->left_radius_m);
     const bslam_real_t right_m =
         travel_m(settings, before->right_ticks, now->right_ticks, settings->right_radius_m);
-    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(now->time_us - before->time_us);
+    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(int32_t)(now->time_us - before->time_us);
 }
 
 /// Of the mean of two wheels that err independently.

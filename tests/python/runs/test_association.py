@@ -87,7 +87,7 @@ def test_without_signatures_position_alone_decides(harder_pairs: Log) -> None:
     log = replace(harder_pairs, sightings=replace(harder_pairs.sightings, signature=None))
     blind = run_log(log, SVM)
     off = run_log(harder_pairs, replace(SVM, parameters=(("appearance_weight", 0.0),)))
-    assert blind.counters["taught"] == 0
+    assert blind.counters["trained"] == 0
     # Where looks weigh nothing, what is left of them is who is retired and who may wait.
     assert blind.counts.wrong_associations > 0.03 * blind.counts.sightings
     assert off.counts.wrong_associations > 0.03 * off.counts.sightings
