@@ -446,6 +446,10 @@ def read_map_part(body: bytes) -> tuple[int, bytes]:
     return _PLACE.unpack_from(body)[0], body[_PLACE.size :]
 
 
+LINK_COUNTERS = ("frames", "bad_crc", "truncated", "too_long", "bad_version")
+"""`bslam_link_counters_t`."""
+
+
 def read_counters(body: bytes) -> list[int]:
     """All counters in a row: the library's, the parser's, messages repeated and replayed."""
     return [value for (value,) in struct.iter_unpack("<I", body)]

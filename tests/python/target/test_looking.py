@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bslam.cli import main
+from bslam.core.appearance import rendered_seeds
 from bslam.core.errors import CoreError
 from bslam.core.slam import Slam
 from bslam.core.vision import FrontEnd
@@ -188,7 +189,7 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_e
     params = robot.host_params
     told = gather((TURN + SHOTS) * 3 // 2, lambda: robot.reports(5.0))
     assert robot.reports_lost == 0
-    here, eyes = Slam(params, beacons_max=80), FrontEnd([camera])
+    here, eyes = Slam(params, beacons_max=80, seeds=rendered_seeds()), FrontEnd([camera])
     looks, count = 0, 0
     for step, one in enumerate(told, start=1):
         assert one.refused is None
