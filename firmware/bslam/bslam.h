@@ -98,7 +98,7 @@ typedef struct bslam_odometry_reading {
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry(bslam_t *robot, const bslam_odometry_reading_t *reading);
 
 /// After an interruption of odometry, at a standstill: an encoder reset, a pause of more than 4 s, a robot
-/// that was carried. The next reading starts the clock and the tick reference anew, at any time stamp. The
+/// that was pushed. The next reading starts the clock and the tick reference anew, at any time stamp. The
 /// pose becomes as doubtful as the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m outside 0 to 30
 /// or heading_sd_rad outside 0 to 3.2 (NaN is).
 BSLAM_MUST_CHECK bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real_t position_sd_m,
@@ -145,7 +145,7 @@ bslam_health_t bslam_health(const bslam_t *robot);
 /// Where a chain of fingerprints starts.
 #define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
 
-/// Goes on with a hash of the whole state: two robots that were told the same have the same. O(n²).
+/// Goes on with a hash of the whole state: two robots with the same inputs have the same. O(n²).
 uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before);
 
 // ---- what became of the sightings -------------------------------------------------------------------------
@@ -225,13 +225,13 @@ typedef struct bslam_guard_counters {
 } bslam_guard_counters_t;
 
 typedef struct bslam_appearance_counters {
-    uint32_t taught;    ///< sightings that a classifier was trained with
-    uint32_t unsure;    ///< matches that none was trained with, because they may be wrong
-    uint32_t shared;    ///< times that a beacon was found to look like another and took its classifier
-    uint32_t retired;   ///< beacons taken out because another was in the same place
-    uint32_t vanished;  ///< beacons taken out because they were missed from where they had been seen
-    uint32_t parted;    ///< times that a beacon got a classifier of its own again
-    uint32_t no_slot;   ///< beacons that got no classifier when they were first seen: none was free
+    uint32_t trained;  ///< sightings that a classifier was trained with
+    uint32_t unsure;   ///< matches that none was trained with, because they may be wrong
+    uint32_t shared;   ///< times that a beacon was found to look like another and took its classifier
+    uint32_t retired;  ///< beacons taken out because another was in the same place
+    uint32_t missed;   ///< beacons taken out because they were missed from where they had been seen
+    uint32_t parted;   ///< times that a beacon got a classifier of its own again
+    uint32_t no_slot;  ///< beacons that got no classifier when they were first seen: none was free
 } bslam_appearance_counters_t;
 
 typedef struct bslam_learner_counters {

@@ -34,7 +34,7 @@ static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, 
 {
     const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
     const int32_t scaled = (int32_t)((after - before) << unused_bits);
-    const bslam_real_t ticks = (bslam_real_t)scaled / (bslam_real_t)(UINT32_C(1) << unused_bits);
+    const bslam_real_t ticks = (bslam_real_t)(scaled / (int32_t)(1u << unused_bits));
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 

@@ -335,6 +335,6 @@ void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings
     if (sighting->signature != NULL && bslam_sample_encode(sighting->signature, &sample) == BSLAM_OK &&
         settle_classifier(appearance, settings, index, count, &sample) &&
         bslam_learner_show(&appearance->learner, known->classifier, sighting->signature) == BSLAM_OK) {
-        appearance->counters.taught++;
+        appearance->counters.trained++;
     }
 }

@@ -77,7 +77,7 @@ static void test_each_beacon_learns_its_own_look(void **state)
             assert_true((value_of(b, other, 50) > 0) == (b == other));
         }
     }
-    assert_int_equal(appearance.counters.taught, 24);
+    assert_int_equal(appearance.counters.trained, 24);
     assert_int_equal(appearance.counters.shared, 0);
 }
 
@@ -105,11 +105,11 @@ static void test_a_robot_that_stands_still_teaches_once(void **state)
     for (int i = 0; i < 5; i++) {
         show(0, 1, signature);
     }
-    assert_int_equal(appearance.counters.taught, 1);
+    assert_int_equal(appearance.counters.trained, 1);
     // The way counts modulo 2^32 micrometres.
     travelled_um--;
     show(0, 1, signature);
-    assert_int_equal(appearance.counters.taught, 2);
+    assert_int_equal(appearance.counters.trained, 2);
 }
 
 static void learn_two(int views)
@@ -343,7 +343,7 @@ static void test_a_signature_that_is_no_number_teaches_nothing(void **state)
     signature[5] = NAN;
     show(0, 1, signature);
     assert_int_equal(appearance.of[0].classifier, BSLAM_NO_CLASSIFIER);
-    assert_int_equal(appearance.counters.taught, 0);
+    assert_int_equal(appearance.counters.trained, 0);
 }
 
 static void test_without_a_free_slot_a_beacon_goes_without(void **state)
@@ -354,7 +354,7 @@ static void test_without_a_free_slot_a_beacon_goes_without(void **state)
     teach(0, 1, 0, 0);
     assert_int_equal(appearance.of[0].classifier, BSLAM_NO_CLASSIFIER);
     assert_int_equal(appearance.counters.no_slot, 1);
-    assert_int_equal(appearance.counters.taught, 0);
+    assert_int_equal(appearance.counters.trained, 0);
 }
 
 static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)

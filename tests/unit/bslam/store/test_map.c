@@ -194,7 +194,7 @@ static void test_map_load_frozen_changes_no_beacon_and_adds_none(void **state)
         assert_int_equal(bslam_slam_beacon(&other, b, &after), BSLAM_OK);
         assert_true(after.x_m == before[b].x_m && after.y_m == before[b].y_m);
     }
-    assert_int_equal(other_looks.counters.taught, 0);
+    assert_int_equal(other_looks.counters.trained, 0);
 }
 
 static void test_map_write_leaves_out_provisional_beacons(void **state)
