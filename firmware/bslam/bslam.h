@@ -343,8 +343,7 @@ typedef struct bslam_map_sink {
 
 /// Writes the confirmed beacons, their covariance and their classifiers. sink NULL: only counts. *bytes is
 /// how many there are. BSLAM_E_MAP: the sink failed. O(n² + samples), twice.
-BSLAM_MUST_CHECK bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink,
-                                               uint32_t *bytes);
+BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
 
 /// Takes a stored map in place of the robot's own; the robot does not know where it is in it (bslam_set_pose,
 /// or the setting `recovery`). Settings, clock and counters stay. The same bytes load into builds of other
@@ -370,7 +369,7 @@ typedef struct bslam_flash {
 
 /// Saves the map in the slot that is older or damaged, and reads it back. BSLAM_E_MAP with *fault: the flash
 /// failed, or the map is larger than a slot; the map saved before is still there.
-BSLAM_MUST_CHECK bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash,
+BSLAM_MUST_CHECK bslam_status_t bslam_save_to_flash(bslam_t *robot, const bslam_flash_t *flash,
                                                     bslam_map_fault_t *fault);
 
 /// bslam_load_map of the newest map that it takes. BSLAM_E_MAP: there is none.

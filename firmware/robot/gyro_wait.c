@@ -32,8 +32,8 @@ static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, 
                              bslam_real_t radius_m)
 {
     const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
-    const int64_t scaled = (int32_t)((after - before) << unused_bits);
-    const bslam_real_t ticks = (bslam_real_t)(scaled / (INT64_C(1) << unused_bits));
+    const int32_t scaled = (int32_t)((after - before) << unused_bits);
+    const bslam_real_t ticks = (bslam_real_t)(scaled / (int32_t)(1u << unused_bits));
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 
@@ -45,7 +45,7 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
         travel_m(settings, before->left_ticks, now->left_ticks, settings->left_radius_m);
     const bslam_real_t right_m =
         travel_m(settings, before->right_ticks, now->right_ticks, settings->right_radius_m);
-    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(now->time_us - before->time_us);
+    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(int32_t)(now->time_us - before->time_us);
 }
 
 /// Of the mean of two wheels that err independently.

@@ -2,7 +2,7 @@
 #ifndef FUZZ_PICTURE_H
 #define FUZZ_PICTURE_H
 
-#include "vision/internal.h"
+#include "vision/vision.h"
 #include "fuzz.h"
 #include "base/scalar.h"
 

@@ -1,6 +1,6 @@
-"""The estimator's insides for its tests: an extension from bslam/internal.h, built once into build/internals.
+"""The firmware's insides for tests: extensions from headers that are not the product's, built into build/internals.
 
-It holds the same sizes as the product's own (`bslam.core.build`), so what stands in a `Slam` can be read by it.
+That of the estimator has the same sizes as the product's own (`bslam.core.build`), so what stands in a `Slam` can be read by it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bslam.core import CoreError, Slam
 from bslam.core.appearance import SIGNATURE_SIZE, encode
-from bslam.core.build import SOURCES, compile_extension, declarations, macros_of
+from bslam.core.build import SOURCES, Macros, compile_extension, declarations, macros_of
 from bslam.core.builds import FIRMWARE_DIR, SIZE_CLASSES
 from bslam.errors import BslamError
 
@@ -28,27 +28,32 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "internals"
 
 @cache
 def internals(real: str, beacons_max: int) -> Any:
-    """The module, with `ffi` and `lib`, of the smallest build that holds so many beacons."""
+    """The estimator's insides: the module, with `ffi` and `lib`, of the smallest build with so many beacons."""
     size = next(one for one in SIZE_CLASSES if one >= beacons_max)
-    name = f"_internals_{real}_{size}"
+    return _extension(f"_internals_{real}_{size}", HEADER, "bslam", macros_of(real, size))
+
+
+@cache
+def link_library() -> Any:
+    """The link's parser, as a module with `ffi` and `lib`."""
+    return _extension("_link", "link/parser.h", "link", macros_of("float", SIZE_CLASSES[0]))
+
+
+def _extension(name: str, header: str, library: str, macros: Macros) -> Any:
+    """Of a header and its library; built where it is not there, or older than its sources."""
     path = FOLDER / (name + sysconfig.get_config_var("EXT_SUFFIX"))
     FOLDER.mkdir(parents=True, exist_ok=True)
+    files = [file for folder in SOURCES[library] for file in (FIRMWARE_DIR / folder).rglob("*.[ch]")]
     with (FOLDER / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # another process of these tests may be at it
-        if not path.is_file() or path.stat().st_mtime < _newest_source():
-            macros = macros_of(real, size)
-            declared = declarations(macros, HEADER)
-            compile_extension(name, declared, f'#include "{HEADER}"', macros, "bslam", FOLDER)
+        if not path.is_file() or path.stat().st_mtime < max(file.stat().st_mtime for file in files):
+            declared = declarations(macros, header)
+            compile_extension(name, declared, f'#include "{header}"', macros, library, FOLDER)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def _newest_source() -> float:
-    files = [file for folder in SOURCES["bslam"] for file in (FIRMWARE_DIR / folder).rglob("*.[ch]")]
-    return max(file.stat().st_mtime for file in files)
 
 
 def module_of(slam: Slam) -> Any:

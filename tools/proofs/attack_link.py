@@ -21,7 +21,6 @@ from typing import Any
 
 from cobs import cobs
 
-from bslam.core.raw import library
 from bslam.core.slam import Slam
 from bslam.link import messages
 from bslam.link.frames import crc16
@@ -133,8 +132,7 @@ def connected(line: AttackedLine, params: Any, beacons: int) -> RemoteSlam:
 
 def link_counters(line: Line) -> dict[str, int]:
     """What the robot says of its link, by name, over a calm line."""
-    names = [name for name, _ in library("float", 1).ffi.typeof("bslam_link_counters_t").fields]
-    names += ["repeated", "replayed"]
+    names = [*messages.LINK_COUNTERS, "repeated", "replayed"]
     values = messages.read_counters(Client(line).ask(Message.COUNTERS).body)
     return dict(zip(names, values[-len(names) :], strict=True))
 

@@ -51,9 +51,14 @@ void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam)
     }
 }
 
+bool bslam_guard_is_sealed(const bslam_guard_t *guard)
+{
+    return guard->seal == SEALED;
+}
+
 bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam)
 {
-    if (guard->seal == SEALED && checksum_of(slam) == guard->checksum) {
+    if (bslam_guard_is_sealed(guard) && checksum_of(slam) == guard->checksum) {
         return BSLAM_OK;
     }
     guard->counters.corrupt++;
@@ -62,7 +67,7 @@ bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam)
 
 bslam_status_t bslam_guard_restore(bslam_guard_t *guard, bslam_slam_t *slam)
 {
-    if (guard->seal != SEALED || guard->copy == NULL || checksum_of(guard->copy) != guard->checksum) {
+    if (!bslam_guard_is_sealed(guard) || guard->copy == NULL || checksum_of(guard->copy) != guard->checksum) {
         return BSLAM_E_STATE;
     }
     memcpy(slam, guard->copy, sizeof *slam);

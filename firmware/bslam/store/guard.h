@@ -22,6 +22,8 @@ typedef struct bslam_guard {
 /// The state is good as it is now.
 void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam);
 
+bool bslam_guard_is_sealed(const bslam_guard_t *guard);
+
 /// BSLAM_E_STATE: it is not as it was when it was sealed, or nothing was. Counts it, and changes nothing.
 BSLAM_MUST_CHECK bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam);
 

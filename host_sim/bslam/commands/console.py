@@ -14,7 +14,9 @@ import numpy as np
 
 from bslam.commands.arguments import add_filter_options, run_options
 from bslam.commands.report import table_of
+from bslam.core.appearance import rendered_seeds
 from bslam.core.errors import CoreError
+from bslam.core.slam import BY_APPEARANCE
 from bslam.errors import BslamError
 from bslam.link.messages import Health, PoseReport
 from bslam.log import Log, read_folder
@@ -137,7 +139,9 @@ def _watch(arguments: argparse.Namespace) -> int:
         if arguments.record is None:
             _follow(slam, screen, None, arguments)
         else:
-            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max)
+            learns = slam.params["association"] == BY_APPEARANCE
+            seeds = rendered_seeds() if learns else None  # what a robot with cameras starts from
+            start = Start(arguments.record.stem, slam.host_params, slam.info.beacons_max, seeds)
             start.about.update(slam.target_description())
             with RecordingWriter(arguments.record, start) as writer:
                 if not arguments.reset:

@@ -20,7 +20,7 @@ from cffi import FFI
 from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 
 CORE_DIR = Path(__file__).resolve().parent
-SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision")}
+SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision"), "link": ("base", "link")}
 """Folders of the firmware that make each library."""
 HEADER = "bslam/bslam.h"
 VISION_HEADER = "vision/vision.h"

@@ -6,11 +6,11 @@ from cobs import cobs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bslam.core.raw import library
 from bslam.link.frames import Decoder, Frame, crc16, encode
+from bslam.link.messages import LINK_COUNTERS
+from internals import link_library
 
-RAW = library("float", 1)
-FFI, LIB = RAW.ffi, RAW.lib
+FFI, LIB = link_library().ffi, link_library().lib
 
 frames = st.builds(
     Frame,
@@ -42,8 +42,8 @@ class CParser:
 
     @property
     def dropped(self):
-        counters = RAW.fields(self.parser.counters, "bslam_link_counters_t")
-        return sum(counters.values()) - counters["frames"]
+        counters = self.parser.counters
+        return sum(getattr(counters, name) for name in LINK_COUNTERS) - counters.frames
 
 
 def c_encode(frame):
@@ -58,6 +58,10 @@ def c_encode(frame):
     length = LIB.bslam_link_end(writer)
     assert length > 0
     return bytes(FFI.buffer(out, length))
+
+
+def test_the_counters_of_the_link_are_those_of_the_parser():
+    assert tuple(name for name, _ in FFI.typeof("bslam_link_counters_t").fields) == LINK_COUNTERS
 
 
 @given(frames)
