@@ -340,8 +340,7 @@ static bool is_solver(bslam_learner_t *learner)
 {
     bslam_solver_t *solver = &learner->training.solver;
     bool good = bslam_is_count(solver->count, BSLAM_SOLVER_ROWS_MAX) &&
-                bslam_is_count(solver->active, solver->count) &&
-                bslam_is_count(solver->next, solver->active);
+                bslam_is_count(solver->active, solver->count) && bslam_is_count(solver->next, solver->active);
     bslam_mend_flag(&solver->thorough);
     for (int32_t i = 0; good && i < solver->count; i++) {
         bslam_mend_flag(&solver->rows[i].positive);
