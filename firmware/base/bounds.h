@@ -1,4 +1,5 @@
-/// The smaller and the larger of two numbers, and a number within bounds; what memory that may be damaged has.
+/// The smaller and the larger of two numbers, and a number within bounds; what memory that may be damaged
+/// has.
 #ifndef BSLAM_BASE_BOUNDS_H
 #define BSLAM_BASE_BOUNDS_H
 

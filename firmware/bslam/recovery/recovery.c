@@ -38,8 +38,8 @@ enum {
     ELSEWHERE_BEACONS = 4,  ///< beacons that another pose has more than the present one, in a map that grows,
     ELSEWHERE_FRAMES = 3,   ///< in as many frames: the robot is there
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
-    CONFIRMED_BY_TIME = 8,  ///< or fewer than one more than a fix needs
-    COUNT_MAX = 1000000000  ///< of frames: more than a year's
+    CONFIRMED_BY_TIME = 8,   ///< or fewer than one more than a fix needs
+    COUNT_MAX = 1000000000   ///< of frames: more than a year's
 };
 
 void bslam_recovery_restart(bslam_recovery_t *recovery)
