@@ -90,9 +90,9 @@ static void set_paper(bslam_settings_t *settings)
     settings->right_speed_sd_mps = BSLAM_R(0.3);
 }
 
-/// What stands half hidden is measured as if it were whole, so a few sightings in a hundred err by many times
-/// what the front end says. Distances are so doubtful that position alone fits too much: appearance counts
-/// twice, new beacons are expected less, and the viewpoint tells nothing.
+/// What is partly hidden is measured as if it were whole: a few sightings in a hundred err by many times what
+/// they say. Distances are so doubtful that position alone fits too much: appearance counts twice, new
+/// beacons are expected less, and the viewpoint tells nothing.
 static void set_camera(bslam_settings_t *settings)
 {
     settings->huber_d = 1;

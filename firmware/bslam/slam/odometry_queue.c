@@ -5,8 +5,7 @@
 static const bslam_real_t TRAVEL_MAX_M = BSLAM_R(1000.0);
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 
-/// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
-/// filter's own speed has no bound that would keep the conversion defined.
+/// The length of a motion, or 1 km if it is longer, so that the conversion is defined.
 static uint32_t whole_micrometres(bslam_real_t forward_m)
 {
     return bslam_in_range(forward_m, -TRAVEL_MAX_M, TRAVEL_MAX_M)
