@@ -1,4 +1,4 @@
-/// What the two files of the learner share. Not for users of the library.
+/// What the two files of the learner share.
 #ifndef BSLAM_APPEARANCE_LEARNER_INTERNAL_H
 #define BSLAM_APPEARANCE_LEARNER_INTERNAL_H
 

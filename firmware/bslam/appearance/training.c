@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-// C as in the study that docs/EXPERIMENTS.md reports. A tolerance of 0.2 costs no decisions, 0.7 some.
+// A tolerance of 0.2 costs no decisions, 0.7 some.
 static const float COST = 10.0f;
 static const float TOLERANCE = 0.2f;
 

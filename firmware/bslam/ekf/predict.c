@@ -345,8 +345,8 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
     }
 }
 
-/// A walk of v makes the way no more doubtful than this, which is as good as unknown: beside more, the few
-/// millimetres that are known of it would be rounded away.
+/// A walk of v makes the travel no more doubtful than this: beside more, the millimetres that are known of it
+/// would be rounded away.
 static const bslam_real_t TRAVEL_SD_MAX_M = BSLAM_R(1.5);
 
 /// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
@@ -375,7 +375,7 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
     move_covariance(state, &transition);
 }
 
-/// The way is as doubtful as it misses the next point, times `share`, both axes.
+/// The travel is as doubtful as it misses the next point, times `share`, both axes.
 static void doubt_travel(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
 {
     const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);

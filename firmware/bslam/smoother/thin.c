@@ -7,7 +7,7 @@
 #include "bslam/smoother/smoother_internal.h"
 #include "base/scalar.h"
 
-/// No way is bent by more: beyond that it has no direction to speak of.
+/// No path is bent by more: beyond that it has no direction to speak of.
 static const bslam_real_t TURNED_MAX_RAD = BSLAM_R(1.0);
 static const bslam_real_t STRETCHED_MAX = BSLAM_R(0.3);
 /// A chord shorter than this has no direction.
@@ -19,7 +19,7 @@ enum { RANGES_MAX = BSLAM_SMOOTHER_FIRST - 1 };
 
 enum { SPEEDS = BSLAM_ROBOT_DIM_MAX - BSLAM_STATE_FORWARD };
 
-/// Two neighbours on their way into one.
+/// Two neighbours that become one.
 typedef struct pair {
     bslam_pose_t pose[2];
     bslam_pose_t mean;
@@ -31,7 +31,7 @@ static bslam_pose_t pose_at(const bslam_real_t *at)
     return (bslam_pose_t){at[BSLAM_STATE_X], at[BSLAM_STATE_Y], at[BSLAM_STATE_THETA]};
 }
 
-// ---- the way ----------------------------------------------------------------------------------------------
+// ---- the path ---------------------------------------------------------------------------------------------
 
 /// How far the node's speeds drive it and turn it; odometry's increments, times their scales, where there are
 /// no speeds.
@@ -73,7 +73,7 @@ static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, b
     }
 }
 
-/// A node's way, at whose beginning there is more of it than the node knows: `motion`, at these speeds.
+/// A node's path, at whose beginning there is more than the node knows: `motion`, at these speeds.
 static void lengthen(bslam_smoother_node_t *node, const bslam_motion_t *motion, const bslam_real_t *speeds)
 {
     const bslam_real_t share = motion->dt_s / (motion->dt_s + node->motion.dt_s);
@@ -223,11 +223,11 @@ static int join_seen(bslam_smoother_t *smoother, const pair_t *pair, int beacon,
 typedef struct closing {
     int32_t node, seen, to_node, to_seen;
     bslam_real_t from[BSLAM_ROBOT_DIM_MAX];  ///< the robot at the node before
-    bslam_motion_t ahead;                    ///< from there to where the next node's way begins, if anywhere
-    bslam_real_t speeds[SPEEDS];             ///< on that way
+    bslam_motion_t ahead;                    ///< from there to where the next node's path begins, if anywhere
+    bslam_real_t speeds[SPEEDS];             ///< on that path
 } closing_t;
 
-/// The next node, with all of its way.
+/// The next node, with all of its path.
 static bslam_smoother_node_t read_node(bslam_smoother_t *smoother, closing_t *at)
 {
     bslam_smoother_node_t node = *bslam_smoother_node(smoother, at->node);
