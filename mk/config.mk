@@ -1,7 +1,9 @@
 # The C libraries, their files, and the flags every build of them shares. base is what both stand on; bslam is
-# the estimator, vision the way from images to sightings: neither needs the other. link is the serial protocol.
+# the estimator, vision the way from images to sightings: neither needs the other. link is the serial
+# protocol.
 
-library_files = $(sort $(foreach folder,$(1),$(wildcard firmware/$(folder)/*.$(2) firmware/$(folder)/*/*.$(2))))
+library_files = $(sort $(foreach folder,$(1),$(wildcard $(addsuffix .$(2),firmware/$(folder)/* \
+    firmware/$(folder)/*/*))))
 BASE_SOURCES := $(call library_files,base,c)
 LIBRARIES := bslam vision link
 LIBRARY_SOURCES_bslam := $(BASE_SOURCES) $(call library_files,bslam,c)

@@ -1,12 +1,16 @@
-# The core as a static library for a microcontroller: build/<core>/libbslam.a. TARGET picks the core; or a
-# board, and then its images are linked (mk/images.mk).
+# The libraries for a microcontroller: build/<core>/libbslam.a, libvision.a and liblink.a. TARGET picks the
+# core; or a board, and then its images are linked (mk/images.mk). SIZES="-DBSLAM_BEACONS_MAX=50" sets what
+# the application sets, too.
 
 TARGET ?= m4f
+SIZES :=
 
 ARM := arm-none-eabi-
 RISCV := riscv64-unknown-elf-
 TARGET_FLAGS_m0plus := -mcpu=cortex-m0plus
 TARGET_FLAGS_m4f := -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard
+# With all that is left out by itself: for the symbols, the stack and the sizes of all code.
+TARGET_FLAGS_m4f_whole := $(TARGET_FLAGS_m4f) -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2
 TARGET_FLAGS_m7 := -mcpu=cortex-m7 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 TARGET_FLAGS_m33 := -mcpu=cortex-m33 -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 # Without its vector extension (MVE), whose floating point flushes denormals to zero: other bits.
@@ -54,19 +58,21 @@ SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inl
 define core_rules
 CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
 CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(call FLAGS_FOR,$(1)) -Os -g \
-    $(SMALLER) -fno-math-errno -DBSLAM_SETTING_MEANINGS=0 \
+    $(SMALLER) -fno-math-errno -DBSLAM_SETTING_MEANINGS=0 $(SIZES) \
     -ffunction-sections -fdata-sections \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT) -Wstack-usage=$(call STACK_MAX_FOR,$(1))
 
-.PHONY: library-$(1)
-library-$(1): build/$(1)/libbslam.a
-	@$$(PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$<
-	@$(call TOOLS_FOR,$(1))size --totals $$< | \
-	    awk 'END { printf "firmware $(1): %d bytes of code and constants\n", $$$$1 }'
+CORE_ARCHIVES_$(1) := $(LIBRARIES:%=build/$(1)/lib%.a)
 
-build/$(1)/libbslam.a: $$(CORE_OBJECTS_$(1))
+.PHONY: library-$(1)
+library-$(1): $$(CORE_ARCHIVES_$(1))
+	@$$(PYTHON) -m tools.checks.check_symbols --nm $(call TOOLS_FOR,$(1))nm $$^
+	@for archive in $$^; do $(call TOOLS_FOR,$(1))size --totals $$$$archive | \
+	    awk "END { printf \"$$$$archive: %d bytes of code and constants\\n\", \$$$$1 }"; done
+
+$$(CORE_ARCHIVES_$(1)): build/$(1)/lib%.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
-	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$^
+	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$(LIBRARY_SOURCES_$$*:%.c=build/$(1)/%.o)
 
 $$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk
 	@mkdir -p $$(@D)
@@ -81,7 +87,7 @@ TARGET_LIBRARIES := $(foreach core,$(TARGETS),$(if $(call CAN_BUILD,$(core)),lib
 firmware-all: $(TARGET_LIBRARIES) images ## the library for every core, the images for every board
 
 .PHONY: sizes
-sizes: ## print how much RAM an instance takes, by number of beacons
-	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 --learner 6 32 64 \
+sizes: ## print how much RAM an instance takes, by number of beacons and what it has
+	@$(PYTHON) -m tools.checks.sizes --beacons 6 20 50 \
 	    --compiler "host" "$(CC) $(C_STANDARD) $(C_INCLUDES)" nm \
 	    --compiler "m4f" "$(ARM)gcc $(C_STANDARD) $(C_INCLUDES) -mthumb $(TARGET_FLAGS_m4f)" $(ARM)nm

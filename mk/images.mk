@@ -9,7 +9,7 @@ PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)
 # The sizes of the host's largest build (core/build.py), so that a board with much memory answers as it does,
 # the front end for pictures, turns seen, and the smoother.
-HOST_SIZES := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
+HOST_SIZES := -DROBOT_VISION=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION_MAP_BYTES=65536 \
     -DBSLAM_BEACONS_MAX=80 -DBSLAM_RAYS_MAX=80 -DBSLAM_SIGHTINGS_MAX=96 -DBSLAM_HISTORY_MAX=128
 
 include $(BOARDS:%=firmware/port/%/board.mk)
@@ -45,7 +45,8 @@ build/$(1)/%.o: %.c $$(BOARD_MK_$(1))
 	@$$(BOARD_COMPILE_$(1)) -MMD -MP -c $$< -o $$@
 
 build/$(1)/robot.elf: build/$(1)/firmware/robot/main.o
-$$(filter-out build/$(1)/robot.elf,$$(BOARD_ALL_$(1):%=build/$(1)/%.elf)): build/$(1)/%.elf: build/$(1)/firmware/bench/%.o
+$$(filter-out build/$(1)/robot.elf,$$(BOARD_ALL_$(1):%=build/$(1)/%.elf)): build/$(1)/%.elf: \
+    build/$(1)/firmware/bench/%.o
 $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)/memory.ld \
     firmware/port/sections.ld tools/checks/check_image.py
 	@$$(BOARD_CC_$(1)) $$(IMAGE_LINK) $$(call LIBC_FOR,$$(BOARD_CORE_$(1))) \
@@ -55,7 +56,8 @@ $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)
 .PHONY: image-$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 
--include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
+-include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d \
+    $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 
@@ -67,7 +69,7 @@ build/microbit/shallow.elf: build/microbit/robot.elf
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DROBOT_VISUAL_GYRO=1 -DSESSION_MAP_BYTES=65536
+HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)
@@ -90,8 +92,8 @@ selftest: images ## run the self-test of every board that QEMU has
 	@$(PYTHON) -m tools.proofs.run_image selftest
 
 .PHONY: sizes-doc check-sizes
-sizes-doc: images library-m4f ## measure flash, RAM, stack and instructions anew, write docs/SIZES.md
+sizes-doc: images library-m4f_whole ## measure flash, RAM, stack and instructions, write docs/SIZES.md
 	@$(PYTHON) -m tools.checks.sizes_doc
 
-check-sizes: images library-m4f
+check-sizes: images library-m4f_whole
 	@$(PYTHON) -m tools.checks.sizes_doc --check

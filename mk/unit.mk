@@ -1,5 +1,5 @@
 # C unit tests: tests/unit/<path>/test_<module>.c mirrors firmware/<path>/<module>.c. Each is a CMocka program
-# linked with its own library and no other, built under sanitizers twice: float (the target), double (the twin).
+# linked with its own library and no other, built under sanitizers twice: float (the target) and double.
 
 UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
 # The library of a test, by its first folder; what a test of all of them links.

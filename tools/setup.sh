@@ -2,9 +2,9 @@
 # Makes this machine ready: system packages, then .venv with pinned Python packages and the command `bslam`.
 #
 #   tools/setup.sh run     what `make run` needs: Python, a C compiler
-#   tools/setup.sh test    that, and what `make test` needs: CMocka, Arm compiler, QEMU, browser, valgrind
+#   tools/setup.sh test    that, and what `make test` needs: CMocka, compilers, QEMU, browser, valgrind
 #   tools/setup.sh bench   the same, for `make bench`
-#   tools/setup.sh proof   that, and what `make proof` needs: clang with libFuzzer and MC/DC
+#   tools/setup.sh proof   that, and what `make proof` needs: libFuzzer and MC/DC of clang
 #
 # Quick when nothing is missing; asks no question. With NO_INSTALL=1 apt-get's command is printed, not run.
 # Exit status 0: ready. 2: something is missing that could not be installed; the first line says what.
@@ -89,8 +89,9 @@ find_missing() {
     need qemu-system-arm "running the firmware" command -v qemu-system-arm
     need chromium-headless-shell "trying the pages in a browser" has_browser
     need valgrind "counting instructions" command -v valgrind
+    need g++ "users' programs in C++" command -v g++
+    need clang-19 "users' programs, by a second compiler" command -v clang++-19
     [[ $part == test || $part == bench ]] && return
-    need clang-19 "fuzzing and coverage" command -v clang-19
     need llvm-19 "reading coverage" command -v llvm-cov-19
     need libclang-rt-19-dev "fuzzing and coverage" sh -c 'echo "int main(void) { return 0; }" |
         clang-19 -x c -fsanitize=address -fprofile-instr-generate - -o /dev/null'

@@ -9,7 +9,7 @@
 #include BSLAM_CONFIG_HEADER
 #endif
 
-/// 0: bslam_real_t is float (the target). 1: double (the twin, which tests compare with).
+/// 0: bslam_real_t is float (the target). 1: double, which tests compare with.
 #ifndef BSLAM_REAL_DOUBLE
 #define BSLAM_REAL_DOUBLE 0
 #endif

@@ -42,12 +42,21 @@ static bslam_real_t bring_near(bslam_real_t angle)
     return remainder_of_turns(angle);
 }
 
+/// The nearest whole number; 0 for NaN, which goes on in what the caller makes of the angle itself.
+static int32_t nearest_whole(bslam_real_t turns)
+{
+    if (!(turns == turns)) {
+        return 0;
+    }
+    return (int32_t)(turns + (turns < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
+}
+
 /// The angle less the nearest multiple of pi/2, and which multiple that was.
 static bslam_real_t reduce_to_quadrant(bslam_real_t any_angle, int32_t *quadrant)
 {
     const bslam_real_t angle = bring_near(any_angle);
     const bslam_real_t turns = angle * BSLAM_R(0.63661977236758134308);
-    const int32_t nearest = (int32_t)(turns + (turns < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
+    const int32_t nearest = nearest_whole(turns);
     const bslam_real_t q = (bslam_real_t)nearest;
     *quadrant = nearest;
     return ((angle - q * HALF_PI_HIGH) - q * HALF_PI_MIDDLE) - q * HALF_PI_LOW;
@@ -161,7 +170,7 @@ bslam_real_t bslam_angle_wrap(bslam_real_t angle_rad)
     }
     const bslam_real_t near_rad = bring_near(angle_rad);
     const bslam_real_t turns = near_rad / (2 * BSLAM_PI);
-    const int32_t nearest = (int32_t)(turns + (turns < 0 ? BSLAM_R(-0.5) : BSLAM_R(0.5)));
+    const int32_t nearest = nearest_whole(turns);
     const bslam_real_t quadrants = (bslam_real_t)(4 * nearest);
     bslam_real_t wrapped =
         ((near_rad - quadrants * HALF_PI_HIGH) - quadrants * HALF_PI_MIDDLE) - quadrants * HALF_PI_LOW;

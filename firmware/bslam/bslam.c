@@ -28,14 +28,37 @@ static bslam_slam_t *copy_of(bslam_instance_t *robot)
 }
 #endif
 
+#if BSLAM_GUARD
+/// What the guard does not watch may be worth less when it is damaged, but every index in it is within bounds.
+static void mend_members(bslam_instance_t *robot)
+{
+    const bslam_settings_t *settings = &robot->slam.settings;
+#if BSLAM_RECOVERY
+    bslam_recovery_mend(&robot->recovery);
+#endif
+#if BSLAM_APPEARANCE
+    bslam_appearance_mend(&robot->appearance, settings->seeds, settings->seed_count);
+#endif
+#if BSLAM_SMOOTHER
+    if (settings->filter == BSLAM_FILTER_SMOOTHER) {
+        bslam_smoother_mend(&robot->smoother, settings, &robot->slam.ekf);
+    }
+#endif
+    (void)settings;
+}
+#endif
+
 /// The pipeline, if its memory is as the step before left it; else NULL, for BSLAM_E_STATE.
 static bslam_slam_t *begin_step(bslam_t *robot)
 {
     bslam_instance_t *instance = bslam_instance(robot);
 #if BSLAM_GUARD
-    if (instance->slam.settings.guard != 0 &&
-        bslam_guard_check(&instance->guard, &instance->slam) != BSLAM_OK) {
-        return NULL;
+    // Neither of the two flags that say so can be damaged unnoticed while the other is good.
+    if (instance->slam.settings.guard != 0 || bslam_guard_is_sealed(&instance->guard)) {
+        if (bslam_guard_check(&instance->guard, &instance->slam) != BSLAM_OK) {
+            return NULL;
+        }
+        mend_members(instance);
     }
 #endif
     return &instance->slam;
@@ -47,6 +70,7 @@ static bslam_status_t ended(bslam_t *robot, bslam_status_t status)
 #if BSLAM_GUARD
     bslam_instance_t *instance = bslam_instance(robot);
     if (instance->slam.settings.guard != 0) {
+        instance->guard.copy = copy_of(instance);
         bslam_guard_seal(&instance->guard, &instance->slam);
     }
 #endif
@@ -129,6 +153,7 @@ bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_r
     if (status != BSLAM_OK) {
         return status;
     }
+    mend_members(instance);
 #if BSLAM_RECOVERY
     bslam_recovery_restart(&instance->recovery);
 #endif
@@ -289,11 +314,14 @@ bslam_status_t bslam_set_pose(bslam_t *robot, const bslam_pose_t *pose, bslam_re
 
 // ---- keeping the map --------------------------------------------------------------------------------------
 
-bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes)
+bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes)
 {
-    const bslam_slam_t *slam = &bslam_const_instance(robot)->slam;
+    const bslam_slam_t *slam = begin_step(robot);
     bslam_map_fault_t fault;
-    *bytes = bslam_map_size(slam);
+    *bytes = slam == NULL ? 0 : bslam_map_size(slam);
+    if (slam == NULL) {
+        return BSLAM_E_STATE;
+    }
     return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
 }
 
@@ -310,15 +338,16 @@ bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source, 
     return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_map_load(slam, source, mode_of(slam), fault));
 }
 
-bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
+bslam_status_t bslam_save_to_flash(bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
 {
-    return bslam_slots_save(flash, &bslam_const_instance(robot)->slam, fault);
+    *fault = BSLAM_MAP_FINE;
+    const bslam_slam_t *slam = begin_step(robot);
+    return slam == NULL ? BSLAM_E_STATE : bslam_slots_save(flash, slam, fault);
 }
 
 bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)
 {
     *fault = BSLAM_MAP_FINE;
     bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE
-                        : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slots_load(flash, slam, mode_of(slam), fault));
 }

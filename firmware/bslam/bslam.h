@@ -30,7 +30,7 @@
 #include "base/types.h"
 
 #define BSLAM_VERSION_MAJOR 0
-#define BSLAM_VERSION_MINOR 2
+#define BSLAM_VERSION_MINOR 1
 #define BSLAM_VERSION_PATCH 0
 
 #ifdef __cplusplus
@@ -49,9 +49,13 @@ typedef union bslam {
 
 /// Robot at the origin, empty map. The settings are copied. BSLAM_E_PARAMETER: *bad_setting is the first
 /// setting outside its range, or that contradicts another (bslam_settings_info). BSLAM_E_SIZE: library and
-/// application were compiled with other sizes (config.h); nothing was written then. O(memory).
+/// application were compiled with other sizes (config.h); nothing was written then. BSLAM_E_COUNT: more seeds
+/// than BSLAM_SEEDS_MAX. O(memory).
 #define bslam_init(robot, settings, bad_setting) \
     bslam_init_sized((robot), sizeof *(robot), BSLAM_SIZES_HASH, (settings), (bad_setting))
+#if BSLAM_REAL_DOUBLE
+#define bslam_init_sized bslam_init_double  // library and application of two scalar types do not link
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_init_sized(bslam_t *robot, size_t robot_bytes, uint32_t sizes_hash,
                                                  const bslam_settings_t *settings, int *bad_setting);
 
@@ -94,7 +98,7 @@ typedef struct bslam_odometry_reading {
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry(bslam_t *robot, const bslam_odometry_reading_t *reading);
 
 /// After an interruption of odometry, at a standstill: an encoder reset, a pause of more than 4 s, a robot
-/// that was carried. The next reading starts the clock and the tick reference anew, at any time stamp. The
+/// that was pushed. The next reading starts the clock and the tick reference anew, at any time stamp. The
 /// pose becomes as doubtful as the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m outside 0 to 30
 /// or heading_sd_rad outside 0 to 3.2 (NaN is).
 BSLAM_MUST_CHECK bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real_t position_sd_m,
@@ -141,7 +145,7 @@ bslam_health_t bslam_health(const bslam_t *robot);
 /// Where a chain of fingerprints starts.
 #define BSLAM_FINGERPRINT_START 0xcbf29ce484222325u
 
-/// Goes on with a hash of the whole state: two robots that were told the same have the same. O(n²).
+/// Goes on with a hash of the whole state: two robots with the same inputs have the same. O(n²).
 uint64_t bslam_fingerprint(const bslam_t *robot, uint64_t before);
 
 // ---- what became of the sightings -------------------------------------------------------------------------
@@ -221,13 +225,13 @@ typedef struct bslam_guard_counters {
 } bslam_guard_counters_t;
 
 typedef struct bslam_appearance_counters {
-    uint32_t taught;    ///< sightings that a classifier was trained with
-    uint32_t unsure;    ///< matches that none was trained with, because they may be wrong
-    uint32_t shared;    ///< times that a beacon was found to look like another and took its classifier
-    uint32_t retired;   ///< beacons taken out because another was in the same place
-    uint32_t vanished;  ///< beacons taken out because they were missed from where they had been seen
-    uint32_t parted;    ///< times that a beacon got a classifier of its own again
-    uint32_t no_slot;   ///< beacons that got no classifier when they were first seen: none was free
+    uint32_t trained;  ///< sightings that a classifier was trained with
+    uint32_t unsure;   ///< matches that none was trained with, because they may be wrong
+    uint32_t shared;   ///< times that a beacon was found to look like another and took its classifier
+    uint32_t retired;  ///< beacons taken out because another was in the same place
+    uint32_t missed;   ///< beacons taken out because they were missed from where they had been seen
+    uint32_t parted;   ///< times that a beacon got a classifier of its own again
+    uint32_t no_slot;  ///< beacons that got no classifier when they were first seen: none was free
 } bslam_appearance_counters_t;
 
 typedef struct bslam_learner_counters {
@@ -339,8 +343,7 @@ typedef struct bslam_map_sink {
 
 /// Writes the confirmed beacons, their covariance and their classifiers. sink NULL: only counts. *bytes is
 /// how many there are. BSLAM_E_MAP: the sink failed. O(n² + samples), twice.
-BSLAM_MUST_CHECK bslam_status_t bslam_save_map(const bslam_t *robot, const bslam_map_sink_t *sink,
-                                               uint32_t *bytes);
+BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
 
 /// Takes a stored map in place of the robot's own; the robot does not know where it is in it (bslam_set_pose,
 /// or the setting `recovery`). Settings, clock and counters stay. The same bytes load into builds of other
@@ -366,7 +369,7 @@ typedef struct bslam_flash {
 
 /// Saves the map in the slot that is older or damaged, and reads it back. BSLAM_E_MAP with *fault: the flash
 /// failed, or the map is larger than a slot; the map saved before is still there.
-BSLAM_MUST_CHECK bslam_status_t bslam_save_to_flash(const bslam_t *robot, const bslam_flash_t *flash,
+BSLAM_MUST_CHECK bslam_status_t bslam_save_to_flash(bslam_t *robot, const bslam_flash_t *flash,
                                                     bslam_map_fault_t *fault);
 
 /// bslam_load_map of the newest map that it takes. BSLAM_E_MAP: there is none.

@@ -32,12 +32,14 @@ typedef struct bslam_instance {
 
 static inline bslam_instance_t *bslam_instance(bslam_t *robot)
 {
-    return (bslam_instance_t *)(void *)robot;
+    void *memory = robot;
+    return memory;
 }
 
 static inline const bslam_instance_t *bslam_const_instance(const bslam_t *robot)
 {
-    return (const bslam_instance_t *)(const void *)robot;
+    const void *memory = robot;
+    return memory;
 }
 
 #endif

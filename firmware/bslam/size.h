@@ -5,10 +5,12 @@
 #define BSLAM_SIZE_H
 
 #include "bslam/config.h"
+#include "base/status.h"
 
-/// Of a number and of an address.
+/// Of a number, of an address and of an enumeration: some compilers for cores take a byte for one.
 #define BSLAM_SIZE_REAL (BSLAM_REAL_DOUBLE ? 8 : 4)
 #define BSLAM_SIZE_POINTER ((int)sizeof(void *))
+#define BSLAM_SIZE_ENUM ((int)sizeof(bslam_status_t))
 
 /// State values: 5 for the robot, 2 a beacon, and room for 2 more a ray; filled up to a multiple of four.
 #define BSLAM_SIZE_STATE ((5 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 3) / 4 * 4)
@@ -17,14 +19,15 @@
     (BSLAM_SIZE_REAL * (BSLAM_SIZE_STATE * 6 + BSLAM_SIZE_STATE * (BSLAM_SIZE_STATE + 4) / 2 + 4) + \
      BSLAM_BEACONS_MAX * (56 + 4 * BSLAM_SIZE_REAL) + 32)
 /// The values of the settings.
-#define BSLAM_SIZE_SETTINGS (82 * BSLAM_SIZE_REAL + 88 + 2 * BSLAM_SIZE_POINTER)
+#define BSLAM_SIZE_SETTINGS (82 * BSLAM_SIZE_REAL + 80 + 2 * BSLAM_SIZE_POINTER)
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
-     BSLAM_SIGHTINGS_MAX * (36 + 29 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + 4 * BSLAM_SIZE_REAL + \
-     2 * BSLAM_SIZE_POINTER + 180)
+     BSLAM_SIGHTINGS_MAX * (16 + 5 * BSLAM_SIZE_ENUM + 29 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + \
+     4 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 152)
 
-#define BSLAM_SIZE_RECOVERY (BSLAM_RECOVERY * (496 + 124 * BSLAM_SIZE_REAL))
+#define BSLAM_SIZE_RECOVERY \
+    (BSLAM_RECOVERY * ((BSLAM_SIZE_REAL + BSLAM_SIZE_POINTER > 8 ? 496 : 416) + 124 * BSLAM_SIZE_REAL))
 #define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 32 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
 
 /// A classifier: its list of negatives, its weights, its samples.

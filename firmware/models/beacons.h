@@ -8,7 +8,7 @@
 #ifndef BSLAM_MODELS_BEACONS_H
 #define BSLAM_MODELS_BEACONS_H
 
-#include "vision/classifiers/beacon_model.h"
+#include "vision/vision.h"
 
 static const bslam_beacon_class_t bslam_beacons_classes[7] = {
     {"extinguisher", 0.600000024f, 0.0f, 1.10000002f, 1.60000002f, 0.00999999978f, 0.180000007f, 0.479999989f,
@@ -2952,10 +2952,41 @@ static const float bslam_beacons_wide_verdict_bias[1] = {
 };
 
 static const bslam_beacon_model_t bslam_beacons_model = {
-    .class_count = 7,
-    .classes = bslam_beacons_classes,
-    .pinhole = {.cell = {.rows = 1, .features = 22, .weights = bslam_beacons_pinhole_cell_weights, .bias = bslam_beacons_pinhole_cell_bias}, .glance = {.rows = 1, .features = 56, .weights = bslam_beacons_pinhole_glance_weights, .bias = bslam_beacons_pinhole_glance_bias}, .glance_threshold = -0.636639118f, .blob_offset = bslam_beacons_pinhole_offset, .blob_scale = bslam_beacons_pinhole_scale, .screen = {.rows = 1, .features = 82, .weights = bslam_beacons_pinhole_screen_weights, .bias = bslam_beacons_pinhole_screen_bias}, .screen_threshold = -0.356629491f, .any_threshold = -1.06404603f, .kinds = {.rows = 9, .features = 82, .knots = bslam_beacons_pinhole_kinds_knots, .crossed_count = 16, .crossed = bslam_beacons_pinhole_kinds_crossed, .bytes = bslam_beacons_pinhole_kinds_bytes, .byte_scale = bslam_beacons_pinhole_kinds_byte_scale, .bias = bslam_beacons_pinhole_kinds_bias}, .fusion = {.rows = 1, .features = 10, .quadratic = true, .weights = bslam_beacons_pinhole_fusion_weights, .bias = bslam_beacons_pinhole_fusion_bias}, .fusion_threshold = -0.759015679f, .close = {.rows = 9, .features = 370, .knots = bslam_beacons_pinhole_close_knots, .bytes = bslam_beacons_pinhole_close_bytes, .byte_scale = bslam_beacons_pinhole_close_byte_scale, .bias = bslam_beacons_pinhole_close_bias}, .verdict = {.rows = 1, .features = 11, .quadratic = true, .weights = bslam_beacons_pinhole_verdict_weights, .bias = bslam_beacons_pinhole_verdict_bias}, .threshold = 0.247998327f},
-    .wide = {.cell = {.rows = 1, .features = 22, .weights = bslam_beacons_wide_cell_weights, .bias = bslam_beacons_wide_cell_bias}, .glance = {.rows = 1, .features = 56, .weights = bslam_beacons_wide_glance_weights, .bias = bslam_beacons_wide_glance_bias}, .glance_threshold = -0.932200968f, .blob_offset = bslam_beacons_wide_offset, .blob_scale = bslam_beacons_wide_scale, .screen = {.rows = 1, .features = 82, .weights = bslam_beacons_wide_screen_weights, .bias = bslam_beacons_wide_screen_bias}, .screen_threshold = -0.579100192f, .any_threshold = -0.892666101f, .kinds = {.rows = 9, .features = 82, .knots = bslam_beacons_wide_kinds_knots, .crossed_count = 16, .crossed = bslam_beacons_wide_kinds_crossed, .bytes = bslam_beacons_wide_kinds_bytes, .byte_scale = bslam_beacons_wide_kinds_byte_scale, .bias = bslam_beacons_wide_kinds_bias}, .fusion = {.rows = 1, .features = 10, .quadratic = true, .weights = bslam_beacons_wide_fusion_weights, .bias = bslam_beacons_wide_fusion_bias}, .fusion_threshold = -0.670666218f, .close = {.rows = 9, .features = 370, .knots = bslam_beacons_wide_close_knots, .bytes = bslam_beacons_wide_close_bytes, .byte_scale = bslam_beacons_wide_close_byte_scale, .bias = bslam_beacons_wide_close_bias}, .verdict = {.rows = 1, .features = 11, .quadratic = true, .weights = bslam_beacons_wide_verdict_weights, .bias = bslam_beacons_wide_verdict_bias}, .threshold = 0.48930198f},
+    7,  // class_count
+    bslam_beacons_classes,  // classes
+    {
+        {1, 22, false, bslam_beacons_pinhole_cell_weights, NULL, NULL, bslam_beacons_pinhole_cell_bias},  // cell
+        {1, 56, false, bslam_beacons_pinhole_glance_weights, NULL, NULL, bslam_beacons_pinhole_glance_bias},  // glance
+        -0.636639118f,  // glance_threshold
+        bslam_beacons_pinhole_offset,  // blob_offset
+        bslam_beacons_pinhole_scale,  // blob_scale
+        {1, 82, false, bslam_beacons_pinhole_screen_weights, NULL, NULL, bslam_beacons_pinhole_screen_bias},  // screen
+        -0.356629491f,  // screen_threshold
+        -1.06404603f,  // any_threshold
+        {9, 82, bslam_beacons_pinhole_kinds_knots, 16, bslam_beacons_pinhole_kinds_crossed, bslam_beacons_pinhole_kinds_bytes, bslam_beacons_pinhole_kinds_byte_scale, bslam_beacons_pinhole_kinds_bias},  // kinds
+        {1, 10, true, bslam_beacons_pinhole_fusion_weights, NULL, NULL, bslam_beacons_pinhole_fusion_bias},  // fusion
+        -0.759015679f,  // fusion_threshold
+        {9, 370, bslam_beacons_pinhole_close_knots, bslam_beacons_pinhole_close_bytes, bslam_beacons_pinhole_close_byte_scale, bslam_beacons_pinhole_close_bias},  // close
+        {1, 11, true, bslam_beacons_pinhole_verdict_weights, NULL, NULL, bslam_beacons_pinhole_verdict_bias},  // verdict
+        0.247998327f,  // threshold
+    },  // pinhole
+    {
+        {1, 22, false, bslam_beacons_wide_cell_weights, NULL, NULL, bslam_beacons_wide_cell_bias},  // cell
+        {1, 56, false, bslam_beacons_wide_glance_weights, NULL, NULL, bslam_beacons_wide_glance_bias},  // glance
+        -0.932200968f,  // glance_threshold
+        bslam_beacons_wide_offset,  // blob_offset
+        bslam_beacons_wide_scale,  // blob_scale
+        {1, 82, false, bslam_beacons_wide_screen_weights, NULL, NULL, bslam_beacons_wide_screen_bias},  // screen
+        -0.579100192f,  // screen_threshold
+        -0.892666101f,  // any_threshold
+        {9, 82, bslam_beacons_wide_kinds_knots, 16, bslam_beacons_wide_kinds_crossed, bslam_beacons_wide_kinds_bytes, bslam_beacons_wide_kinds_byte_scale, bslam_beacons_wide_kinds_bias},  // kinds
+        {1, 10, true, bslam_beacons_wide_fusion_weights, NULL, NULL, bslam_beacons_wide_fusion_bias},  // fusion
+        -0.670666218f,  // fusion_threshold
+        {9, 370, bslam_beacons_wide_close_knots, bslam_beacons_wide_close_bytes, bslam_beacons_wide_close_byte_scale, bslam_beacons_wide_close_bias},  // close
+        {1, 11, true, bslam_beacons_wide_verdict_weights, NULL, NULL, bslam_beacons_wide_verdict_bias},  // verdict
+        0.48930198f,  // threshold
+    },  // wide
+    NULL,  // recogniser
 };
 
 #endif

@@ -3,7 +3,7 @@
 #ifndef PORT_FILM_H
 #define PORT_FILM_H
 
-#include "vision/camera/lens.h"
+#include "vision/vision.h"
 #include "port/port.h"
 
 #define FILM_MAGIC 0x4d4c4946u  // "FILM"

@@ -6,7 +6,6 @@
 #include "port/port.h"
 
 #define MAGIC 0x5450454bu  // "KEPT"
-#define SLOTS 2
 
 /// Before the bytes, and written after them: what makes them count.
 typedef struct head {
@@ -53,7 +52,7 @@ static int find_newest(const bslam_flash_t *flash, uint32_t count, uint32_t *seq
 {
     int newest = -1;
     *sequence = 0;
-    for (int slot = 0; slot < SLOTS; slot++) {
+    for (int slot = 0; slot < BSLAM_SLOTS; slot++) {
         head_t head;
         if (read_head(flash, slot, count, &head) &&
             (newest < 0 || head.sequence - *sequence < UINT32_MAX / 2)) {

@@ -53,7 +53,7 @@ bool port_encoders(int64_t *time_us, uint32_t *left_ticks, uint32_t *right_ticks
 /// each reading. False: it has none, or cannot tell now.
 bool port_gyro(float *rate_radps);
 
-/// The robot's cameras, as vision/camera/lens.h describes them, and how many there are.
+/// The robot's cameras, as vision/vision.h describes them, and how many there are.
 struct bslam_camera;
 const struct bslam_camera *port_cameras(int *count);
 

@@ -15,18 +15,23 @@ static void clear(camera_input_t *input)
 bslam_status_t camera_input_set_camera(camera_input_t *input, int index, const bslam_camera_t *camera)
 {
     clear(input);
-    input->vision.camera_count = 0;
+    input->camera_count = 0;
     if (index < 0 || index >= BSLAM_CAMERAS_MAX) {
         return BSLAM_E_COUNT;
     }
     input->cameras[index] = *camera;
-    return bslam_vision_init(&input->vision, &bslam_beacons_model, input->cameras, index + 1);
+    const bslam_status_t status =
+        bslam_vision_init(&input->vision, &bslam_beacons_model, input->cameras, index + 1);
+    if (status == BSLAM_OK) {
+        input->camera_count = index + 1;
+    }
+    return status;
 }
 
 static bslam_status_t begin(camera_input_t *input, int camera, bslam_pixel_format_t format)
 {
     clear(input);
-    if (camera < 0 || camera >= input->vision.camera_count) {
+    if (camera < 0 || camera >= input->camera_count) {
         return BSLAM_E_COUNT;
     }
     const bslam_camera_t *lens = &input->cameras[camera];
@@ -76,12 +81,8 @@ bslam_status_t camera_input_look(camera_input_t *input, bool robot_moved)
 {
     clear(input);
     const bslam_status_t status = bslam_vision_end(&input->vision, robot_moved);
-    int32_t count = 0;
-    const bslam_candidate_t *found = bslam_vision_candidates(&input->vision, &count);
-    for (int i = 0; status == BSLAM_OK && i < count; i++) {
-        if (found[i].has_bearing) {
-            input->sightings[input->count++] = bslam_sighting_of(&found[i]);
-        }
+    if (status == BSLAM_OK) {
+        input->count = bslam_vision_sightings(&input->vision, input->sightings);
     }
     return status;
 }

@@ -19,12 +19,15 @@
 typedef struct camera_input {
     bslam_vision_t vision;
     bslam_camera_t cameras[BSLAM_CAMERAS_MAX];
-    uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];
+    int camera_count;
     size_t row_bytes;  ///< of the frame that streams in; 0: there is none
     size_t filled;     ///< bytes of the row that have come
     bool takes_rows;   ///< a frame streams in by whole rows
-    bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];
-    int count;  ///< of sightings in the last finished frame
+    int count;         ///< of sightings in the last finished frame
+    union {
+        uint8_t row[3 * BSLAM_IMAGE_WIDTH_MAX];            ///< while a frame streams in
+        bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX];  ///< of one that is finished
+    };
 } camera_input_t;
 
 /// Sets camera `index`, and that there are index + 1; starts over, with empty memories of the room. What

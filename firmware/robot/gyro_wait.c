@@ -1,6 +1,6 @@
 #include "robot/gyro_wait.h"
 
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
 
 #define SPEED_SD_LEAST_MPS 0.01f  // where the settings say that the wheels hardly err
 #define SPEED_SD_MOST_MPS 100.0f
@@ -8,20 +8,22 @@
 #define ROOT_HALF 0.70710678f
 
 /// A lens of 180 degrees among the cameras makes all rates rough.
-static bslam_real_t least_sd_radps(const bslam_vision_t *vision)
+static bslam_real_t least_sd_radps(const camera_input_t *input)
 {
-    for (int i = 0; i < vision->camera_count; i++) {
-        if (vision->cameras[i].lens == BSLAM_LENS_EQUIDISTANT) {
+    for (int i = 0; i < input->camera_count; i++) {
+        if (input->cameras[i].lens == BSLAM_LENS_EQUIDISTANT) {
             return BSLAM_VISUAL_GYRO_WIDE_SD_RADPS;
         }
     }
     return BSLAM_VISUAL_GYRO_SD_RADPS;
 }
 
-void gyro_wait_start(gyro_wait_t *wait, const bslam_vision_t *vision)
+void gyro_wait_start(gyro_wait_t *wait, camera_input_t *input)
 {
-    bslam_turns_init(&wait->turns, vision);
-    bslam_visual_gyro_init(&wait->gyro, least_sd_radps(vision));
+    bslam_vision_forget_turns(&input->vision);
+    const bslam_status_t status = bslam_visual_gyro_init(&wait->gyro, least_sd_radps(input));
+    (void)status;  // of sizes that differ the front end tells
+    wait->is_running = false;
     wait->is_waiting = false;
 }
 
@@ -43,43 +45,43 @@ static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odom
         travel_m(settings, before->left_ticks, now->left_ticks, settings->left_radius_m);
     const bslam_real_t right_m =
         travel_m(settings, before->right_ticks, now->right_ticks, settings->right_radius_m);
-    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(now->time_us - before->time_us);
+    return (left_m + right_m) / 2 * 1e6f / (bslam_real_t)(int32_t)(now->time_us - before->time_us);
 }
 
 /// Of the mean of two wheels that err independently.
 static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
 {
-    const bslam_real_t sd_mps =
-        ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
+    const bslam_real_t sd_mps = ROOT_HALF * (settings->left_speed_sd_mps + settings->right_speed_sd_mps) / 2;
     if (sd_mps > SPEED_SD_MOST_MPS) {
         return SPEED_SD_MOST_MPS;
     }
     return sd_mps < SPEED_SD_LEAST_MPS ? SPEED_SD_LEAST_MPS : sd_mps;
 }
 
-bool gyro_wait_begin(gyro_wait_t *wait, const bslam_vision_t *vision, const bslam_settings_t *settings,
+bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *input, const bslam_settings_t *settings,
                      const bslam_odometry_reading_t *reading)
 {
-    const bool follows = wait->gyro.running && reading->time_us > wait->reading.time_us;
+    const bool follows = wait->is_running && reading->time_us > wait->reading.time_us;
     const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
     const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
     wait->reading = *reading;
-    if (jumped || bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) !=
-                      BSLAM_OK) {
-        gyro_wait_start(wait, vision);
+    if (jumped ||
+        bslam_visual_gyro_advance(&wait->gyro, reading->time_us, mps, speed_sd_mps(settings)) != BSLAM_OK) {
+        gyro_wait_start(wait, input);
         return false;
     }
+    wait->is_running = true;
     wait->is_waiting = true;
     return true;
 }
 
-void gyro_wait_see(gyro_wait_t *wait, const bslam_vision_t *vision, int camera, int64_t time_us)
+void gyro_wait_see(gyro_wait_t *wait, camera_input_t *input, int camera, int64_t time_us)
 {
-    if (!wait->gyro.running || wait->gyro.time_us != time_us) {
+    if (!wait->is_running || wait->reading.time_us != time_us) {
         return;
     }
     bslam_turn_t turn;
-    const bool tells = bslam_turns_see(&wait->turns, vision, &turn);
+    const bool tells = bslam_vision_turn(&input->vision, &turn);
     const bslam_status_t status = bslam_visual_gyro_take(&wait->gyro, camera, tells ? &turn : NULL);
     if (status == BSLAM_OK && wait->is_waiting) {
         bslam_odometry_reading_t *reading = &wait->reading;

@@ -1,14 +1,20 @@
 #include "robot/health.h"
 
-void health_init(health_t *health, const bslam_counters_t *counters)
+static health_counts_t counts_of(const bslam_t *slam)
 {
-    *health = (health_t){.last = *counters};
+    const bslam_counters_t counters = bslam_counters(slam);
+    return (health_counts_t){counters.recovery, counters.guard, counters.slam.insane};
+}
+
+void health_init(health_t *health, const bslam_t *slam)
+{
+    *health = (health_t){.last = counts_of(slam)};
 }
 
 void health_begin(health_t *health)
 {
-    health->last = (bslam_counters_t){0};
-    health->insane = 0;
+    health->last = (health_counts_t){0};
+    health->counts.insane = 0;
 }
 
 void health_note(health_t *health, health_trouble_t trouble, int64_t time_us)
@@ -17,20 +23,22 @@ void health_note(health_t *health, health_trouble_t trouble, int64_t time_us)
     health->trouble_us = time_us;
 }
 
-void health_look(health_t *health, const bslam_counters_t *counters, int64_t time_us)
+void health_look(health_t *health, const bslam_t *slam, int64_t time_us)
 {
-    const bslam_counters_t *last = &health->last;
-    const uint32_t lost = counters->recovery.lost - last->recovery.lost;
-    const uint32_t found = counters->recovery.found - last->recovery.found;
-    const uint32_t insane = counters->slam.insane - last->slam.insane;
-    health->recovery.contradicting += counters->recovery.contradicting - last->recovery.contradicting;
-    health->recovery.withheld += counters->recovery.withheld - last->recovery.withheld;
-    health->recovery.lost += lost;
-    health->recovery.found += found;
-    health->guard.corrupt += counters->guard.corrupt - last->guard.corrupt;
-    health->guard.restored += counters->guard.restored - last->guard.restored;
-    health->insane += insane;
-    health->last = *counters;
+    const health_counts_t now = counts_of(slam);
+    const health_counts_t *last = &health->last;
+    health_counts_t *counts = &health->counts;
+    const uint32_t lost = now.recovery.lost - last->recovery.lost;
+    const uint32_t found = now.recovery.found - last->recovery.found;
+    const uint32_t insane = now.insane - last->insane;
+    counts->recovery.contradicting += now.recovery.contradicting - last->recovery.contradicting;
+    counts->recovery.withheld += now.recovery.withheld - last->recovery.withheld;
+    counts->recovery.lost += lost;
+    counts->recovery.found += found;
+    counts->guard.corrupt += now.guard.corrupt - last->guard.corrupt;
+    counts->guard.restored += now.guard.restored - last->guard.restored;
+    counts->insane += insane;
+    health->last = now;
     if (lost > 0) {
         health_note(health, HEALTH_LOST, time_us);
     }

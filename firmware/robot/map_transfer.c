@@ -27,7 +27,7 @@ static bool take_piece(void *context, const void *bytes, uint32_t count)
     return true;
 }
 
-void map_transfer_put(const bslam_t *slam, uint32_t at, bslam_link_writer_t *out)
+void map_transfer_put(bslam_t *slam, uint32_t at, bslam_link_writer_t *out)
 {
     uint32_t size = 0;
     bslam_status_t status = bslam_save_map(slam, NULL, &size);

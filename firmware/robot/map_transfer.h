@@ -22,7 +22,7 @@ typedef struct map_transfer {
 /// Puts the size of the map and its bytes from place `at` on, as many as one message holds. The map is
 /// written anew for each piece: nothing is kept, and what changed in between shows by the CRC. O(n² +
 /// classifiers).
-void map_transfer_put(const bslam_t *slam, uint32_t at, bslam_link_writer_t *out);
+void map_transfer_put(bslam_t *slam, uint32_t at, bslam_link_writer_t *out);
 
 /// Takes what is left of a message as the bytes of a map from place `at` on. False: there is no such room.
 bool map_transfer_take(map_transfer_t *transfer, uint32_t at, bslam_link_reader_t *reader);

@@ -46,8 +46,7 @@ static void apply_hello(session_t *session, bslam_link_reader_t *reader)
         if ((flags & FLAG_AS_IT_IS) != 0) {
             robot->settings = robot->in_force;
         } else {
-            const bslam_counters_t counters = bslam_counters(&robot->slam);
-            health_init(&robot->health, &counters);
+            health_init(&robot->health, &robot->slam);
             bslam_settings_preset(&robot->settings, BSLAM_PRESET_REAL_WHEELS);
         }
         keep(session, BSLAM_OK);

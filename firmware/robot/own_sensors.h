@@ -8,7 +8,7 @@
 /// The reading that port_encoders and port_gyro have, if one is due.
 bool own_sensors_read(bslam_odometry_reading_t *reading);
 
-/// A reading that was due. Without a gyro, and with ROBOT_VISUAL_GYRO, it waits until the picture of its
+/// A reading that was due. Without a gyro, and with BSLAM_VISION_TURNS, it waits until the picture of its
 /// moment has been looked at, but not beyond the next reading, or message that changes anything.
 void own_sensors_take_reading(robot_t *robot, session_t *session, const bslam_odometry_reading_t *reading);
 

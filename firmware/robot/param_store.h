@@ -2,7 +2,7 @@
 #ifndef ROBOT_PARAM_STORE_H
 #define ROBOT_PARAM_STORE_H
 
-#include "bslam/settings.h"
+#include "bslam/bslam.h"
 
 /// How many there are, and one of them: an integer rounded to the scalar type, 0 if there is no such setting.
 int param_store_count(void);

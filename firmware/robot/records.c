@@ -79,14 +79,12 @@ void record_put_counters(bslam_link_writer_t *out, const void *counters, size_t 
 void record_put_health(bslam_link_writer_t *out, const health_t *health, const bslam_settings_t *settings,
                        bslam_recovery_state_t state)
 {
-    bslam_link_put_u8(
-        out, (settings->recovery != 0 ? FLAG_RECOVERS : 0u) | (settings->guard != 0 ? FLAG_GUARDS : 0u));
+    bslam_link_put_u8(out, (settings->recovery != 0 ? FLAG_RECOVERS : 0u) |
+                               (settings->guard != 0 ? FLAG_GUARDS : 0u));
     bslam_link_put_u8(out, (uint8_t)state);
     bslam_link_put_u8(out, (uint8_t)health->trouble);
     bslam_link_put_u64(out, (uint64_t)health->trouble_us);
-    record_put_counters(out, &health->recovery, sizeof health->recovery);
-    record_put_counters(out, &health->guard, sizeof health->guard);
-    bslam_link_put_u32(out, health->insane);
+    record_put_counters(out, &health->counts, sizeof health->counts);
 }
 
 void record_put_sighting(bslam_link_writer_t *out, const bslam_sighting_t *sighting, bool with_signature)

@@ -7,8 +7,7 @@
 #include "robot/health.h"
 
 /// STEP. ticks: what the last message took.
-void record_put_step(bslam_link_writer_t *out, const bslam_t *slam, uint64_t fingerprint,
-                     uint32_t ticks);
+void record_put_step(bslam_link_writer_t *out, const bslam_t *slam, uint64_t fingerprint, uint32_t ticks);
 
 /// How many, then an ACCOUNT for each sighting of the last frame.
 void record_put_accounts(bslam_link_writer_t *out, const bslam_t *slam);

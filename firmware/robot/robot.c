@@ -51,8 +51,8 @@ static bslam_real_t at_most(bslam_real_t value, bslam_real_t most)
     return value < most ? value : most;
 }
 
-/// With the state that a reset left, if it is good. Time stamps and the counters of wheels begin anew, and the
-/// robot may have rolled on meanwhile.
+/// With the state that a reset left, if it is good. Time stamps and the counters of wheels begin anew, and
+/// the robot may have rolled on meanwhile.
 static bool goes_on(robot_t *robot)
 {
     const bslam_settings_t *settings = &robot->in_force;
@@ -61,9 +61,8 @@ static bool goes_on(robot_t *robot)
                       at_most(settings->gap_turn_sd_radps * RESTART_S, HEADING_SD_MAX_RAD)) != BSLAM_OK) {
         return false;
     }
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
     robot->settings = robot->in_force;
-    health_look(&robot->health, &counters, port_time_us());
+    health_look(&robot->health, &robot->slam, port_time_us());
     health_note(&robot->health, HEALTH_RESTARTED, port_time_us());
     return true;
 }
@@ -180,8 +179,7 @@ static bslam_status_t start_cold(robot_t *robot, bool has_cameras, robot_start_t
             status = robot_start_over(robot, &bad_setting);
         }
     }
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
-    health_init(&robot->health, &counters);
+    health_init(&robot->health, &robot->slam);
     return status;
 }
 
@@ -202,8 +200,7 @@ bslam_status_t robot_start(robot_t *robot, robot_start_t *start)
 
 void robot_end_call(robot_t *robot, bslam_status_t status, int64_t time_us)
 {
-    const bslam_counters_t counters = bslam_counters(&robot->slam);
-    health_look(&robot->health, &counters, time_us);
+    health_look(&robot->health, &robot->slam, time_us);
     if (status != BSLAM_E_STATE) {
         return;
     }
@@ -239,10 +236,9 @@ bool robot_lets_wait(robot_t *robot, const bslam_odometry_reading_t *reading)
     }
     robot->left_ticks = reading->left_ticks;
     robot->right_ticks = reading->right_ticks;
-#if ROBOT_VISUAL_GYRO
-    const bslam_vision_t *vision = &robot->camera.vision;
-    return !reading->has_gyro && vision->camera_count > 0 &&
-           gyro_wait_begin(&robot->gyro_wait, vision, &robot->in_force, reading);
+#if ROBOT_VISION && BSLAM_VISION_TURNS
+    return !reading->has_gyro && robot->camera.camera_count > 0 &&
+           gyro_wait_begin(&robot->gyro_wait, &robot->camera, &robot->in_force, reading);
 #else
     return false;
 #endif
@@ -250,7 +246,7 @@ bool robot_lets_wait(robot_t *robot, const bslam_odometry_reading_t *reading)
 
 bool robot_end_wait(robot_t *robot, bslam_odometry_reading_t *reading)
 {
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
     return gyro_wait_end(&robot->gyro_wait, reading);
 #else
     (void)robot;
@@ -264,8 +260,8 @@ bool robot_end_wait(robot_t *robot, bslam_odometry_reading_t *reading)
 bslam_status_t robot_set_camera(robot_t *robot, int index, const bslam_camera_t *camera)
 {
     const bslam_status_t status = camera_input_set_camera(&robot->camera, index, camera);
-#if ROBOT_VISUAL_GYRO
-    gyro_wait_start(&robot->gyro_wait, &robot->camera.vision);
+#if ROBOT_VISION && BSLAM_VISION_TURNS
+    gyro_wait_start(&robot->gyro_wait, &robot->camera);
 #endif
     return status;
 }
@@ -275,9 +271,9 @@ bslam_status_t robot_look(robot_t *robot, int camera, int64_t time_us)
     const bslam_status_t status =
         camera_input_look(&robot->camera, robot->moves != robot->moves_seen[camera]);
     robot->moves_seen[camera] = robot->moves;
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
     if (status == BSLAM_OK) {
-        gyro_wait_see(&robot->gyro_wait, &robot->camera.vision, camera, time_us);
+        gyro_wait_see(&robot->gyro_wait, &robot->camera, camera, time_us);
     }
 #else
     (void)time_us;

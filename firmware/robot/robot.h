@@ -43,7 +43,7 @@ typedef struct robot {
     uint32_t moves_seen[BSLAM_CAMERAS_MAX];  ///< when each camera's last picture was looked at
     uint32_t picture_ticks;                  ///< that the robot's own picture which streams in took so far
 #endif
-#if ROBOT_VISUAL_GYRO
+#if ROBOT_VISION && BSLAM_VISION_TURNS
     gyro_wait_t gyro_wait;
 #endif
 } robot_t;

@@ -1,4 +1,5 @@
-/// The robot's side of the link: messages in, calls of the robot, answers out. docs/LINK.md has every message.
+/// The robot's side of the link: messages in, calls of the robot, answers out. docs/LINK.md has every
+/// message.
 ///
 /// The host leads: it opens a session, and each of its messages is applied once and answered once. A message
 /// that comes again, because its answer was lost, is answered again and not applied again; an older one is
@@ -83,11 +84,14 @@ typedef struct session {
     uint32_t replayed;  ///< older messages, which were dropped
     uint32_t ticks;     ///< that the last message took to apply; a look with all of its pixels
     uint64_t fingerprint;
-    bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];
-    uint8_t out[BSLAM_LINK_FRAME_MAX];
+    union {
+        bslam_sighting_t sightings[BSLAM_SIGHTINGS_MAX];  ///< while a message is applied
+        uint8_t out[BSLAM_LINK_FRAME_MAX];                ///< while a frame is sent
+    };
 } session_t;
 
-/// Starts a session over a robot, whose memory stays where it is, and reports that it is ready, and with what.
+/// Starts a session over a robot, whose memory stays where it is, and reports that it is ready, and with
+/// what.
 void session_start(session_t *session, robot_t *robot);
 
 /// Takes a byte that came over the link; applies and answers the message that it completes.

@@ -5,8 +5,8 @@
 #include "base/config.h"
 
 /// Largest frame that the vision front end takes, pixels; multiples of 4. RAM grows with the area: an
-/// instance takes about 117 KB for QVGA and four cameras, 107 KB for one, 46 KB for QQVGA and one. A camera
-/// with a zoom of 2 needs room for twice its width and height: 416 KB for QVGA.
+/// instance takes about 125 KB for QVGA and four cameras, 111 KB for one, 48 KB for QQVGA and one. A camera
+/// with a zoom of 2 needs room for twice its width and height: 430 KB for QVGA and four.
 #ifndef BSLAM_IMAGE_WIDTH_MAX
 #define BSLAM_IMAGE_WIDTH_MAX 320
 #endif

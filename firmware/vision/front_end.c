@@ -503,12 +503,6 @@ bslam_status_t bslam_front_end_end(bslam_front_end_t *vision, bool robot_moved)
     return BSLAM_OK;
 }
 
-const bslam_candidate_t *bslam_front_end_candidates(const bslam_front_end_t *vision, int32_t *count)
-{
-    *count = vision->candidate_count;
-    return vision->candidates;
-}
-
 bslam_box_t bslam_front_end_proposal_box(const bslam_front_end_t *vision, int32_t index)
 {
     return unzoomed_box(vision->proposals.items[index].box, vision->cameras[vision->camera].zoom);

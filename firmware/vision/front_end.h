@@ -48,7 +48,6 @@ BSLAM_MUST_CHECK bslam_status_t bslam_front_end_row(bslam_front_end_t *vision, c
 BSLAM_MUST_CHECK bslam_status_t bslam_front_end_end(bslam_front_end_t *vision, bool robot_moved);
 BSLAM_MUST_CHECK bslam_status_t bslam_front_end_point(bslam_front_end_t *vision, int32_t camera,
                                                       bslam_real_t yaw_rad);
-const bslam_candidate_t *bslam_front_end_candidates(const bslam_front_end_t *vision, int32_t *count);
 
 /// For training: the box of proposal `index` of the last finished frame, in the camera's pixels.
 bslam_box_t bslam_front_end_proposal_box(const bslam_front_end_t *vision, int32_t index);

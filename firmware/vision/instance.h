@@ -16,12 +16,14 @@ typedef struct bslam_vision_instance {
 
 static inline bslam_vision_instance_t *bslam_vision_instance(bslam_vision_t *vision)
 {
-    return (bslam_vision_instance_t *)(void *)vision;
+    void *memory = vision;
+    return memory;
 }
 
 static inline const bslam_vision_instance_t *bslam_const_vision_instance(const bslam_vision_t *vision)
 {
-    return (const bslam_vision_instance_t *)(const void *)vision;
+    const void *memory = vision;
+    return memory;
 }
 
 #endif

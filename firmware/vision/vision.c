@@ -7,8 +7,6 @@
 
 _Static_assert(sizeof(bslam_candidate_t) <= BSLAM_VISION_SIZE_CANDIDATE, "size.h: a candidate");
 _Static_assert(sizeof(bslam_run_t) * BSLAM_RUNS_MAX <= BSLAM_VISION_SIZE_RUNS, "size.h: runs of cells");
-_Static_assert(sizeof(bslam_row_sums_t) <= BSLAM_VISION_SIZE_RUNS, "size.h: sums of rows");
-_Static_assert(sizeof(bslam_channel_tables_t) <= BSLAM_VISION_SIZE_RUNS, "size.h: tables of channels");
 _Static_assert(sizeof(bslam_thumbnail_t) <= BSLAM_VISION_SIZE_THUMBNAIL, "size.h: the picture");
 _Static_assert(sizeof(bslam_proposals_t) <= BSLAM_VISION_SIZE_PROPOSALS, "size.h: boxes");
 _Static_assert(sizeof(bslam_front_end_t) <= BSLAM_VISION_SIZE_FRONT_END, "size.h: the front end");
@@ -77,7 +75,8 @@ const char *bslam_vision_reason_name(bslam_vision_reason_t reason)
 
 const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, int32_t *count)
 {
-    return bslam_front_end_candidates(&bslam_const_vision_instance(vision)->front_end, count);
+    *count = bslam_const_vision_instance(vision)->front_end.candidate_count;
+    return bslam_const_vision_instance(vision)->front_end.candidates;
 }
 
 int32_t bslam_vision_sightings(const bslam_vision_t *vision, bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX])
@@ -107,5 +106,11 @@ bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
     return bslam_turns_see(&instance->turns, &instance->front_end, turn);
+}
+
+void bslam_vision_forget_turns(bslam_vision_t *vision)
+{
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    bslam_turns_init(&instance->turns, &instance->front_end);
 }
 #endif

@@ -88,6 +88,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera)
 /// kind's height is not 0 to 10 m. BSLAM_E_NOT_FINITE, BSLAM_E_PARAMETER: a camera or the model.
 #define bslam_vision_init(vision, model, cameras, camera_count) \
     bslam_vision_init_sized((vision), sizeof *(vision), BSLAM_VISION_HASH, (model), (cameras), (camera_count))
+#if BSLAM_REAL_DOUBLE  // library and application of two scalar types do not link
+#define bslam_vision_init_sized bslam_vision_init_double
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, size_t vision_bytes,
                                                         uint32_t sizes_hash,
                                                         const bslam_beacon_model_t *model,
@@ -230,6 +233,9 @@ typedef struct bslam_turn {
 /// turned since the picture of the same camera before. False, *turn unchanged: there is none before, one of
 /// the two was unusable (black, say), or it shows nothing but plain walls. Some 9 instructions a pixel.
 bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn);
+
+/// Forgets the pictures of before: where a gyro starts anew. The next one of each camera tells no turn.
+void bslam_vision_forget_turns(bslam_vision_t *vision);
 #endif
 
 /// What the rate of a step errs by at least. Errors of some steps follow each other; this is what their sum
@@ -243,7 +249,7 @@ bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn);
 ///
 /// A small Kalman filter of its own, so that a picture's turn, which spans several steps, need not wait in
 /// the map's filter: turn rate, speed, the turn since each camera's picture before, how much nearer than the
-/// floor line said is what each camera sees, and by how much the heading has turned from what was told.
+/// floor line said is what each camera sees, and by how much the heading has turned from what was reported.
 typedef union bslam_visual_gyro {
     unsigned char bytes[BSLAM_VISUAL_GYRO_BYTES];
     int64_t alignment_of_times;
@@ -254,6 +260,9 @@ typedef union bslam_visual_gyro {
 /// bslam_vision_init.
 #define bslam_visual_gyro_init(gyro, least_sd_radps) \
     bslam_visual_gyro_init_sized((gyro), sizeof *(gyro), BSLAM_VISION_HASH, (least_sd_radps))
+#if BSLAM_REAL_DOUBLE
+#define bslam_visual_gyro_init_sized bslam_visual_gyro_init_double
+#endif
 BSLAM_MUST_CHECK bslam_status_t bslam_visual_gyro_init_sized(bslam_visual_gyro_t *gyro, size_t gyro_bytes,
                                                              uint32_t sizes_hash,
                                                              bslam_real_t least_sd_radps);
@@ -272,10 +281,10 @@ BSLAM_MUST_CHECK bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro
                                                        const bslam_turn_t *turn);
 
 /// The turn rate of the last step, positive to the left, and its noise. The rate brings the heading to where
-/// it is thought to be, with what steps before were told wrongly, so that the sum over steps is right; the
+/// it is thought to be, with what steps before reported wrongly, so that the sum over steps is right; the
 /// noise is what the heading's variance grew by of late. False, both unchanged, where too little was seen to
 /// know the rate to about 0.4 rad/s. It may be asked after each picture of a step; the last answer counts as
-/// told.
+/// reported.
 bool bslam_visual_gyro_rate(bslam_visual_gyro_t *gyro, bslam_real_t *rate_radps, bslam_real_t *sd_radps);
 
 #ifdef __cplusplus

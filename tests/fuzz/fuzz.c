@@ -91,13 +91,13 @@ void fuzz_require_sound(const bslam_slam_t *slam)
     const bslam_pose_t pose = bslam_slam_pose(slam);
     fuzz_require(isfinite((double)pose.x_m) && isfinite((double)pose.y_m) &&
                  isfinite((double)pose.theta_rad));
-    for (int b = 0; b < bslam_slam_beacon_count(slam); b++) {
+    for (int b = 0; b < slam->ekf.beacon_count; b++) {
         bslam_beacon_view_t view;
         fuzz_require(bslam_slam_beacon(slam, b, &view) == BSLAM_OK);
         fuzz_require(isfinite((double)view.x_m) && isfinite((double)view.y_m));
         fuzz_require(isfinite((double)view.covariance_m2.xx) && isfinite((double)view.covariance_m2.yy));
     }
-    const bslam_counters_t *counters = bslam_slam_counters(slam);
+    const bslam_slam_counters_t *counters = &slam->counters;
     fuzz_require(counters->matched + counters->added + counters->rejected + counters->deferred ==
                  counters->sightings);
 }
@@ -142,5 +142,5 @@ void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance)
         fuzz_require(bslam_slam_odometry(slam, &reading) == BSLAM_OK);
         fuzz_require(bslam_slam_sightings(slam, now_us, seen, 3) == BSLAM_OK);
     }
-    fuzz_require(bslam_slam_beacon_count(slam) == 3);
+    fuzz_require(slam->ekf.beacon_count == 3);
 }

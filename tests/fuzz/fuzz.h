@@ -7,7 +7,7 @@
 
 #include <stddef.h>
 
-#include "bslam/slam/slam.h"
+#include "bslam/internal.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/trig.h"
-#include "vision/gyro/frame_rotation.h"
+#include "vision/internal.h"
 
 #include "models/beacons.h"
 #include "picture.h"
@@ -13,7 +13,6 @@ enum { FRAMES_MAX = 3 };
 
 static bslam_vision_t vision;
 static bslam_vision_t before;
-static bslam_turns_t turns;
 
 static void require_unchanged_if(bslam_status_t status)
 {
@@ -29,9 +28,6 @@ static bool set_up(fuzz_input_t *input)
     }
     const bslam_status_t status = bslam_vision_init(&vision, &bslam_beacons_model, cameras, (int32_t)count);
     require_unchanged_if(status);
-    if (status == BSLAM_OK) {
-        bslam_turns_init(&turns, &vision);
-    }
     return status == BSLAM_OK;
 }
 
@@ -39,7 +35,7 @@ static bool set_up(fuzz_input_t *input)
 static void require_turn(void)
 {
     bslam_turn_t turn;
-    if (bslam_turns_see(&turns, &vision, &turn)) {
+    if (bslam_vision_turn(&vision, &turn)) {
         fuzz_require(bslam_in_range(turn.turn_rad, -3 * BSLAM_PI, 3 * BSLAM_PI));
         fuzz_require(turn.variance_rad2 > 0 && isfinite((double)turn.variance_rad2));
         fuzz_require(bslam_in_range(turn.mismatch, 0, 2));
@@ -73,7 +69,9 @@ static void give_frame(fuzz_input_t *input)
     const unsigned flags = fuzz_u8(input);
     const int32_t camera = (int32_t)(flags & 3u) - 1;
     const bslam_pixel_format_t format = (bslam_pixel_format_t)(flags >> 2 & 3u);
-    const bslam_camera_t *lens = camera >= 0 && camera < BSLAM_CAMERAS_MAX ? &vision.cameras[camera] : NULL;
+    const bslam_camera_t *lens = camera >= 0 && camera < BSLAM_CAMERAS_MAX
+                                     ? &bslam_vision_instance(&vision)->front_end.cameras[camera]
+                                     : NULL;
     const int32_t width_px = lens != NULL ? lens->width_px : BSLAM_IMAGE_WIDTH_MAX;
     const int32_t height_px = lens != NULL ? lens->height_px : BSLAM_IMAGE_HEIGHT_MAX;
     memcpy(&before, &vision, sizeof before);

@@ -3,7 +3,7 @@
 // picture.
 #include <string.h>
 
-#include "vision/classifiers/recogniser.h"
+#include "vision/internal.h"
 
 #include "models/beacons.h"
 #include "picture.h"
@@ -302,9 +302,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     const bslam_camera_t camera = fuzz_camera(BSLAM_LENS_PINHOLE);
     const bslam_status_t status = check();
-    vision.model = NULL;
+    bslam_front_end_t *inside = &bslam_vision_instance(&vision)->front_end;
+    inside->model = NULL;
     fuzz_require(bslam_vision_init(&vision, &made.model, &camera, 1) == status);
-    fuzz_require((vision.model == NULL) == (status != BSLAM_OK));
+    fuzz_require((inside->model == NULL) == (status != BSLAM_OK));
     if (status == BSLAM_OK) {
         look(&vision);
     }

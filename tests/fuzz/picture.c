@@ -4,6 +4,7 @@
 
 #include "base/trig.h"
 #include "base/scalar.h"
+#include "vision/internal.h"
 
 bslam_camera_t fuzz_camera(bslam_lens_kind_t lens)
 {
@@ -72,11 +73,12 @@ void fuzz_room_row(int32_t y, uint8_t row[FUZZ_ROW_BYTES])
 static void require_candidate(const bslam_vision_t *vision, const bslam_candidate_t *candidate)
 {
     const bslam_box_t *box = &candidate->outline;
+    const int32_t classes = bslam_const_vision_instance(vision)->front_end.model->class_count;
     fuzz_require(isfinite((double)box->left_px) && isfinite((double)box->right_px));
     fuzz_require(box->left_px <= box->right_px && box->top_px <= box->bottom_px);
     fuzz_require(isfinite((double)candidate->score) && isfinite((double)candidate->class_margin));
-    fuzz_require(candidate->beacon_class >= 1 && candidate->beacon_class <= vision->model->class_count);
-    fuzz_require(candidate->second_class <= vision->model->class_count);
+    fuzz_require(candidate->beacon_class >= 1 && candidate->beacon_class <= classes);
+    fuzz_require(candidate->second_class <= classes);
     if (candidate->has_bearing) {
         fuzz_require(bslam_in_range(candidate->bearing_rad, -BSLAM_PI, BSLAM_PI));
         fuzz_require(candidate->bearing_sd_rad > 0 && isfinite((double)candidate->bearing_sd_rad));

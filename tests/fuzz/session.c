@@ -1,11 +1,10 @@
 // The whole application behind its serial line: any bytes, or messages that the input makes up in good
 // frames. Whatever comes, the pipeline stays sound, every answer is a good frame, and no message is answered
 // twice.
-#include "robot/session.h"
+#include "robot/own_sensors.h"
 
 #include <string.h>
 
-#include "bslam/store/map.h"
 #include "picture.h"
 #include "port/port.h"
 
@@ -14,6 +13,7 @@ enum { MESSAGES_MAX = 40, STORE_BYTES = 1024, MAP_BYTES = 4096, PIECE_BYTES = 40
 /// One above the last message there is.
 enum { TYPES = SESSION_MAP_LOAD + 1 };
 
+static robot_t robot;
 static session_t session;
 static bslam_link_parser_t answers;
 static uint8_t store[STORE_BYTES];
@@ -26,6 +26,18 @@ static bool has_gyro;
 static float gyro_radps;
 
 // ---- a board of nothing but memory -----------------------------------------------------------------------
+
+/// What comes, messages and pictures, the target gives itself.
+int port_read(void)
+{
+    return -1;
+}
+
+bool port_camera_row(port_row_t *row)
+{
+    (void)row;
+    return false;
+}
 
 void port_write(const uint8_t *bytes, size_t count)
 {
@@ -109,11 +121,7 @@ static void require_good_answers(uint32_t most)
 /// Whether a reading waits for its picture: what ends the wait has it reported before it is answered itself.
 static uint32_t reports_due(void)
 {
-#if SESSION_TURNS
-    return session.seeing.turning.is_waiting ? 1 : 0;
-#else
-    return 0;
-#endif
+    return robot.gyro_wait.is_waiting ? 1 : 0;
 }
 
 static void take(uint8_t byte)
@@ -163,8 +171,8 @@ static void put_map_piece(bslam_link_writer_t *writer, fuzz_input_t *input, unsi
     static uint8_t bytes[MAP_BYTES];
     bslam_map_memory_t memory = {bytes, MAP_BYTES, 0};
     const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
-    bslam_map_fault_t fault;
-    fuzz_require(bslam_map_write(&session.slam, &sink, &fault) == BSLAM_OK);
+    uint32_t size;
+    fuzz_require(bslam_save_map(&robot.slam, &sink, &size) == BSLAM_OK);
     const unsigned change = fuzz_u8(input);
     if (change < 64) {
         bytes[fuzz_u16(input) % memory.count] ^= (uint8_t)(change + 1);
@@ -174,6 +182,13 @@ static void put_map_piece(bslam_link_writer_t *writer, fuzz_input_t *input, unsi
     for (uint32_t i = at; i < memory.count && i < at + PIECE_BYTES; i++) {
         bslam_link_put_u8(writer, bytes[i]);
     }
+}
+
+static uint32_t map_size(void)
+{
+    uint32_t size;
+    fuzz_require(bslam_save_map(&robot.slam, NULL, &size) == BSLAM_OK);
+    return size;
 }
 
 /// Messages whose length hangs on what they say, and those that need a number to make sense.
@@ -191,7 +206,7 @@ static void put_payload(bslam_link_writer_t *writer, fuzz_input_t *input, unsign
         put_map_piece(writer, input, count);
         break;
     case SESSION_MAP_LOAD:
-        bslam_link_put_u32(writer, bslam_map_size(&session.slam) + (count == 0 ? fuzz_u8(input) : 0));
+        bslam_link_put_u32(writer, map_size() + (count == 0 ? fuzz_u8(input) : 0));
         bslam_link_put_u8(writer, (uint8_t)(count % 2));
         break;
     case SESSION_SIGNATURES:
@@ -272,7 +287,7 @@ static void show_picture(fuzz_input_t *input)
                                 .time_us = clock_us,
                                 .is_first = y == 0,
                                 .is_last = y == own_camera.height_px - 1};
-        session_take_row(&session, &row);
+        own_sensors_take_row(&robot, &session, &row);
     }
 }
 
@@ -284,8 +299,8 @@ static void take_reading(fuzz_input_t *input)
     right_ticks = fuzz_u16(input);
     has_gyro = left_ticks % 2 != 0;
     gyro_radps = has_gyro ? (float)fuzz_real(input, -4, 4) : 0;
-    fuzz_require(session_read_body(&reading));
-    session_take_reading(&session, &reading);
+    fuzz_require(own_sensors_read(&reading));
+    own_sensors_take_reading(&robot, &session, &reading);
 }
 
 static void talk(fuzz_input_t *input)
@@ -302,7 +317,7 @@ static void talk(fuzz_input_t *input)
         } else {
             send_message(input, &sequence, &now_us);
         }
-        fuzz_require_sound(&session.slam);
+        fuzz_require_sound(&bslam_instance(&robot.slam)->slam);
     }
 }
 
@@ -316,8 +331,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     stored = 0;
     own_camera = fuzz_camera(BSLAM_LENS_PINHOLE);
     own_cameras = (choice & 4u) != 0 ? 1 : 0;
-    memset(&session, 0, sizeof session);
-    session_init(&session);
+    memset(&robot, 0, sizeof robot);
+    session_start(&session, &robot);
     require_good_answers(1);
     if ((choice & 1u) != 0) {
         talk(&input);
@@ -327,8 +342,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
     }
     if ((choice & 2u) != 0) {
-        session_init(&session);  // a restart: with what was stored, or guarded
+        session_start(&session, &robot);  // a restart: with what was stored, or guarded
     }
-    fuzz_require_sound(&session.slam);
+    fuzz_require_sound(&bslam_instance(&robot.slam)->slam);
     return 0;
 }

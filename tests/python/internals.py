@@ -1,27 +1,84 @@
-"""Machines that learn on the robot, and their solver, as classes over the C library."""
+"""The estimator's insides for its tests: an extension from bslam/internal.h, built once into build/internals.
+
+It holds the same sizes as the product's own (`bslam.core.build`), so what stands in a `Slam` can be read by it.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import importlib.util
+import sysconfig
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.raw import Library, library
+from bslam.core import CoreError, Slam
+from bslam.core.appearance import SIGNATURE_SIZE, encode
+from bslam.core.build import SOURCES, compile_extension, declarations, macros_of
+from bslam.core.builds import FIRMWARE_DIR, SIZE_CLASSES
 from bslam.errors import BslamError
 
 Floats = NDArray[np.float32]
+HEADER = "bslam/internal.h"
+FOLDER = Path(__file__).resolve().parents[2] / "build" / "internals"
 
-SIGNATURE_SIZE = 71
-"""Values of a signature."""
 
-_SEEDS = Path(__file__).with_name("seeds.npy")  # tools/training/make_seeds.py writes it
-_SEED_STEPS = 127  # of 1, as firmware/bslam/appearance/sample.h stores them
+@cache
+def internals(real: str, beacons_max: int) -> Any:
+    """The module, with `ffi` and `lib`, of the smallest build that holds so many beacons."""
+    size = next(one for one in SIZE_CLASSES if one >= beacons_max)
+    name = f"_internals_{real}_{size}"
+    path = FOLDER / (name + sysconfig.get_config_var("EXT_SUFFIX"))
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with (FOLDER / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another process of these tests may be at it
+        if not path.is_file() or path.stat().st_mtime < _newest_source():
+            macros = macros_of(real, size)
+            declared = declarations(macros, HEADER)
+            compile_extension(name, declared, f'#include "{HEADER}"', macros, "bslam", FOLDER)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _newest_source() -> float:
+    files = [file for folder in SOURCES["bslam"] for file in (FIRMWARE_DIR / folder).rglob("*.[ch]")]
+    return max(file.stat().st_mtime for file in files)
+
+
+def module_of(slam: Slam) -> Any:
+    """The one that reads an instance."""
+    return internals(slam._raw.real, slam._raw.beacons_max)
+
+
+def inside(slam: Slam) -> Any:
+    """What stands in it, as bslam_instance_t *."""
+    ffi = module_of(slam).ffi
+    address = int(slam._ffi.cast("uintptr_t", slam._robot))
+    return ffi.cast("bslam_instance_t *", address)
+
+
+def _ensure(module: Any, status: int, message: str) -> None:
+    """Raises CoreError unless status is BSLAM_OK."""
+    if status != module.lib.BSLAM_OK:
+        raise CoreError(module.ffi.string(module.lib.bslam_status_name(status)).decode(), message)
+
+
+def _samples(module: Any, signatures: Floats, real: str) -> Any:
+    """Signatures (n, 71) as a C array."""
+    encoded = encode(signatures, real)
+    array = module.ffi.new("bslam_sample_t[]", len(encoded))
+    module.ffi.buffer(array)[:] = encoded.tobytes()
+    return array
 
 
 class Learner:
-    """A machine a beacon, which tells it from the others by its signature: one instance of the C learner.
+    """A classifier a beacon, which tells it from the others by its signature: one C learner.
 
     seeds: (n, 71) signatures of things that are no beacon here. machines: how many it must hold. real:
     "float", samples of 8 bits as on the target, or "double", float32 samples. Raises BslamError for another
@@ -29,22 +86,26 @@ class Learner:
     """
 
     def __init__(self, seeds: Floats | None = None, *, machines: int = 20, real: str = "float") -> None:
-        self._raw = library(real, machines)
-        self._lib, self._ffi = self._raw.lib, self._raw.ffi
+        self._real, self._module = real, internals(real, machines)
+        self._lib, self._ffi = self._module.lib, self._module.ffi
         self._learner = self._ffi.new("bslam_learner_t *")
-        self._seeds = encode(self._raw, np.empty((0, SIGNATURE_SIZE), np.float32) if seeds is None else seeds)
+        nothing = np.empty((0, SIGNATURE_SIZE), np.float32)
+        self._seeds = _samples(self._module, nothing if seeds is None else seeds, real)
         status = self._lib.bslam_learner_init(self._learner, self._seeds, len(self._seeds))
-        self._raw.ensure(status, f"{len(self._seeds)} seeds")
+        self._ensure(status, f"{len(self._seeds)} seeds")
+
+    def _ensure(self, status: int, message: str) -> None:
+        _ensure(self._module, status, message)
 
     def add(self) -> int:
         """A new machine's handle. Raises CoreError if there is no room."""
         machine = self._ffi.new("int32_t *")
-        self._raw.ensure(self._lib.bslam_learner_add(self._learner, machine), "another machine")
+        self._ensure(self._lib.bslam_learner_add(self._learner, machine), "another machine")
         return machine[0]
 
     def remove(self, machine: int) -> None:
         """Forgets a machine. Raises CoreError if there is none."""
-        self._raw.ensure(self._lib.bslam_learner_remove(self._learner, machine), f"machine {machine}")
+        self._ensure(self._lib.bslam_learner_remove(self._learner, machine), f"machine {machine}")
 
     def show(self, machine: int, signature: Floats) -> None:
         """Gives a machine a signature (71,) of its beacon to learn from.
@@ -55,8 +116,8 @@ class Learner:
         if np.shape(signature) != (SIGNATURE_SIZE,):
             raise BslamError(f"signature of shape {np.shape(signature)}; allowed: ({SIGNATURE_SIZE},)")
         values = np.ascontiguousarray(signature, np.float32)
-        status = self._lib.bslam_learner_show(self._learner, machine, _floats(self._ffi, values))
-        self._raw.ensure(status, f"a signature for machine {machine}")
+        status = self._lib.bslam_learner_show(self._learner, machine, self._ffi.from_buffer("float[]", values))
+        self._ensure(status, f"a signature for machine {machine}")
 
     def work(self, budget: int) -> bool:
         """At most `budget` pieces of training; True if work is left."""
@@ -73,13 +134,13 @@ class Learner:
         Raises CoreError if there is no such machine or a signature is not finite, BslamError for another
         shape.
         """
-        samples = encode(self._raw, signatures)
+        samples = _samples(self._module, signatures, self._real)
         values = np.empty((len(samples), len(machines)), np.float32)
         value = self._ffi.new("float *")
         for column, machine in enumerate(machines):
             for row in range(len(samples)):
                 status = self._lib.bslam_learner_decide(self._learner, machine, samples + row, value)
-                self._raw.ensure(status, f"machine {machine}")
+                self._ensure(status, f"machine {machine}")
                 values[row, column] = value[0]
         return values
 
@@ -90,7 +151,8 @@ class Learner:
     @property
     def counters(self) -> dict[str, int]:
         """What happened so far, by the C counters' names."""
-        return self._raw.fields(self._learner.counters, "bslam_learner_counters_t")
+        counters = self._learner.counters
+        return {name: getattr(counters, name) for name, _ in self._ffi.typeof(counters).fields}
 
 
 class Solution:
@@ -115,12 +177,12 @@ class Solution:
         Raises BslamError for other shapes, or for more samples than the solver holds; CoreError for a
         signature that is not finite.
         """
-        raw = library(real, 1)
+        raw = internals(real, 1)
         rows_max = len(raw.ffi.new("bslam_solver_t *").rows)
         if np.shape(positive) != (len(signatures),) or len(signatures) > rows_max:
             sizes = f"{len(signatures)} signatures with labels of shape {np.shape(positive)}"
             raise BslamError(f"{sizes}; allowed: up to {rows_max}, a label each")
-        stored = encode(raw, signatures)
+        stored = _samples(raw, signatures, real)
         samples = raw.ffi.new("bslam_samples_t *", {"own": stored, "own_count": len(stored)})
         solver = raw.ffi.new("bslam_solver_t *")
         raw.lib.bslam_solver_begin(solver, cost, tolerance, True)
@@ -132,28 +194,3 @@ class Solution:
         self.features = unit * np.array([list(one.q)[:used] for one in stored])
         self.weights = np.array(list(solver.weights)[:used]) / unit
         self.alphas = np.array([solver.rows[row].alpha for row in range(len(stored))])
-
-
-def encode(raw: Library, signatures: Floats) -> Any:
-    """Signatures (n, 71) as a C array of samples.
-
-    Raises BslamError for another shape, CoreError for one that is not finite.
-    """
-    if np.ndim(signatures) != 2 or np.shape(signatures)[1] != SIGNATURE_SIZE:
-        raise BslamError(f"signatures of shape {np.shape(signatures)}; allowed: (n, {SIGNATURE_SIZE})")
-    values = np.ascontiguousarray(signatures, np.float32)
-    samples = raw.ffi.new("bslam_sample_t[]", len(values))
-    for row in range(len(values)):
-        status = raw.lib.bslam_sample_encode(_floats(raw.ffi, values[row]), samples + row)
-        raw.ensure(status, f"signature {row}")
-    return samples
-
-
-def _floats(ffi: Any, values: Floats) -> Any:
-    """The numbers of a C-contiguous array, good as long as it is."""
-    return ffi.from_buffer("float[]", values)
-
-
-def rendered_seeds() -> Floats:
-    """Signatures (n, 71) of rendered beacons that are nobody's: what a robot with cameras starts from."""
-    return np.load(_SEEDS).astype(np.float32) / np.float32(_SEED_STEPS)

@@ -238,7 +238,7 @@ static void soak(uint64_t seed, long steps, long standing)
     const double all = (double)(steps - STEPS_AT_START);
     const double last = fmin(all, STEPS_AN_HOUR);
     (void)printf("%llu,%.3f,%.6f,%.6f,%.6f,%u\n", (unsigned long long)seed, (double)steps / STEPS_AN_HOUR,
-                 nees / all, nees_last / last, error_m / all, (unsigned)bslam_slam_counters(&slam)->insane);
+                 nees / all, nees_last / last, error_m / all, (unsigned)slam.counters.insane);
     (void)fflush(stdout);
 }
 

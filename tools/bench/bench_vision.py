@@ -42,7 +42,8 @@ def build(lens: str) -> Path:
     zoom = RIGS[lens].cameras[0].zoom
     room = [f"-DBSLAM_IMAGE_WIDTH_MAX={320 * zoom}", f"-DBSLAM_IMAGE_HEIGHT_MAX={240 * zoom}"]
     room += [f"-DBSLAM_PROPOSALS_MAX={120 * zoom}"]
-    sources = [ROOT / "tests/bench/bench_vision.c", *sorted((ROOT / "firmware/bslam").rglob("*.c"))]
+    sources = [ROOT / "tests/bench/bench_vision.c"]
+    sources += [path for one in ("base", "vision") for path in sorted((ROOT / "firmware" / one).rglob("*.c"))]
     subprocess.run(["cc", *FLAGS, *room, *map(str, sources), "-lm", "-o", str(program)], check=True)
     return program
 

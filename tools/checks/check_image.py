@@ -19,18 +19,13 @@ from pathlib import Path
 from tools.checks.check_symbols import UNWANTED_CALLS
 
 CALLED_BY_POINTER = (
-    (r"session_", r"(apply|answer)_"),
-    (r"bslam_slam_learn_appearance|bslam_slam_drop_beacon", r"bslam_appearance_forget|bslam_smoother_remove"),
-    (r"predict_step|fuse_match|add_new|use_matches", r"bslam_smoother_(move|see|add)"),
-    (
-        r"bslam_slam_|associate_ticks",
-        r"bslam_associate_|bslam_slam_learn_appearance|bslam_appearance_(clear|forget)|bslam_smoother_\w+",
-    ),
-    (r"weigh|find_best|decide_rest|bslam_associate_svm", r"bslam_appearance_(ask|class_odds|is_due)"),
+    (r"session_|take_message", r"(apply|answer)_"),
+    (r"bslam_settings_preset", r"set_"),
+    (r"bslam_slam_", r"bslam_associate_"),
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
-    (r"read_head|kept_|port_(save|load)|look_at|flush|read_map|bslam_slots_", r"(erase|write|read)$"),
-    (r"bslam_codec_|variance_at", r"take_piece|write_piece|read_memory|read_map"),
+    (r"read_(head|slot|map)|kept_|port_(save|load)|look_at|flush|bslam_slots_", r"(erase|write|read)$"),
+    (r"bslam_codec_|variance_at", r"take_piece|write_piece|read_bytes|read_map"),
 )
 """Callers, and whom they may call through a pointer."""
 

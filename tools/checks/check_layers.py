@@ -25,7 +25,9 @@ MODEL = SETTINGS | {"bslam/linalg", "bslam/model"}
 EKF = MODEL | {"bslam/ekf"}
 ASSOCIATION = EKF | {"bslam/appearance", "bslam/association"}
 SLAM = ASSOCIATION | {"bslam/smoother", "bslam/slam"}
-VISION = frozenset({"base", "vision/config.h", "vision/frame.h", "vision/vision.h"})
+VISION = frozenset(
+    {"base", "vision/config.h", "vision/frame.h", "vision/model.h", "vision/size.h", "vision/vision.h"}
+)
 PIXELS = VISION | {"vision/camera", "vision/pixels"}
 DETECTION = PIXELS | {"vision/classifiers", "vision/detection"}
 C_MAY_INCLUDE: dict[str, frozenset[str]] = {
@@ -46,9 +48,9 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "vision/classifiers": PIXELS,
     "vision/detection": DETECTION,
     "vision/measurement": PIXELS,
-    "vision/gyro": VISION,
+    "vision/gyro": DETECTION | {"vision/measurement", "vision/front_end.h"},
     "link": frozenset({"base"}),
-    "models": frozenset({"vision/vision.h"}),
+    "models": frozenset({"bslam/bslam.h", "vision/vision.h"}),
     "port": frozenset({"base", "bslam/bslam.h", "vision/vision.h"}),
     # A user's program as any other: public headers, and of base what they are made of.
     "robot": frozenset({"base", "bslam/bslam.h", "vision/vision.h", "link", "models", "port"}),
@@ -63,7 +65,7 @@ LIBC_HEADERS = frozenset(
 )
 
 LOG = frozenset({"errors", "parsing", "log"})
-OPTIONS = LOG | {"core", "options"}
+OPTIONS = LOG | {"core", "datasets", "options"}
 EVALUATION = OPTIONS | {"evaluation"}
 RUNS = EVALUATION | {
     "algorithms",
@@ -94,7 +96,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "datasets": LOG | {"rig"},
     "options": OPTIONS,
     "evaluation": EVALUATION,
-    "calibration": LOG | {"core", "datasets", "evaluation", "rig", "world"},
+    "calibration": EVALUATION | {"rig", "world"},
     "runs": RUNS,
     "faults": RUNS | {"link", "modelfile"},
     "view": LOG | {"moment"},

@@ -1,4 +1,4 @@
-"""Checks the symbols of a cross-compiled libbslam.a, as nm lists them.
+"""Checks the symbols of cross-compiled libraries, as nm lists them.
 
 Every global name starts with bslam_, so that the library can be linked with anything. No mutable static data,
 so that several instances can live side by side. No call of heap, printf or double arithmetic: they cost a
@@ -40,7 +40,7 @@ def fault(kind: str, name: str) -> str | None:
 
 
 def findings(listing: str) -> Iterator[str]:
-    """Every bad symbol in the output of `nm --portability ARCHIVE`."""
+    """Every bad symbol in the output of `nm --portability ARCHIVE...`."""
     member = ""
     for line in listing.splitlines():
         if line.endswith(":"):
@@ -54,10 +54,10 @@ def findings(listing: str) -> Iterator[str]:
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("archive", help="libbslam.a")
+    parser.add_argument("archives", nargs="+", metavar="ARCHIVE", help="libbslam.a, libvision.a, ...")
     parser.add_argument("--nm", default="nm", help="the nm of the toolchain that made it (default: nm)")
     options = parser.parse_args(argv)
-    command = [options.nm, "--portability", options.archive]
+    command = [options.nm, "--portability", *options.archives]
     listing = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     found = list(findings(listing))
     for finding in found:

@@ -14,6 +14,7 @@ from typing import Any
 from bslam.core.presets import preset_settings
 from bslam.core.raw import library
 
+HEAD = ("| setting | default | range | meaning |", "|---|---:|---|---|")
 KNOWN, SVM = 0, 3
 INVARIANT, SMOOTHER = 1, 2
 GROUPS = {"settings": "Settings", "expert": "For who knows the filter"}
@@ -25,7 +26,7 @@ def settings_tables() -> str:
     parts = []
     for group, title in GROUPS.items():
         rows = [row(raw.text, info) for info in raw.settings_infos() if raw.text(info.group) == group]
-        parts += [f"### {title}", "", "| setting | default | range | meaning |", "|---|---:|---|---|", *rows, ""]
+        parts += [f"### {title}", "", *HEAD, *rows, ""]
     return "\n".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""Prints how much RAM one SLAM instance and one learner take, by compiler and number of beacons.
+"""Prints how much RAM one instance takes, by compiler and number of beacons, with and without its members.
 
 Nothing is run: the size of the struct is read from an object file, so that a cross-compiler does as well.
 """
@@ -10,13 +10,20 @@ import sys
 import tempfile
 from pathlib import Path
 
+MEMBERS = {
+    "as config.h has it": "",
+    "BSLAM_RECOVERY = 0, BSLAM_GUARD = 0": " -DBSLAM_RECOVERY=0 -DBSLAM_GUARD=0",
+    "BSLAM_APPEARANCE = 1": " -DBSLAM_APPEARANCE=1",
+    "BSLAM_SMOOTHER = 1, BSLAM_RAYS_MAX = 0": " -DBSLAM_SMOOTHER=1 -DBSLAM_RAYS_MAX=0",
+}
+"""Flags of the compiler by what they say."""
 PROBE = """#include "{}"
 unsigned char bslam_size_probe[sizeof({})];
 """
 
 
 def instance_bytes(
-    compiler: str, nm: str, beacons_max: int, type_name: str, header: str = "bslam/bslam.h"
+    compiler: str, nm: str, beacons_max: int, type_name: str = "bslam_t", header: str = "bslam/bslam.h"
 ) -> int:
     """sizeof(type_name) for a map of `beacons_max`; `compiler` is a command with its flags."""
     with tempfile.TemporaryDirectory() as folder:
@@ -41,20 +48,18 @@ def main(argv: list[str] | None = None) -> int:
         metavar=("NAME", "COMMAND", "NM"),
         help="a column: its heading, the compiler with its flags, the nm that goes with it",
     )
-    parser.add_argument("--learner", type=int, nargs="+", default=[], help="map sizes, for the learner")
     options = parser.parse_args(argv)
-    print_table("RAM of one instance, bytes", "bslam_slam_t", options.beacons, options.compiler)
-    if options.learner:
-        print_table("RAM of one learner, bytes", "bslam_learner_t", options.learner, options.compiler)
+    for members, flags in MEMBERS.items():
+        print_table(members, flags, options.beacons, options.compiler)
     return 0
 
 
-def print_table(title: str, type_name: str, beacons: list[int], compilers: list[list[str]]) -> None:
+def print_table(members: str, flags: str, beacons: list[int], compilers: list[list[str]]) -> None:
     """A row a map size, a column a compiler: its heading, command and nm."""
-    print(f"{title} (BSLAM_BEACONS_MAX = number of beacons)")
+    print(f"RAM of one bslam_t, bytes, by BSLAM_BEACONS_MAX; {members}")
     print(f"{'beacons':>8}" + "".join(f"{name:>10}" for name, _, _ in compilers))
     for count in beacons:
-        sizes = [instance_bytes(command, nm, count, type_name) for _, command, nm in compilers]
+        sizes = [instance_bytes(command + flags, nm, count) for _, command, nm in compilers]
         print(f"{count:>8}" + "".join(f"{size:>10}" for size in sizes))
 
 

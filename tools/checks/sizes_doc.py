@@ -17,7 +17,7 @@ import numpy as np
 from bslam.target.lines import BUILD_DIR, NS_PER_INSTRUCTION, QEMU, ROOT, emulator_of, qemu_machines
 from tools.checks.check_image import CallGraph, output_of, read_frames, read_functions
 from tools.checks.markdown import Row, table
-from tools.checks.sizes import instance_bytes
+from tools.checks.sizes import MEMBERS, instance_bytes
 from tools.proofs.run_image import run_image
 from tools.training.render_set import RIGS, camera_of, render_world
 
@@ -35,13 +35,7 @@ COST_BOARDS = {"Cortex-M0+": "mps2_an385", "Cortex-M4F": "mps2_an386", "Cortex-M
 BEACONS = (6, 20, 50)
 M4F = "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"
 COMPILER = f"arm-none-eabi-gcc -std=c11 -ffp-contract=off -I{ROOT / 'firmware'} -mthumb {M4F} -Os"
-SLAM_LAYERS = ("base", "math", "odometry", "model", "ekf", "association", "slam", "svm", "link")
-STRUCTS = {
-    "bslam_slam_t": "bslam/bslam.h",
-    "bslam_appearance_t": "bslam/bslam.h",
-    "bslam_vision_t": "vision/vision.h",
-}
-LOOKING_STRUCTS = ("bslam_slam_t", "bslam_appearance_t")
+NM = "arm-none-eabi-nm"
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 PARTS = {
@@ -58,26 +52,27 @@ PARTS = {
 
 
 def flash_by_layer() -> dict[str, int]:
-    """Code and constants of build/m4f/libbslam.a by layer, bytes."""
+    """Code and constants of the libraries with all their members by layer, bytes."""
     found: dict[str, int] = defaultdict(int)
-    folder = BUILD_DIR / "m4f"
+    folder = BUILD_DIR / "m4f_whole"
     for path in sorted(folder.rglob("*.o")):
         if not (ROOT / path.relative_to(folder)).with_suffix(".c").is_file():
             continue  # of a source that is gone
         text, data = output_of("arm-none-eabi-size", str(path)).splitlines()[1].split()[:2]
-        found[path.parent.name] += int(text) + int(data)
+        found[str(path.parent.relative_to(folder / "firmware"))] += int(text) + int(data)
     return found
 
 
-def linked_bytes(with_looks: bool) -> int:
-    """Code and constants that tests/bench/link_core.c takes of build/m4f/libbslam.a and of libc."""
+def linked_bytes(flags: str) -> int:
+    """Code and constants that tests/bench/link_core.c takes of the estimator and of libc."""
     options = "-fno-math-errno -ffunction-sections -fdata-sections -nostartfiles"
     link = "--specs=nano.specs --specs=nosys.specs -Wl,--gc-sections,--entry=main,--no-warn-rwx-segments -lm"
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder) / "core.elf"
-        files = [str(ROOT / "tests" / "bench" / "link_core.c"), str(BUILD_DIR / "m4f" / "libbslam.a")]
-        define = f"-DWITH_LOOKS={int(with_looks)}"
-        output_of(*COMPILER.split(), *options.split(), define, *files, *link.split(), "-o", str(image))
+        sources = [path for part in ("base", "bslam") for path in (ROOT / "firmware" / part).rglob("*.c")]
+        files = [str(path) for path in (ROOT / "tests" / "bench" / "link_core.c", *sorted(sources))]
+        words = f"{COMPILER} {options} -DBSLAM_SETTING_MEANINGS=0 {flags}".split()
+        output_of(*words, *files, *link.split(), "-o", str(image))
         text, data = output_of("arm-none-eabi-size", str(image)).splitlines()[1].split()[:2]
         symbols = output_of("arm-none-eabi-nm", "--portability", str(image)).splitlines()
         own = sum(int(line.split()[3], 16) for line in symbols if line.split()[0] in ("main", "robot_step"))
@@ -85,8 +80,8 @@ def linked_bytes(with_looks: bool) -> int:
 
 
 def linked_rows() -> Iterator[Row]:
-    yield "known association, or by position and class", linked_bytes(with_looks=False)
-    yield "and classifiers that learn appearance on the robot", linked_bytes(with_looks=True)
+    for members, flags in MEMBERS.items():
+        yield members, linked_bytes(flags)
 
 
 def image_sections(path: Path) -> tuple[int, int]:
@@ -161,22 +156,15 @@ def budget(filter_costs: dict[tuple[str, int], int], frames: dict[str, int]) -> 
 
 def flash_rows() -> list[Row]:
     flash = flash_by_layer()
-    slam = sum(flash[layer] for layer in SLAM_LAYERS)
-    return [*((name, flash[name]) for name in sorted(flash)), ("all but vision, store, recovery", slam)]
+    estimator = sum(size for name, size in flash.items() if name.split("/")[0] in ("base", "bslam"))
+    return [*((name, flash[name]) for name in sorted(flash)), ("base and bslam, all of it", estimator)]
 
 
 def ram_rows() -> Iterator[Row]:
-    for struct, header in STRUCTS.items():
-        sizes = [instance_bytes(COMPILER, "arm-none-eabi-nm", n, struct, header) for n in BEACONS]
-        yield (f"`{struct}`", *sizes)
-    without_rays = f"{COMPILER} -DBSLAM_RAYS_MAX=0"
-    sizes = [instance_bytes(without_rays, "arm-none-eabi-nm", n, "bslam_smoother_t") for n in BEACONS]
-    yield ("`bslam_smoother_t`, `BSLAM_RAYS_MAX` = 0", *sizes)
-    both = [
-        sum(instance_bytes(without_rays, "arm-none-eabi-nm", n, one) for one in LOOKING_STRUCTS)
-        for n in BEACONS
-    ]
-    yield ("`bslam_slam_t` and `bslam_appearance_t`, `BSLAM_RAYS_MAX` = 0", *both)
+    for members, flags in MEMBERS.items():
+        yield (f"`bslam_t`, {members}", *(instance_bytes(COMPILER + flags, NM, n) for n in BEACONS))
+    sizes = (instance_bytes(COMPILER, NM, n, "bslam_vision_t", "vision/vision.h") for n in BEACONS)
+    yield ("`bslam_vision_t`, QVGA, four cameras", *sizes)
 
 
 def image_rows() -> Iterator[Row]:
@@ -229,19 +217,18 @@ cores are emulated. Compiler: {output_of("arm-none-eabi-gcc", "--version").split
 
 ## Flash
 
-Code and constants of the library for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
+Code and constants of the libraries for a Cortex-M4F, `-Os`, by layer, bytes. A linker with `--gc-sections` \
 takes only what is called.
 
 {table(("layer", "bytes"), flash_rows())}
-What a robot without a camera links of it and of libc, bytes: odometry, sightings with and without distance, \
-all ways of association, pose, covariance, map (tests/bench/link_core.c).
+What a robot without a camera links of the estimator and of libc, bytes, by the members that config.h \
+switches: odometry, sightings with and without distance, pose, covariance, map (tests/bench/link_core.c).
 
 {table(("linked", "bytes"), linked_rows())}
 ## RAM
 
-Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. \
-`bslam_appearance_t` is for association by appearance, `bslam_vision_t` (QVGA, four cameras) for the camera \
-front end, `bslam_smoother_t` for `filter` = 2, which needs no rays.
+Instances, bytes, by `BSLAM_BEACONS_MAX`, on a Cortex-M4F; other sizes at their defaults. `make sizes` \
+prints them for the host, too.
 
 {table(("instance", *BEACONS), ram_rows())}
 ## Images

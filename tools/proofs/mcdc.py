@@ -1,8 +1,8 @@
-"""Measures the modified condition/decision coverage (MC/DC) of firmware/bslam by the C tests.
+"""Measures the modified condition/decision coverage (MC/DC) of the libraries by the C tests.
 
 Examples:
-    python -m tools.proofs.mcdc                          a table by file, and the total against the goal
-    python -m tools.proofs.mcdc --list vision/lens.c     conditions that no test has shown to matter
+    python -m tools.proofs.mcdc                              a table by file, and the total against the goal
+    python -m tools.proofs.mcdc --list vision/camera/lens.c  conditions that no test has shown to matter
 
 `make mcdc` builds what this runs: the C unit tests, and the inputs that fuzzing kept, whose core has smaller
 sizes. A condition is covered if two runs of its decision with the same core differ in it alone, of what was
@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/mcdc"
-CORE = ROOT / "firmware/bslam"
+CORE = ROOT / "firmware"
 CORPUS = ROOT / "tests/fuzz/corpus"
 EXCLUSIONS = ROOT / "tests/unit/mcdc.toml"
 GOAL_PERCENT = 95.0
@@ -34,7 +34,7 @@ GOAL_PERCENT = 95.0
 class Decision(NamedTuple):
     """Two conditions or more, joined by && and ||."""
 
-    file: str  # below firmware/bslam
+    file: str  # below firmware
     line: int
     text: str  # as in the source, white space collapsed
     covered: tuple[bool, ...]

@@ -82,7 +82,7 @@ def own_proofs(quick: bool) -> list[Proof]:
     cuts = ("power cuts at every byte, at every pair", "0 mixed", r"power cuts: (.*)")
     flips = ("bit flips of the guarded state", "found, or without effect", r"bit flips: (.*)")
     soak = ("6 h x 20 seeds, float beside double", "NEES 2.4-3.7, 0, 10 %", r"soak: .* seeds: (.*)")
-    mcdc = ("MC/DC of firmware/bslam", "95 %", r"mcdc: (\d.*?),")
+    mcdc = ("MC/DC of the libraries", "95 %", r"mcdc: (\d.*?),")
     fuzz = ("fuzzing: executions, crashes", "2e8, 1e6 each, 0", r"fuzz: (.*)")
     depth = MappingProxyType({}) if quick else THOROUGH
     less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []

@@ -1,7 +1,7 @@
 """Feeds one log to the core on this computer and on emulated boards, and compares the state after every step.
 
 Prints the fingerprint of all states for each, and where the first difference is. The fingerprint is computed
-where the core runs (bslam_slam_fingerprint): the state, its covariance, the weights of every machine that was
+where the core runs (bslam_fingerprint): the state, its covariance, the weights of every machine that was
 learned on the way, and all that a smoother keeps.
 
 A board whose image is too small for the run, or has no smoother, is left out, and named. The last line
@@ -63,12 +63,11 @@ class Noting:
 
 def fingerprints(log: Log, options: RunOptions) -> list[int]:
     """After every reading and frame of a run on options.target, chained: the last stands for all."""
-    looks = options.association == "svm"
     if options.target == "host":
         made: list[Noting] = []
 
         def factory(params: Any, beacons: int) -> Noting:
-            slam = Slam(params, beacons_max=beacons, looks=looks, seeds=log.seeds)
+            slam = Slam(params, beacons_max=beacons, seeds=log.seeds)
             made.append(Noting(slam))
             return made[0]
 
@@ -77,7 +76,7 @@ def fingerprints(log: Log, options: RunOptions) -> list[int]:
     opened: list[Noting] = []
 
     def connected(params: Any, beacons: int) -> Noting:
-        slam = connect(options.target, params, beacons, fingerprints=True, looks=looks, seeds=log.seeds)
+        slam = connect(options.target, params, beacons, fingerprints=True, seeds=log.seeds)
         opened.append(Noting(slam))  # chained over there
         return opened[0]
 
@@ -123,7 +122,7 @@ def on_board(log: Log, words: dict[str, Any], board: str) -> list[int] | str:
     except BslamError as error:  # a small board's image
         return str(error)
     except TargetError as error:
-        if "the image has no smoother" in str(error):
+        if "BSLAM_SMOOTHER=0" in str(error):
             return str(error)
         raise
 

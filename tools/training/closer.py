@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from bslam.core.vision import DetectorModel, FrontEnd
+from bslam.core.vision import DetectorModel
 from tools.training.detector_fit import (
     FUSION_LIMIT,
     FUSION_SHARE,
@@ -28,6 +28,7 @@ from tools.training.detector_fit import (
     usable,
 )
 from tools.training.detector_samples import BoxSamples, boxes_of_world, joined, model_of
+from tools.training.front_end import FrontEnd
 from tools.training.hinged import decide_hinged, fit_hinged
 from tools.training.render_set import camera_of
 from tools.training.together import fit_together

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from bslam.core.vision import BeaconModel, DetectorModel, FrontEnd, Proposals, feature_counts
+from bslam.core.vision import BeaconModel, DetectorModel
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm, weights_in_row
 from tools.training.additive import KNOTS
+from tools.training.front_end import FrontEnd, Proposals, feature_counts
 from tools.training.render_set import CELL_PX, KINDS, World, camera_of, read_world
 from tools.training.truth import NOTHING, areas, owners, teaches
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.vision import FrontEnd
 from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, dress, free_pose, make_world
 from bslam.world.scenario import load_scenario
 from tools.training.detector_samples import blank_detector, model_of
+from tools.training.front_end import FrontEnd
 
 SEEN_PX_MIN = 150
 SEEN_SHARE_MIN = 0.7

@@ -12,9 +12,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from bslam.core.learner import SIGNATURE_SIZE, encode
 from numpy.typing import NDArray
 
-from bslam.core.learner import SIGNATURE_SIZE, encode
 from bslam.core.raw import library
 from tools.training.looks import generic
 

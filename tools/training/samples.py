@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.learner import rendered_seeds
-from bslam.core.vision import BeaconModel, Candidate, FrontEnd
+from bslam.core.appearance import rendered_seeds
+from bslam.core.vision import BeaconModel, Candidate
 from bslam.datasets.pictures import Box, Scaled, camera_for, load_picture
 from bslam.errors import BslamError
 from bslam.rig import Camera
 from tools.training.folder import FILE, Folder, Label
+from tools.training.front_end import FrontEnd
 from tools.training.truth import areas, intersections, overlaps
 
 NONE = -1

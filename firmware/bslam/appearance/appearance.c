@@ -1,5 +1,6 @@
 #include "bslam/appearance/appearance.h"
 
+#include "base/bounds.h"
 #include "base/logarithm.h"
 
 #include <string.h>
@@ -65,6 +66,25 @@ void bslam_appearance_clear(bslam_appearance_t *appearance)
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
         release(appearance, b, BSLAM_BEACONS_MAX);
         appearance->of[b] = BLANK;
+    }
+}
+
+/// A classifier's number, if it is one.
+static int16_t classifier_or_none(const bslam_appearance_t *appearance, int16_t classifier)
+{
+    const bool is_one = bslam_is_count(classifier, BSLAM_LEARNER_SLOTS - 1) &&
+                        appearance->learner.classifiers[classifier].used;
+    return is_one ? classifier : BSLAM_NO_CLASSIFIER;
+}
+
+void bslam_appearance_mend(bslam_appearance_t *appearance, const bslam_sample_t *seeds, int32_t seed_count)
+{
+    bslam_learner_mend(&appearance->learner, seeds, seed_count);
+    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
+        bslam_beacon_appearance_t *of = &appearance->of[b];
+        of->classifier = classifier_or_none(appearance, of->classifier);
+        of->twin = classifier_or_none(appearance, of->twin);
+        bslam_mend_flag(&of->is_trained);
     }
 }
 
@@ -138,7 +158,7 @@ static void note_class(bslam_beacon_appearance_t *known, uint8_t beacon_class)
     if (!is_evidence(beacon_class)) {
         return;
     }
-    if (known->seen_as[beacon_class - 1] == SEEN_AS_MAX) {
+    if (known->seen_as[beacon_class - 1] >= SEEN_AS_MAX) {  // a loaded map may have more
         for (int k = 0; k < BSLAM_APPEARANCE_CLASSES; k++) {
             known->seen_as[k] /= 2;
         }
@@ -315,6 +335,6 @@ void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings
     if (sighting->signature != NULL && bslam_sample_encode(sighting->signature, &sample) == BSLAM_OK &&
         settle_classifier(appearance, settings, index, count, &sample) &&
         bslam_learner_show(&appearance->learner, known->classifier, sighting->signature) == BSLAM_OK) {
-        appearance->counters.taught++;
+        appearance->counters.trained++;
     }
 }

@@ -55,6 +55,10 @@ BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appear
 /// Forgets all beacons, in time for another map.
 void bslam_appearance_clear(bslam_appearance_t *appearance);
 
+/// Of memory that may be damaged: makes every number one that may be used. Seeds as bslam_learner_init has
+/// them. A damaged classifier judges worse, until its next training.
+void bslam_appearance_mend(bslam_appearance_t *appearance, const bslam_sample_t *seeds, int32_t seed_count);
+
 /// What the classifier of beacon `index` says of a sample.
 bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
                                      int index, const bslam_sample_t *sample);

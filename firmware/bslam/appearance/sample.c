@@ -79,7 +79,8 @@ void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t
     rounded->unit = largest / 32767.0f;
     for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
         const float w = weights[i] * per_unit;
-        rounded->w[i] = (int16_t)(w + (w < 0.0f ? -0.5f : 0.5f));
+        const float rounded_w = w + (w < 0.0f ? -0.5f : 0.5f);
+        rounded->w[i] = (int16_t)(rounded_w > -32768.0f && rounded_w < 32768.0f ? rounded_w : 0.0f);
     }
 }
 #endif

@@ -1,5 +1,7 @@
 #include "bslam/appearance/learner_internal.h"
 
+#include "base/bounds.h"
+
 #include <string.h>
 
 // A tolerance of 0.2 costs no decisions, 0.7 some.
@@ -34,7 +36,7 @@ static bslam_classifier_t *in_training(bslam_learner_t *learner)
 static uint16_t pack_alpha(float alpha)
 {
     const float units = alpha / ALPHA_UNIT + 0.5f;
-    return (uint16_t)(units < ALPHAS ? units : ALPHAS);
+    return (uint16_t)(units < ALPHAS ? (units > 0.0f ? units : 0.0f) : ALPHAS);
 }
 
 /// Keeps the dual variables for the next start; competitors at 0 only if asked.
@@ -48,7 +50,7 @@ static void keep_alphas(bslam_learner_t *learner, bool with_zeros)
         const uint16_t alpha = pack_alpha(row->alpha);
         if (row->positive) {
             classifier->own_alpha[row->sample - learner->training.classifier * BSLAM_PER_CLASSIFIER] = alpha;
-        } else if (alpha > 0 || with_zeros) {
+        } else if ((alpha > 0 || with_zeros) && classifier->negatives < BSLAM_NEGATIVES_MAX) {
             classifier->negative[classifier->negatives] = row->sample;
             classifier->negative_alpha[classifier->negatives] = alpha;
             classifier->negatives++;
@@ -228,7 +230,7 @@ static bool is_hard(bslam_training_t *training, int32_t sample)
         return false;
     }
     if (bin == training->hard - 1) {
-        training->spare--;
+        training->spare -= training->spare >= 0 ? 1 : 0;
         return training->spare >= 0;
     }
     return true;
@@ -322,4 +324,57 @@ bool bslam_learner_work(bslam_learner_t *learner, int32_t budget)
         done = work_some(learner, &samples, left);
     }
     return learner->training.stage != BSLAM_STAGE_IDLE || next_waiting(learner) >= 0;
+}
+
+// ---- mending ----------------------------------------------------------------------------------------------
+
+static bool is_row(const bslam_learner_t *learner, const bslam_solver_row_t *row)
+{
+    const int32_t first = learner->training.classifier * BSLAM_PER_CLASSIFIER;
+    return row->positive ? row->sample >= first && row->sample < first + BSLAM_PER_CLASSIFIER
+                         : row->sample < BSLAM_OWN_SAMPLES + learner->seed_count;
+}
+
+/// Rows of the classifier's own samples and of others, and the order in which they are looked at.
+static bool is_solver(bslam_learner_t *learner)
+{
+    bslam_solver_t *solver = &learner->training.solver;
+    bool good = bslam_is_count(solver->count, BSLAM_SOLVER_ROWS_MAX) &&
+                bslam_is_count(solver->active, solver->count) &&
+                bslam_is_count(solver->next, solver->active);
+    bslam_mend_flag(&solver->thorough);
+    for (int32_t i = 0; good && i < solver->count; i++) {
+        bslam_mend_flag(&solver->rows[i].positive);
+        good = is_row(learner, &solver->rows[i]) && solver->order[i] < solver->count;
+    }
+    return good;
+}
+
+static bool is_training(bslam_learner_t *learner)
+{
+    bslam_training_t *training = &learner->training;
+    const bool has_rows = training->stage >= BSLAM_STAGE_RECALL;
+    const bool recalls = training->stage == BSLAM_STAGE_RECALL;
+    return training->stage <= BSLAM_STAGE_SOLVE && bslam_is_count(training->first_block, TURNS) &&
+           training->block_step >= 1 && training->block_step <= TURNS &&
+           bslam_is_count(training->block, block_count(learner) + TURNS) &&
+           bslam_is_count(training->spare + 1, BSLAM_NEGATIVES_MAX + 1) &&
+           bslam_is_count(training->steps_left, BSLAM_LEARNER_STEPS_MAX) &&
+           bslam_is_count(training->own_recalled, BSLAM_PER_CLASSIFIER) &&
+           bslam_is_count(training->negatives_recalled, BSLAM_NEGATIVES_MAX) &&
+           (!recalls || training->solver.count == training->own_recalled + training->negatives_recalled) &&
+           (!has_rows || is_solver(learner));
+}
+
+void bslam_training_mend(bslam_learner_t *learner)
+{
+    bslam_training_t *training = &learner->training;
+    const bool is_classifier = bslam_is_count(training->classifier, BSLAM_LEARNER_SLOTS - 1);
+    if (is_classifier && (training->stage == BSLAM_STAGE_IDLE || is_training(learner))) {
+        return;
+    }
+    training->classifier = is_classifier ? training->classifier : 0;
+    training->stage = BSLAM_STAGE_IDLE;
+    training->solver.count = 0;
+    in_training(learner)->waiting = true;
 }

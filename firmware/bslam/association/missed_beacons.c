@@ -65,6 +65,6 @@ int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t 
             missed = known->missed >= settings->missed_views ? b : missed;
         }
     }
-    appearance->counters.vanished += missed != BSLAM_NO_MISSED_BEACON ? 1u : 0u;
+    appearance->counters.missed += missed != BSLAM_NO_MISSED_BEACON ? 1u : 0u;
     return missed;
 }

@@ -26,8 +26,7 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 
 bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
 {
-    return (bslam_pose_t){ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y],
-                               ekf->mean[BSLAM_STATE_THETA]};
+    return (bslam_pose_t){ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y], ekf->mean[BSLAM_STATE_THETA]};
 }
 
 /// A ray's values with an inverse distance that has a point.

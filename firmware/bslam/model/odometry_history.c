@@ -49,11 +49,11 @@ bslam_motion_t bslam_history_walk(const bslam_history_t *history, bslam_history_
     place->gone_us = whole ? 0 : place->gone_us + part_us;
     const bslam_real_t share = (bslam_real_t)part_us / (bslam_real_t)step->duration_us;
     return (bslam_motion_t){.dt_s = (bslam_real_t)part_us * SECONDS_PER_US,
-                                   .forward_m = step->forward_m * share,
-                                   .turn_rad = step->turn_rad * share,
-                                   .forward_var_m2 = step->forward_var_m2 * share,
-                                   .turn_var_rad2 = step->turn_var_rad2 * share,
-                                   .forward_turn_cov_mrad = step->forward_turn_cov_mrad * share};
+                            .forward_m = step->forward_m * share,
+                            .turn_rad = step->turn_rad * share,
+                            .forward_var_m2 = step->forward_var_m2 * share,
+                            .turn_var_rad2 = step->turn_var_rad2 * share,
+                            .forward_turn_cov_mrad = step->forward_turn_cov_mrad * share};
 }
 
 void bslam_history_take(bslam_history_t *history, const bslam_history_place_t *place,

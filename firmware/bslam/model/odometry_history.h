@@ -29,8 +29,8 @@ typedef struct bslam_history {
     bslam_real_t gone_turn_rad;
 } bslam_history_t;
 
-/// Remembers a motion of this duration, which now waits, of fewer than `room` then; forgets the oldest if there
-/// is no room.
+/// Remembers a motion of this duration, which now waits, of fewer than `room` then; forgets the oldest if
+/// there is no room.
 void bslam_history_add(bslam_history_t *history, int32_t room, int32_t duration_us,
                        const bslam_motion_t *motion);
 

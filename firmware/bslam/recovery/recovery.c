@@ -1,5 +1,6 @@
 #include "bslam/recovery/recovery.h"
 
+#include "base/bounds.h"
 #include "bslam/linalg/symmat.h"
 #include "base/trig.h"
 #include "bslam/model/noise.h"
@@ -37,12 +38,39 @@ enum {
     ELSEWHERE_BEACONS = 4,  ///< beacons that another pose has more than the present one, in a map that grows,
     ELSEWHERE_FRAMES = 3,   ///< in as many frames: the robot is there
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
-    CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
+    CONFIRMED_BY_TIME = 8,  ///< or fewer than one more than a fix needs
+    COUNT_MAX = 1000000000  ///< of frames: more than a year's
 };
 
 void bslam_recovery_restart(bslam_recovery_t *recovery)
 {
     *recovery = (bslam_recovery_t){.counters = recovery->counters};
+}
+
+static bool is_time(int64_t time_us)
+{
+    return time_us >= -INT64_MAX / 4 && time_us <= INT64_MAX / 2;
+}
+
+void bslam_recovery_mend(bslam_recovery_t *recovery)
+{
+    bool good = bslam_is_count(recovery->memory_count, BSLAM_CLUES_MAX) &&
+                bslam_is_count(recovery->evidence, COUNT_MAX) &&
+                bslam_is_count(recovery->undecided, COUNT_MAX) &&
+                bslam_is_count(recovery->silent, COUNT_MAX) &&
+                bslam_is_count(recovery->confirmed, COUNT_MAX) && is_time(recovery->doubted_us) &&
+                is_time(recovery->grew_us) && is_time(recovery->contradicted_us) && is_time(recovery->fix_us);
+    bslam_mend_flag(&recovery->several);
+    bslam_mend_flag(&recovery->has_grown);
+    bslam_mend_flag(&recovery->has_contradicted);
+    bslam_mend_flag(&recovery->has_fix);
+    for (int m = 0; good && m < recovery->memory_count; m++) {
+        good = is_time(recovery->memories[m].time_us);
+        bslam_mend_flag(&recovery->memories[m].sighting.has_range);
+    }
+    if (!good) {
+        bslam_recovery_restart(recovery);
+    }
 }
 
 bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, const bslam_slam_t *slam)

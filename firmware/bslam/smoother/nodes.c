@@ -23,8 +23,9 @@ void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion
 
 int32_t bslam_smoother_units(bslam_real_t value)
 {
-    return (int32_t)(value < BSLAM_SMOOTHER_UNITS_MAX ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5))
-                                                      : BSLAM_SMOOTHER_UNITS_MAX);
+    const bool is_within = value < BSLAM_SMOOTHER_UNITS_MAX && value > -BSLAM_SMOOTHER_UNITS_MAX;
+    return (int32_t)(is_within ? value + (value < 0 ? -BSLAM_R(0.5) : BSLAM_R(0.5))
+                               : BSLAM_SMOOTHER_UNITS_MAX);
 }
 
 uint8_t bslam_smoother_weight(bslam_real_t sd_rad)

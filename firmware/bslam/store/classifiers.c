@@ -192,6 +192,9 @@ static void read_classifier(bslam_codec_t *codec, uint32_t classifiers, named_t 
     bslam_codec_require(codec, trained <= 1, BSLAM_MAP_CONTENT);
     bslam_weights_t weights = {0};
     move_weights(codec, &weights);
+    if (codec->fault != BSLAM_MAP_FINE) {
+        return;
+    }
     named->samples[slot] = (uint8_t)samples;
     if (classifier != NULL) {
         classifier->used = true;

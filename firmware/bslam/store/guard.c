@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define START 0x9e3779b9u
+#define SEALED 0x5ea1ed01u
 #define FACTOR 0x85ebca6bu  // odd, so that every step can be undone
 
 static uint32_t add(uint32_t sum, const void *bytes, size_t size)
@@ -44,15 +45,20 @@ static uint32_t checksum_of(const bslam_slam_t *slam)
 void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam)
 {
     guard->checksum = checksum_of(slam);
-    guard->is_sealed = true;
+    guard->seal = SEALED;
     if (guard->copy != NULL) {
         memcpy(guard->copy, slam, sizeof *slam);
     }
 }
 
+bool bslam_guard_is_sealed(const bslam_guard_t *guard)
+{
+    return guard->seal == SEALED;
+}
+
 bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam)
 {
-    if (guard->is_sealed && checksum_of(slam) == guard->checksum) {
+    if (bslam_guard_is_sealed(guard) && checksum_of(slam) == guard->checksum) {
         return BSLAM_OK;
     }
     guard->counters.corrupt++;
@@ -61,7 +67,7 @@ bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam)
 
 bslam_status_t bslam_guard_restore(bslam_guard_t *guard, bslam_slam_t *slam)
 {
-    if (!guard->is_sealed || guard->copy == NULL || checksum_of(guard->copy) != guard->checksum) {
+    if (!bslam_guard_is_sealed(guard) || guard->copy == NULL || checksum_of(guard->copy) != guard->checksum) {
         return BSLAM_E_STATE;
     }
     memcpy(slam, guard->copy, sizeof *slam);

@@ -15,12 +15,14 @@
 typedef struct bslam_guard {
     bslam_guard_counters_t counters;
     uint32_t checksum;
-    bool is_sealed;
+    uint32_t seal;  ///< a constant once there is a checksum: memory that holds anything has no such number
     bslam_slam_t *copy;  ///< where each seal keeps the state to fall back to; NULL: nowhere
 } bslam_guard_t;
 
 /// The state is good as it is now.
 void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam);
+
+bool bslam_guard_is_sealed(const bslam_guard_t *guard);
 
 /// BSLAM_E_STATE: it is not as it was when it was sealed, or nothing was. Counts it, and changes nothing.
 BSLAM_MUST_CHECK bslam_status_t bslam_guard_check(bslam_guard_t *guard, const bslam_slam_t *slam);

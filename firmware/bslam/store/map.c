@@ -158,13 +158,14 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
         bslam_codec_require(
             codec, record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
             BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec, values <= header->values, BSLAM_MAP_CONTENT);
+        bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
         least_uid = uid + 1;
-        if (is_taken(target, &record.beacon)) {
+        if (codec->fault == BSLAM_MAP_FINE && is_taken(target, &record.beacon)) {
             take_record(target, &record);
         }
     }
     bslam_codec_require(codec, values == header->values, BSLAM_MAP_CONTENT);
-    bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
 }
 
 // ---- mean and covariance ----------------------------------------------------------------------------------
@@ -345,26 +346,30 @@ bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t 
     return codec.fault == BSLAM_MAP_FINE ? BSLAM_OK : BSLAM_E_MAP;
 }
 
-static void read_all(bslam_codec_t *codec, const target_t *target, const room_t *room)
+/// All of a blob whose CRC was `crc` when its frame was checked. Flash that is worn, or a line, may read
+/// otherwise now: nothing of this reading is to be believed before its own CRC is the same.
+static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target, const room_t *room)
 {
     header_t header = {0};
     move_header(codec, &header);
-    if (target != NULL) {
-        target->slam->ekf.next_uid = header.next_uid;
-    }
     read_beacons(codec, &header, target);
+    if (codec->fault != BSLAM_MAP_FINE) {
+        return;  // counts are not to be believed
+    }
     read_values(codec, &header, target, room);
     const bool learns = target != NULL && bslam_slam_learns(target->slam);
     bslam_map_read_classifiers(codec, header.classifiers, learns ? &target->slam->appearance->learner : NULL);
-    const uint32_t body = codec->at;
-    (void)bslam_codec_whole(codec, 0, CRC_BYTES);
-    bslam_codec_require(codec, body + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, codec->at + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
     bslam_codec_require(codec, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
+    if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
+        target->slam->ekf.next_uid = header.next_uid;
+    }
 }
 
-/// The frame of a blob: it begins as a map, is as long as it says, and its CRC is right. All else is looked
-/// at only then, so that damage is called damage.
-static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
+/// The frame of a blob: it begins as a map, is as long as it says, and its CRC, *crc, is right. All else is
+/// looked at only then, so that damage is called damage.
+static bslam_map_fault_t check_frame(const bslam_map_source_t *source, uint32_t *crc)
 {
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
     header_t header = {0};
@@ -385,25 +390,26 @@ static bslam_map_fault_t check_frame(const bslam_map_source_t *source)
         const uint32_t left = header.length - CRC_BYTES - codec.at;
         bslam_codec_bytes(&codec, bytes, left < sizeof bytes ? left : sizeof bytes);
     }
-    const uint32_t crc = ~codec.crc;
-    bslam_codec_require(&codec, bslam_codec_whole(&codec, 0, CRC_BYTES) == crc, BSLAM_MAP_BAD_CRC);
+    *crc = ~codec.crc;
+    bslam_codec_require(&codec, bslam_codec_whole(&codec, 0, CRC_BYTES) == *crc, BSLAM_MAP_BAD_CRC);
     return codec.fault;
 }
 
-static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room)
+static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room, uint32_t *crc)
 {
-    const bslam_map_fault_t fault = check_frame(source);
+    const bslam_map_fault_t fault = check_frame(source, crc);
     if (fault != BSLAM_MAP_FINE) {
         return fault;
     }
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, NULL, room);
+    read_all(&codec, *crc, NULL, room);
     return codec.fault;
 }
 
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
 {
-    return check(source, NULL);
+    uint32_t crc;
+    return check(source, NULL, &crc);
 }
 
 bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source, bslam_map_mode_t mode,
@@ -412,10 +418,11 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     // Behind the rows of its own covariance the pipeline's memory holds nothing.
     const size_t own = bslam_symmat_row(slam->ekf.dim);
     room_t room = {slam->ekf.covariance + own, BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - own, 0};
-    *fault = check(source, &room);
+    uint32_t crc;
+    *fault = check(source, &room, &crc);
     if (*fault == BSLAM_MAP_COVARIANCE) {
         room.raise = SHORTFALL_MAX;
-        *fault = check(source, &room);
+        *fault = check(source, &room, &crc);
     }
     memset(room.factor, 0, room.length * sizeof *room.factor);
     if (*fault != BSLAM_MAP_FINE) {
@@ -425,7 +432,7 @@ bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *sour
     slam->is_frozen = mode == BSLAM_MAP_FROZEN;
     const target_t target = {slam, mode, room.raise};
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, &target, NULL);
+    read_all(&codec, crc, &target, NULL);
     *fault = codec.fault;
     if (*fault != BSLAM_MAP_FINE) {
         bslam_slam_forget_map(slam);

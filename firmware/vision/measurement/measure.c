@@ -21,7 +21,7 @@ static const bslam_real_t SIZE_MAX_M = 10;
 static const bslam_real_t HEIGHT_MIN_PX = 8;
 static const bslam_real_t SIDE_MIN_PX = 5;
 // The variances: floors, and how much of the outline's doubts about which edge it is counts. Fitted to the
-// errors in training worlds; docs/EXPERIMENTS.md has the errors that these leave in test worlds.
+// errors in training worlds.
 static const bslam_real_t BEARING_FLOOR_RAD = BSLAM_R(0.0008);
 static const bslam_real_t RANGE_FLOOR = BSLAM_R(0.01);
 static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.3);

@@ -38,7 +38,7 @@ typedef struct bslam_size {
 /// 0 where none could be taken.
 ///
 /// The standard deviations are those of the errors left, of which a large part repeats from frame to frame:
-/// they come from the object's looks, not from noise (docs/EXPERIMENTS.md). BSLAM_E_NOT_FINITE: the box or
+/// they come from the object's appearance, not from noise. BSLAM_E_NOT_FINITE: the box or
 /// the size. BSLAM_E_RANGE: the box is empty or lies outside the frame, the size is outside 0 to 10 m or
 /// deeper than twice its height, or the lens sees no upright object there. BSLAM_E_PARAMETER: the camera's
 /// frame has another size. *candidate is then unchanged. The camera has passed bslam_camera_check.

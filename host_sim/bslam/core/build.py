@@ -17,19 +17,13 @@ from pathlib import Path
 
 from cffi import FFI
 
-from bslam.core.builds import (
-    FIRMWARE_DIR,
-    REALS,
-    SIZE_CLASSES,
-    VISION_EXTENSION,
-    VISION_TRAINING_EXTENSION,
-    extension_name,
-)
+from bslam.core.builds import FIRMWARE_DIR, REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 
 CORE_DIR = Path(__file__).resolve().parent
 SOURCES = {"bslam": ("base", "bslam"), "vision": ("base", "vision")}
 """Folders of the firmware that make each library."""
 HEADER = "bslam/bslam.h"
+VISION_HEADER = "vision/vision.h"
 CONSTANTS = "\n".join(
     f"#define {name} ..."
     for name in ("BSLAM_SIZES_HASH", "BSLAM_SAMPLE_FEATURES", "BSLAM_SEEDS_MAX", "BSLAM_CLASS_NOT_MAPPABLE")
@@ -94,6 +88,7 @@ def declarations(macros: Macros, header: str) -> str:
         for libc_header in LIBC_HEADERS:
             Path(empty, libc_header).touch()
         defines = [f"-D{name}={value}" for name, value in macros]
+        defines.append("-Dbslam_init_double=bslam_init_sized")  # one name for both scalar types
         command = [os.environ.get("CC", "cc"), "-E", "-P", "-nostdinc", f"-I{empty}", f"-I{FIRMWARE_DIR}"]
         command += [*defines, "-D__attribute__(x)=", "-DINT_MAX=2147483647", str(FIRMWARE_DIR / header)]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -110,7 +105,7 @@ def build(real: str, beacons_max: int) -> Path:
     return compile_extension(name, declared, f'#include "{HEADER}"', macros, "bslam")
 
 
-def build_vision(name: str = VISION_EXTENSION, header: str = "vision/vision.h") -> Path:
+def build_vision(name: str = VISION_EXTENSION, header: str = VISION_HEADER, folder: Path = CORE_DIR) -> Path:
     """Builds the vision library, in float as on the target, with its model where there is one yet."""
     text = declarations(VISION_MACROS, header) + "#define BSLAM_VISION_HASH ...\n"
     text += "const bslam_beacon_model_t *built_in_model(void);\n"
@@ -119,12 +114,7 @@ def build_vision(name: str = VISION_EXTENSION, header: str = "vision/vision.h") 
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    return compile_extension(name, text, includes + function, VISION_MACROS, "vision")
-
-
-def build_vision_training() -> Path:
-    """The same with what is inside."""
-    return build_vision(VISION_TRAINING_EXTENSION, "vision/internal.h")
+    return compile_extension(name, text, includes + function, VISION_MACROS, "vision", folder)
 
 
 def compile_extension(
@@ -165,8 +155,8 @@ def main() -> int:
     """Builds every extension, one on a core (in processes, since cffi changes the directory)."""
     sizes, reals = zip(*[(size, real) for size in SIZE_CLASSES for real in REALS], strict=True)
     with ProcessPoolExecutor() as pool:
-        vision = [pool.submit(one) for one in (build_vision, build_vision_training)]
-        for path in [*pool.map(build, reals, sizes), *(one.result() for one in vision)]:
+        vision = pool.submit(build_vision)
+        for path in [*pool.map(build, reals, sizes), vision.result()]:
             print(f"built {path.name}", file=sys.stderr)
     return 0
 

@@ -17,7 +17,4 @@ def extension_name(real: str, beacons_max: int) -> str:
 
 
 VISION_EXTENSION = "bslam.core._vision"
-"""The build of the vision library: it holds no map, so one size serves all."""
-
-VISION_TRAINING_EXTENSION = "bslam.core._vision_training"
-"""The same with what is inside it, for training: features of cells and boxes, machines one by one."""
+"""The build of the vision front end: it holds no map, so one size serves all."""

@@ -9,13 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.builds import (
-    REALS,
-    SIZE_CLASSES,
-    VISION_EXTENSION,
-    VISION_TRAINING_EXTENSION,
-    extension_name,
-)
+from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_name
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
@@ -60,7 +54,9 @@ class Library:
     def enum_names(self, type_name: str, prefix: str, space: str = "_") -> dict[int, str]:
         """Value -> name in lower case without the prefix, with `space` between its words."""
         elements = self.ffi.typeof(type_name).elements
-        return {value: name.removeprefix(prefix).lower().replace("_", space) for value, name in elements.items()}
+        return {
+            value: name.removeprefix(prefix).lower().replace("_", space) for value, name in elements.items()
+        }
 
     def sightings(
         self,
@@ -152,11 +148,7 @@ def library(real: str, beacons_max: int) -> Library:
 class VisionLibrary:
     """The vision library 1:1: `ffi` and `lib` of cffi, and C views on machines and models."""
 
-    def __init__(self, extension: str = VISION_EXTENSION) -> None:
-        try:
-            module = import_module(extension)
-        except ImportError as error:
-            raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error
+    def __init__(self, module: Any) -> None:
         self.ffi = module.ffi
         self.lib = module.lib
 
@@ -254,10 +246,7 @@ class VisionLibrary:
 @cache
 def vision_library() -> VisionLibrary:
     """The one build of the vision library."""
-    return VisionLibrary()
-
-
-@cache
-def vision_training_library() -> VisionLibrary:
-    """The build that shows what is inside it: all that the other one has, and more."""
-    return VisionLibrary(VISION_TRAINING_EXTENSION)
+    try:
+        return VisionLibrary(import_module(VISION_EXTENSION))
+    except ImportError as error:
+        raise BslamError(f"the vision library is not built ({error}): run `make setup`") from error

@@ -45,7 +45,7 @@ def _answers(line: ProcessLine, frames: list[Frame], wanted: int) -> list[bytes]
 
 def _session() -> list[Frame]:
     """From the start: readings, and an interruption, which adds doubt as often as it is told."""
-    hello = messages.hello(7, messages.Wishes())
+    hello = messages.hello(7)
     frames = [Frame(Message.HELLO, 1, 0, hello), Frame(Message.RESET, 2, 0, b"")]
     for step in range(1, 11):
         reading = messages.odometry("wheels", 0.02, 0.018, None)

@@ -32,8 +32,8 @@ def _number_in_odometry(value: float, protected: bool) -> Measured:
     if protected:
         status = refusal(lambda: course.slam.odometry("wheels", 51 * STEP_US, value, 0.0))
     else:
-        x_m = course.slam.pose()[0]
-        put(course.slam, x_m, x_m + value)
+        pose = course.slam.pose()
+        put(course.slam, pose[0] + value, *pose)
         status = ""
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
@@ -47,7 +47,8 @@ def _number_in_sighting(value: float, protected: bool) -> Measured:
         polar = ([value], [1.0]) if math.isnan(value) else ([0.1], [value])
         status = refusal(lambda: course.slam.sightings(51 * STEP_US, *polar, [9], [True]))
     else:
-        put(course.slam, course.slam.beacons()[0].x_m, value)
+        beacon = course.slam.beacons()[0]
+        put(course.slam, value, beacon.x_m, beacon.y_m)
         status = ""
     same = state_of(course.slam) == before
     return Measured(bool(status) and same, f"{status or 'taken'}, state {'same' if same else 'changed'}")
@@ -77,7 +78,7 @@ def _number_elsewhere(value: float, protected: bool) -> Measured:
     before = state_of(slam)
     taken = [name for name, call in calls.items() if not (protected and _is_refused(call))]
     if not protected:
-        put(slam, slam.pose()[0], value)
+        put(slam, value, *slam.pose())
     same = state_of(slam) == before
     text = f"{len(calls) - len(taken)} of {len(calls)} refused, state {'same' if same else 'changed'}"
     return Measured(not taken and same, text)

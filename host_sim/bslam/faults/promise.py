@@ -117,9 +117,9 @@ def refusal(call: Callable[[], object]) -> str:
     return ""
 
 
-def state_of(slam: Slam) -> int:
-    """A fingerprint of all that the filter knows."""
-    return slam.fingerprint(0)
+def state_of(slam: Slam) -> tuple[int, tuple[float, float, float]]:
+    """A fingerprint of all that the filter knows, and where odometry since then has the robot."""
+    return slam.fingerprint(0), slam.pose()
 
 
 # ---- damage ------------------------------------------------------------------------------------------------
@@ -135,9 +135,9 @@ def places_of(slam: Slam, *values: float) -> list[int]:
     return found
 
 
-def put(slam: Slam, before: float, after: float) -> None:
-    """A number in the place of another one, past every check."""
-    at = places_of(slam, before)[0]
+def put(slam: Slam, after: float, *before: float) -> None:
+    """A number in the place of the first of those that stand there, past every check."""
+    at = places_of(slam, *before)[0]
     slam.memory[at : at + 4] = struct.pack("=f", after)
 
 

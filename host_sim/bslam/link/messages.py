@@ -61,8 +61,6 @@ LINK_STATUSES = {
     0x41: "TYPE",
     0x42: "LENGTH",
     0x43: "STORE",
-    0x44: "LOOKS",
-    0x45: "SMOOTHER",
 }
 """Statuses that are the link's own; below are the library's."""
 NO_DETAIL = 255
@@ -110,20 +108,9 @@ def float32(value: float) -> bytes:
         return np.float32(value).astype("<f4").tobytes()
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What a host asks of a session."""
-
-    fingerprints: bool = False
-    looks: bool = False
-    as_it_is: bool = False
-    recovery: bool = False  # it notices when it is lost
-    guard: bool = False  # it notices when its memory is no longer what it was
-
-
-def hello(session: int, wishes: Wishes) -> bytes:
-    flags = sum(int(one) << bit for bit, one in enumerate(astuple(wishes)))
-    return _HELLO.pack(session, flags)
+def hello(session: int, *, fingerprints: bool = False, as_it_is: bool = False) -> bytes:
+    """as_it_is: the robot goes on with the parameters and the map that it has."""
+    return _HELLO.pack(session, fingerprints | as_it_is << 2)
 
 
 def odometry(

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 from bslam.link import messages
 from bslam.link.frames import Decoder, Frame, encode
-from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report, Wishes
+from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report
 from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
 _MEANING = {
     "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
-    "LOOKS": ": the image learns no looks (SESSION_APPEARANCE=0)",
-    "SMOOTHER": ": the image has no smoother (SESSION_SMOOTHER=0)",
 }
 
 
@@ -36,7 +34,7 @@ def _started_anew(ready: Frame) -> TargetError:
 class Client:
     """The host's side of the link. A message is applied once, however often its frame or answer is lost."""
 
-    def __init__(self, line: Line, wishes: Wishes | None = None) -> None:
+    def __init__(self, line: Line, *, fingerprints: bool = False, as_it_is: bool = False) -> None:
         self._line = line
         self._decoder = Decoder()
         self._frames: deque[Frame] = deque()
@@ -47,7 +45,8 @@ class Client:
         self.reports_lost = 0
         session = secrets.randbits(32)
         line.write(b"\0")
-        answer = self.ask(Message.HELLO, messages.hello(session, wishes or Wishes()))
+        payload = messages.hello(session, fingerprints=fingerprints, as_it_is=as_it_is)
+        answer = self.ask(Message.HELLO, payload)
         self.info: Info = messages.read_info(answer.body)
         self._open = True
 

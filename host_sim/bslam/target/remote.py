@@ -17,10 +17,17 @@ from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam, told_classes
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
-from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step, Wishes
+from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
 
+_LEFT_OUT = {
+    "filter": "BSLAM_SMOOTHER",
+    "association": "BSLAM_APPEARANCE",
+    "recovery": "BSLAM_RECOVERY",
+    "guard": "BSLAM_GUARD",
+}
+"""Parameters that ask for what an image may leave out, and by which switch."""
 _MAP_ATTEMPTS = 3  # a robot that drives may change its map between two pieces of it
 
 
@@ -57,9 +64,7 @@ class RemoteSlam:
         as_it_is = params is None
         # What the image would refuse is refused here first, in the words of the library.
         self._values = Slam(params, beacons_max=beacons_max).params
-        learns = not as_it_is and self._values["association"] == BY_APPEARANCE
-        recovers, guards = (not as_it_is and bool(self._values[name]) for name in ("recovery", "guard"))
-        self._client = Client(line, Wishes(fingerprints, learns, as_it_is, recovers, guards))
+        self._client = Client(line, fingerprints=fingerprints, as_it_is=as_it_is)
         self._check_image(beacons_max)
         self._step: Step | None = None
         self._sighted: list[Seen] = []  # of a picture whose report has not come yet
@@ -67,7 +72,7 @@ class RemoteSlam:
         self._outcomes = self._raw.enum_names("bslam_outcome_t", "BSLAM_OUTCOME_")
         self._reasons = self._raw.enum_names("bslam_reason_t", "BSLAM_REASON_")
         self._kinds = self._raw.enum_names("bslam_beacon_kind_t", "BSLAM_BEACON_")
-        if learns and seeds is not None:
+        if not as_it_is and seeds is not None and self._values["association"] == BY_APPEARANCE:
             self._send_signatures(Message.SEEDS, seeds)
         if as_it_is:
             self._values = {name: self._param(number) for number, name in enumerate(self._values)}
@@ -334,9 +339,17 @@ class RemoteSlam:
         self._step = None
         answer = self._client.ask(Message.RESET)
         if answer.status:
-            self._ensure(answer, f"parameter {list(self._values)[answer.detail]}")
+            self._refuse(answer)
         self._client.drop_reports()
         self._sighted = []
+
+    def _refuse(self, answer: Answer) -> None:
+        """Raises TargetError for what the image leaves out: the host's build, which took it, has all."""
+        name = list(self._values)[answer.detail]
+        what = f"parameter {name} = {self._values[name]:g}"
+        if name in _LEFT_OUT:
+            raise TargetError(f"{what}: the image is built with {_LEFT_OUT[name]}=0")
+        self._ensure(answer, what)
 
     def set_param(self, name: str, value: float) -> None:
         """Set a parameter for the next `reset`. Raises BslamError."""

@@ -30,7 +30,7 @@ from bslam.world.wheels import count_ticks, read_gyro, read_travel
 __all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
 
 _REDRAW_STREAM = 77  # of wheels whose noise is drawn anew
-_BIAS_AS_NOISE_S = 2.0  # docs/EXPERIMENTS.md "A gyro"
+_BIAS_AS_NOISE_S = 2.0
 
 
 def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, noise: str | None = None) -> Log:

@@ -112,7 +112,7 @@ void peer_pose(double pose[3])
 
 int peer_landmarks(void)
 {
-    return bslam_slam_beacon_count(&slam);
+    return slam.ekf.beacon_count;
 }
 
 size_t peer_static_bytes(void)

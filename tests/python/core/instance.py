@@ -1,11 +1,13 @@
-"""The filter's state as the C instance holds it, read through the raw layer: for tests only."""
+"""The filter's state as the C instance holds it."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core import Slam
+from internals import inside, module_of
 
 
 @cache
@@ -22,34 +24,43 @@ def _places(dim: int) -> NDArray[np.int64]:
 def _array(slam: Slam, field: object) -> NDArray[np.float64]:
     """A member array of the instance, as a copy in double."""
     real = np.float64 if slam._raw.real == "double" else np.float32
-    return np.frombuffer(slam._ffi.buffer(field), dtype=real).astype(np.float64)
+    return np.frombuffer(module_of(slam).ffi.buffer(field), dtype=real).astype(np.float64)
 
 
 def dim(slam: Slam) -> int:
     """Size of the state."""
-    return int(slam._slam.ekf.dim)
+    return int(inside(slam).slam.ekf.dim)
 
 
 def mean(slam: Slam) -> NDArray[np.float64]:
     """(n,) the state: robot, then beacons. m, rad."""
-    return _array(slam, slam._slam.ekf.mean)[: dim(slam)]
+    return _array(slam, inside(slam).slam.ekf.mean)[: dim(slam)]
 
 
 def covariance(slam: Slam) -> NDArray[np.float64]:
     """(n, n) its covariance."""
-    return _array(slam, slam._slam.ekf.covariance)[_places(dim(slam))]
+    return _array(slam, inside(slam).slam.ekf.covariance)[_places(dim(slam))]
+
+
+def beacons(slam: Slam) -> list[Any]:
+    """The filter's beacons, bslam_beacon_t."""
+    ekf = inside(slam).slam.ekf
+    return [ekf.beacons[i] for i in range(ekf.beacon_count)]
 
 
 def angles(slam: Slam) -> list[int]:
     """Which values of the state are angles: the heading, and rays' directions."""
-    beacons = [slam._slam.ekf.beacons[i] for i in range(slam._slam.ekf.beacon_count)]
-    return [2, *(b.at + 2 for b in beacons if b.kind == slam._lib.BSLAM_BEACON_RAY)]
+    ray = module_of(slam).lib.BSLAM_BEACON_RAY
+    return [2, *(one.at + 2 for one in beacons(slam) if one.kind == ray)]
 
 
 def copy_of(slam: Slam) -> Slam:
-    """Another instance in the same state."""
-    other = Slam(beacons_max=slam._raw.beacons_max, real=slam._raw.real)
-    slam._ffi.memmove(other._slam, slam._slam, slam._ffi.sizeof("bslam_slam_t"))
+    """Another instance in the same state, with the same settings."""
+    other = Slam(slam.params, beacons_max=slam._raw.beacons_max, real=slam._raw.real)
+    mine = inside(other).slam
+    own = mine.appearance, mine.smoother
+    module_of(slam).ffi.memmove(inside(other), inside(slam), len(slam.state_bytes))
+    mine.appearance, mine.smoother = own
     return other
 
 
@@ -57,10 +68,23 @@ def state_without_counters(slam: Slam) -> bytes:
     """Every byte of the instance but those that a refusal may change: the counters, and which sighting was
     bad.
     """
-    data = bytearray(slam.state_bytes)
-    fields = dict(slam._ffi.typeof("bslam_slam_t").fields)
-    for name in ("counters", "bad_sighting"):
-        offset, size = fields[name].offset, slam._ffi.sizeof(fields[name].type)
+    return _blanked(slam, ("slam", "counters"), ("slam", "bad_sighting"), ("guard", "counters"))
+
+
+def state_without_addresses(slam: Slam) -> bytes:
+    """Every byte of the instance that two which were fed alike have alike: scratch holds addresses, too."""
+    held = (("slam", name) for name in ("appearance", "smoother", "records"))
+    return _blanked(slam, *held, ("guard", "copy"))
+
+
+def _blanked(slam: Slam, *paths: tuple[str, ...]) -> bytes:
+    """The bytes of an instance, those of some members 0."""
+    data, ffi = bytearray(slam.state_bytes), module_of(slam).ffi
+    for path in paths:
+        kind = ffi.typeof("bslam_instance_t")
+        for name in path:
+            kind = dict(kind.fields)[name].type
+        offset, size = ffi.offsetof("bslam_instance_t", *path), ffi.sizeof(kind)
         data[offset : offset + size] = bytes(size)
     return bytes(data)
 

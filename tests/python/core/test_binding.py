@@ -2,6 +2,7 @@
 
 import math
 import re
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,8 +10,7 @@ import numpy as np
 import pytest
 
 from bslam.core import CoreError, Slam
-from bslam.core.build import LIBRARY_DIR
-from bslam.core.builds import SIZE_CLASSES
+from bslam.core.builds import FIRMWARE_DIR, SIZE_CLASSES
 from bslam.errors import BslamError
 from core import instance
 from core.feeding import KINDS, feed
@@ -22,20 +22,21 @@ REALS = pytest.mark.parametrize("real", ["float", "double"])
 
 
 def table_in_c() -> list[tuple[str, float, float, float, bool, str]]:
-    """The lines of BSLAM_SETTINGS as they stand in the header: name, default, low, high, is it whole,
-    meaning."""
-    text = Path(LIBRARY_DIR, "base", "params.h").read_text(encoding="utf-8").replace("\\\n", " ")
+    """The lines of the tables as they stand in the headers: name, default, low, high, is it whole, meaning."""
+    headers = ("settings.h", "association/tuning.h")
+    text = "".join(Path(FIRMWARE_DIR, "bslam", name).read_text(encoding="utf-8") for name in headers)
     line = re.compile(r'(REAL|INTEGER)\((\w+), ([-\w.]+), ([-\w.]+), ([-\w.]+),\s*"([^"]*)"\)')
     return [
         (name, float(initial), float(low), float(high), kind == "INTEGER", meaning)
-        for kind, name, initial, low, high, meaning in line.findall(text)
+        for kind, name, initial, low, high, meaning in line.findall(text.replace("\\\n", " "))
     ]
 
 
 @REALS
-def test_parameters_are_the_table_in_c(real: str) -> None:
+def test_parameters_are_the_tables_in_c(real: str) -> None:
     found = [(p.name, p.default, p.low, p.high, p.is_integer, p.meaning) for p in Slam.parameters(real)]
     assert found == table_in_c()
+    assert list(dict.fromkeys(p.group for p in Slam.parameters(real))) == ["settings", "expert", "tuning"]
 
 
 @REALS
@@ -84,7 +85,7 @@ def test_params_fraction_of_a_whole_number_is_refused() -> None:
 
 
 def test_params_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(BslamError, match=r"'wheelbase' does not exist; allowed are filter, .*wheelbase_m"):
+    with pytest.raises(BslamError, match=r"'wheelbase' does not exist; allowed are wheelbase_m, .*filter"):
         Slam({"wheelbase": 0.4})
 
 
@@ -162,6 +163,14 @@ def without_noise() -> Slam:
     return started({"velocity_states": 1, "left_speed_sd_mps": 1e-30, "right_speed_sd_mps": 1e-30})
 
 
+def damaged() -> Slam:
+    """A guarded instance in whose memory a bit has flipped."""
+    slam = started({"guard": 1})
+    at = slam.state_bytes.find(struct.pack("=f", slam.beacons()[0].x_m))
+    slam.memory[at] ^= 1
+    return slam
+
+
 REFUSALS: list[tuple[str, Callable[[], Slam], Callable[[Slam], object], str]] = [
     ("BSLAM_E_TIME", started, lambda s: s.odometry("wheels", 0, 0.0, 0.0), "odometry at 0 us"),
     ("BSLAM_E_TIME", started, lambda s: s.sightings(0, *ONE), "frame at 0 us"),
@@ -183,6 +192,8 @@ REFUSALS: list[tuple[str, Callable[[], Slam], Callable[[Slam], object], str]] = 
     ("BSLAM_E_MAP", started, lambda s: s.load_map(b"BSLM"), "map of 4 bytes: truncated"),
     ("BSLAM_E_RANGE", started, lambda s: s.set_pose(0.0, 0.0, 0.0, 31.0, 0.1), "sd 31.0 m"),
     ("BSLAM_E_DUPLICATE", started, lambda s: s.add_known_beacon(3, 0.0, 0.0), "known beacon 3"),
+    ("BSLAM_E_STATE", damaged, lambda s: s.odometry("wheels", 40_000, 0.0, 0.0), "odometry at 40000"),
+    ("BSLAM_E_STATE", started, lambda s: s.restart(0.1, 0.1), "restart with sd 0.1 m"),
     (
         "BSLAM_E_SINGULAR",
         without_noise,
@@ -209,7 +220,7 @@ def test_refusal_raises_its_status_and_says_what(
 
 def test_every_status_has_a_case() -> None:
     names = set(Slam()._raw.enum_names("bslam_status_t", "").values())
-    covered = {case[0].lower() for case in REFUSALS} | {"bslam_e_parameter", "bslam_e_state"}
+    covered = {case[0].lower() for case in REFUSALS} | {"bslam_e_parameter", "bslam_e_size"}
     assert names - {"bslam_ok", "bslam_status_count"} == covered
 
 

@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
 from bslam.core import CoreError
-from bslam.core.learner import SIGNATURE_SIZE, Learner, Solution, rendered_seeds
+from bslam.core.appearance import SIGNATURE_SIZE, encode, rendered_seeds
 from bslam.errors import BslamError
+from internals import Learner, Solution, internals
 
 REALS = pytest.mark.parametrize("real", ["float", "double"])
 COST = 10.0
@@ -115,3 +116,24 @@ def test_rendered_seeds_all_differ():
     seeds = rendered_seeds()
     assert seeds.shape == (64, SIGNATURE_SIZE) and np.abs(seeds).max() <= 1.0
     assert len(np.unique(seeds, axis=0)) == 64
+
+
+@REALS
+def test_encode_gives_the_samples_of_the_c_library_to_the_bit(real: str) -> None:
+    values = np.random.default_rng(4).uniform(-1.5, 1.5, (50, SIGNATURE_SIZE)).astype(np.float32)
+    values[0] = np.float32(0.5) / np.float32(127)
+    values[1, :6] = [0.0, -0.0, 1.0, -1.0, 1e12, -1e12]
+    module = internals(real, 1)
+    samples = module.ffi.new("bslam_sample_t[]", len(values))
+    for row, sample in zip(values, samples, strict=True):
+        status = module.lib.bslam_sample_encode(module.ffi.from_buffer("float[]", row), module.ffi.addressof(sample))
+        assert status == module.lib.BSLAM_OK
+    assert encode(values, real).tobytes() == bytes(module.ffi.buffer(samples))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.1e12])
+def test_encode_refuses_what_is_no_number(value: float) -> None:
+    values = np.zeros((3, SIGNATURE_SIZE), np.float32)
+    values[1, 4] = value
+    with pytest.raises(BslamError, match="signature 1 has a value that is no number"):
+        encode(values)

@@ -8,7 +8,8 @@ ROOT = Path(__file__).resolve().parents[3]
 README = ROOT / "README.md"
 STRICT = " -Wall -Wextra -Wconversion -Wdouble-promotion -Werror "
 EXAMPLE = re.compile(
-    r"^```c\n(?P<code>.*?)^```\n\n    (?P<command>cc [^\n]*)\n    (?P<output>[^\n]*)$", re.MULTILINE | re.DOTALL
+    r"^```c\n(?P<code>.*?)^```\n\n    (?P<command>cc [^\n]*)\n    (?P<output>[^\n]*)$",
+    re.MULTILINE | re.DOTALL,
 )
 
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from bslam.core import CoreError
-from bslam.core.build import LIBRARY_DIR
+from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.vision import FrontEnd
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
 from bslam.rig import Camera, load_rig
 from bslam.world.camera import Renderer, make_world, walk
+from tools.training.front_end import FrontEnd as OpenFrontEnd
 
 
 @pytest.fixture
@@ -114,7 +115,7 @@ def test_see_packed_picture_is_as_the_unpacked_one(camera: Camera) -> None:
     rgb = np.stack([(packed >> 11) << 3, (packed >> 5 & 63) << 2, (packed & 31) << 3], axis=-1)
     values = []
     for picture in (packed, rgb.astype(np.uint8)):
-        front_end = FrontEnd([camera])
+        front_end = OpenFrontEnd([camera])
         front_end.see(picture)
         values.append(front_end.cell_values())
     assert np.array_equal(*values)
@@ -176,7 +177,7 @@ def test_a_black_frame_tells_no_turn() -> None:
 
 
 def test_the_gyro_s_noise_is_the_header_s() -> None:
-    header = (LIBRARY_DIR / "vision" / "visual_gyro.h").read_text(encoding="utf-8")
+    header = (FIRMWARE_DIR / "vision" / "vision.h").read_text(encoding="utf-8")
     values = re.findall(r"#define BSLAM_VISUAL_GYRO_(?:WIDE_)?SD_RADPS ([0-9.]+)f", header)
     assert [float(value) for value in values] == [VisualGyro.SD_RADPS, VisualGyro.WIDE_SD_RADPS]
 
@@ -185,7 +186,7 @@ def test_measure_of_a_box_gives_what_a_sighting_needs(camera: Camera) -> None:
     picture = plain(170)
     picture[180:] = 80
     picture[90:150, 120:170] = (150, 20, 20)
-    front_end = FrontEnd([camera])
+    front_end = OpenFrontEnd([camera])
     front_end.see(picture)
     found = front_end.measure((119.5, 89.5, 169.5, 149.5), BeaconClass("red", 0.6))
     assert found is not None and found.bearing_rad is not None

@@ -5,6 +5,7 @@ import re
 import subprocess
 
 import pytest
+
 from docs.reading import ESTIMATOR, FIRMWARE, STRICT, block, blocks, column, output_of, read, section
 
 TEXT = read("docs/C-API.md")
@@ -22,19 +23,17 @@ def test_command_that_stands_below_it_names_every_source():
 
 
 def test_warm_restart_compiles(tmp_path):
-    body = f'#include "bslam/bslam.h"\nbool wake(bslam_t *, const bslam_settings_t *, const bslam_flash_t *);\n'
-    source = body + blocks(TEXT, "c")[1].replace("static bool wake", "bool wake")
+    source = '#include "bslam/bslam.h"\n' + blocks(TEXT, "c")[1]
     (tmp_path / "wake.c").write_text(source, encoding="utf-8")
-    command = [os.environ.get("CC", "cc"), *STRICT, "-c", str(tmp_path / "wake.c"), "-o", str(tmp_path / "o")]
-    subprocess.run(command, check=True)
+    command = [os.environ.get("CC", "cc"), *STRICT, "-Wno-unused-function", "-c", "wake.c"]
+    subprocess.run(command, cwd=tmp_path, check=True)
 
 
 def test_cxx_sighting_compiles_as_cxx_11(tmp_path):
     source = '#include "bslam/bslam.h"\nbslam_sighting_t door_of();\nbslam_sighting_t door_of()\n{\n'
     (tmp_path / "door.cpp").write_text(source + block(TEXT, "cpp") + "return door;\n}\n", encoding="utf-8")
     flags = ["-std=c++11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{FIRMWARE}"]
-    command = [os.environ.get("CXX", "g++"), *flags, "-c", str(tmp_path / "door.cpp"), "-o", str(tmp_path / "o")]
-    subprocess.run(command, check=True)
+    subprocess.run([os.environ.get("CXX", "g++"), *flags, "-c", "door.cpp"], cwd=tmp_path, check=True)
 
 
 def test_statuses_are_all_listed():
@@ -48,8 +47,10 @@ def test_presets_are_all_listed():
 
 
 def test_sizes_are_those_of_the_configuration():
-    own = read("firmware/bslam/config.h").split("what follows from these")[0]
-    defaults = dict(re.findall(r"^#define (BSLAM_\w+) (.+)$", own + read("firmware/base/config.h"), re.MULTILINE))
+    text = read("firmware/bslam/config.h").split("what follows from these")[0] + read(
+        "firmware/base/config.h"
+    )
+    defaults = dict(re.findall(r"^#define (BSLAM_\w+) (.+)$", text, re.MULTILINE))
     table = section(TEXT, "Sizes")
     assert {name for name in defaults if not name.endswith("_H")} == column(table)
     for name, value in defaults.items():

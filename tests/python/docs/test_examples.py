@@ -8,7 +8,6 @@ import shlex
 from dataclasses import fields
 
 import pytest
-from docs.reading import blocks, column, read, section
 
 from bslam.cli import COMMANDS, main
 from bslam.core import Slam
@@ -16,6 +15,7 @@ from bslam.evaluation.trace import Trace
 from bslam.log import GYRO, GYRO_SD, ODOMETRY_COLUMNS, SIGHTING_NUMBERS, Robot
 from bslam.recording.entries import FORMATS
 from bslam.world.scenario import scenario_names
+from docs.reading import blocks, column, read, section
 
 CLI, LOGS, PYTHON, TUNING = (read(f"docs/{name}.md") for name in ("CLI", "LOG-FORMAT", "PYTHON", "TUNING"))
 
@@ -52,8 +52,8 @@ def test_commands_are_all_listed():
 
 def test_examples_of_commands_are_of_that_command():
     for row in re.findall(r"^\| (`bslam .*)$", section(CLI, "Commands"), re.MULTILINE):
-        command, example = (re.search(r"bslam (\w+)", cell)[1] for cell in (row.split("|")[0], row.split("|")[2]))
-        assert command == example
+        command, _, example, *_ = row.split("|")
+        assert command.strip(" `") == " ".join(example.strip(" `").split()[:2])
 
 
 def test_scenarios_are_all_listed():

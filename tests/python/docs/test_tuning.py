@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from docs.reading import column, read, section
 
 from bslam.core import Slam
+from docs.reading import column, read, section
 from tools.checks import params_doc
 
 TEXT = read("docs/TUNING.md")
@@ -28,8 +28,8 @@ def test_twelve_are_twelve():
 
 def test_parts_are_put_between_the_markers(tmp_path):
     file = tmp_path / "doc.md"
-    pairs = [params_doc.markers(name) for name in PARTS]
-    file.write_text("above\n" + "between\n".join(f"{first}\nstale\n{last}\n" for first, last in pairs) + "below\n")
+    stale = ["{}\nstale\n{}\n".format(*params_doc.markers(name)) for name in PARTS]
+    file.write_text("above\n" + "between\n".join(stale) + "below\n")
     assert params_doc.main(["--into", str(file)]) == 0
     once = file.read_text()
     assert once.startswith("above\n")

@@ -20,7 +20,7 @@ PLACES = np.array([[4.0, 1.0], [3.0, -2.0], [-1.0, 4.0], [6.0, 3.0], [-2.0, -3.0
 def seen_map(places, labels, looks_of=None, **params):
     """The map of a robot that stands at the origin and sees these beacons ten times."""
     association = {"association": 0} if looks_of is None else {"association": 3, "confirm_window_us": 0}
-    slam = Slam({"velocity_states": 0} | association | params, looks=looks_of is not None)
+    slam = Slam({"velocity_states": 0} | association | params)
     random = np.random.default_rng(3)
     bearing = np.arctan2(places[:, 1], places[:, 0])
     far = np.hypot(places[:, 0], places[:, 1])

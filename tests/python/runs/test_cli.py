@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bslam.cli import COMMANDS, main
+from bslam.core import Slam
 from bslam.log import write_folder
 
 
@@ -238,7 +239,7 @@ def test_tables_writes_the_paper_s_figures_beside_ours(tmp_path):
     own = [entry["position_error_m"]["mean"] for entry in runs(out) if entry["observation"] == "distance"]
     assert cells[0]["error_cm"]["mean"] == pytest.approx(100.0 * np.mean(own))
     assert (out / "sigma0.6.png").read_bytes().startswith(b"\x89PNG")
-    assert len(runs(out)) == 8
+    assert len(runs(out)) == 6
 
 
 def test_sweep_runs_every_combination(tmp_path, capsys):
@@ -285,8 +286,27 @@ def test_calibrate_writes_parameters_and_tries_them(made, tmp_path, capsys):
 def test_params_lists_every_parameter_with_default_and_meaning(capsys):
     assert main(["params"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["parameter", "default", "allowed", "meaning"]
+    assert [lines[0], lines[1].split()] == ["settings", ["default", "allowed", "meaning"]]
     assert any(line.startswith("bearing_sd_rad") and "noise of the direction" in line for line in lines)
+    names = [one.name for one in Slam.parameters() if one.group != "tuning"]
+    assert [line.split()[0] for line in lines if " to " in line[:70]] == names
+    assert main(["params", "--all"]) == 0
+    assert "appearance_weight" in capsys.readouterr().out
+
+
+def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):
+    run = ["run", "figure3", "--pictures", "0", "--association", "known", "--out", str(tmp_path)]
+    assert main(run) == 0
+    assert "presets: paper\n" in capsys.readouterr().out
+    assert main([*run, "--preset", "real-wheels", "--preset", "camera"]) == 0
+    assert "presets: real-wheels, camera\n" in capsys.readouterr().out
+    (entry,) = runs(tmp_path)
+    assert entry["presets"] == ["real-wheels", "camera"]
+    assert entry["parameters"]["huber_d"] == 1.0
+    assert not entry["velocity_states"]
+    with pytest.raises(SystemExit):
+        main([*run, "--preset", "wheels"])
+    assert "'wheels' does not exist; allowed: real-wheels, paper, camera, bearing-only" in capsys.readouterr().err
 
 
 def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, capsys):

@@ -6,7 +6,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from bslam.core.presets import preset_settings
 from bslam.core.slam import Slam
+from bslam.datasets import dlr, mrclam
 from bslam.errors import BslamError
 from bslam.log import Odometry, Robot
 from bslam.options import (
@@ -16,9 +18,9 @@ from bslam.options import (
     core_params,
     odometry_lead_us,
     parse_association,
+    presets_of,
     recovery_of,
 )
-from bslam.runs import defaults
 from bslam.runs.runner import run_log
 
 
@@ -38,8 +40,9 @@ def test_every_parameter_exists_in_the_core(made):
     known = Slam.defaults()
     for one in (log, ticks, velocity(log)):
         for observation in ("distance", "direction"):
-            assert set(core_params(RunOptions(observation=observation), one)) <= set(known)
-    assert set(defaults.REAL_LOG) | set(defaults.REAL_LOG_UNKNOWN_IDENTITY) <= set(known)
+            assert set(core_params(RunOptions(observation=observation), one)) == set(known)
+    of_a_set = (mrclam.SETTINGS, mrclam.UNKNOWN_IDENTITY_SETTINGS, mrclam.BEARING_ONLY_SMOOTHER_SETTINGS)
+    assert {name for settings in (*of_a_set, dlr.SETTINGS) for name in settings} <= set(known)
 
 
 def test_the_robot_s_noise_and_geometry_reach_the_filter(made):
@@ -114,7 +117,28 @@ def test_sigma_of_the_command_line_wins_over_the_log_s_and_set_over_all(made):
 def test_what_is_set_for_directions_alone_is_not_where_distances_are_seen(made, name, walk):
     log, options = made.circle_log(steps=1), RunOptions(observation="direction", filter=name)
     assert core_params(options, log)["velocity_walk_mps_sqrt_s"] == walk
-    assert "velocity_walk_mps_sqrt_s" not in core_params(replace(options, observation="distance"), log)
+    ranged = core_params(replace(options, observation="distance"), log)
+    assert ranged["velocity_walk_mps_sqrt_s"] == Slam.defaults()["velocity_walk_mps_sqrt_s"]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (RunOptions(), ("paper",)),
+        (RunOptions(noise="actuation"), ("real-wheels",)),
+        (RunOptions(sigma_mps=0.0), ("real-wheels",)),
+        (RunOptions(sensor="camera"), ("paper", "camera")),
+        (RunOptions(observation="direction", noise="actuation"), ("real-wheels", "bearing-only")),
+        (RunOptions(presets=("camera",)), ("camera",)),
+    ],
+)
+def test_presets_are_chosen_by_what_the_log_says_unless_asked_for(made, options, expected):
+    log = made.circle_log(steps=1)
+    assert presets_of(options, log) == expected
+    params, preset = core_params(options, log), preset_settings(expected, 0, 1)
+    assert params["huber_d"] == preset["huber_d"]
+    assert params["velocity_states"] == preset["velocity_states"]
+    assert presets_of(RunOptions(), velocity(log)) == ("real-wheels",)
 
 
 @pytest.mark.parametrize(
@@ -144,17 +168,19 @@ def test_velocity_states_belong_to_speedometer_noise(made, options, expected):
 )
 def test_what_a_run_notices_of_being_lost(made, options, expected):
     assert recovery_of(options) == expected
-    settles = core_params(options, made.circle_log(steps=1)).get("settled_us")
-    assert settles == (defaults.GROWING["settled_us"] if expected == "growing" else None)
+    params = core_params(options, made.circle_log(steps=1))
+    assert params["recovery"] == int(expected != "off")
+    settled_us = 1_000_000_000 if expected == "growing" else Slam.defaults()["settled_us"]
+    assert params["settled_us"] == settled_us
 
 
 def test_real_logs_have_their_own_set(made):
     own = velocity(made.circle_log(steps=1))
     log = replace(own, collection="mrclam")
     params = core_params(RunOptions(), log)
-    assert defaults.REAL_LOG.items() <= params.items()
+    assert mrclam.SETTINGS.items() <= params.items()
     assert params["velocity_states"] == 0
-    assert odometry_lead_us(RunOptions(), log) == defaults.REAL_ODOMETRY_LEAD_US
+    assert odometry_lead_us(RunOptions(), log) == mrclam.ODOMETRY_LEAD_US
     # A folder with velocities is told by its own robot.toml.
     assert odometry_lead_us(RunOptions(), own) == 0
     assert core_params(RunOptions(), own)["left_speed_sd_mps"] == own.robot.wheel_speed_sigma_mps

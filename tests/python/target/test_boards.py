@@ -68,7 +68,7 @@ def test_a_board_that_is_too_small_is_refused(log):
 
 
 def test_a_board_without_a_smoother_says_so(log):
-    with pytest.raises(TargetError, match="the image has no smoother"):
+    with pytest.raises(TargetError, match="filter = 2: the image is built with BSLAM_SMOOTHER=0"):
         run_log(log, RunOptions(filter="smoother", target="qemu:stm32f405"))
 
 

@@ -55,15 +55,15 @@ def test_the_stm32f405_loads_the_newer_of_its_sectors_and_says_that_qemu_s_canno
             robot.save_params()
 
 
-SESSION_PARAMS = 16  # bytes into the session: amid the parameters, which are guarded
+ROBOT_PARAMS = 16  # bytes into the robot: amid the parameters, which are guarded
 
 
 def damage(line):
     """Flips a bit in the RAM of a running board."""
     image = Path(__file__).parents[3] / "build/microbit/robot.elf"
     names = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
-    session = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" session"))
-    said = line.monitor("human-monitor-command", **{"command-line": f"gpa2hva {session + SESSION_PARAMS:#x}"})
+    robot = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" robot"))
+    said = line.monitor("human-monitor-command", **{"command-line": f"gpa2hva {robot + ROBOT_PARAMS:#x}"})
     place = int(re.search(r"is (0x[0-9a-f]+)", said)[1], 16)
     with Path(f"/proc/{line.process_id}/mem").open("r+b", buffering=0) as memory:
         memory.seek(place)
@@ -90,7 +90,7 @@ def test_a_reset_in_mid_run_costs_a_guarded_board_nothing_and_another_all():
 
 
 def _restart_a_guarded_one(line):
-    course = Course(RemoteSlam(line, PARAMS, 6, recovery=True, guard=True))
+    course = Course(RemoteSlam(line, PARAMS | {"recovery": 1, "guard": 1}, 6))
     course.slam.sightings(0, [], [], [], [])
     course.drive(25)
     blob, pose = course.slam.save_map(), course.slam.pose()

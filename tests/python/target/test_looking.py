@@ -23,7 +23,6 @@ from bslam.link.messages import (
     Message,
     PoseReport,
     Report,
-    Wishes,
     hello,
     read_pose_report,
 )
@@ -189,7 +188,7 @@ def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_e
     params = robot.host_params
     told = gather((TURN + SHOTS) * 3 // 2, lambda: robot.reports(5.0))
     assert robot.reports_lost == 0
-    here, eyes = Slam(params, beacons_max=80, looks=params["association"] == 3), FrontEnd([camera])
+    here, eyes = Slam(params, beacons_max=80), FrontEnd([camera])
     looks, count = 0, 0
     for step, one in enumerate(told, start=1):
         assert one.refused is None
@@ -264,11 +263,10 @@ def test_a_host_that_greets_while_a_reading_waits_for_its_picture_takes_no_rate_
 ):
     make_film(tmp_path / "close", "paper_room", 0, camera, CLOSE, CLOSE)
     monkeypatch.setenv("BSLAM_FILM", str(tmp_path / "close"))
-    wishes = Wishes(as_it_is=True)
-    with closing(Client(ProcessLine(ROBOT), wishes)) as client:
+    with closing(Client(ProcessLine(ROBOT), as_it_is=True)) as client:
 
         def greet():
-            client.ask(Message.HELLO, hello(1, wishes))
+            client.ask(Message.HELLO, hello(1, as_it_is=True))
             frames = [frame for frame in client.listen(None) if frame.type == Report.POSE]
             return [read_pose_report(frame.payload).gyro_radps for frame in frames]
 

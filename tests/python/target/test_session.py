@@ -66,9 +66,9 @@ def drive(slam, log, first, last):
 def test_a_robot_that_recovers_is_the_host_s_and_says_how_it_is(robot_line):
     """It drives, is told that it stands elsewhere, is lost, and finds itself again."""
     log = first_steps(simulate(load_scenario("paper_room"), 3), 200)
-    params = {"association": 0, "velocity_states": 0}
-    here = Slam(params, beacons_max=6, recovery=True)
-    with RemoteSlam(robot_line(), params, 6, recovery=True) as there:
+    params = {"recovery": 1, "left_speed_sd_mps": 0.3, "right_speed_sd_mps": 0.3}
+    here = Slam(params, beacons_max=6)
+    with RemoteSlam(robot_line(), params, 6) as there:
         healthy = there.health()
         assert (healthy.recovers, healthy.guards, healthy.state) == (True, False, "following")
         assert healthy.trouble == "none"
@@ -91,7 +91,7 @@ def test_a_map_goes_to_the_host_and_to_another_robot_which_finds_itself_in_it(ro
             drive(slam, log, 0, 150)
         blob = robot.save_map()
         assert blob == host.save_map()
-    with RemoteSlam(robot_line(), params, 20, recovery=True) as other:
+    with RemoteSlam(robot_line(), params | {"recovery": 1}, 20) as other:
         before = other.save_map()
         for bad in (blob[:-1], blob[:40] + bytes([blob[40] ^ 4]) + blob[41:]):
             with pytest.raises(CoreError, match=r"truncated|bad crc"):
@@ -117,7 +117,7 @@ def test_a_score_that_is_sent_puts_a_beacon_on_trial_as_on_the_host(robot_line):
                 seen = slam.sightings(40_000 * (step + 1), [0.1], [4.0], [-1], [True], score=[2.0])
                 told[-1] += [(seen[0].result, seen[0].reason)]
     assert told[0] == told[1]
-    assert told[0] == [("new", "none"), *[("deferred", "trial")] * 4, *[("matched", "none")] * 3]
+    assert told[0] == [("new", "none"), *[("deferred", "tentative")] * 4, *[("matched", "none")] * 3]
 
 
 def test_a_map_that_changes_while_it_is_read_is_read_again(robot_line, log, monkeypatch):
@@ -135,7 +135,7 @@ def flip_a_bit(line):
     """In the parameters of the filter, in the memory of the running robot."""
     process = line._process.pid
     names = subprocess.run(["nm", ROBOT], capture_output=True, text=True, check=True).stdout
-    offset = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" b session"))
+    offset = next(int(row.split()[0], 16) for row in names.splitlines() if row.endswith(" b robot"))
     areas = Path(f"/proc/{process}/maps").read_text().splitlines()
     first = next(row for row in areas if row.endswith(str(ROBOT))).split("-")[0]
     with Path(f"/proc/{process}/mem").open("r+b", buffering=0) as memory:
@@ -148,7 +148,7 @@ def flip_a_bit(line):
 @pytest.mark.parametrize("guard", [True, False])
 def test_a_bit_that_flips_in_a_robot_s_memory_is_noticed_where_it_is_guarded(robot_line, guard):
     line = robot_line()
-    with RemoteSlam(line, {"association": 0}, 6, guard=guard) as robot:
+    with RemoteSlam(line, {"association": 0, "guard": int(guard)}, 6) as robot:
         robot.sightings(0, [0.1], [2.0], [7], [True])
         robot.odometry("wheels", 40_000, 0.01, 0.01)
         flip_a_bit(line)
@@ -164,7 +164,7 @@ def test_a_bit_that_flips_in_a_robot_s_memory_is_noticed_where_it_is_guarded(rob
 
 def test_a_robot_starts_in_the_map_that_it_kept_and_falls_back_to_it(robot_line, log, tmp_path, monkeypatch):
     monkeypatch.setenv("BSLAM_MAP", str(tmp_path / "flash"))
-    with RemoteSlam(robot_line(), {"association": 0}, 6, recovery=True) as robot:
+    with RemoteSlam(robot_line(), {"association": 0, "recovery": 1}, 6) as robot:
         drive(robot, log, 0, 100)
         robot.keep_map()
         blob = robot.save_map()
@@ -173,7 +173,7 @@ def test_a_robot_starts_in_the_map_that_it_kept_and_falls_back_to_it(robot_line,
         health = robot.health()
         assert (health.recovers, health.guards, health.trouble) == (True, True, "none")
     line = robot_line()
-    with RemoteSlam(line, {"association": 0}, 6, recovery=True, guard=True) as robot:
+    with RemoteSlam(line, {"association": 0, "recovery": 1, "guard": 1}, 6) as robot:
         drive(robot, log, 0, 40)
         flip_a_bit(line)
         with pytest.raises(CoreError, match="BSLAM_E_STATE"):

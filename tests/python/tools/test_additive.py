@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
-from bslam.core.vision import vision_library
 from bslam.modelfile import AdditiveSvm
 from tools.training.additive import (
     DEVIATION_MIN,
@@ -22,6 +21,7 @@ from tools.training.additive import (
 from tools.training.compiled import compile_library
 from tools.training.detector_samples import recoloured
 from tools.training.export import Header
+from tools.training.front_end import open_library
 
 CROSSED = np.array([0, 1, 4], np.uint8)
 COST = 0.05
@@ -59,7 +59,7 @@ def test_a_band_and_a_product_are_told(machine: AdditiveSvm) -> None:
 
 
 def test_c_decides_as_python(machine: AdditiveSvm) -> None:
-    library = vision_library()
+    library = open_library()
     keep: list[object] = []
     made = library.ffi.new("bslam_additive_t *", library.additive(machine, keep))
     assert library.lib.bslam_additive_check(made, machine.features) == library.lib.BSLAM_OK
@@ -74,13 +74,13 @@ def test_c_decides_as_python(machine: AdditiveSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: AdditiveSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["vision/classifiers/additive.h"], {})
+    header = Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_additive_t", "machine", header.additive("kinds", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(
         tmp_path,
         """#include "machine.h"
-#include "bslam/svm/additive.c"
+#include "vision/classifiers/additive.c"
 void decide(const float *x, float *values);
 void decide(const float *x, float *values)
 {

@@ -80,17 +80,18 @@ no sentence. At all.
     ("text", "words"),
     [
         ("The looks of a beacon.", ["appearance"]),
-        ("It looks like a beacon; a robot looks at it.", []),
+        ("It looks like a beacon; a robot looks at it, and how it looks.", []),
+        ("By position and looks; looks count half.", ["appearance", "appearance"]),
         ("Its machine was taught.", ["classifier", "trained"]),
         ("A support vector machine, from this machine to another\nmachine.", []),
-        ("a support vector\nmachine", []),
+        ("a support vector\nmachine, *Machine\nLearning*, the machine's byte order, told apart", []),
         ("Identities are told, in direction only.", ["known data association", "bearing-only"]),
         ("The robot is carried away; the pose is carried on.", ["kidnapped"]),
         (
             "The twin, a glance, two rivals.",
             ["competitor, negative sample", "pre-filter", "double-precision build"],
         ),
-        ("Measured by hand.", ["(no such figure)"]),
+        ("Measured by hand, with `told`.", ["(no such figure)"]),
         ("By handing it over, in trusted code, untold, 2 parts, a double.", []),
     ],
 )

@@ -22,13 +22,14 @@ def test_a_program_links_the_library(tmp_path):
         "target_compile_definitions(bslam PUBLIC BSLAM_BEACONS_MAX=7)\n"
     )
     (tmp_path / "main.c").write_text(
-        '#include "bslam/bslam.h"\nstatic bslam_slam_t slam;\n'
-        "int main(void)\n{\n    bslam_settings_t params;\n    int bad_id;\n    bslam_settings_default(&params);\n"
-        "    const bslam_status_t status = bslam_slam_init(&slam, &params, &bad_id);\n"
+        '#include "bslam/bslam.h"\nstatic bslam_t robot;\nint main(void)\n{\n'
+        "    bslam_settings_t settings;\n    int bad_setting;\n"
+        "    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);\n"
+        "    const bslam_status_t status = bslam_init(&robot, &settings, &bad_setting);\n"
         "    return status == BSLAM_OK && BSLAM_BEACONS_MAX == 7 ? 0 : 1;\n}\n"
     )
     cmake("-S", tmp_path, "-B", tmp_path / "build")
-    cmake("--build", tmp_path / "build")
+    cmake("--build", tmp_path / "build", "--target", "user")
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
 
 
@@ -38,7 +39,8 @@ def test_the_toolchain_file_builds_for_a_core(tmp_path):
     cmake("-S", FIRMWARE, "-B", tmp_path, *words)
     cmake("--build", tmp_path)
     archive = tmp_path / "libbslam.a"
-    assert check_symbols.main([str(archive), "--nm", "arm-none-eabi-nm"]) == 0
+    archives = [str(archive), str(tmp_path / "libvision.a")]
+    assert check_symbols.main([*archives, "--nm", "arm-none-eabi-nm"]) == 0
     shown = subprocess.run(["arm-none-eabi-readelf", "-A", archive], capture_output=True, text=True).stdout
     assert "Tag_CPU_arch: v6S-M" in shown
 

@@ -36,7 +36,7 @@ def samples(features: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.b
 
 def compiled(svm: fit.Svm) -> CompiledSvm:
     """`svm` by way of its header."""
-    header = export.Header("MACHINE_H", ["vision/classifiers/svm.h"], {})
+    header = export.Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_svm_t", "machine", header.svm("table", svm))
     return CompiledSvm(header.text(), "machine")
 

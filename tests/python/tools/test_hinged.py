@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
-from bslam.core.vision import vision_library
 from bslam.modelfile import HingedSvm
 from tools.training.closer import mirrored
 from tools.training.compiled import compile_library
 from tools.training.export import Header
+from tools.training.front_end import open_library
 from tools.training.hinged import DEVIATION_MIN, decide_hinged, expand_hinges, fit_hinged
 
 COST = 0.05
@@ -53,7 +53,7 @@ def test_what_is_far_from_the_middle_either_way_is_told(machine: HingedSvm) -> N
 
 
 def test_c_decides_as_python(machine: HingedSvm) -> None:
-    library = vision_library()
+    library = open_library()
     keep: list[object] = []
     made = library.ffi.new("bslam_hinged_t *", library.hinged(machine, keep))
     assert library.lib.bslam_hinged_check(made, machine.features) == library.lib.BSLAM_OK
@@ -65,12 +65,13 @@ def test_c_decides_as_python(machine: HingedSvm) -> None:
 
 
 def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -> None:
-    header = Header("MACHINE_H", ["vision/classifiers/hinged.h"], {})
+    header = Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_hinged_t", "machine", header.hinged("close", machine))
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(
         tmp_path,
-        '#include "machine.h"\n#include "bslam/svm/hinged.c"\nvoid decide(const uint8_t *x, float *values);\n'
+        '#include "machine.h"\n#include "vision/classifiers/hinged.c"\n'
+        "void decide(const uint8_t *x, float *values);\n"
         "void decide(const uint8_t *x, float *values) { bslam_hinged_decide(&machine, x, values); }\n",
     )
     x = samples(3, 100)[0]
@@ -82,7 +83,7 @@ def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -
 
 def pixels_of(half: NDArray[np.uint16], box: tuple[float, float, float, float]) -> NDArray[np.uint8]:
     """What the pixels of a box in a half-resolution copy tell."""
-    library = vision_library()
+    library = open_library()
     pixels = library.ffi.cast("uint16_t *", half.ctypes.data)
     frame = library.new_filled("bslam_frame_t", width_px=WIDTH_PX, height_px=HEIGHT_PX, half=pixels)
     sides = dict(zip(("left_px", "top_px", "right_px", "bottom_px"), box, strict=True))

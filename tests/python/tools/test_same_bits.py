@@ -15,7 +15,7 @@ STATES: dict[str, list[int] | Exception] = {
     "qemu:like": [1, 2, 3],
     "qemu:unlike": [1, 2, 4],
     "qemu:small": BslamError("no room"),
-    "qemu:plain": TargetError("RESET was refused: SMOOTHER: the image has no smoother (SESSION_SMOOTHER=0)"),
+    "qemu:plain": TargetError("parameter filter = 2: the image is built with BSLAM_SMOOTHER=0"),
     "qemu:gone": TargetError("ended with status 1"),
 }
 

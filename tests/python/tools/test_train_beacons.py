@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bslam.core.vision import FrontEnd
 from bslam.datasets.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools.blind import blind_model
 from tools.training import example_pictures, samples, train_beacons
 from tools.training.compiled import FIRMWARE, CompiledSvm
 from tools.training.folder import COLUMNS, read_folder
+from tools.training.front_end import FrontEnd
 from tools.training.truth import overlaps
 
 SIGNATURE = 71
@@ -80,7 +80,7 @@ class Compiled:
             "const char *name(int i) { return bslam_my_beacons.objects[i].name; }\n"
         )
         flags = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
-        parts = [FIRMWARE / "bslam/svm/svm.c", FIRMWARE / "bslam/vision/recogniser.c"]
+        parts = [FIRMWARE / "vision/classifiers/svm.c", FIRMWARE / "vision/classifiers/recogniser.c"]
         out = folder / "recognise.so"
         command = [os.environ.get("CC", "cc"), *flags, f"-I{FIRMWARE}", "-shared", "-fPIC"]
         subprocess.run([*command, str(source), *map(str, parts), "-lm", "-o", str(out)], check=True)

@@ -74,13 +74,10 @@ static bslam_status_t show(int camera, bool moved)
 
 static int candidate_count(void)
 {
-    int32_t count = -1;
-    (void)bslam_front_end_candidates(&vision, &count);
-    return count;
+    return vision.candidate_count;
 }
 
-// ---- refusals
-// ----------------------------------------------------------------------------------------------
+// ---- refusals ---------------------------------------------------------------------------------------------
 
 static void test_init_bad_count_camera_or_model_is_refused_and_nothing_changes(void **state)
 {
@@ -160,8 +157,7 @@ static void test_point_wrong_camera_or_angle_is_refused(void **state)
     assert_near(vision.cameras[1].yaw_rad, 1.25, 0);
 }
 
-// ---- frames that show nothing
-// ------------------------------------------------------------------------------
+// ---- frames that show nothing -----------------------------------------------------------------------------
 
 static void check_unusable(bslam_vision_reason_t reason)
 {
@@ -203,8 +199,7 @@ static void test_end_empty_room_shows_nothing(void **state)
     assert_int_equal(vision.frames[BSLAM_VISION_NOTHING], 1);
 }
 
-// ---- the room and what stands out of it
-// --------------------------------------------------------------------
+// ---- the room and what stands out of it -------------------------------------------------------------------
 
 static void test_end_learns_the_colours_of_wall_and_floor(void **state)
 {
@@ -357,8 +352,8 @@ static void test_end_candidates_come_surest_first(void **state)
     paint(100, 60, 124, 80, 200, 30, 30);
     paint(220, 60, 252, 84, 30, 160, 30);
     assert_int_equal(show(0, true), BSLAM_OK);
-    int32_t count = 0;
-    const bslam_candidate_t *found = bslam_front_end_candidates(&vision, &count);
+    const int32_t count = vision.candidate_count;
+    const bslam_candidate_t *found = vision.candidates;
     assert_true(count >= 2 && count <= BSLAM_CANDIDATES_MAX);
     assert_int_equal(vision.reason, BSLAM_VISION_SEEN);
     for (int i = 0; i < count; i++) {
@@ -377,9 +372,9 @@ static void take_all(int class_count)
 static const bslam_candidate_t *found_in(bslam_status_t shown, int32_t *count)
 {
     assert_int_equal(shown, BSLAM_OK);
-    const bslam_candidate_t *found = bslam_front_end_candidates(&vision, count);
+    *count = vision.candidate_count;
     assert_true(*count > 0);
-    return found;
+    return vision.candidates;
 }
 
 static void start_with(const bslam_camera_t *camera)
@@ -531,8 +526,8 @@ static float score_of(int side_px, float height_m)
     paint_room();
     paint(140, 60, 140 + side_px, 60 + side_px, 200, 30, 30);
     assert_int_equal(show(0, true), BSLAM_OK);
-    int32_t count;
-    const bslam_candidate_t *found = bslam_front_end_candidates(&vision, &count);
+    const int32_t count = vision.candidate_count;
+    const bslam_candidate_t *found = vision.candidates;
     for (int i = 1; i < count; i++) {
         assert_true(found[i].score <= found[i - 1].score);
     }
@@ -662,8 +657,8 @@ static void test_end_zoomed_camera_sees_what_a_doubled_picture_shows(void **stat
     paint(100, 60, 124, 80, 200, 30, 30);
     paint(220, 60, 252, 84, 30, 160, 30);
     assert_int_equal(show(0, true), BSLAM_OK);
-    int32_t wanted_count = 0;
-    const bslam_candidate_t *found = bslam_front_end_candidates(&vision, &wanted_count);
+    const int32_t wanted_count = vision.candidate_count;
+    const bslam_candidate_t *found = vision.candidates;
     bslam_candidate_t wanted[BSLAM_CANDIDATES_MAX];
     memcpy(wanted, found, sizeof wanted);
     const bslam_box_t wanted_box = bslam_front_end_proposal_box(&vision, 0);
@@ -676,8 +671,7 @@ static void test_end_zoomed_camera_sees_what_a_doubled_picture_shows(void **stat
     for (int format = 0; format < 2; format++) {
         assert_int_equal(bslam_front_end_init(&vision, &model, &small, 1), BSLAM_OK);
         assert_int_equal(show_small((bslam_pixel_format_t)format), BSLAM_OK);
-        int32_t count = 0;
-        found = bslam_front_end_candidates(&vision, &count);
+        const int32_t count = vision.candidate_count;
         assert_int_equal(count, wanted_count);
         assert_true(count >= 2);
         for (int i = 0; i < count; i++) {

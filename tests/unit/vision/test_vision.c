@@ -111,6 +111,9 @@ static void test_turn_is_by_how_much_the_picture_went_sideways(void **state)
     show(4);
     assert_true(bslam_vision_turn(&vision, &turn));
     assert_near(turn.turn_rad, 4.0 / 140, 3e-3);  // what stands ahead goes to the right: a turn to the left
+    bslam_vision_forget_turns(&vision);
+    show(4);
+    assert_false(bslam_vision_turn(&vision, &turn));
 }
 
 static void test_reason_name_every_reason_has_its_own(void **state)

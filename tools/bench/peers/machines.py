@@ -150,7 +150,7 @@ def _liblinear(_task: Task) -> list[str]:
 def _header(task: Task, *, small: bool) -> list[str]:
     x, labels = _all(task)
     svm = fit.fit(x, fit.one_vs_rest(labels, len(task.sets)), COST).svm
-    header = export.Header("MACHINE_H", ["vision/classifiers/svm.h"], {})
+    header = export.Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_svm_t", "machine", header.svm("table", fit.quantised(svm) if small else svm))
     core = str(ROOT / "firmware/vision/classifiers/svm.c")
     return [*_compiled_in(header.text()), core, f"-I{ROOT / 'firmware'}"]

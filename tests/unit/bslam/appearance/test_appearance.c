@@ -77,7 +77,7 @@ static void test_each_beacon_learns_its_own_look(void **state)
             assert_true((value_of(b, other, 50) > 0) == (b == other));
         }
     }
-    assert_int_equal(appearance.counters.taught, 24);
+    assert_int_equal(appearance.counters.trained, 24);
     assert_int_equal(appearance.counters.shared, 0);
 }
 
@@ -105,11 +105,11 @@ static void test_a_robot_that_stands_still_teaches_once(void **state)
     for (int i = 0; i < 5; i++) {
         show(0, 1, signature);
     }
-    assert_int_equal(appearance.counters.taught, 1);
+    assert_int_equal(appearance.counters.trained, 1);
     // The way counts modulo 2^32 micrometres.
     travelled_um--;
     show(0, 1, signature);
-    assert_int_equal(appearance.counters.taught, 2);
+    assert_int_equal(appearance.counters.trained, 2);
 }
 
 static void learn_two(int views)
@@ -255,6 +255,20 @@ static void test_a_class_seen_for_long_is_unlearned_again(void **state)
     assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 5) > 1);
 }
 
+/// As a map may have it that another build wrote.
+static void test_a_class_count_beyond_the_limit_comes_down_and_never_wraps(void **state)
+{
+    for (int count = 0; count <= UINT8_MAX; count++) {
+        appearance.of[0].seen_as[2] = (uint8_t)count;
+        for (int view = 0; view < 20; view++) {
+            see_class(3, 1);
+            assert_true(bslam_appearance_class_odds(&appearance, &settings, 0, 3) > 0);
+            assert_int_equal(bslam_appearance_class(&appearance, 0), 3);
+        }
+        assert_true(appearance.of[0].seen_as[2] <= 33);
+    }
+}
+
 static const double TURN_RAD = 6.283185307179586;
 
 static int sector_at(double turns)
@@ -329,7 +343,7 @@ static void test_a_signature_that_is_no_number_teaches_nothing(void **state)
     signature[5] = NAN;
     show(0, 1, signature);
     assert_int_equal(appearance.of[0].classifier, BSLAM_NO_CLASSIFIER);
-    assert_int_equal(appearance.counters.taught, 0);
+    assert_int_equal(appearance.counters.trained, 0);
 }
 
 static void test_without_a_free_slot_a_beacon_goes_without(void **state)
@@ -340,7 +354,7 @@ static void test_without_a_free_slot_a_beacon_goes_without(void **state)
     teach(0, 1, 0, 0);
     assert_int_equal(appearance.of[0].classifier, BSLAM_NO_CLASSIFIER);
     assert_int_equal(appearance.counters.no_slot, 1);
-    assert_int_equal(appearance.counters.taught, 0);
+    assert_int_equal(appearance.counters.trained, 0);
 }
 
 static void test_init_refuses_too_many_seeds_and_changes_nothing(void **state)
@@ -391,6 +405,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_class_odds_are_of_counts_with_a_little_doubt, setup),
         cmocka_unit_test_setup(test_a_class_seen_for_long_is_unlearned_again, setup),
+        cmocka_unit_test_setup(test_a_class_count_beyond_the_limit_comes_down_and_never_wraps, setup),
         cmocka_unit_test_setup(test_sectors_are_equal_parts_of_a_turn, setup),
         cmocka_unit_test_setup(test_side_odds_fall_with_the_angle_to_where_it_was_seen_from, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),

@@ -58,7 +58,7 @@ static void test_one_that_is_missed_from_where_it_was_seen_is_removed(void **sta
 {
     assert_int_equal(go_round(4, true, true), 0);
     assert_true(go_round(4.5, false, true) > 0);
-    assert_true(appearance.counters.vanished > 0);
+    assert_true(appearance.counters.missed > 0);
 }
 
 static void test_from_elsewhere_nothing_is_missed(void **state)

@@ -138,7 +138,7 @@ static void test_what_is_surely_matched_is_learned(void **state)
     see_two(10);
     assert_int_equal(slam.ekf.beacon_count, 2);
     assert_int_equal(slam.counters.matched, 18);
-    assert_true(appearance.counters.taught > 10);
+    assert_true(appearance.counters.trained > 10);
     assert_true(bslam_learner_knows(&appearance.learner, appearance.of[0].classifier));
 }
 
@@ -148,7 +148,7 @@ static void test_other_methods_leave_appearance_alone(void **state)
     settings.association = BSLAM_ASSOCIATION_MAHALANOBIS;
     start(settings);
     see_two(10);
-    assert_int_equal(appearance.counters.taught + appearance.counters.unsure, 0);
+    assert_int_equal(appearance.counters.trained + appearance.counters.unsure, 0);
 }
 
 static void test_without_appearance_position_decides(void **state)
@@ -428,11 +428,11 @@ static void test_what_is_missed_is_noticed_while_another_is_tentative(void **sta
     pass_by(0, 0.1, true, 1.0);
     pass_by(4, -0.1, true, 1.0);
     assert_int_equal(slam.ekf.beacon_count, THINGS);
-    assert_int_equal(appearance.counters.vanished, 0);
+    assert_int_equal(appearance.counters.missed, 0);
     const uint32_t deferred = slam.counters.deferred;
     pass_by(0, 0.1, false, 1.0);
     assert_int_equal(slam.counters.deferred - deferred, 40);
-    assert_int_equal(appearance.counters.vanished, 1);
+    assert_int_equal(appearance.counters.missed, 1);
     assert_int_equal(slam.ekf.beacon_count, THINGS - 1);
 }
 

@@ -1,21 +1,33 @@
-"""The front end with its inside open, for training: what it measures of given boxes, and features of boxes and
-cells. Nothing that runs on a robot needs it.
+"""The front end with its inside open: what it measures of given boxes, and features of boxes and cells.
+
+Nothing that runs on a robot needs it, so it has a build of its own, from vision/internal.h, in
+build/training.
 """
 
 from __future__ import annotations
 
+import fcntl
+import importlib.util
+import sysconfig
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core import vision
-from bslam.core.raw import VisionLibrary, vision_training_library
+from bslam.core.build import SOURCES, build_vision
+from bslam.core.builds import FIRMWARE_DIR
+from bslam.core.raw import VisionLibrary
 from bslam.core.vision import SIGNATURE_SIZE, Candidate
 from bslam.modelfile import BeaconClass
 
+EXTENSION = "_vision_training"
+HEADER = "vision/internal.h"
+FOLDER = Path(__file__).resolve().parents[2] / "build" / "training"
 UNKNOWN = BeaconClass("")
 """A kind of which no size is known."""
 
@@ -30,12 +42,35 @@ class Proposals:
     glances: NDArray[np.float32]  # (n, glance features)
 
 
+@cache
+def open_library() -> VisionLibrary:
+    """The build that shows what is inside: all that the product's has, and more. Made where it is missing or
+    old.
+    """
+    path = FOLDER / (EXTENSION + sysconfig.get_config_var("EXT_SUFFIX"))
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with (FOLDER / f"{EXTENSION}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another process may be at it
+        if not path.is_file() or path.stat().st_mtime < _newest_source():
+            build_vision(EXTENSION, HEADER, FOLDER)
+    spec = importlib.util.spec_from_file_location(EXTENSION, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return VisionLibrary(module)
+
+
+def _newest_source() -> float:
+    folders = (*SOURCES["vision"], "models")
+    return max(file.stat().st_mtime for one in folders for file in (FIRMWARE_DIR / one).rglob("*.[ch]"))
+
+
 class FrontEnd(vision.FrontEnd):
     """A front end that tells how it comes to its candidates."""
 
     @staticmethod
     def _open() -> VisionLibrary:
-        return vision_training_library()
+        return open_library()
 
     def _inside(self) -> Any:
         return self._library.ffi.cast("bslam_front_end_t *", self._vision)
@@ -123,6 +158,6 @@ class FrontEnd(vision.FrontEnd):
 
 def feature_counts() -> tuple[int, int, int, int]:
     """Features of a cell, of a glance at a proposal, of a proposal, and of a closer look at it."""
-    lib = vision_training_library().lib
+    lib = open_library().lib
     counts = lib.BSLAM_CELL_FEATURES, lib.BSLAM_GLANCE_FEATURES, lib.BSLAM_BLOB_FEATURES
     return *map(int, counts), int(lib.BSLAM_CLOSE_FEATURES)  # type: ignore[return-value]
