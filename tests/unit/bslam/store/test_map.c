@@ -569,14 +569,14 @@ static void test_map_load_of_a_source_that_changes_takes_no_byte_of_it(void **st
         if (load_changing(LOOKS, mode) == BSLAM_OK) {
             // A covariance that seemed none was looked at once more, as a whole.
             assert_int_equal(pass, 2 * LOOKS + 1);
-            kept_empty(&other, &other_looks);
+            kept_empty(&other, &other_appearance);
         }
         assert_memory_equal(&other, &before, sizeof other);
         assert_int_equal(load_changing(TAKES, mode), BSLAM_E_MAP);
         assert_int_equal(other.ekf.beacon_count, 0);
         assert_int_equal(other.ekf.dim, other.ekf.base_dim);
         assert_int_equal(other.ekf.next_uid, before.ekf.next_uid);
-        kept_empty(&other, &other_looks);
+        kept_empty(&other, &other_appearance);
     }
     load(BSLAM_MAP_LIVING);
 }
