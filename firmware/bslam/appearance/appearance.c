@@ -166,7 +166,7 @@ static void note_class(bslam_beacon_appearance_t *known, uint8_t beacon_class)
     known->seen_as[beacon_class - 1]++;
 }
 
-// ---- sides ------------------------------------------------------------------------------------------------
+// ---- viewpoints -------------------------------------------------------------------------------------------
 
 /// How many sectors lie from one to the other, the shorter way round.
 static int sectors_between(int one, int other)
@@ -196,14 +196,7 @@ bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearanc
     return -settings->viewpoint_low * (bslam_real_t)(far - NEAR_SECTORS) / (FAR_SECTORS - NEAR_SECTORS);
 }
 
-// ---- views ------------------------------------------------------------------------------------------------
-
-void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam_real_t view_score)
-{
-    appearance->of[index].view_score = view_score;
-}
-
-// ---- waiting ----------------------------------------------------------------------------------------------
+// ---- delayed decisions ------------------------------------------------------------------------------------
 
 /// How long matches with a beacon have waited; 0 if not, or if none did within the last decision_delay_us.
 static uint32_t delayed_us(const bslam_beacon_appearance_t *known, const bslam_settings_t *settings,

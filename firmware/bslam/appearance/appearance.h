@@ -79,9 +79,6 @@ uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index);
 void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                             int count, uint32_t travelled_um, const bslam_sighting_t *sighting);
 
-/// Beacon `index` was matched, or has begun, with this `view_score` (association.h).
-void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam_real_t view_score);
-
 /// A match with beacon `index` waits at this moment: association.h, `delayed_for`.
 void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                                  int64_t time_us);

@@ -112,8 +112,6 @@ bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf);
 void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings, const bslam_motion_t *motion,
                          bslam_motion_t *moved);
 
-bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
-
 /// The robot may have moved unseen and stands still now: adds variance to its position (each axis) and
 /// heading, up to (30 m)² and (3.2 rad)² in all; velocity states become as at the start. O(n).
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,
@@ -262,7 +260,16 @@ bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, co
 
 // ---- queries ----------------------------------------------------------------------------------------------
 
-bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf);
+/// Of a state, or of the robot's part of it, the pose.
+static inline bslam_pose_t bslam_pose_of(const bslam_real_t *mean)
+{
+    return (bslam_pose_t){mean[BSLAM_STATE_X], mean[BSLAM_STATE_Y], mean[BSLAM_STATE_THETA]};
+}
+
+static inline bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
+{
+    return bslam_pose_of(ekf->mean);
+}
 
 /// Where a beacon is, in the map. A ray without a positive inverse distance answers with a point 1 km along
 /// it.

@@ -24,11 +24,6 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
     ekf->base_dim = ekf->dim;
 }
 
-bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
-{
-    return (bslam_pose_t){ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y], ekf->mean[BSLAM_STATE_THETA]};
-}
-
 /// A ray's values with an inverse distance that has a point.
 static bslam_ray_point_t ray_point(const bslam_ekf_t *ekf, int at)
 {

@@ -303,10 +303,10 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
         if (match->delayed_for >= 0) {
             bslam_appearance_note_delay(slam->appearance, &slam->settings, match->delayed_for, time_us);
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
-            bslam_appearance_note_view(slam->appearance, bslam_slam_find_beacon(slam, account->beacon_uid),
-                                       slam->settings.again_odds);
+            slam->appearance->of[bslam_slam_find_beacon(slam, account->beacon_uid)].view_score =
+                slam->settings.again_odds;
         } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account)) {
-            bslam_appearance_note_view(slam->appearance, match->beacon, match->view_score);
+            slam->appearance->of[match->beacon].view_score = match->view_score;
         }
     }
 }
@@ -420,22 +420,12 @@ static void count_accounts(bslam_slam_t *slam, int count)
     bslam_slam_counters_t *counters = &slam->counters;
     counters->frames++;
     counters->sightings += (uint32_t)count;
+    uint32_t *const by_outcome[] = {[BSLAM_OUTCOME_REJECTED] = &counters->rejected,
+                                    [BSLAM_OUTCOME_MATCHED] = &counters->matched,
+                                    [BSLAM_OUTCOME_NEW] = &counters->added,
+                                    [BSLAM_OUTCOME_DEFERRED] = &counters->deferred};
     for (int i = 0; i < count; i++) {
-        switch (slam->accounts[i].outcome) {
-        case BSLAM_OUTCOME_MATCHED:
-            counters->matched++;
-            break;
-        case BSLAM_OUTCOME_NEW:
-            counters->added++;
-            break;
-        case BSLAM_OUTCOME_DEFERRED:
-            counters->deferred++;
-            break;
-        case BSLAM_OUTCOME_REJECTED:
-        default:
-            counters->rejected++;
-            break;
-        }
+        (*by_outcome[slam->accounts[i].outcome])++;
     }
     counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
 }

@@ -97,7 +97,7 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
         const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
         bslam_robot_predict(&robot, &slam->settings, &motion, &moved);
     }
-    *pose = bslam_robot_pose(&robot);
+    *pose = bslam_pose_of(robot.mean);
     if (behind_us < 0) {
         const bslam_pose_t ahead = bslam_history_look_ahead(&slam->settings, &moved, -behind_us);
         *pose = bslam_pose_compose(pose, &ahead);

@@ -26,11 +26,6 @@ typedef struct pair {
     int32_t first_seen[3];  ///< of the older, of the newer, and behind that
 } pair_t;
 
-static bslam_pose_t pose_at(const bslam_real_t *at)
-{
-    return (bslam_pose_t){at[BSLAM_STATE_X], at[BSLAM_STATE_Y], at[BSLAM_STATE_THETA]};
-}
-
 // ---- the path ---------------------------------------------------------------------------------------------
 
 /// How far the node's speeds drive it and turn it; odometry's increments, times their scales, where there are
@@ -51,7 +46,7 @@ static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, b
 {
     bslam_real_t forward_m, turn_rad;
     arc_to(model, node, &forward_m, &turn_rad);
-    const bslam_pose_t start = pose_at(from);
+    const bslam_pose_t start = bslam_pose_of(from);
     bslam_motion_jacobian_t unused;
     const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, forward_m, turn_rad, &unused);
     const bslam_real_t arc[2] = {end.x_m - start.x_m, end.y_m - start.y_m};
@@ -264,14 +259,14 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
 {
     const bslam_smoother_node_t older = read_node(smoother, at);
     bslam_smoother_node_t joined = read_node(smoother, at);
-    pair_t pair = {{pose_at(older.at), pose_at(joined.at)},
+    pair_t pair = {{bslam_pose_of(older.at), bslam_pose_of(joined.at)},
                    {0, 0, 0},
                    {at->seen, at->seen + older.seen, at->seen + older.seen + joined.seen}};
     go_half_way(older.at, joined.at);
     for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
         joined.moved[i] = (int16_t)((older.moved[i] + joined.moved[i]) / 2);
     }
-    pair.mean = pose_at(joined.at);
+    pair.mean = bslam_pose_of(joined.at);
     int count = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
         count += join_seen(smoother, &pair, b, &smoother->joined[count]);

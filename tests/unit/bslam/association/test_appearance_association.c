@@ -113,7 +113,7 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     ekf.beacons[0].last_seen_us = 1000000;
-    bslam_appearance_note_view(&appearance, 0, BSLAM_R(2.1));  // enough for all of them
+    appearance.of[0].view_score = BSLAM_R(2.1);  // enough for all of them
     const int64_t times_us[] = {1000000, 1000001, 1200000, 1200001};
     const double odds[] = {0, 4.2, 4.2, 0};
     for (int i = 0; i < 4; i++) {
@@ -132,7 +132,7 @@ static void test_what_was_matched_with_little_is_hardly_held(void **state)
     ekf.beacons[0].last_seen_us = 1000000;
     const double views[] = {-3, 0, 0.5, 2, 50}, odds[] = {0, 0, 1, 4, 4.2};
     for (int i = 0; i < 5; i++) {
-        bslam_appearance_note_view(&appearance, 0, real(views[i]));
+        appearance.of[0].view_score = real(views[i]);
         const bslam_match_t just = decide_at(1100000, &ekf, &settings, &seen, 1).records[0].match;
         assert_near(just.score, alone + odds[i], 1e-4);
         assert_near(just.view_score, views[i] > alone ? views[i] : alone, 1e-4);
@@ -149,7 +149,7 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].beacon_class = 3;
-    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
+    appearance.of[0].view_score = settings.again_odds;
     bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     seen.beacon_class = 3;
     assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).records[0].match.score,
@@ -167,7 +167,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].confirmed = true;
-    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
+    appearance.of[0].view_score = settings.again_odds;
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_classifier(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
