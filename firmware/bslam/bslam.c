@@ -26,10 +26,9 @@ static bslam_slam_t *copy_of(bslam_instance_t *robot)
     return NULL;
 #endif
 }
-#endif
 
-#if BSLAM_GUARD
-/// What the guard does not watch may be worth less when it is damaged, but every index in it is within bounds.
+/// What the guard does not watch may be worth less when it is damaged, but every index in it is within
+/// bounds.
 static void mend_members(bslam_instance_t *robot)
 {
     const bslam_settings_t *settings = &robot->slam.settings;
