@@ -36,10 +36,7 @@ static bslam_real_t remainder_of_turns(bslam_real_t angle)
 /// The same direction within BSLAM_ANGLE_MAX.
 static bslam_real_t bring_near(bslam_real_t angle)
 {
-    if (bslam_abs(angle) <= BSLAM_ANGLE_MAX) {
-        return angle;
-    }
-    return remainder_of_turns(angle);
+    return bslam_abs(angle) <= BSLAM_ANGLE_MAX ? angle : remainder_of_turns(angle);
 }
 
 /// The nearest whole number; 0 for NaN, which goes on in what the caller makes of the angle itself.

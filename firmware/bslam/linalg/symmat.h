@@ -19,32 +19,32 @@
 #define BSLAM_SYMMAT_LENGTH(n) (BSLAM_SYMMAT_PADDED(n) * (BSLAM_SYMMAT_PADDED(n) + 4) / 2)
 
 /// Where row i begins.
-inline size_t bslam_symmat_row(int i)
+static inline size_t bslam_symmat_row(int i)
 {
     const size_t block = (size_t)i / 4;
     return 4 * (block + 1) * (2 * block + (size_t)i % 4);
 }
 
 /// Where element (i, j) stands, for any order of i and j.
-inline size_t bslam_symmat_at(int i, int j)
+static inline size_t bslam_symmat_at(int i, int j)
 {
     return i >= j ? bslam_symmat_row(i) + (size_t)j : bslam_symmat_row(j) + (size_t)i;
 }
 
 /// Element (i, j).
-inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
+static inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
 {
     return m[bslam_symmat_at(i, j)];
 }
 
 /// Sets element (i, j), and so (j, i).
-inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
+static inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
 {
     m[bslam_symmat_at(i, j)] = value;
 }
 
 /// How long row i is with its fill: from its beginning to the next one's.
-inline size_t bslam_symmat_filled(int i)
+static inline size_t bslam_symmat_filled(int i)
 {
     return ((size_t)i / 4 + 1) * 4;
 }

@@ -197,7 +197,7 @@ static void close_block(bslam_smoother_t *smoother)
 /// The middle of the block is now, as far as one knows.
 static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
 {
-    bslam_smoother_add_motion(&smoother->to_middle, &smoother->from_middle);
+    bslam_smoother_add_motion(&smoother->to_middle, &smoother->from_middle, 1);
     smoother->from_middle = (bslam_motion_t){0};
     smoother->middle_s = smoother->block_s;
     memcpy(smoother->middle, ekf->mean, (size_t)ekf->base_dim * sizeof smoother->middle[0]);
@@ -349,7 +349,7 @@ void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, con
     if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S) {
         close_block(smoother);
     }
-    bslam_smoother_add_motion(&smoother->from_middle, motion);
+    bslam_smoother_add_motion(&smoother->from_middle, motion, 1);
     smoother->gap_s += motion->dt_s;
     if (smoother->frames > 0) {
         smoother->block_s += motion->dt_s;

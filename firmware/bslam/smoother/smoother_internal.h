@@ -63,8 +63,8 @@ void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
 
 // ---- nodes.c
 
-/// sum += motion, which goes on from it or leads to it.
-void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion);
+/// sum += share * motion, which goes on from it or leads to it.
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion, bslam_real_t share);
 
 /// The nearest whole number, 65535 at most.
 int32_t bslam_smoother_units(bslam_real_t value);

@@ -75,19 +75,7 @@ static void lengthen(bslam_smoother_node_t *node, const bslam_motion_t *motion, 
     for (int i = 0; i < SPEEDS; i++) {
         node->at[BSLAM_STATE_FORWARD + i] += share * (speeds[i] - node->at[BSLAM_STATE_FORWARD + i]);
     }
-    bslam_smoother_add_motion(&node->motion, motion);
-}
-
-static bslam_motion_t half_of(const bslam_motion_t *motion)
-{
-    return (bslam_motion_t){
-        .dt_s = motion->dt_s / 2,
-        .forward_m = motion->forward_m / 2,
-        .turn_rad = motion->turn_rad / 2,
-        .forward_var_m2 = motion->forward_var_m2 / 2,
-        .turn_var_rad2 = motion->turn_var_rad2 / 2,
-        .forward_turn_cov_mrad = motion->forward_turn_cov_mrad / 2,
-    };
+    bslam_smoother_add_motion(&node->motion, motion, 1);
 }
 
 /// Half way between two poses, where what was seen from both is seen from: what each of them errs by at
@@ -275,7 +263,8 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
         *bslam_smoother_seen(smoother, at->to_seen + k) = smoother->joined[k];
     }
     at->seen = pair.first_seen[2];
-    at->ahead = half_of(&joined.motion);
+    at->ahead = (bslam_motion_t){0};
+    bslam_smoother_add_motion(&at->ahead, &joined.motion, BSLAM_R(0.5));
     memcpy(at->speeds, &joined.at[BSLAM_STATE_FORWARD], sizeof at->speeds);
     joined.motion = at->ahead;
     lengthen(&joined, &older.motion, &older.at[BSLAM_STATE_FORWARD]);

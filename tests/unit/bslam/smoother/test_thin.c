@@ -116,7 +116,7 @@ static bslam_motion_t sum_of_motions(void)
 {
     bslam_motion_t sum = {0};
     for (int k = 0; k < smoother.node_count; k++) {
-        bslam_smoother_add_motion(&sum, &bslam_smoother_node(&smoother, k)->motion);
+        bslam_smoother_add_motion(&sum, &bslam_smoother_node(&smoother, k)->motion, 1);
     }
     return sum;
 }
