@@ -1,6 +1,7 @@
-"""The firmware's insides for tests: extensions from headers that are not the product's, built into build/internals.
+"""The firmware's insides for tests: extensions from headers that are not the product's, in build/internals.
 
-That of the estimator has the same sizes as the product's own (`bslam.core.build`), so what stands in a `Slam` can be read by it.
+That of the estimator has the sizes of the product's own (`bslam.core.build`), so it reads what stands in a
+`Slam`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "internals"
 
 @cache
 def internals(real: str, beacons_max: int) -> Any:
-    """The estimator's insides: the module, with `ffi` and `lib`, of the smallest build with so many beacons."""
+    """The estimator's insides: a module with `ffi` and `lib`, the smallest build of so many beacons."""
     size = next(one for one in SIZE_CLASSES if one >= beacons_max)
     return _extension(f"_internals_{real}_{size}", HEADER, "bslam", macros_of(real, size))
 
@@ -121,7 +122,9 @@ class Learner:
         if np.shape(signature) != (SIGNATURE_SIZE,):
             raise BslamError(f"signature of shape {np.shape(signature)}; allowed: ({SIGNATURE_SIZE},)")
         values = np.ascontiguousarray(signature, np.float32)
-        status = self._lib.bslam_learner_show(self._learner, machine, self._ffi.from_buffer("float[]", values))
+        status = self._lib.bslam_learner_show(
+            self._learner, machine, self._ffi.from_buffer("float[]", values)
+        )
         self._ensure(status, f"a signature for machine {machine}")
 
     def work(self, budget: int) -> bool:

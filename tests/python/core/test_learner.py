@@ -126,7 +126,9 @@ def test_encode_gives_the_samples_of_the_c_library_to_the_bit(real: str) -> None
     module = internals(real, 1)
     samples = module.ffi.new("bslam_sample_t[]", len(values))
     for row, sample in zip(values, samples, strict=True):
-        status = module.lib.bslam_sample_encode(module.ffi.from_buffer("float[]", row), module.ffi.addressof(sample))
+        status = module.lib.bslam_sample_encode(
+            module.ffi.from_buffer("float[]", row), module.ffi.addressof(sample)
+        )
         assert status == module.lib.BSLAM_OK
     assert encode(values, real).tobytes() == bytes(module.ffi.buffer(samples))
 
