@@ -160,7 +160,8 @@ def _collection_params(options: RunOptions, collection: str | None) -> dict[str,
 
 def _recovery_params(recovery: str) -> dict[str, Number]:
     params: dict[str, Number] = {"recovery": int(recovery != "off")}
-    if recovery == "growing":  # nothing settles: it takes several beacons that fit a pose elsewhere to be lost
+    if recovery == "growing":
+        # Nothing settles: to be lost takes several beacons that fit a pose elsewhere.
         params["settled_us"] = 1_000_000_000
     return params
 
