@@ -6,7 +6,7 @@ FUZZ_TARGETS := link map model image api drive session
 FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c
 FUZZ_ROBOT := $(ROBOT_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_ROBOT) $(FUZZ_HELPERS)
-FUZZ_DEFINES := -Itests/fuzz -DBSLAM_CONFIG_HEADER='"sizes.h"' -DROBOT_VISION=1 \
+FUZZ_DEFINES := -Itests/fuzz -Itests/unit -DBSLAM_CONFIG_HEADER='"sizes.h"' -DROBOT_VISION=1 \
     -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2 -DSESSION_MAP_BYTES=4096
 FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) $(FUZZ_DEFINES) $(SANITIZE) -g -MMD -MP
 

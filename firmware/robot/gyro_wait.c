@@ -32,8 +32,8 @@ static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, 
                              bslam_real_t radius_m)
 {
     const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
-    const int64_t scaled = (int32_t)((after - before) << unused_bits);
-    const bslam_real_t ticks = (bslam_real_t)(scaled / (INT64_C(1) << unused_bits));
+    const int32_t scaled = (int32_t)((after - before) << unused_bits);
+    const bslam_real_t ticks = (bslam_real_t)(scaled / (int32_t)(1u << unused_bits));
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 

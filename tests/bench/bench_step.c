@@ -6,13 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bslam/internal.h"
+#include "bslam/bslam.h"
+#include "base/scalar.h"
 #include "base/trig.h"
 
 #define STEP_US 40000
 #define MEASURED_STEPS 60
 
-static bslam_slam_t slam;
+static bslam_t slam;
 static bslam_real_t beacon_x_m[BSLAM_BEACONS_MAX];
 static bslam_real_t beacon_y_m[BSLAM_BEACONS_MAX];
 
@@ -21,8 +22,8 @@ void measured_step(const bslam_odometry_reading_t *reading, const bslam_sighting
 __attribute__((noinline)) void measured_step(const bslam_odometry_reading_t *reading,
                                              const bslam_sighting_t *sightings, int count)
 {
-    if (bslam_slam_odometry(&slam, reading) != BSLAM_OK ||
-        bslam_slam_sightings(&slam, reading->time_us, sightings, count) != BSLAM_OK) {
+    if (bslam_odometry(&slam, reading) != BSLAM_OK ||
+        bslam_sightings(&slam, reading->time_us, sightings, count) != BSLAM_OK) {
         (void)fprintf(stderr, "bench: a step was refused\n");
         exit(1);
     }
@@ -31,7 +32,7 @@ __attribute__((noinline)) void measured_step(const bslam_odometry_reading_t *rea
 /// The exact sighting of a beacon from a robot that stands at the estimate.
 static bslam_sighting_t see(int beacon)
 {
-    const bslam_pose_t pose = bslam_slam_pose(&slam);
+    const bslam_pose_t pose = bslam_pose(&slam);
     const bslam_real_t dx = beacon_x_m[beacon] - pose.x_m;
     const bslam_real_t dy = beacon_y_m[beacon] - pose.y_m;
     const bslam_sighting_t sighting = {
@@ -57,14 +58,14 @@ int main(int argc, char **argv)
     int bad_id = -1;
     bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
     settings.velocity_states = argc > 1 && strcmp(argv[1], "velocity") == 0 ? 1 : 0;
-    if (bslam_slam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
+    if (bslam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         return 1;
     }
     place_beacons();
     int64_t time_us = 0;
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
         const bslam_sighting_t sighting = see(b);
-        if (bslam_slam_sightings(&slam, time_us, &sighting, 1) != BSLAM_OK) {
+        if (bslam_sightings(&slam, time_us, &sighting, 1) != BSLAM_OK) {
             return 1;
         }
         time_us += 1000;
@@ -82,7 +83,8 @@ int main(int argc, char **argv)
         }
         measured_step(&reading, sightings, count);
     }
-    const bool good = slam.counters.matched == (uint32_t)seen && slam.counters.insane == 0;
+    const bslam_slam_counters_t counters = bslam_counters(&slam).slam;
+    const bool good = counters.matched == (uint32_t)seen && counters.insane == 0;
     printf("%d\n", MEASURED_STEPS);
     return good ? 0 : 1;
 }

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "map_memory.h"
+
 enum { CALLS_MAX = 40, BLOB_MAX = 4096 };
 
 static bslam_t robot;
@@ -109,8 +111,8 @@ static bslam_status_t call_pose_at(fuzz_input_t *input, int64_t now_us)
 
 static bslam_status_t call_save(void)
 {
-    bslam_map_memory_t memory = {blob, BLOB_MAX, 0};
-    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    map_memory_t memory = {blob, BLOB_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
     const bslam_status_t status = bslam_save_map(&robot, &sink, &blob_size);
     fuzz_require(status != BSLAM_OK || memory.count == blob_size);
     return status;
@@ -118,7 +120,7 @@ static bslam_status_t call_save(void)
 
 static bslam_status_t call_load(fuzz_input_t *input)
 {
-    const bslam_map_source_t source = bslam_map_from_memory(blob, blob_size);
+    const bslam_map_source_t source = map_from_memory(blob, blob_size);
     bslam_map_fault_t fault;
     bslam_freeze_map(&robot, (fuzz_u8(input) & 1u) != 0);
     memcpy(&before, &robot, sizeof before);

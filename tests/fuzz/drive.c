@@ -215,7 +215,7 @@ static void prepare(robot_t *start, world_t *world, unsigned how)
         fuzz_require(bslam_appearance_init(&robot.appearance, NULL, 0) == BSLAM_OK);
         bslam_slam_attach_appearance(&robot.slam, (how & 1u) != 0 ? &robot.appearance : NULL);
         bslam_slam_attach_smoother(&robot.slam, (how & 4u) != 0 ? &robot.smoother : NULL);
-        bslam_recovery_init(&robot.recovery);
+        robot.recovery = (bslam_recovery_t){0};
         *world = (world_t){.stretch = 1, .has_range = (how & 2u) == 0, .by_looks = (how & 1u) != 0};
         for (int k = 0; k < 12; k++) {
             world->in_view = k % 2 == 0 ? 7u : 14u;

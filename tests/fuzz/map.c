@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "map_memory.h"
 #include "base/crc32.h"
 #include "bslam/store/map.h"
 
@@ -21,8 +22,8 @@ static uint32_t good_size[2];  ///< of the same map without machines, and with t
 
 static uint32_t write_map(const bslam_slam_t *slam, uint8_t bytes[BLOB_MAX])
 {
-    bslam_map_memory_t memory = {bytes, BLOB_MAX, 0};
-    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    map_memory_t memory = {bytes, BLOB_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
     bslam_map_fault_t fault;
     fuzz_require(bslam_map_write(slam, &sink, &fault) == BSLAM_OK && fault == BSLAM_MAP_FINE);
     fuzz_require(memory.count == bslam_map_size(slam));
@@ -88,7 +89,7 @@ static void write_again(const bslam_slam_t *slam)
     static robot_t other;
     uint8_t blob[BLOB_MAX];
     const uint32_t size = write_map(slam, blob);
-    const bslam_map_source_t source = bslam_map_from_memory(blob, size);
+    const bslam_map_source_t source = map_from_memory(blob, size);
     fuzz_require(bslam_map_check(&source) == BSLAM_MAP_FINE);
     bslam_map_fault_t fault;
     memcpy(&other.slam, slam, sizeof other.slam);
@@ -99,7 +100,7 @@ static void write_again(const bslam_slam_t *slam)
 static void load(const uint8_t *blob, uint32_t size, bslam_map_mode_t mode, bool with_looks)
 {
     static robot_t robot;
-    const bslam_map_source_t source = bslam_map_from_memory(blob, size);
+    const bslam_map_source_t source = map_from_memory(blob, size);
     memcpy(&robot, &start, sizeof robot);
     robot.slam.appearance = with_looks ? &robot.appearance : NULL;
     const bslam_slam_t *before = &start.slam;

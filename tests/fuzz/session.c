@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "map_memory.h"
 #include "picture.h"
 #include "port/port.h"
 
@@ -169,8 +170,8 @@ static void put_sighting(bslam_link_writer_t *writer, fuzz_input_t *input)
 static void put_map_piece(bslam_link_writer_t *writer, fuzz_input_t *input, unsigned piece)
 {
     static uint8_t bytes[MAP_BYTES];
-    bslam_map_memory_t memory = {bytes, MAP_BYTES, 0};
-    const bslam_map_sink_t sink = bslam_map_to_memory(&memory);
+    map_memory_t memory = {bytes, MAP_BYTES, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
     uint32_t size;
     fuzz_require(bslam_save_map(&robot.slam, &sink, &size) == BSLAM_OK);
     const unsigned change = fuzz_u8(input);

@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bslam/slam/slam.h"
+#include "bslam/bslam.h"
 
 #define PI 3.14159265358979323846
 #define STEP_S 0.04
@@ -163,10 +163,10 @@ static bslam_settings_t filter_params(void)
 }
 
 /// eᵀ P⁻¹ e of the pose, by Cholesky's factor of P in double.
-static double nees_of(const bslam_slam_t *slam, const double e[3])
+static double nees_of(const bslam_t *slam, const double e[3])
 {
     bslam_real_t lower[6];
-    bslam_slam_pose_covariance(slam, lower);
+    bslam_pose_covariance(slam, lower);
     const double l00 = sqrt((double)lower[0]);
     const double l10 = (double)lower[1] / l00;
     const double l11 = sqrt((double)lower[2] - l10 * l10);
@@ -180,9 +180,9 @@ static double nees_of(const bslam_slam_t *slam, const double e[3])
 }
 
 /// The filter's error in the frame of the start, where the map's is.
-static void error_of(const bslam_slam_t *slam, const world_t *world, const world_t *start, double e[3])
+static void error_of(const bslam_t *slam, const world_t *world, const world_t *start, double e[3])
 {
-    const bslam_pose_t pose = bslam_slam_pose(slam);
+    const bslam_pose_t pose = bslam_pose(slam);
     const double dx = world->x_m - start->x_m;
     const double dy = world->y_m - start->y_m;
     const double sine = sin(start->theta_rad);
@@ -203,10 +203,10 @@ static void require(bool condition, const char *what)
 /// It may stand for a while before it drives off.
 static void soak(uint64_t seed, long steps, long standing)
 {
-    static bslam_slam_t slam;
+    static bslam_t slam;
     const bslam_settings_t settings = filter_params();
     int bad_id;
-    require(bslam_slam_init(&slam, &settings, &bad_id) == BSLAM_OK, "a parameter is refused");
+    require(bslam_init(&slam, &settings, &bad_id) == BSLAM_OK, "a parameter is refused");
     world_t world = begin(seed);
     world_t start = world;
     double nees = 0;
@@ -222,8 +222,8 @@ static void soak(uint64_t seed, long steps, long standing)
         const bslam_odometry_reading_t reading = read_wheels(&world, step * (int64_t)STEP_US);
         bslam_sighting_t seen[BEACONS];
         const int count = look(&world, seen);
-        require(bslam_slam_odometry(&slam, &reading) == BSLAM_OK, "a reading is refused");
-        require(bslam_slam_sightings(&slam, reading.time_us, seen, count) == BSLAM_OK, "a frame is refused");
+        require(bslam_odometry(&slam, &reading) == BSLAM_OK, "a reading is refused");
+        require(bslam_sightings(&slam, reading.time_us, seen, count) == BSLAM_OK, "a frame is refused");
         if (step <= STEPS_AT_START) {
             continue;
         }
@@ -238,7 +238,7 @@ static void soak(uint64_t seed, long steps, long standing)
     const double all = (double)(steps - STEPS_AT_START);
     const double last = fmin(all, STEPS_AN_HOUR);
     (void)printf("%llu,%.3f,%.6f,%.6f,%.6f,%u\n", (unsigned long long)seed, (double)steps / STEPS_AN_HOUR,
-                 nees / all, nees_last / last, error_m / all, (unsigned)slam.counters.insane);
+                 nees / all, nees_last / last, error_m / all, (unsigned)bslam_counters(&slam).slam.insane);
     (void)fflush(stdout);
 }
 
