@@ -159,11 +159,11 @@ def _collection_params(options: RunOptions, collection: str | None) -> dict[str,
 
 
 def _recovery_params(recovery: str) -> dict[str, Number]:
-    if recovery == "off":
-        return {"recovery": 0}
-    # A map that grows never settles: it takes several beacons that fit a pose elsewhere to be lost.
-    settled: dict[str, Number] = {"settled_us": 1_000_000_000} if recovery == "growing" else {}
-    return {"recovery": 1, **settled}
+    params: dict[str, Number] = {"recovery": int(recovery != "off")}
+    if recovery == "growing":
+        # Nothing settles: to be lost takes several beacons that fit a pose elsewhere.
+        params["settled_us"] = 1_000_000_000
+    return params
 
 
 def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:

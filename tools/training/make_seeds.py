@@ -1,11 +1,11 @@
 """Writes host_sim/bslam/core/seeds.npy: signatures of rendered beacons of training worlds, one a world; and
 firmware/models/seeds.h, which has the same for a robot.
 
-None of them is a user's: the learner (firmware/bslam/appearance/learner.h) sets a new beacon against them.
-They are to be made anew when signatures change; the same call writes the same bytes:
+None of them is a user's: the learner (firmware/bslam/appearance/learner.h) sets a new beacon against them. They are
+to be made anew when signatures change; the same call writes the same bytes:
 
     .venv/bin/python -m tools.training.make_seeds [--count 64] [--first-world 5000]
-    .venv/bin/python -m tools.training.make_seeds --header    the header alone, of the seeds as they are
+    .venv/bin/python -m tools.training.make_seeds --header    writes the header alone, of the seeds as they are
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.core.appearance import encode
+from bslam.core.appearance import SIGNATURE_SIZE, encode
 from tools.training.looks import generic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,14 +24,14 @@ HEADER = ROOT / "firmware/models/seeds.h"
 
 def stored(signatures: NDArray[np.float32]) -> NDArray[np.int8]:
     """The signatures (n, 71) as the learner keeps samples, in 127ths."""
-    return np.asarray(encode(signatures)[:, : signatures.shape[1]], np.int8)
+    return encode(signatures)[:, :SIGNATURE_SIZE].astype(np.int8)
 
 
 def header(seeds: NDArray[np.int8]) -> str:
     """The seeds (n, 71) as a C header."""
     rows = "".join(f"    {{{{{', '.join(map(str, [*row, 127]))}}}}},\n" for row in seeds.tolist())
-    return f"""/// Signatures of rendered beacons, none of them a user's, for classifiers to start from
-/// (settings.seeds). tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
+    return f"""/// Signatures of rendered beacons, none of them a user's, for classifiers to start from (settings.seeds).
+/// tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
 #ifndef BSLAM_MODELS_SEEDS_H
 #define BSLAM_MODELS_SEEDS_H
 

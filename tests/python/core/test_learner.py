@@ -51,7 +51,7 @@ def test_solver_looser_tolerance_takes_fewer_steps(real: str) -> None:
 def test_learner_tells_objects_apart(real: str) -> None:
     random = np.random.default_rng(1)
     views = signatures(random, 12 * 10, 12)
-    learner = Learner(signatures(random, 20, 20), machines=12, real=real)
+    learner = Learner(signatures(random, 20, 20), classifiers=12, real=real)
     machines = [learner.add() for _ in range(12)]
     for i in range(6 * 12):
         learner.show(machines[i % 12], views[i])
