@@ -68,8 +68,8 @@ static bool are_nodes(bslam_smoother_t *smoother)
     int seen = 0;
     for (int k = 0; k < smoother->node_count; k++) {
         const int count = bslam_smoother_node(smoother, k)->seen;
-        if ((k == smoother->at && smoother->at_seen != seen) || !bslam_is_count(count, smoother->seen_count - seen) ||
-            !is_seen(smoother, seen, count)) {
+        if ((k == smoother->at && smoother->at_seen != seen) ||
+            !bslam_is_count(count, smoother->seen_count - seen) || !is_seen(smoother, seen, count)) {
             return false;
         }
         seen += count;
@@ -111,8 +111,8 @@ static bool are_counts(const bslam_smoother_t *smoother)
            bslam_is_count(smoother->anchors, smoother->node_count) &&
            bslam_is_count(smoother->anchors_to_come, BSLAM_SMOOTHER_ANCHORS) &&
            smoother->phase <= BSLAM_SMOOTHER_BACK && bslam_is_count(smoother->top, smoother->node_count) &&
-           bslam_is_count(smoother->at, smoother->phase == BSLAM_SMOOTHER_FORTH ? smoother->node_count
-                                                                                : smoother->top) &&
+           bslam_is_count(smoother->at,
+                          smoother->phase == BSLAM_SMOOTHER_FORTH ? smoother->node_count : smoother->top) &&
            bslam_magnitude(bslam_most(smoother->work, -INT32_MAX)) < COUNT_MAX &&
            bslam_is_count(smoother->fitted, COUNT_MAX) && bslam_is_count(smoother->halvings, COUNT_MAX) &&
            bslam_is_count(smoother->unfilled, COUNT_MAX) && bslam_is_count(smoother->frames, COUNT_MAX);

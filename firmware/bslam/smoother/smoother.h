@@ -139,7 +139,8 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *
 
 /// Of memory that may be damaged: starts anew from this filter unless every count and number may be used.
 /// O(what is kept).
-void bslam_smoother_mend(bslam_smoother_t *smoother, const bslam_settings_t *settings, const bslam_ekf_t *ekf);
+void bslam_smoother_mend(bslam_smoother_t *smoother, const bslam_settings_t *settings,
+                         const bslam_ekf_t *ekf);
 
 /// The filter has gone through this motion (as odometry reported it, before any scale). O(1).
 void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
