@@ -1,5 +1,4 @@
-/// The smaller and the larger of two numbers, and a number within bounds; what memory that may be damaged
-/// has.
+/// The smaller and the larger of two numbers, and a number within bounds.
 #ifndef BSLAM_BASE_BOUNDS_H
 #define BSLAM_BASE_BOUNDS_H
 
