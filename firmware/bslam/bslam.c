@@ -48,6 +48,7 @@ static void sum_members(const bslam_instance_t *robot, uint32_t sums[BSLAM_GUARD
 }
 
 /// What stands beside the pipeline and is no longer what it was begins anew: no index in it may be believed.
+/// Counted as corrupt.
 static void check_members(bslam_instance_t *robot)
 {
     uint32_t sums[BSLAM_GUARD_MEMBERS] = {0};
@@ -76,6 +77,7 @@ static void check_members(bslam_instance_t *robot)
         bslam_slam_restart_smoother(&robot->slam);
     }
 #endif
+    sum_members(robot, robot->guard.members);
 }
 #endif
 
