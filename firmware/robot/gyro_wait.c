@@ -4,6 +4,7 @@
 
 #define SPEED_SD_LEAST_MPS 0.01f  // where the settings say that the wheels hardly err
 #define SPEED_SD_MOST_MPS 100.0f
+#define PAUSE_US 5000000  // longer than the visual gyro goes on over
 #define TURN_RAD 6.2831853f
 #define ROOT_HALF 0.70710678f
 
@@ -37,7 +38,7 @@ static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, 
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 
-/// Forward, mean since the reading before.
+/// Forward, mean since the reading before, not long ago.
 static bslam_real_t speed_mps(const bslam_settings_t *settings, const bslam_odometry_reading_t *before,
                               const bslam_odometry_reading_t *now)
 {
@@ -61,7 +62,8 @@ static bslam_real_t speed_sd_mps(const bslam_settings_t *settings)
 bool gyro_wait_begin(gyro_wait_t *wait, camera_input_t *input, const bslam_settings_t *settings,
                      const bslam_odometry_reading_t *reading)
 {
-    const bool follows = wait->is_running && reading->time_us > wait->reading.time_us;
+    const int64_t passed_us = reading->time_us - wait->reading.time_us;
+    const bool follows = wait->is_running && passed_us > 0 && passed_us < PAUSE_US;
     const bslam_real_t mps = follows ? speed_mps(settings, &wait->reading, reading) : 0;
     const bool jumped = mps > settings->speed_max_mps || mps < -settings->speed_max_mps;
     wait->reading = *reading;

@@ -91,6 +91,11 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         choices=WHEEL_NOISES,
         help="what errs: the reading or the motion (default: as the scenario or log says)",
     )
+    _add_core_options(group)
+
+
+def _add_core_options(group: Any) -> None:
+    """Which core runs where, and its settings one by one."""
     group.add_argument(
         "--target",
         type=_target,

@@ -153,8 +153,8 @@ static void test_a_flipped_bit_in_the_smoother_is_no_index(void **state)
     drive(120);
     bslam_smoother_t *smoother = &inside()->smoother;
     assert_true(smoother->cycles > 0);
-    flip_in(&smoother->first_node,
-            offsetof(bslam_smoother_t, marks) - offsetof(bslam_smoother_t, first_node), 9, 6);
+    flip_in(&smoother->first_node, offsetof(bslam_smoother_t, marks) - offsetof(bslam_smoother_t, first_node),
+            9, 6);
     flip_in(smoother->nodes, 40 * sizeof smoother->nodes[0], 9, 7);
     flip_in(smoother->seen, 100 * sizeof smoother->seen[0], 9, 8);
     flip_in(smoother->lines, BEACONS * sizeof smoother->lines[0], 9, 9);
