@@ -7,19 +7,22 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
+UNIT = ROOT / "tests" / "unit"
 SOURCES = [
-    ROOT / "tests" / "unit" / "slam" / "test_slam_limits.c",
-    *sorted((ROOT / "tests" / "unit").glob("*.c")),
-    *sorted((ROOT / "firmware" / "bslam").rglob("*.c")),
+    UNIT / "bslam" / "slam" / "test_slam_limits.c",
+    UNIT / "support.c",
+    UNIT / "plain_settings.c",
+    *(path for name in ("base", "bslam") for path in sorted((ROOT / "firmware" / name).rglob("*.c"))),
 ]
 FLAGS = ["-std=c11", "-ffp-contract=off", "-O1", "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter"]
+ALL = {"BSLAM_APPEARANCE": 1, "BSLAM_SMOOTHER": 1, "BSLAM_GUARD": 2}
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 
 def compiled(program: Path, **sizes: int) -> subprocess.CompletedProcess[str]:
     """The test program with these sizes."""
-    defines = [f"-D{name}={value}" for name, value in sizes.items()]
-    includes = [f"-I{ROOT / 'firmware'}", f"-I{ROOT / 'tests' / 'unit'}"]
+    defines = [f"-D{name}={value}" for name, value in (ALL | sizes).items()]
+    includes = [f"-I{ROOT / 'firmware'}", f"-I{UNIT}"]
     command = [os.environ.get("CC", "cc"), *FLAGS, *SANITIZE, *defines, *includes, *map(str, SOURCES)]
     command += ["-lcmocka", "-lm", "-o", str(program)]
     return subprocess.run(command, check=False, capture_output=True, text=True)
@@ -64,15 +67,15 @@ def test_limits_hold_in_any_size(
         ("BSLAM_SIGHTINGS_MAX", 251),
         ("BSLAM_HISTORY_MAX", 0),
         ("BSLAM_HISTORY_MAX", 1025),
-        ("BSLAM_LEARNER_SLOTS", 0),
-        ("BSLAM_LEARNER_SLOTS", 251),
+        ("BSLAM_RECOVERY", 2),
+        ("BSLAM_GUARD", 3),
+        ("BSLAM_APPEARANCE", 2),
         ("BSLAM_SAMPLES_PER_CLASSIFIER", 1),
         ("BSLAM_SAMPLES_PER_CLASSIFIER", 65),
-        ("BSLAM_NEGATIVES_MAX", 7),
-        ("BSLAM_NEGATIVES_MAX", 1025),
-        ("BSLAM_LEARNER_STEPS_MAX", 99),
-        ("BSLAM_LEARNER_STEPS_MAX", 100001),
-        ("BSLAM_SAMPLE_FLOAT", 2),
+        ("BSLAM_SMOOTHER", 2),
+        ("BSLAM_SMOOTHER_NODES_MAX", 7),
+        ("BSLAM_SMOOTHER_NODES_MAX", 10001),
+        ("BSLAM_SETTING_MEANINGS", 2),
         ("BSLAM_REAL_DOUBLE", 2),
     ],
 )
