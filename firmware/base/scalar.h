@@ -1,4 +1,4 @@
-/// What the libraries compute with numbers of the scalar type. Not for users.
+/// What the libraries compute with numbers of the scalar type.
 #ifndef BSLAM_BASE_SCALAR_H
 #define BSLAM_BASE_SCALAR_H
 

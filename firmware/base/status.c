@@ -18,8 +18,5 @@ const char *bslam_status_name(bslam_status_t status)
         [BSLAM_E_STATE] = "BSLAM_E_STATE",
         [BSLAM_E_SIZE] = "BSLAM_E_SIZE",
     };
-    if ((unsigned)status >= (unsigned)BSLAM_STATUS_COUNT) {
-        return "unknown status";
-    }
-    return names[status];
+    return (unsigned)status < (unsigned)BSLAM_STATUS_COUNT ? names[status] : "unknown status";
 }

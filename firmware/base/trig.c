@@ -14,9 +14,8 @@
 #define HALF_PI_LOW 7.5497899548918821e-8f
 #endif
 
-/// What whole turns leave of an angle, with its sign: C's fmod to the bit, since nothing in it rounds (a
-/// difference of two numbers of which one is at most twice the other is exact). Not fmod itself, whose code
-/// and stack are a multiple of this. NaN for what is not finite.
+/// What whole turns leave of an angle, with its sign: C's fmod to the bit, since nothing in it rounds. Not
+/// fmod itself, whose code and stack are a multiple of this. NaN for what is not finite.
 static bslam_real_t remainder_of_turns(bslam_real_t angle)
 {
     bslam_real_t left = bslam_abs(angle);
@@ -34,14 +33,10 @@ static bslam_real_t remainder_of_turns(bslam_real_t angle)
     return angle < 0 ? -left : left;
 }
 
-/// The same direction within BSLAM_ANGLE_MAX. The remainder of a division is exact, so this is the same
-/// everywhere too.
+/// The same direction within BSLAM_ANGLE_MAX.
 static bslam_real_t bring_near(bslam_real_t angle)
 {
-    if (bslam_abs(angle) <= BSLAM_ANGLE_MAX) {
-        return angle;
-    }
-    return remainder_of_turns(angle);
+    return bslam_abs(angle) <= BSLAM_ANGLE_MAX ? angle : remainder_of_turns(angle);
 }
 
 /// The nearest whole number; 0 for NaN, which goes on in what the caller makes of the angle itself.

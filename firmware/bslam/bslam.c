@@ -26,26 +26,56 @@ static bslam_slam_t *copy_of(bslam_instance_t *robot)
     return NULL;
 #endif
 }
-#endif
 
-#if BSLAM_GUARD
-/// What the guard does not watch may be worth less when it is damaged, but every index in it is within
-/// bounds.
-static void mend_members(bslam_instance_t *robot)
+/// Checksums of what stands beside the pipeline. Samples are left out: a damaged one is judged by, no more.
+static void sum_members(const bslam_instance_t *robot, uint32_t sums[BSLAM_GUARD_MEMBERS])
 {
-    const bslam_settings_t *settings = &robot->slam.settings;
 #if BSLAM_RECOVERY
-    bslam_recovery_mend(&robot->recovery);
+    sums[0] = bslam_guard_sum(0, &robot->recovery, sizeof robot->recovery);
 #endif
 #if BSLAM_APPEARANCE
-    bslam_appearance_mend(&robot->appearance, settings->seeds, settings->seed_count);
+    const bslam_appearance_t *appearance = &robot->appearance;
+    const bslam_learner_t *learner = &appearance->learner;
+    sums[1] = bslam_guard_sum(0, appearance, offsetof(bslam_appearance_t, learner));
+    sums[1] = bslam_guard_sum(sums[1], learner, offsetof(bslam_learner_t, samples));
+    sums[1] = bslam_guard_sum(sums[1], &learner->training, sizeof learner->training);
 #endif
 #if BSLAM_SMOOTHER
-    if (settings->filter == BSLAM_FILTER_SMOOTHER) {
-        bslam_smoother_mend(&robot->smoother, settings, &robot->slam.ekf);
+    sums[2] = bslam_guard_sum(0, &robot->smoother, sizeof robot->smoother);
+#endif
+    (void)robot;
+    (void)sums;
+}
+
+/// What stands beside the pipeline and is no longer what it was begins anew: no index in it may be believed.
+static void check_members(bslam_instance_t *robot)
+{
+    uint32_t sums[BSLAM_GUARD_MEMBERS] = {0};
+    bool is_good[BSLAM_GUARD_MEMBERS];
+    sum_members(robot, sums);
+    for (int m = 0; m < BSLAM_GUARD_MEMBERS; m++) {
+        is_good[m] = sums[m] == robot->guard.members[m];
+        robot->guard.counters.corrupt += is_good[m] ? 0u : 1u;
+    }
+#if BSLAM_RECOVERY
+    if (!is_good[0]) {
+        robot->recovery = (bslam_recovery_t){0};
     }
 #endif
-    (void)settings;
+#if BSLAM_APPEARANCE
+    if (!is_good[1]) {
+        const bslam_settings_t *settings = &robot->slam.settings;
+        const bslam_status_t status =
+            bslam_appearance_init(&robot->appearance, settings->seeds, settings->seed_count);
+        (void)status;  // the seeds were taken before
+    }
+#endif
+#if BSLAM_SMOOTHER
+    if (!is_good[2]) {
+        robot->smoother = (bslam_smoother_t){0};
+        bslam_slam_restart_smoother(&robot->slam);
+    }
+#endif
 }
 #endif
 
@@ -59,7 +89,7 @@ static bslam_slam_t *begin_step(bslam_t *robot)
         if (bslam_guard_check(&instance->guard, &instance->slam) != BSLAM_OK) {
             return NULL;
         }
-        mend_members(instance);
+        check_members(instance);
     }
 #endif
     return &instance->slam;
@@ -73,6 +103,7 @@ static bslam_status_t ended(bslam_t *robot, bslam_status_t status)
     if (instance->slam.settings.guard != 0) {
         instance->guard.copy = copy_of(instance);
         bslam_guard_seal(&instance->guard, &instance->slam);
+        sum_members(instance, instance->guard.members);
     }
 #endif
     (void)robot;
@@ -154,7 +185,7 @@ bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_r
     if (status != BSLAM_OK) {
         return status;
     }
-    mend_members(instance);
+    check_members(instance);
 #if BSLAM_RECOVERY
     bslam_recovery_restart(&instance->recovery);
 #endif

@@ -30,7 +30,7 @@
 #include "base/types.h"
 
 #define BSLAM_VERSION_MAJOR 0
-#define BSLAM_VERSION_MINOR 1
+#define BSLAM_VERSION_MINOR 2
 #define BSLAM_VERSION_PATCH 0
 
 #ifdef __cplusplus

@@ -41,7 +41,8 @@
 #error "BSLAM_RECOVERY is 0 or 1"
 #endif
 
-/// 1: damaged memory is noticed (setting `guard`). 2: and a copy of the state kept, to go back to.
+/// 1: damaged memory is noticed (setting `guard`); twice a call, five instructions a word of what is watched.
+/// 2: and a copy of the pipeline is kept, to go back to.
 #ifndef BSLAM_GUARD
 #define BSLAM_GUARD 1
 #endif

@@ -1,4 +1,4 @@
-/// What stands in a bslam_t. Not for users.
+/// What stands in a bslam_t.
 #ifndef BSLAM_INSTANCE_H
 #define BSLAM_INSTANCE_H
 

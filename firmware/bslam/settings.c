@@ -90,9 +90,9 @@ static void set_paper(bslam_settings_t *settings)
     settings->right_speed_sd_mps = BSLAM_R(0.3);
 }
 
-/// What stands half hidden is measured as if it were whole, so a few sightings in a hundred err by many times
-/// what the front end says. Distances are so doubtful that position alone fits too much: appearance counts
-/// twice, new beacons are expected less, and the viewpoint tells nothing.
+/// What is partly hidden is measured as if it were whole: a few sightings in a hundred err by many times what
+/// they say. Distances are so doubtful that position alone fits too much: appearance counts twice, new
+/// beacons are expected less, and the viewpoint tells nothing.
 static void set_camera(bslam_settings_t *settings)
 {
     settings->huber_d = 1;
@@ -158,18 +158,14 @@ int bslam_settings_at(size_t offset)
 /// The field that contradicts velocity states; negative: none does.
 static int contradiction(const bslam_settings_t *settings)
 {
-    if (settings->velocity_states == 0) {
-        return -1;
-    }
-    if (settings->scale_states != 0) {
-        return bslam_settings_at(offsetof(bslam_settings_t, scale_states));
-    }
-    if (!(settings->left_speed_sd_mps > 0)) {
-        return bslam_settings_at(offsetof(bslam_settings_t, left_speed_sd_mps));
-    }
-    return settings->right_speed_sd_mps > 0
-               ? -1
-               : bslam_settings_at(offsetof(bslam_settings_t, right_speed_sd_mps));
+    const size_t scale = offsetof(bslam_settings_t, scale_states);
+    const size_t left = offsetof(bslam_settings_t, left_speed_sd_mps);
+    const size_t right = offsetof(bslam_settings_t, right_speed_sd_mps);
+    return settings->velocity_states == 0        ? -1
+           : settings->scale_states != 0         ? bslam_settings_at(scale)
+           : !(settings->left_speed_sd_mps > 0)  ? bslam_settings_at(left)
+           : !(settings->right_speed_sd_mps > 0) ? bslam_settings_at(right)
+                                                 : -1;
 }
 
 bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id)
@@ -181,9 +177,6 @@ bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_i
         }
     }
     const int bad = contradiction(settings);
-    if (bad >= 0) {
-        *bad_id = bad;
-        return BSLAM_E_PARAMETER;
-    }
-    return BSLAM_OK;
+    *bad_id = bad >= 0 ? bad : *bad_id;
+    return bad >= 0 ? BSLAM_E_PARAMETER : BSLAM_OK;
 }

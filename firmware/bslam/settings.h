@@ -180,8 +180,8 @@ typedef struct bslam_setting_info {
 /// Line id >= 0 of the tables one after the other; NULL behind the last one.
 const bslam_setting_info_t *bslam_settings_info(int id);
 
-/// Sets field id. BSLAM_E_PARAMETER, and no change, if there is no such field, the value is outside its
-/// range, or an integer is asked for and the value has a fraction.
+/// Sets field id. BSLAM_E_PARAMETER, and no change: there is no such field, the value is outside its range,
+/// or an integer has a fraction.
 BSLAM_MUST_CHECK bslam_status_t bslam_settings_set(bslam_settings_t *settings, int id, bslam_real_t value);
 
 #ifdef __cplusplus

@@ -28,7 +28,7 @@
 
 #define BSLAM_SIZE_RECOVERY \
     (BSLAM_RECOVERY * ((BSLAM_SIZE_REAL + BSLAM_SIZE_POINTER > 8 ? 496 : 416) + 124 * BSLAM_SIZE_REAL))
-#define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 32 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
+#define BSLAM_SIZE_GUARD (BSLAM_GUARD == 0 ? 0 : 44 + (BSLAM_GUARD == 2 ? BSLAM_SIZE_PIPELINE : 0))
 
 /// A classifier: its list of negatives, its weights, its samples.
 #define BSLAM_SIZE_SAMPLE (BSLAM_SAMPLE_FLOAT ? 288 : 72)

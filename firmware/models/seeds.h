@@ -1,5 +1,5 @@
-/// Signatures of rendered beacons, none of them a user's, for classifiers to start from (settings.seeds).
-/// tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
+/// Signatures of rendered beacons, none of them a user's, for classifiers to start from
+/// (settings.seeds). tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
 #ifndef BSLAM_MODELS_SEEDS_H
 #define BSLAM_MODELS_SEEDS_H
 

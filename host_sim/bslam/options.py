@@ -93,7 +93,9 @@ def presets_of(options: RunOptions, log: Log) -> tuple[str, ...]:
     if options.presets:
         return options.presets
     sigma_mps = log.robot.wheel_speed_sigma_mps if options.sigma_mps is None else options.sigma_mps
-    is_paper = log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
+    is_paper = (
+        log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
+    )
     chosen = ["paper" if is_paper else "real-wheels"]
     chosen += ["camera"] if options.sensor == "camera" else []
     chosen += ["bearing-only"] if options.observation == "direction" else []
@@ -157,10 +159,11 @@ def _collection_params(options: RunOptions, collection: str | None) -> dict[str,
 
 
 def _recovery_params(recovery: str) -> dict[str, Number]:
-    if recovery == "off":
-        return {"recovery": 0}
-    # A map that grows never settles: it takes several beacons that fit a pose elsewhere to be lost.
-    return {"recovery": 1} | ({"settled_us": 1_000_000_000} if recovery == "growing" else {})
+    params: dict[str, Number] = {"recovery": int(recovery != "off")}
+    if recovery == "growing":
+        # Nothing settles: to be lost takes several beacons that fit a pose elsewhere.
+        params["settled_us"] = 1_000_000_000
+    return params
 
 
 def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:

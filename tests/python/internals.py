@@ -1,6 +1,7 @@
-"""The firmware's insides for tests: extensions from headers that are not the product's, built into build/internals.
+"""The firmware's insides for tests: extensions from headers that are not the product's, in build/internals.
 
-That of the estimator has the same sizes as the product's own (`bslam.core.build`), so what stands in a `Slam` can be read by it.
+That of the estimator has the sizes of the product's own (`bslam.core.build`), so it reads what stands in a
+`Slam`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "internals"
 
 @cache
 def internals(real: str, beacons_max: int) -> Any:
-    """The estimator's insides: the module, with `ffi` and `lib`, of the smallest build with so many beacons."""
+    """The estimator's insides: a module with `ffi` and `lib`, the smallest build of so many beacons."""
     size = next(one for one in SIZE_CLASSES if one >= beacons_max)
     return _extension(f"_internals_{real}_{size}", HEADER, "bslam", macros_of(real, size))
 
@@ -85,13 +86,13 @@ def _samples(module: Any, signatures: Floats, real: str) -> Any:
 class Learner:
     """A classifier a beacon, which tells it from the others by its signature: one C learner.
 
-    seeds: (n, 71) signatures of things that are no beacon here. machines: how many it must hold. real:
+    seeds: (n, 71) signatures of things that are no beacon here. classifiers: how many it must hold. real:
     "float", samples of 8 bits as on the target, or "double", float32 samples. Raises BslamError for another
     shape of seeds, CoreError if they are too many or not finite.
     """
 
-    def __init__(self, seeds: Floats | None = None, *, machines: int = 20, real: str = "float") -> None:
-        self._real, self._module = real, internals(real, machines)
+    def __init__(self, seeds: Floats | None = None, *, classifiers: int = 20, real: str = "float") -> None:
+        self._real, self._module = real, internals(real, classifiers)
         self._lib, self._ffi = self._module.lib, self._module.ffi
         self._learner = self._ffi.new("bslam_learner_t *")
         nothing = np.empty((0, SIGNATURE_SIZE), np.float32)
@@ -103,26 +104,28 @@ class Learner:
         _ensure(self._module, status, message)
 
     def add(self) -> int:
-        """A new machine's handle. Raises CoreError if there is no room."""
-        machine = self._ffi.new("int32_t *")
-        self._ensure(self._lib.bslam_learner_add(self._learner, machine), "another machine")
-        return machine[0]
+        """A new classifier's handle. Raises CoreError if there is no room."""
+        classifier = self._ffi.new("int32_t *")
+        self._ensure(self._lib.bslam_learner_add(self._learner, classifier), "another classifier")
+        return classifier[0]
 
-    def remove(self, machine: int) -> None:
-        """Forgets a machine. Raises CoreError if there is none."""
-        self._ensure(self._lib.bslam_learner_remove(self._learner, machine), f"machine {machine}")
+    def remove(self, classifier: int) -> None:
+        """Forgets a classifier. Raises CoreError if there is none."""
+        self._ensure(self._lib.bslam_learner_remove(self._learner, classifier), f"classifier {classifier}")
 
-    def show(self, machine: int, signature: Floats) -> None:
-        """Gives a machine a signature (71,) of its beacon to learn from.
+    def show(self, classifier: int, signature: Floats) -> None:
+        """Gives a classifier a signature (71,) of its beacon to learn from.
 
-        Raises CoreError if there is no such machine or the signature is not finite, BslamError for another
+        Raises CoreError if there is no such classifier or the signature is not finite, BslamError for another
         shape.
         """
         if np.shape(signature) != (SIGNATURE_SIZE,):
             raise BslamError(f"signature of shape {np.shape(signature)}; allowed: ({SIGNATURE_SIZE},)")
         values = np.ascontiguousarray(signature, np.float32)
-        status = self._lib.bslam_learner_show(self._learner, machine, self._ffi.from_buffer("float[]", values))
-        self._ensure(status, f"a signature for machine {machine}")
+        status = self._lib.bslam_learner_show(
+            self._learner, classifier, self._ffi.from_buffer("float[]", values)
+        )
+        self._ensure(status, f"a signature for classifier {classifier}")
 
     def work(self, budget: int) -> bool:
         """At most `budget` pieces of training; True if work is left."""
@@ -133,25 +136,19 @@ class Learner:
         while self.work(1000):
             pass
 
-    def decide(self, machines: list[int], signatures: Floats) -> Floats:
-        """Decision values (signatures, machines) of signatures (n, 71).
-
-        Raises CoreError if there is no such machine or a signature is not finite, BslamError for another
-        shape.
-        """
+    def decide(self, classifiers: list[int], signatures: Floats) -> Floats:
+        """Decision values (signatures, classifiers) of signatures (n, 71)."""
         samples = _samples(self._module, signatures, self._real)
-        values = np.empty((len(samples), len(machines)), np.float32)
-        value = self._ffi.new("float *")
-        for column, machine in enumerate(machines):
+        values = np.empty((len(samples), len(classifiers)), np.float32)
+        for column, classifier in enumerate(classifiers):
+            weights = self._ffi.addressof(self._learner.classifiers[classifier], "weights")
             for row in range(len(samples)):
-                status = self._lib.bslam_learner_decide(self._learner, machine, samples + row, value)
-                self._ensure(status, f"machine {machine}")
-                values[row, column] = value[0]
+                values[row, column] = self._lib.bslam_sample_decide(weights, samples + row)
         return values
 
-    def samples(self, machine: int) -> int:
-        """How many samples a machine keeps; 0 if there is no such machine."""
-        return self._lib.bslam_learner_samples(self._learner, machine)
+    def samples(self, classifier: int) -> int:
+        """How many samples a classifier keeps; 0 if there is no such classifier."""
+        return self._lib.bslam_learner_samples(self._learner, classifier)
 
     @property
     def counters(self) -> dict[str, int]:

@@ -3,7 +3,7 @@
 
 enum { STEP_US = 40000 };
 
-bslam_settings_t kept_params(void)
+bslam_settings_t kept_settings(void)
 {
     bslam_settings_t settings = unit_settings();
     settings.association = 3;
@@ -27,7 +27,7 @@ const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_F
 
 void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance)
 {
-    const bslam_settings_t settings = kept_params();
+    const bslam_settings_t settings = kept_settings();
     int bad_id;
     memset(slam, 0, sizeof *slam);
     assert_int_equal(bslam_slam_init(slam, &settings, &bad_id), BSLAM_OK);

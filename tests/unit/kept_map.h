@@ -8,17 +8,17 @@
 
 enum { KEPT_BYTES_MAX = 65536 };
 
-/// Parameters of association by position and looks.
-bslam_settings_t kept_params(void);
+/// Settings of association by position and appearance.
+bslam_settings_t kept_settings(void);
 
 /// A signature of an object, a little different with each view.
 const float *kept_signature(int object, int view, float signature[BSLAM_SAMPLE_FEATURES]);
 
-/// A pipeline that has seen `objects` <= 6 beacons often enough to know their places and looks, and one in
-/// direction only. `looks` stays attached; NULL: none.
+/// A pipeline that has seen `objects` <= 6 beacons often enough to know their places and appearance, and one
+/// in direction only. `appearance` stays attached; NULL: none.
 void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects);
 
-/// The same parameters and looks, and no map yet.
+/// The same settings and appearance, and no map yet.
 void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance);
 
 /// Behind the rows in use the covariance's memory holds nothing; zeros here, as a load leaves them.

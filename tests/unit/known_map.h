@@ -1,4 +1,4 @@
-/// Maps, and machines that know their beacons, for tests of association to decide in.
+/// Maps, and classifiers that know their beacons, for tests of association to decide in.
 #ifndef UNIT_KNOWN_MAP_H
 #define UNIT_KNOWN_MAP_H
 
@@ -7,7 +7,7 @@
 /// Robot at the origin, which it knows exactly; beacons with deviations of 0.1 m in each coordinate.
 bslam_ekf_t unit_map_of(const bslam_settings_t *settings, const double (*places)[2], int count);
 
-/// A machine for beacon `index` that has learned from `samples` (16 at most), and answers value * first
+/// A classifier for beacon `index` that has learned from `samples` (16 at most), and answers value * first
 /// feature.
 void unit_give_machine(bslam_appearance_t *appearance, int index, double value, int samples);
 

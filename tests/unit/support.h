@@ -64,7 +64,7 @@ void unit_mean_direction(double start, double turn, double *cosine, double *sine
 /// The angle from b to a, in [-pi, pi]: how far two directions differ.
 double unit_angle_between(double a, double b);
 
-/// A sighting with a distance, or in direction only.
+/// A sighting with a distance, or bearing-only.
 bslam_sighting_t unit_polar(double bearing_rad, double range_m, int32_t label);
 bslam_sighting_t unit_direction(double bearing_rad, int32_t label);
 

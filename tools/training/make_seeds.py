@@ -12,10 +12,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from bslam.core.learner import SIGNATURE_SIZE, encode
 from numpy.typing import NDArray
 
-from bslam.core.raw import library
+from bslam.core.appearance import SIGNATURE_SIZE, encode
 from tools.training.looks import generic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,8 +24,7 @@ HEADER = ROOT / "firmware/models/seeds.h"
 
 def stored(signatures: NDArray[np.float32]) -> NDArray[np.int8]:
     """The signatures (n, 71) as the learner keeps samples, in 127ths."""
-    samples = encode(library("float", 1), signatures)
-    return np.array([list(one.q)[:SIGNATURE_SIZE] for one in samples], np.int8)
+    return encode(signatures)[:, :SIGNATURE_SIZE].astype(np.int8)
 
 
 def header(seeds: NDArray[np.int8]) -> str:

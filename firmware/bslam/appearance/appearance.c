@@ -69,25 +69,6 @@ void bslam_appearance_clear(bslam_appearance_t *appearance)
     }
 }
 
-/// A classifier's number, if it is one.
-static int16_t classifier_or_none(const bslam_appearance_t *appearance, int16_t classifier)
-{
-    const bool is_one = bslam_is_count(classifier, BSLAM_LEARNER_SLOTS - 1) &&
-                        appearance->learner.classifiers[classifier].used;
-    return is_one ? classifier : BSLAM_NO_CLASSIFIER;
-}
-
-void bslam_appearance_mend(bslam_appearance_t *appearance, const bslam_sample_t *seeds, int32_t seed_count)
-{
-    bslam_learner_mend(&appearance->learner, seeds, seed_count);
-    for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
-        bslam_beacon_appearance_t *of = &appearance->of[b];
-        of->classifier = classifier_or_none(appearance, of->classifier);
-        of->twin = classifier_or_none(appearance, of->twin);
-        bslam_mend_flag(&of->is_trained);
-    }
-}
-
 void bslam_appearance_forget(bslam_appearance_t *appearance, int index, int count)
 {
     release(appearance, index, count);
@@ -166,7 +147,7 @@ static void note_class(bslam_beacon_appearance_t *known, uint8_t beacon_class)
     known->seen_as[beacon_class - 1]++;
 }
 
-// ---- sides ------------------------------------------------------------------------------------------------
+// ---- viewpoints -------------------------------------------------------------------------------------------
 
 /// How many sectors lie from one to the other, the shorter way round.
 static int sectors_between(int one, int other)
@@ -196,14 +177,7 @@ bslam_real_t bslam_appearance_viewpoint_odds(const bslam_appearance_t *appearanc
     return -settings->viewpoint_low * (bslam_real_t)(far - NEAR_SECTORS) / (FAR_SECTORS - NEAR_SECTORS);
 }
 
-// ---- views ------------------------------------------------------------------------------------------------
-
-void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam_real_t view_score)
-{
-    appearance->of[index].view_score = view_score;
-}
-
-// ---- waiting ----------------------------------------------------------------------------------------------
+// ---- delayed decisions ------------------------------------------------------------------------------------
 
 /// How long matches with a beacon have waited; 0 if not, or if none did within the last decision_delay_us.
 static uint32_t delayed_us(const bslam_beacon_appearance_t *known, const bslam_settings_t *settings,

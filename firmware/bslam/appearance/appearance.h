@@ -55,10 +55,6 @@ BSLAM_MUST_CHECK bslam_status_t bslam_appearance_init(bslam_appearance_t *appear
 /// Forgets all beacons, in time for another map.
 void bslam_appearance_clear(bslam_appearance_t *appearance);
 
-/// Of memory that may be damaged: makes every number one that may be used. Seeds as bslam_learner_init has
-/// them. A damaged classifier judges worse, until its next training.
-void bslam_appearance_mend(bslam_appearance_t *appearance, const bslam_sample_t *seeds, int32_t seed_count);
-
 /// What the classifier of beacon `index` says of a sample.
 bslam_opinion_t bslam_appearance_ask(const bslam_appearance_t *appearance, const bslam_settings_t *settings,
                                      int index, const bslam_sample_t *sample);
@@ -78,9 +74,6 @@ uint8_t bslam_appearance_class(const bslam_appearance_t *appearance, int index);
 /// classifier is shown it, unless the last one was a few centimetres ago. O(classifiers).
 void bslam_appearance_train(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,
                             int count, uint32_t travelled_um, const bslam_sighting_t *sighting);
-
-/// Beacon `index` was matched, or has begun, with this `view_score` (association.h).
-void bslam_appearance_note_view(bslam_appearance_t *appearance, int index, bslam_real_t view_score);
 
 /// A match with beacon `index` waits at this moment: association.h, `delayed_for`.
 void bslam_appearance_note_delay(bslam_appearance_t *appearance, const bslam_settings_t *settings, int index,

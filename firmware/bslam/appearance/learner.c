@@ -54,23 +54,6 @@ static void strike(bslam_classifier_t *classifier, int32_t first, int32_t count)
     classifier->negatives = kept;
 }
 
-void bslam_learner_mend(bslam_learner_t *learner, const bslam_sample_t *seeds, int32_t seed_count)
-{
-    const int32_t sample_end = BSLAM_OWN_SAMPLES + seed_count;
-    learner->seeds = seeds;
-    learner->seed_count = seed_count;
-    for (int32_t m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
-        bslam_classifier_t *classifier = &learner->classifiers[m];
-        bslam_mend_flag(&classifier->used);
-        bslam_mend_flag(&classifier->trained);
-        bslam_mend_flag(&classifier->waiting);
-        classifier->samples = (uint8_t)bslam_least(classifier->samples, BSLAM_PER_CLASSIFIER);
-        classifier->negatives = (uint16_t)bslam_least(classifier->negatives, BSLAM_NEGATIVES_MAX);
-        strike(classifier, sample_end, UINT16_MAX);
-    }
-    bslam_training_mend(learner);
-}
-
 bslam_status_t bslam_learner_remove(bslam_learner_t *learner, int32_t classifier)
 {
     if (!exists(learner, classifier)) {

@@ -76,10 +76,6 @@ typedef struct bslam_learner {
 BSLAM_MUST_CHECK bslam_status_t bslam_learner_init(bslam_learner_t *learner, const bslam_sample_t *seeds,
                                                    int32_t seed_count);
 
-/// Of memory that may be damaged: makes every count and number one that may be used. A training under way that
-/// cannot be is put off. Seeds as bslam_learner_init has them. O(classifiers, and what is on their lists).
-void bslam_learner_mend(bslam_learner_t *learner, const bslam_sample_t *seeds, int32_t seed_count);
-
 /// A new classifier's handle. BSLAM_E_MAP_FULL: no slot is free.
 BSLAM_MUST_CHECK bslam_status_t bslam_learner_add(bslam_learner_t *learner, int32_t *classifier);
 

@@ -1,4 +1,4 @@
-/// What the two files of the learner share. Not for users of the library.
+/// What the two files of the learner share.
 #ifndef BSLAM_APPEARANCE_LEARNER_INTERNAL_H
 #define BSLAM_APPEARANCE_LEARNER_INTERNAL_H
 
@@ -14,8 +14,5 @@ void bslam_training_pause(bslam_learner_t *learner);
 
 /// The same, if it uses one of the samples first to first + count - 1.
 void bslam_training_pause_if_used(bslam_learner_t *learner, int32_t first, int32_t count);
-
-/// Of memory that may be damaged: puts the training off unless all of it may be used.
-void bslam_training_mend(bslam_learner_t *learner);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "base/real.h"
 
@@ -59,16 +60,7 @@ float bslam_sample_decide(const bslam_weights_t *weights, const bslam_sample_t *
     return weights->unit * (float)sum;
 }
 
-#if BSLAM_SAMPLE_FLOAT
-void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded)
-{
-    rounded->unit = 1.0f;
-    for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
-        rounded->w[i] = weights[i];
-    }
-}
-#else
-void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded)
+float bslam_weights_to_words(const float weights[BSLAM_SAMPLE_SIZE], int16_t words[BSLAM_SAMPLE_SIZE])
 {
     float largest = 0.0f;
     for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
@@ -76,11 +68,19 @@ void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t
         largest = size > largest ? size : largest;
     }
     const float per_unit = largest > 0.0f ? 32767.0f / largest : 0.0f;
-    rounded->unit = largest / 32767.0f;
     for (int32_t i = 0; i < BSLAM_SAMPLE_SIZE; i++) {
         const float w = weights[i] * per_unit;
-        const float rounded_w = w + (w < 0.0f ? -0.5f : 0.5f);
-        rounded->w[i] = (int16_t)(rounded_w > -32768.0f && rounded_w < 32768.0f ? rounded_w : 0.0f);
+        words[i] = (int16_t)(w + (w < 0.0f ? -0.5f : 0.5f));
     }
+    return largest;
 }
+
+void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded)
+{
+#if BSLAM_SAMPLE_FLOAT
+    rounded->unit = 1.0f;
+    memcpy(rounded->w, weights, sizeof rounded->w);
+#else
+    rounded->unit = bslam_weights_to_words(weights, rounded->w) / 32767.0f;
 #endif
+}

@@ -47,6 +47,9 @@ float bslam_sample_distance2(const bslam_sample_t *a, const bslam_sample_t *b);
 /// w . q, exact for 8-bit samples but for two roundings.
 float bslam_sample_decide(const bslam_weights_t *weights, const bslam_sample_t *sample);
 
+/// Weights in units of a 32767th of the largest of them, which is returned.
+float bslam_weights_to_words(const float weights[BSLAM_SAMPLE_SIZE], int16_t words[BSLAM_SAMPLE_SIZE]);
+
 /// Rounds weights to half a 32767th of the largest of them; for float samples nothing is rounded.
 void bslam_weights_round(const float weights[BSLAM_SAMPLE_SIZE], bslam_weights_t *rounded);
 

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-// Chosen by trial. A tolerance of 0.2 costs no decisions, 0.7 some.
+// A tolerance of 0.2 costs no decisions, 0.7 some.
 static const float COST = 10.0f;
 static const float TOLERANCE = 0.2f;
 
@@ -324,56 +324,4 @@ bool bslam_learner_work(bslam_learner_t *learner, int32_t budget)
         done = work_some(learner, &samples, left);
     }
     return learner->training.stage != BSLAM_STAGE_IDLE || next_waiting(learner) >= 0;
-}
-
-// ---- mending ----------------------------------------------------------------------------------------------
-
-static bool is_row(const bslam_learner_t *learner, const bslam_solver_row_t *row)
-{
-    const int32_t first = learner->training.classifier * BSLAM_PER_CLASSIFIER;
-    return row->positive ? row->sample >= first && row->sample < first + BSLAM_PER_CLASSIFIER
-                         : row->sample < BSLAM_OWN_SAMPLES + learner->seed_count;
-}
-
-/// Rows of the classifier's own samples and of others, and the order in which they are looked at.
-static bool is_solver(bslam_learner_t *learner)
-{
-    bslam_solver_t *solver = &learner->training.solver;
-    bool good = bslam_is_count(solver->count, BSLAM_SOLVER_ROWS_MAX) &&
-                bslam_is_count(solver->active, solver->count) && bslam_is_count(solver->next, solver->active);
-    bslam_mend_flag(&solver->thorough);
-    for (int32_t i = 0; good && i < solver->count; i++) {
-        bslam_mend_flag(&solver->rows[i].positive);
-        good = is_row(learner, &solver->rows[i]) && solver->order[i] < solver->count;
-    }
-    return good;
-}
-
-static bool is_training(bslam_learner_t *learner)
-{
-    bslam_training_t *training = &learner->training;
-    const bool has_rows = training->stage >= BSLAM_STAGE_RECALL;
-    const bool recalls = training->stage == BSLAM_STAGE_RECALL;
-    return training->stage <= BSLAM_STAGE_SOLVE && bslam_is_count(training->first_block, TURNS) &&
-           training->block_step >= 1 && training->block_step <= TURNS &&
-           bslam_is_count(training->block, block_count(learner) + TURNS) &&
-           bslam_is_count(training->spare + 1, BSLAM_NEGATIVES_MAX + 1) &&
-           bslam_is_count(training->steps_left, BSLAM_LEARNER_STEPS_MAX) &&
-           bslam_is_count(training->own_recalled, BSLAM_PER_CLASSIFIER) &&
-           bslam_is_count(training->negatives_recalled, BSLAM_NEGATIVES_MAX) &&
-           (!recalls || training->solver.count == training->own_recalled + training->negatives_recalled) &&
-           (!has_rows || is_solver(learner));
-}
-
-void bslam_training_mend(bslam_learner_t *learner)
-{
-    bslam_training_t *training = &learner->training;
-    const bool is_classifier = bslam_is_count(training->classifier, BSLAM_LEARNER_SLOTS - 1);
-    if (is_classifier && (training->stage == BSLAM_STAGE_IDLE || is_training(learner))) {
-        return;
-    }
-    training->classifier = is_classifier ? training->classifier : 0;
-    training->stage = BSLAM_STAGE_IDLE;
-    training->solver.count = 0;
-    in_training(learner)->waiting = true;
 }

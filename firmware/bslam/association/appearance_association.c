@@ -1,4 +1,4 @@
-// Position selects candidates, looks decide: paper Section IV. MATH "Position and appearance".
+// Position selects candidates, appearance decides: paper Section IV. MATH "Position and appearance".
 #include "bslam/association/association.h"
 #include "bslam/association/conditional.h"
 #include "bslam/association/association_internal.h"
@@ -35,7 +35,7 @@ static bslam_real_t log_lost(const bslam_sighting_t *taken, const bslam_sighting
     return sighting->has_range && !taken->has_range ? -bslam_ln(LN_NINE * sighting->range_m) : 0;
 }
 
-/// What looks add to the score.
+/// What appearance adds to the score.
 static bslam_real_t appearance_score(const bslam_settings_t *settings, const bslam_opinion_t *opinion)
 {
     const bslam_real_t odds =
@@ -53,7 +53,7 @@ static bslam_real_t class_odds(const bslam_sighting_frame_t *frame, const bslam_
                                                                    sighting->beacon_class);
 }
 
-/// What the side from which the robot sees a beacon adds to the score, where it is known.
+/// What the viewpoint adds to the score, where it is known.
 static bslam_real_t viewpoint_odds(const bslam_sighting_frame_t *frame, int beacon)
 {
     if (frame->appearance == NULL || !bslam_has_viewpoint(&frame->ekf->beacons[beacon])) {
@@ -77,8 +77,7 @@ static bool is_old(const bslam_sighting_frame_t *frame, int beacon)
            seen_ago_us(frame, beacon) > frame->settings->decision_delay_us;
 }
 
-/// The best score without again_odds that a beacon has had since it came into view, where its next one is
-/// this.
+/// The best score without again_odds since a beacon came into view, where its next one is this.
 static bslam_real_t view_score(const bslam_sighting_frame_t *frame, int beacon, bslam_real_t score)
 {
     const bool is_in_view =
@@ -88,9 +87,8 @@ static bslam_real_t view_score(const bslam_sighting_frame_t *frame, int beacon, 
                : score;
 }
 
-/// What being seen in one of the last frames adds to the score: what was in view a moment ago is in view, and
-/// its sighting is this one or was missed. As something else it was missed; and whether it was in view at all
-/// is no surer than the best that spoke for it.
+/// What was in view a moment ago is in view: its sighting is this one or was missed. Whether it was in view
+/// at all is no surer than the best that spoke for it.
 static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                                int beacon)
 {
@@ -104,9 +102,9 @@ static bslam_real_t again_odds(const bslam_sighting_frame_t *frame, const bslam_
                                      : clip(VIEW_WORTH * frame->appearance->of[beacon].view_score, 0, odds);
 }
 
-/// Whether a sighting is called something else than a beacon, and that says enough. Of an old one that does
-/// not count the map hardly knows where it stands, and its classifier knows little, so that most things may
-/// be it: what has a place of its own and is called something else is another.
+/// Whether a sighting is called something else than a beacon, and that says enough. The map hardly knows
+/// where an old unconfirmed one stands, and its classifier knows little: what has a place and another class
+/// is another.
 static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting, int beacon)
 {
     const bslam_beacon_t *other = &frame->ekf->beacons[beacon];
@@ -114,7 +112,7 @@ static bool is_another_kind(const bslam_sighting_frame_t *frame, const bslam_sig
            (frame->appearance == NULL || (sighting->has_range && is_old(frame, beacon)));
 }
 
-/// Weighs a sighting against a beacon, given the matches so far. False if it cannot be that one.
+/// Weighs a sighting against a beacon, conditional on the matches so far. False if it cannot be that one.
 static bool weigh(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i, int beacon,
                   const bslam_sample_t *sample, candidate_t *found)
 {
@@ -154,7 +152,7 @@ static bool is_taken(const bslam_sighting_frame_t *frame, const bslam_record_t *
     return false;
 }
 
-/// The sample of a sighting, where there are looks to compare it with; else NULL.
+/// The sample of a sighting, where there is an appearance to compare it with; else NULL.
 static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int i, bslam_sample_t *sample)
 {
     const float *signature = frame->sightings[i].signature;
@@ -165,8 +163,7 @@ static const bslam_sample_t *sample_of(const bslam_sighting_frame_t *frame, int 
     return sample;
 }
 
-/// Whether a classifier may learn from a match: it is near, no other beacon comes close, and it looks like
-/// it, if that is known.
+/// Whether a classifier may learn from a match: it is near, unrivalled, and alike where that is known.
 static bool is_sure(const bslam_settings_t *settings, const candidate_t *best, bslam_real_t lead)
 {
     const bool is_alike =
@@ -174,26 +171,27 @@ static bool is_sure(const bslam_settings_t *settings, const candidate_t *best, b
     return best->distance2 <= settings->learn_d2 && lead >= settings->learn_lead && is_alike;
 }
 
-/// Whether a classifier of few samples is against a match. It may be another beacon that stands near, and the
-/// two are told apart once both are in view; or else the classifier has not seen that side of its beacon yet.
+/// Whether a classifier of few samples is against a match. It may be another beacon that stands near, which
+/// shows once both are in view; or the classifier does not know this viewpoint yet.
 static bool is_doubted(const bslam_sighting_frame_t *frame, const candidate_t *best)
 {
     return best->opinion.weight < 0.5f && best->score < frame->settings->learn_lead &&
            appearance_score(frame->settings, &best->opinion) < 0;
 }
 
-/// Whether a match that little speaks for can wait: another beacon in view holds the robot in its place.
-static bool can_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+/// Whether a match that little speaks for can be delayed: another beacon in view holds the robot in its
+/// place.
+static bool can_be_delayed(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
     return frame->appearance != NULL && best->score < frame->settings->decision_delay_score &&
            bslam_is_placed(frame->ekf, frame->settings->again_us, beacon, frame->time_us);
 }
 
-/// Whether a match has to wait. Not one with a beacon in view: that it was seen just now says more.
-static bool has_to_wait(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
+/// Whether a match is delayed. Not one with a beacon in view: that it was seen just now says more.
+static bool is_delayed(const bslam_sighting_frame_t *frame, int beacon, const candidate_t *best)
 {
     return best->score > 0 && seen_ago_us(frame, beacon) > frame->settings->decision_delay_us &&
-           (is_doubted(frame, best) || can_wait(frame, beacon, best)) &&
+           (is_doubted(frame, best) || can_be_delayed(frame, beacon, best)) &&
            !bslam_appearance_is_due(frame->appearance, frame->settings, beacon, frame->time_us);
 }
 
@@ -231,7 +229,7 @@ static void find_best(const bslam_sighting_frame_t *frame, bslam_conditional_t *
     // Another beacon, or a new one, whose score is 0.
     match->lead = best.score - (has_second && second > 0 ? second : 0);
     match->sure = match->beacon >= 0 && is_sure(frame->settings, &best, match->lead);
-    match->delayed_for = match->beacon >= 0 && has_to_wait(frame, match->beacon, &best) ? match->beacon : -1;
+    match->delayed_for = match->beacon >= 0 && is_delayed(frame, match->beacon, &best) ? match->beacon : -1;
 }
 
 static bool is_open(const bslam_match_t *match)
@@ -239,8 +237,7 @@ static bool is_open(const bslam_match_t *match)
     return match->verdict == BSLAM_VERDICT_DEFER && match->reason != BSLAM_REASON_AMBIGUOUS;
 }
 
-/// The sighting without a beacon yet whose choice is the clearest; -1: none has a score above 0, or
-/// it waits.
+/// The open sighting whose choice is the clearest; -1: none has a score above 0, or it is delayed.
 static int next_to_settle(const bslam_record_t *records, int count)
 {
     int next = -1;
@@ -254,9 +251,9 @@ static int next_to_settle(const bslam_record_t *records, int count)
     return next;
 }
 
-/// Takes a match into what is given for the others.
-static void give(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
-                 const bslam_match_t *match)
+/// The other matches are conditional on this one from now on.
+static void condition_on(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
+                         const bslam_match_t *match)
 {
     const bslam_sighting_t taken =
         bslam_ekf_taken_as(&frame->ekf->beacons[match->beacon], &frame->sightings[i]);
@@ -293,7 +290,7 @@ static bool is_contested(const bslam_sighting_frame_t *frame, bslam_record_t *re
 }
 
 /// Gives each beacon to one sighting at most, the clearest choice first. A choice that is not clear yet is
-/// made anew, given the matches so far.
+/// made anew, conditional on the matches so far.
 static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional,
                    bslam_record_t *records)
 {
@@ -303,7 +300,7 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *con
             continue;
         }
         records[next].match.verdict = BSLAM_VERDICT_MATCH;
-        give(frame, conditional, next, &records[next].match);
+        condition_on(frame, conditional, next, &records[next].match);
         for (int i = 0; i < frame->count; i++) {
             const bool is_clear = records[i].match.lead >= frame->settings->learn_lead;
             if (is_open(&records[i].match) &&
@@ -314,10 +311,9 @@ static void settle(const bslam_sighting_frame_t *frame, bslam_conditional_t *con
     }
 }
 
-/// A beacon that a sighting clearly looks like, that is not seen in this frame and that could be here, though
-/// it is no candidate: the map has it in the wrong place, rather than that there is a new one; -1: there is
-/// none. For a while, if the robot is right: what is still elsewhere then is another, or the map has it where
-/// it will never be found.
+/// A beacon that a sighting clearly resembles, that is not seen in this frame and could be here, though it is
+/// no candidate; -1: none. Then the map has it in the wrong place, rather than that there is a new one: for a
+/// while, if the robot is right. What is still elsewhere then is another.
 static int resembles_another(const bslam_sighting_frame_t *frame, bslam_conditional_t *conditional, int i,
                              const bslam_record_t *records)
 {
@@ -337,9 +333,9 @@ static int resembles_another(const bslam_sighting_frame_t *frame, bslam_conditio
     return -1;
 }
 
-/// Whether a sighting is too near to the beacon that fits it best to be new. Of one that was seen a few times
-/// long ago the map hardly knows where it stands, so that much is nearly it: what has a distance, and so a
-/// place, is new there if that is likelier.
+/// Whether a sighting is too near to the beacon that fits it best to be new. Of one seen a few times long ago
+/// the map hardly knows where it stands: what has a distance, and so a place, is new there if that is
+/// likelier.
 static bool is_near(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                     const bslam_match_t *match)
 {

@@ -27,8 +27,7 @@ static void keep_one_to_one(const bslam_sighting_frame_t *frame, bslam_record_t 
 
 // ---- known identity ---------------------------------------------------------------------------------------
 
-// Tentative beacons of one label. More than a few in a second are no more than the false sightings there
-// are.
+// Tentative beacons of one label: more than a few in a second are false sightings.
 enum { COMPETITORS_MAX = 8 };
 
 static bslam_real_t mahalanobis2(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
@@ -59,9 +58,9 @@ static bslam_real_t euclidean2(const bslam_sighting_frame_t *frame, const bslam_
     return difference * difference;
 }
 
-/// The beacon that a label tells. Until it is confirmed any sighting may be the false one, the first as well
-/// as those that contradict it: each of these starts a competitor of the same label, and the first that is
-/// confirmed stays. So the nearest, and a new one if the gate has that one out and it is not even near.
+/// The beacon of a label. Until it is confirmed any sighting may be the false one, the first as well as those
+/// that contradict it: each of these starts a competitor of the same label, and the first that is confirmed
+/// stays. So the nearest, and a new one if the gate has that one out and it is not even near.
 static void match_label(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
                         bslam_match_t *match)
 {

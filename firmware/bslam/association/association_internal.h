@@ -1,4 +1,4 @@
-/// What the methods share. Not for users of the library.
+/// What the methods share.
 #ifndef BSLAM_ASSOCIATION_ASSOCIATION_INTERNAL_H
 #define BSLAM_ASSOCIATION_ASSOCIATION_INTERNAL_H
 

@@ -1,6 +1,8 @@
 #include "bslam/association/duplicates.h"
 
-// Beacons that have left for being in one's place before it is that one that leaves.
+#include "bslam/association/viewpoint.h"
+
+// So many duplicates of one beacon leave before it is that one that leaves.
 enum { OUSTED_MAX = 3 };
 
 // Things of two classes are two, unless their middles are nearer to each other than any two hang or stand.
@@ -15,18 +17,12 @@ static bool is_seen(const bslam_ekf_t *ekf, int index, int64_t time_us)
     return ekf->beacons[index].last_seen_us == time_us;
 }
 
-/// Whether a beacon's first two state values are its place.
-static bool has_place(const bslam_beacon_t *beacon)
-{
-    return beacon->kind == BSLAM_BEACON_POINT || beacon->kind == BSLAM_BEACON_SIZED;
-}
-
 /// Whether two beacons may stand in the same place, as far as the map knows; no farther apart than so far.
 static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b,
                          bslam_real_t apart_m)
 {
     const int at = ekf->beacons[a].at, bt = ekf->beacons[b].at;
-    if (!has_place(&ekf->beacons[a]) || !has_place(&ekf->beacons[b])) {
+    if (!bslam_has_viewpoint(&ekf->beacons[a]) || !bslam_has_viewpoint(&ekf->beacons[b])) {
         return false;
     }
     const bslam_real_t dx = ekf->mean[at] - ekf->mean[bt];
@@ -47,8 +43,8 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *setting
 }
 
 /// Whether two beacons stand one behind the other, as the robot sees it, and one of them was hardly ever
-/// seen: two distances of one far thing, each of which began a beacon. Without an arc tangent, by the sine of
-/// the angle between them: all pairs of what is seen are asked in every frame.
+/// seen: two distances of one far thing. By the sine of the angle between them, since all pairs are asked in
+/// every frame.
 static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_settings_t *settings, int a, int b)
 {
     const uint32_t few = (uint32_t)settings->doubt_sightings;
@@ -69,8 +65,7 @@ static bool is_one_direction(const bslam_ekf_t *ekf, const bslam_settings_t *set
            b2 < FARTHER2 * a2;
 }
 
-/// A door and the sign beside it are two, however little the map knows of where they stand. A cabinet that is
-/// taken for a door again and again is one.
+/// A door and the sign beside it are two, however little the map knows of where they stand.
 static bool are_of_two_classes(const bslam_appearance_t *appearance, int a, int b)
 {
     const uint8_t one = bslam_appearance_class(appearance, a), other = bslam_appearance_class(appearance, b);
@@ -88,8 +83,8 @@ static bool count_pair(bslam_beacon_appearance_t *younger, uint32_t older_uid, b
     return younger->alone >= limit;
 }
 
-/// Which of two leaves: the one with fewer sightings, unless others have left for being in the same place
-/// again and again while it was not seen: then what was there is there no longer.
+/// Which of two leaves: the one with fewer sightings, unless several have left for being in the place of one
+/// that was not seen: then what was there is there no longer.
 static int who_leaves(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
                       const bslam_settings_t *settings, int a, int b, bool in_place, int64_t time_us)
 {
@@ -101,8 +96,8 @@ static int who_leaves(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
     return is_ousted && appearance->of[more].ousted >= OUSTED_MAX ? more : less;
 }
 
-/// The oldest other beacon that beacon `index` may be: one in its place, or else one in its direction;
-/// BSLAM_NO_DUPLICATE if there is none.
+/// The oldest other beacon that beacon `index` may be: in its place, or else in its direction;
+/// BSLAM_NO_DUPLICATE: none.
 static int find_other(const bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
                       const bslam_settings_t *settings, int index, bool *in_place)
 {

@@ -1,5 +1,5 @@
-/// Two beacons of the map in one place, of which one is a mistake, or no longer there; and two in one
-/// direction from the robot, of which one was hardly ever seen. MATH "Position and appearance".
+/// Two beacons of the map in one place, of which one is a mistake or no longer there; and two in one
+/// direction, of which one was hardly ever seen. MATH "Position and appearance".
 #ifndef BSLAM_ASSOCIATION_DUPLICATES_H
 #define BSLAM_ASSOCIATION_DUPLICATES_H
 
@@ -8,9 +8,8 @@
 
 #define BSLAM_NO_DUPLICATE (-1)
 
-/// Goes through the beacons that the frame of time_us showed. Answers which beacon is to leave, because it
-/// has been in another's place, or direction, for long enough without being seen beside it;
-/// BSLAM_NO_DUPLICATE: none. O(beacons seen * beacons).
+/// Which beacon is to leave because it was in another's place, or direction, for long enough without being
+/// seen beside it; BSLAM_NO_DUPLICATE: none. O(beacons seen * beacons).
 int bslam_duplicates_settle(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
                             const bslam_settings_t *settings, int64_t time_us);
 

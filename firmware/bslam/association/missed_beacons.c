@@ -6,14 +6,12 @@
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 static const bslam_real_t STEPS_PER_M = BSLAM_R(10.0);  // of a kept distance
-// A view is from the same place if its distance differs by no more than this share: with the sector's 22
-// degrees, the line of sight passes the same corners.
+// A view is from the same place if its distance differs by no more than this share.
 static const bslam_real_t SAME_PLACE = BSLAM_R(0.25);
-// Of what was seen to either side: what is nearer to the edge may be cut off.
+// Of the field of view: what is nearer to the edge may be cut off.
 static const bslam_real_t INSIDE = BSLAM_R(0.8);
 static const bslam_real_t HEADING_VAR_MAX_RAD2 = BSLAM_R(0.01);
-// Missed all along so much way it is missed from there: longer than a few frames without a hit, or than what
-// walks past hides it.
+// Missed all along so much travel: more than a few frames without a hit, or than what walks past hides it.
 static const bslam_real_t MISSED_M = BSLAM_R(0.3);
 
 enum { STEPS_MAX = UINT8_MAX };

@@ -9,11 +9,10 @@
 
 #define BSLAM_NO_MISSED_BEACON (-1)
 
-/// Notes from where the beacons of the frame of time_us were seen, when the robot had gone travelled_um. If
-/// `judges`, which holds for a frame whose every sighting found its beacon, it notes which others are missed.
-/// Answers the beacon that was missed from missed_views of the directions from which it had been seen, since
-/// it was seen last; BSLAM_NO_MISSED_BEACON: none. Of a wall's corner, which hides a beacon from one or two
-/// of them for good, each direction speaks but once. O(beacons).
+/// Notes from where the beacons of the frame of time_us were seen, and, if it `judges` because every sighting
+/// found its beacon, which others are missed. Answers the beacon that was missed from missed_views of its
+/// viewpoints since it was seen last; BSLAM_NO_MISSED_BEACON: none. A wall's corner hides one from few: each
+/// speaks but once. O(beacons).
 int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,
                               const bslam_settings_t *settings, int64_t time_us, uint32_t travelled_um,
                               bool judges);

@@ -1,4 +1,4 @@
-/// How a beacon of the map and the robot stand to each other. MATH "Position and appearance".
+/// From where the robot sees a beacon of the map. MATH "Position and appearance".
 #ifndef BSLAM_ASSOCIATION_VIEWPOINT_H
 #define BSLAM_ASSOCIATION_VIEWPOINT_H
 
@@ -12,11 +12,10 @@ typedef struct bslam_viewpoint {
     bool is_sure;              ///< the robot knows its place well enough for range and sector
 } bslam_viewpoint_t;
 
-/// Of the sectors around a beacon the one in which the robot stands that sees it in this direction, which is
-/// the map's: 0 to BSLAM_APPEARANCE_SECTORS - 1.
+/// The sector around a beacon in which a robot stands that sees it in this direction of the map.
 int bslam_viewpoint_sector(bslam_real_t direction_rad);
 
-/// Whether a beacon has a place of its own in the map, so that it has a viewpoint.
+/// Whether a beacon has a place of its own in the map, its first two state values.
 bool bslam_has_viewpoint(const bslam_beacon_t *beacon);
 
 /// Of beacon `index`, which has one. O(1).

@@ -10,8 +10,7 @@
 
 /// A distance tells where on a ray a point is unless it lies more across the ray than this, as a cosine.
 static const bslam_real_t ALONG_MIN = BSLAM_R(0.5);
-/// A scale is never taken for surer than this, where doubt is added: a difference of variances has to be
-/// told.
+/// A scale is never taken for surer than this, where doubt is added by a difference of variances.
 static const bslam_real_t SCALE_VAR_MIN = BSLAM_R(1e-6);
 
 // ---- growing ----------------------------------------------------------------------------------------------
@@ -215,9 +214,8 @@ bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var)
     return true;
 }
 
-/// What hangs on a scale becomes as doubtful as if that had been doubted by more_var more from the start,
-/// when it was by scale_var: a measurement of negative variance takes back what is too much. What is thought
-/// stays.
+/// What hangs on a scale becomes as doubtful as if it had been doubted by more_var more from the start, when
+/// it was by scale_var: a measurement of negative variance takes back what is too much.
 static void doubt_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int at, bslam_real_t scale_var,
                         bslam_real_t more_var)
 {

@@ -2,11 +2,11 @@
 /// right-invariant form. MATH "The filter".
 ///
 /// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 to 4 values each. The
-/// covariance is held in these ordinary coordinates in both forms; the invariant form transports it after
-/// each correction.
+/// covariance is held in these coordinates in both forms; the invariant form transports it after each
+/// correction.
 ///
-/// Cost for a state of n values, in multiply-adds: prediction O(n); each scalar of a sighting 7 n, and n²/2
-/// for its share of the down-date, which waits until four scalars share one pass over the triangle.
+/// Cost in multiply-adds for n values: prediction O(n). Each scalar of a sighting 7 n, and n²/2 for its
+/// down-date, which waits until four scalars share one pass over the triangle.
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
@@ -19,8 +19,7 @@
 
 /// The robot's own values: pose, and v, omega or their scale factors.
 #define BSLAM_ROBOT_DIM_MAX 5
-/// The largest state: 5 for the robot, 2 a beacon, and room for 2 more a ray, or 1 more for each of twice as
-/// many sized beacons.
+/// The largest state: room for 2 values more a ray, or 1 more for each of twice as many sized beacons.
 #define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
 #define BSLAM_STATE_PADDED BSLAM_SYMMAT_PADDED(BSLAM_STATE_MAX)
 /// Scalars whose down-date waits for a common pass.
@@ -44,8 +43,7 @@ static inline int32_t bslam_beacon_dim(bslam_beacon_kind_t kind)
                                         : 0;
 }
 
-/// A beacon's class_lead and distance_lead at most: so many sightings in a row make anything something else,
-/// or of another size.
+/// A beacon's class_lead and distance_lead at most: so many sightings in a row overturn either.
 #define BSLAM_LEAD_MAX 20
 
 /// A beacon of the map.
@@ -70,7 +68,6 @@ typedef struct bslam_beacon {
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
 } bslam_beacon_t;
 
-/// All members are the filter's own; read them through the functions below.
 typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
     bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX)];
@@ -96,13 +93,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_check_motion(const bslam_settings_t *s
                                                        const bslam_motion_t *motion);
 
 /// Moves the robot by one odometry increment with dt_s > 0: paper equations (4), (5). With velocity states
-/// the increment is a measurement of v and omega instead, fused here; one that bslam_ekf_check_motion refuses
-/// measures nothing. *moved is the motion that the filter took for the interval.
+/// the increment is a measurement of v and omega instead. *moved is the motion that the filter took for the
+/// interval.
 void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                        bslam_motion_t *moved);
 
-/// The robot's own part of a state. It goes through odometry alone as it does with the map: neither motions
-/// nor speedometers look at a beacon.
+/// The robot's own part of a state, which goes through odometry alone as it does with the map.
 typedef struct bslam_robot {
     bslam_real_t mean[BSLAM_ROBOT_DIM_MAX];
     bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_ROBOT_DIM_MAX)];
@@ -116,16 +112,12 @@ bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf);
 void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings, const bslam_motion_t *motion,
                          bslam_motion_t *moved);
 
-bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot);
-
 /// The robot may have moved unseen and stands still now: adds variance to its position (each axis) and
-/// heading, up to (30 m)² and (3.2 rad)² in all, beyond which it is lost anyway; velocity states become as at
-/// the start. O(n).
+/// heading, up to (30 m)² and (3.2 rad)² in all; velocity states become as at the start. O(n).
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,
                       bslam_real_t heading_var_rad2);
 
-/// Puts the robot somewhere, whatever was thought before: its pose has these variances (each axis) and is
-/// independent of all else, of which nothing changes. O(n).
+/// Puts the robot somewhere: its pose has these variances (each axis) and is independent of all else. O(n).
 void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_pose_t *pose, bslam_real_t position_var_m2,
                         bslam_real_t heading_var_rad2);
 
@@ -146,20 +138,20 @@ typedef struct bslam_innovation {
 /// True if a beacon and a sighting have classes, and not the same.
 bool bslam_ekf_classes_differ(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
 
-/// A sighting as it shows a beacon. How much too long a beacon's distances are goes with what it is taken
-/// for: taken for something else, a sighting has a direction only.
+/// A sighting as it shows a beacon. How much too long a beacon's distances are goes with its class: taken for
+/// another class, a sighting is bearing-only.
 bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_sighting_t *sighting);
 
 /// Innovation of a sighting if it shows beacon `index`, at the mean and covariance before the frame: take all
 /// of a frame before the first bslam_ekf_fuse. BSLAM_E_SINGULAR: the beacon stands at the sensor, or is a ray
-/// without a positive inverse distance and the sighting has a distance. O(1).
+/// without a point and the sighting has a distance. O(1).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                                      const bslam_pose_t *mount,
                                                      const bslam_sighting_t *sighting, int index,
                                                      bslam_innovation_t *innovation);
 
-/// Squared Mahalanobis distance of an innovation, equation (8)'s S, from the covariance as it stands: for
-/// association. BSLAM_E_SINGULAR: S is not positive definite. O(1).
+/// Squared Mahalanobis distance of an innovation, by equation (8)'s S, from the covariance as it stands.
+/// BSLAM_E_SINGULAR: S is not positive definite. O(1).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
                                                     const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
@@ -172,15 +164,15 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
 /// a P bᵀ for two rows, from the covariance as it stands: how alike the errors of two predictions are. O(1).
 bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b);
 
-/// What became of a sighting.
 typedef struct bslam_fusion {
-    bslam_real_t distance2;  ///< squared Mahalanobis distance given what was fused before it in this frame
-    bslam_real_t weight;     ///< 1, or less by Huber's rule; 0: gated out
+    bslam_real_t
+        distance2;  ///< squared Mahalanobis distance, conditional on what was fused before it in this frame
+    bslam_real_t weight;  ///< 1, or less by Huber's rule; 0: gated out
 } bslam_fusion_t;
 
-/// Equations (9)-(11) for one sighting, given those fused since the last bslam_ekf_correct. The mean moves
-/// only with bslam_ekf_correct. BSLAM_E_RANGE: outside the gate, not used. BSLAM_E_SINGULAR: S is not
-/// positive definite, not used.
+/// Equations (9)-(11) for one sighting, conditional on those fused since the last bslam_ekf_correct, which
+/// alone moves the mean. Not used: BSLAM_E_RANGE, outside the gate; BSLAM_E_SINGULAR, S is not positive
+/// definite.
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                                const bslam_innovation_t *innovation, bslam_fusion_t *fusion);
 
@@ -190,9 +182,9 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings);
 
 // ---- about given points -----------------------------------------------------------------------------------
 
-// For whoever goes through the same drive again (smoother/smoother.h): a linear Kalman filter. With
-// has_correction set and until bslam_ekf_correct the mean is where the models are linearised, and what is
-// known of the state is the correction about it. bslam_ekf_innovation and bslam_ekf_fuse serve as ever.
+// For who goes through the same drive again (smoother/smoother.h): a linear Kalman filter. While
+// has_correction is set the mean is where the models are linearised, and the correction about it is what is
+// known of the state.
 
 /// How the robot's values go through a motion, MATH (14).
 typedef struct bslam_transition {
@@ -201,16 +193,14 @@ typedef struct bslam_transition {
     bslam_real_t keep[2];                  ///< what is left of these
 } bslam_transition_t;
 
-/// How a way of changing speeds differs from the arc at their means: its chord is turned to the left, and
-/// stretched. By how much it then still misses the next point, times doubt_of_miss, is its standard
-/// deviation.
+/// How a path of changing speeds differs from the arc at their means: its chord is turned to the left, and
+/// stretched. By how much it still misses the next point, times doubt_of_miss, is its standard deviation.
 typedef struct bslam_bend {
     bslam_real_t turned_rad, stretch, doubt_of_miss;
 } bslam_bend_t;
 
-/// bslam_ekf_predict in that filter, but for the speedometers: next[base_dim] are the robot's values that the
-/// models are linearised about from then on, with velocity states the motion, too. *transition, if not NULL,
-/// becomes what it did.
+/// bslam_ekf_predict in that filter, but for the speedometers. next[base_dim] are the robot's values that the
+/// models are linearised about from then on. *transition, if not NULL, becomes what it did.
 void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                              const bslam_bend_t *bend, const bslam_real_t *next,
                              bslam_transition_t *transition);
@@ -227,9 +217,8 @@ void bslam_ekf_settle(bslam_ekf_t *ekf);
 
 // ---- map --------------------------------------------------------------------------------------------------
 
-/// Adds the beacon that a sighting shows: as a ray if it has no distance, else as a point, or a sized one
-/// where it or settings->range_scale_sd is set and there is room for its third value. *index is its place.
-/// BSLAM_E_MAP_FULL: no room for it. O(n).
+/// Adds the beacon that a sighting shows: a ray if it has no distance; else a point, or a sized one where
+/// distances err alike and there is room. *index is its place. BSLAM_E_MAP_FULL. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                               const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                               int *index);
@@ -238,24 +227,23 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add(bslam_ekf_t *ekf, const bslam_sett
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
                                                     int *index);
 
-/// Adds a beacon of which a guess says where it is, whatever the robot's pose: as a point, each axis this
-/// doubtful. BSLAM_E_MAP_FULL. O(n).
+/// Adds a point where a guess has it, whatever the robot's pose, each axis this doubtful. BSLAM_E_MAP_FULL.
+/// O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_add_guess(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_real_t y_m,
                                                     bslam_real_t sd_m, int *index);
 
-/// A ray that is seen with a distance becomes a sized beacon where on it the distance ends, of whose scale is
-/// known this variance > 0. False: it does not end on it. The distance is used up by that. MATH "Beacon scale
-/// states". O(n²).
+/// A ray that is seen with a distance becomes a sized beacon where that ends, of a scale of this variance >
+/// 0. False: it does not end on the ray. MATH "Beacon scale states". O(n²).
 bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var);
 
-/// A point whose distances are measured from now on becomes a sized beacon, of whose scale is known this
-/// variance > 0. False: it is no point, or there is no room for it. O(n²).
+/// A point becomes a sized beacon, of a scale of this variance > 0. False: it is no point, or there is no
+/// room. O(n²).
 bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 
 /// A sized beacon is something else than was thought: its scale is 1 again, to this variance and more_var >
-/// 0, whatever was learned of it. All means stay, but what hung on the scale becomes as doubtful as if that
-/// had been doubted by more_var more from the start. No correction may be under way. O(n²).
+/// 0. Means stay; what hung on the scale becomes as doubtful as if more_var had been there from the start. No
+/// correction may be under way. O(n²).
 void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int index,
                            bslam_real_t scale_var, bslam_real_t more_var);
 
@@ -265,14 +253,23 @@ void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
 /// Takes all beacons out. The robot stays as it is. O(n).
 void bslam_ekf_forget_map(bslam_ekf_t *ekf);
 
-/// Turns a ray into a point if its distance is known well enough to be linear (Civera's index, MATH
-/// "Bearing-only"). True if it did. O(n²) then.
+/// Turns a ray into a point if its distance is linear enough (Civera's index, MATH "Bearing-only"). True if
+/// it did.
 bool bslam_ekf_settle_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
                           int index);
 
 // ---- queries ----------------------------------------------------------------------------------------------
 
-bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf);
+/// Of a state, or of the robot's part of it, the pose.
+static inline bslam_pose_t bslam_pose_of(const bslam_real_t *mean)
+{
+    return (bslam_pose_t){mean[BSLAM_STATE_X], mean[BSLAM_STATE_Y], mean[BSLAM_STATE_THETA]};
+}
+
+static inline bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
+{
+    return bslam_pose_of(ekf->mean);
+}
 
 /// Where a beacon is, in the map. A ray without a positive inverse distance answers with a point 1 km along
 /// it.
@@ -281,8 +278,7 @@ void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *
 /// Covariance of a beacon's position in the map; zero for a known one.
 bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index);
 
-/// False if the robot's pose or a variance in the state is not finite, or a variance is not positive (a pose
-/// that has never moved has variance 0, which passes). O(n).
+/// Whether all means and variances are finite, and no variance is negative. O(n).
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf);
 
 #endif

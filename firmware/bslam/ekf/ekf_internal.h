@@ -1,4 +1,4 @@
-/// What the files of the filter share. Not for users.
+/// What the files of the filter share.
 #ifndef BSLAM_EKF_EKF_INTERNAL_H
 #define BSLAM_EKF_EKF_INTERNAL_H
 

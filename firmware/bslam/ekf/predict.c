@@ -161,8 +161,7 @@ static void walk_state(const moving_t *state, int at, bslam_real_t keep, bslam_r
 static void step_pose(const moving_t *state, const bslam_settings_t *settings, bslam_real_t forward_m,
                       bslam_real_t turn_rad, bslam_motion_jacobian_t *jacobian)
 {
-    const bslam_pose_t before = {state->mean[BSLAM_STATE_X], state->mean[BSLAM_STATE_Y],
-                                 state->mean[BSLAM_STATE_THETA]};
+    const bslam_pose_t before = bslam_pose_of(state->mean);
     const bslam_motion_kind_t kind = settings->motion == 0 ? BSLAM_MOTION_EULER : BSLAM_MOTION_ARC;
     const bslam_pose_t after = bslam_motion_step(kind, &before, forward_m, turn_rad, jacobian);
     state->mean[BSLAM_STATE_X] = after.x_m;
@@ -172,22 +171,30 @@ static void step_pose(const moving_t *state, const bslam_settings_t *settings, b
 
 // ---- the motion -------------------------------------------------------------------------------------------
 
-/// v and omega walk, and move the robot for dt_s.
-static void drive_by_velocity(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s)
+/// v and omega forget and walk for dt_s, v by a variance of at most v_var_max.
+static void walk_speeds(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s,
+                        bslam_real_t v_var_max, bslam_real_t keep[2])
 {
     const bslam_real_t v_walk = settings->velocity_walk_mps_sqrt_s;
     const bslam_real_t turn_walk = settings->turn_rate_walk_radps_sqrt_s;
-    const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
-    const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
-    walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_walk * v_walk * dt_s);
-    walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
+    const bslam_real_t v_var = v_walk * v_walk * dt_s;
+    keep[0] = 1 / (1 + dt_s / settings->velocity_decay_s);
+    keep[1] = 1 / (1 + dt_s / settings->turn_rate_decay_s);
+    walk_state(state, BSLAM_STATE_FORWARD, keep[0], v_var < v_var_max ? v_var : v_var_max);
+    walk_state(state, BSLAM_STATE_TURN, keep[1], turn_walk * turn_walk * dt_s);
+}
+
+/// v and omega walk, and move the robot for dt_s.
+static void drive_by_velocity(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s)
+{
+    bslam_real_t keep[2];
+    walk_speeds(state, settings, dt_s, BSLAM_R(1e30), keep);
     bslam_motion_jacobian_t jacobian;
     bslam_transition_t transition;
     step_pose(state, settings, state->mean[BSLAM_STATE_FORWARD] * dt_s, state->mean[BSLAM_STATE_TURN] * dt_s,
               &jacobian);
     fill_transition(&jacobian, dt_s, dt_s, &transition);
-    transition.keep[0] = v_keep;
-    transition.keep[1] = turn_keep;
+    memcpy(transition.keep, keep, sizeof keep);
     move_covariance(state, &transition);
 }
 
@@ -345,24 +352,19 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
     }
 }
 
-/// A walk of v makes the way no more doubtful than this, which is as good as unknown: beside more, the few
-/// millimetres that are known of it would be rounded away.
+/// A walk of v makes the travel no more doubtful than this: beside more, the millimetres that are known of it
+/// would be rounded away.
 static const bslam_real_t TRAVEL_SD_MAX_M = BSLAM_R(1.5);
 
 /// v and omega walk, and what they come to moves the robot: linear about what they are afterwards.
 static void drive_about(const moving_t *state, const bslam_settings_t *settings, bslam_real_t dt_s,
                         bslam_real_t stretch, const bslam_real_t *next)
 {
-    const bslam_real_t v_walk = settings->velocity_walk_mps_sqrt_s;
-    const bslam_real_t turn_walk = settings->turn_rate_walk_radps_sqrt_s;
     bslam_transition_t transition;
     bslam_motion_jacobian_t jacobian;
-    const bslam_real_t v_keep = 1 / (1 + dt_s / settings->velocity_decay_s);
-    const bslam_real_t turn_keep = 1 / (1 + dt_s / settings->turn_rate_decay_s);
-    const bslam_real_t v_var = v_walk * v_walk * dt_s;
+    bslam_real_t keep[2];
     const bslam_real_t v_sd_max = TRAVEL_SD_MAX_M / dt_s;
-    walk_state(state, BSLAM_STATE_FORWARD, v_keep, v_var < v_sd_max * v_sd_max ? v_var : v_sd_max * v_sd_max);
-    walk_state(state, BSLAM_STATE_TURN, turn_keep, turn_walk * turn_walk * dt_s);
+    walk_speeds(state, settings, dt_s, v_sd_max * v_sd_max, keep);
     for (int i = BSLAM_STATE_FORWARD; i <= BSLAM_STATE_TURN; i++) {
         state->correction[i] += state->mean[i] - next[i];
         state->mean[i] = next[i];
@@ -370,12 +372,11 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
     step_pose(state, settings, next[BSLAM_STATE_FORWARD] * dt_s * stretch, next[BSLAM_STATE_TURN] * dt_s,
               &jacobian);
     fill_transition(&jacobian, dt_s * stretch, dt_s, &transition);
-    transition.keep[0] = v_keep;
-    transition.keep[1] = turn_keep;
+    memcpy(transition.keep, keep, sizeof keep);
     move_covariance(state, &transition);
 }
 
-/// The way is as doubtful as it misses the next point, times `share`, both axes.
+/// The travel is as doubtful as it misses the next point, times `share`, both axes.
 static void doubt_travel(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
 {
     const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
@@ -436,12 +437,6 @@ void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings,
         measure_robots_speeds(robot, &state, settings, &speeds);
         note_velocity(robot->mean, moved);
     }
-}
-
-bslam_pose_t bslam_robot_pose(const bslam_robot_t *robot)
-{
-    return (bslam_pose_t){robot->mean[BSLAM_STATE_X], robot->mean[BSLAM_STATE_Y],
-                          robot->mean[BSLAM_STATE_THETA]};
 }
 
 // ---- after an interruption --------------------------------------------------------------------------------

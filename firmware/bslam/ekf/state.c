@@ -5,28 +5,18 @@
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
 {
+    const bool has_speeds = settings->velocity_states != 0,
+               has_scales = !has_speeds && settings->scale_states != 0;
+    const bslam_real_t forward_sd = has_speeds ? settings->velocity_sd_mps : settings->scale_sd;
+    const bslam_real_t turn_sd = has_speeds ? settings->turn_rate_sd_radps : settings->scale_sd;
     *ekf = (bslam_ekf_t){0};
-    ekf->dim = 3;
-    if (settings->velocity_states != 0) {
-        ekf->dim = 5;
-        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] =
-            settings->velocity_sd_mps * settings->velocity_sd_mps;
-        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] =
-            settings->turn_rate_sd_radps * settings->turn_rate_sd_radps;
-    } else if (settings->scale_states != 0) {
-        ekf->dim = 5;
-        const bslam_real_t variance = settings->scale_sd * settings->scale_sd;
-        ekf->mean[BSLAM_STATE_FORWARD] = settings->forward_scale;
-        ekf->mean[BSLAM_STATE_TURN] = settings->turn_scale;
-        ekf->covariance[bslam_symmat_at(BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD)] = variance;
-        ekf->covariance[bslam_symmat_at(BSLAM_STATE_TURN, BSLAM_STATE_TURN)] = variance;
+    ekf->dim = ekf->base_dim = has_speeds || has_scales ? 5 : 3;
+    if (ekf->dim == 5) {
+        ekf->mean[BSLAM_STATE_FORWARD] = has_scales ? settings->forward_scale : 0;
+        ekf->mean[BSLAM_STATE_TURN] = has_scales ? settings->turn_scale : 0;
+        bslam_symmat_set(ekf->covariance, BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD, forward_sd * forward_sd);
+        bslam_symmat_set(ekf->covariance, BSLAM_STATE_TURN, BSLAM_STATE_TURN, turn_sd * turn_sd);
     }
-    ekf->base_dim = ekf->dim;
-}
-
-bslam_pose_t bslam_ekf_pose(const bslam_ekf_t *ekf)
-{
-    return (bslam_pose_t){ekf->mean[BSLAM_STATE_X], ekf->mean[BSLAM_STATE_Y], ekf->mean[BSLAM_STATE_THETA]};
 }
 
 /// A ray's values with an inverse distance that has a point.

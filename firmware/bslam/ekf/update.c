@@ -306,7 +306,7 @@ static void accept_column(bslam_ekf_t *ekf, gain_t gain)
     ekf->pending_count++;
 }
 
-/// The range's column becomes that of the range given the bearing, and both go into the correction.
+/// The range's column becomes conditional on the bearing, and both go into the correction.
 static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *restrict by_bearing,
                          bslam_real_t *restrict by_range, int n, const gain_t gains[2], bslam_real_t share)
 {
@@ -319,8 +319,8 @@ static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *
     }
 }
 
-/// The same for the columns of a bearing and a range in the next two slots; the range's less `share` of the
-/// bearing's first, which makes it that of the range given the bearing.
+/// The same for the columns of a bearing and a range in the next two slots, the range's conditional on the
+/// bearing.
 static void accept_two(bslam_ekf_t *ekf, gain_t bearing, gain_t range, bslam_real_t share)
 {
     const int at = ekf->pending_count;
@@ -357,10 +357,9 @@ static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_
     return BSLAM_OK;
 }
 
-/// A measurement's variance, and at least what h P hᵀ is rounded by: a sighting that is surer than that of a
-/// pose in great doubt would leave no positive definite covariance. What h P hᵀ comes to does not tell: the
-/// doubt that a robot shares with a beacon cancels out, but not its rounding. So `before`, which is h P hᵀ
-/// without what waits, and the robot's own part of it. MATH "Update".
+/// A measurement's variance, and at least what h P hᵀ is rounded by: a sighting surer than that would leave
+/// no positive definite covariance. The doubt that a robot shares with a beacon cancels out, but not its
+/// rounding. So `before`, which is h P hᵀ without what waits, and the robot's own part of it. MATH "Update".
 static bslam_real_t noise_of(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t variance,
                              bslam_real_t before)
 {
@@ -409,7 +408,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
         accept_column(ekf, bearing);
         return BSLAM_OK;
     }
-    // The range's variance and innovation, given the bearing.
+    // The range's variance and innovation, conditional on the bearing.
     const bslam_real_t share = hph.xy / bearing_s;
     const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
     const bslam_real_t range_s =

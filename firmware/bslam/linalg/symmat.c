@@ -4,12 +4,6 @@
 
 #include <string.h>
 
-extern inline size_t bslam_symmat_row(int i);
-extern inline size_t bslam_symmat_at(int i, int j);
-extern inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j);
-extern inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value);
-extern inline size_t bslam_symmat_filled(int i);
-
 /// A function whose callers name constants: each has a copy without tests of them.
 #define COPIED __attribute__((always_inline)) static inline
 
@@ -141,7 +135,7 @@ COPIED void add_two_rows(bslam_real_t *restrict row, size_t length, int i, const
     const bslam_real_t *restrict c2 = terms[2].columns, *restrict c3 = terms[3].columns;
     const bslam_four_t f0 = factor_of(&terms[0], i), g0 = factor_of(&terms[0], i + 1);
     const bslam_four_t f1 = factor_of(&terms[1], i), g1 = factor_of(&terms[1], i + 1);
-    if (count == 2) {
+    if (count <= 2) {
         for (size_t j = 0; j < length; j += 4) {
             const bslam_four_t a = bslam_four(c0 + j), b = bslam_four(c1 + j);
             *(bslam_four_at_t *)(row + j) += f0 * a + f1 * b;
@@ -167,21 +161,12 @@ COPIED void add_four_rows(bslam_real_t *row, int i, const bslam_symmat_term_t te
     add_two_rows(row + 2 * length, length, i + 2, terms, count);
 }
 
-COPIED void add_rows(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4], const int count)
+void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4], int count)
 {
     bslam_real_t *row = m;
     for (int i = 0; i < n; i += 4) {
         add_four_rows(row, i, terms, count);
         row += 4 * (i + 4);
-    }
-}
-
-void bslam_symmat_add_rank4(bslam_real_t *restrict m, int n, const bslam_symmat_term_t terms[4], int count)
-{
-    if (count <= 2) {
-        add_rows(m, n, terms, 2);
-    } else {
-        add_rows(m, n, terms, 4);
     }
 }
 

@@ -1,9 +1,8 @@
 /// A symmetric matrix of changing size, held as one triangle in the caller's array.
 ///
-/// Row i holds columns 0 to i and is filled up to a multiple of four, so that the one inner loop that costs
-/// anything (bslam_symmat_add_rank4) runs in blocks of four without a remainder. What stands in the fill is
-/// no part of the matrix. The same array serves every size up to BSLAM_SYMMAT_LENGTH's argument: growing is
-/// writing the new rows.
+/// Row i holds columns 0 to i and is filled up to a multiple of four, so that inner loops run in blocks of
+/// four. What stands in the fill is no part of the matrix. The same array serves every size up to
+/// BSLAM_SYMMAT_LENGTH's argument.
 #ifndef BSLAM_LINALG_SYMMAT_H
 #define BSLAM_LINALG_SYMMAT_H
 
@@ -20,32 +19,32 @@
 #define BSLAM_SYMMAT_LENGTH(n) (BSLAM_SYMMAT_PADDED(n) * (BSLAM_SYMMAT_PADDED(n) + 4) / 2)
 
 /// Where row i begins.
-inline size_t bslam_symmat_row(int i)
+static inline size_t bslam_symmat_row(int i)
 {
     const size_t block = (size_t)i / 4;
     return 4 * (block + 1) * (2 * block + (size_t)i % 4);
 }
 
 /// Where element (i, j) stands, for any order of i and j.
-inline size_t bslam_symmat_at(int i, int j)
+static inline size_t bslam_symmat_at(int i, int j)
 {
     return i >= j ? bslam_symmat_row(i) + (size_t)j : bslam_symmat_row(j) + (size_t)i;
 }
 
 /// Element (i, j).
-inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
+static inline bslam_real_t bslam_symmat_get(const bslam_real_t *m, int i, int j)
 {
     return m[bslam_symmat_at(i, j)];
 }
 
 /// Sets element (i, j), and so (j, i).
-inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
+static inline void bslam_symmat_set(bslam_real_t *m, int i, int j, bslam_real_t value)
 {
     m[bslam_symmat_at(i, j)] = value;
 }
 
 /// How long row i is with its fill: from its beginning to the next one's.
-inline size_t bslam_symmat_filled(int i)
+static inline size_t bslam_symmat_filled(int i)
 {
     return ((size_t)i / 4 + 1) * 4;
 }
@@ -83,9 +82,8 @@ typedef struct bslam_symmat_term {
 } bslam_symmat_term_t;
 
 /// m += the sum of four terms, of which those behind the first `count` have scale 0, in one pass over the
-/// triangle. The sum must be symmetric (pairs of terms may
-/// be each other's mirror image). This is where a filter step spends its time: 4 multiply-adds an element.
-/// The rows behind n up to a multiple of four, which are no part of the matrix, change too. O(4 n^2 / 2).
+/// triangle. The sum must be symmetric. This is where a filter step spends its time. The rows behind n up to
+/// a multiple of four, which are no part of the matrix, change too. O(4 n^2 / 2).
 void bslam_symmat_add_rank4(bslam_real_t *m, int n, const bslam_symmat_term_t terms[4], int count);
 
 /// Takes rows and columns first to first + count - 1 out; those behind move up. O(n^2).
@@ -94,10 +92,9 @@ void bslam_symmat_remove(bslam_real_t *m, int n, int first, int count);
 /// Puts a row and a column of zeros in at place `at`; those from there on move down by one. O(n^2).
 void bslam_symmat_insert(bslam_real_t *m, int n, int at);
 
-/// One row of a Cholesky factorisation in place: row i of the array, a covariance's, becomes row i of the
-/// factor, which the rows before are already. raise: diagonal elements count as larger by this part, so that
-/// with n / 10^7 (float) a singular matrix passes in spite of rounding. False: with the rows before, it is no
-/// positive semidefinite matrix, raised so; the row then holds nothing. O(i^2 / 2).
+/// One row of a Cholesky factorisation in place: row i of a covariance becomes row i of the factor. raise:
+/// variances count as larger by this part, so that a singular matrix passes in spite of rounding. False:
+/// raised so, it is not positive semidefinite; the row then holds nothing. O(i^2 / 2).
 bool bslam_symmat_factor_row(bslam_real_t *factor, int i, bslam_real_t raise);
 
 #endif

@@ -41,8 +41,7 @@ static inline bslam_real_t bslam_unknown_scale_var(const bslam_settings_t *setti
     return sd * sd;
 }
 
-/// Variance of a measured direction; larger where no distance comes with it (MATH
-/// "Bearing-only").
+/// Variance of a measured direction; larger where no distance comes with it. MATH "Bearing-only".
 static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_settings_t *settings,
                                                        const bslam_sighting_t *sighting)
 {
@@ -51,8 +50,8 @@ static inline bslam_real_t bslam_bearing_variance_rad2(const bslam_settings_t *s
     return sighting->has_range ? sd_rad * sd_rad : sd_rad * sd_rad * settings->bearing_only_variance_factor;
 }
 
-/// By how much a sighting's variances grow because its error is much like that of the sighting of the same
-/// beacon before it, since when the robot went travelled_m; at most 100. MATH "Correlated errors".
+/// By how much a sighting's variances grow, since its error is much like that of the same beacon's sighting
+/// before it, travelled_m ago; at most 100. MATH "Correlated errors".
 static inline bslam_real_t bslam_correlation_factor(const bslam_settings_t *settings,
                                                     bslam_real_t travelled_m)
 {

@@ -23,13 +23,9 @@ void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);
 /// Forgets the clock and the tick reference: the next reading starts both. Its motion since is not known.
 void bslam_odometry_restart(bslam_odometry_t *odometry);
 
-/// The motion since the reading before, into *motion. O(1).
-/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 4 s. BSLAM_E_NOT_FINITE,
-/// BSLAM_E_RANGE (a counter beyond counter_bits, a gyro turn beyond 100 rad, a noise of it that is not 0
-/// and outside the limits of the setting, an unknown source),
-/// BSLAM_E_JUMP: see status.h. On any of these nothing changes, but that
-/// after BSLAM_E_JUMP the next tick reading is the new reference (the encoder was reset), and its interval a
-/// gap. A first reading without a started clock has no interval: BSLAM_OK with motion->dt_s = 0.
+/// The motion since the reading before, with the statuses of bslam_odometry. On any of these nothing changes;
+/// but after BSLAM_E_JUMP the next tick reading is the new reference, and its interval a gap. A first reading
+/// has no interval: BSLAM_OK with motion->dt_s = 0. O(1).
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry,
                                                     const bslam_settings_t *settings,
                                                     const bslam_odometry_reading_t *reading,

@@ -1,6 +1,6 @@
 #include "bslam/recovery/identity.h"
 
-// A classifier recognises what it puts this far above 0, and this far above what the next classifier says.
+// A classifier recognises what it puts this far above 0, and above what the next one says.
 static const float RECOGNISE_WEIGHT = 0.8f;
 static const float RECOGNISE_VALUE = 0.3f;
 static const float RECOGNISE_LEAD = 0.5f;

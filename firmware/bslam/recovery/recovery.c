@@ -17,9 +17,9 @@ static const bslam_real_t FIT_D2 = BSLAM_R(9.0);
 // A fix carried on is the same as a later one within this and both doubts.
 static const bslam_real_t SAME_PLACE_M = BSLAM_R(0.25);
 static const bslam_real_t SAME_HEADING_RAD = BSLAM_R(0.15);
-// Of the way since a clue was seen.
+// Of the distance travelled since a clue was seen.
 static const bslam_real_t TRAVEL_SD = BSLAM_R(0.15);
-// The fix's doubt is that of its clues, which share the beacons' errors and the way since: so much wider.
+// The fix's doubt is that of its clues, which share the beacons' errors and the travel since: so much wider.
 static const bslam_real_t DOUBT_FACTOR = BSLAM_R(1.5);
 static const bslam_real_t DOUBT_M = BSLAM_R(0.05);
 static const bslam_real_t DOUBT_RAD = BSLAM_R(0.03);
@@ -38,39 +38,12 @@ enum {
     ELSEWHERE_BEACONS = 4,  ///< beacons that another pose has more than the present one, in a map that grows,
     ELSEWHERE_FRAMES = 3,   ///< in as many frames: the robot is there
     CONFIRMED_BY_THIRD = 2,  ///< frames with the same fix, where three beacons agree,
-    CONFIRMED_BY_TIME = 8,  ///< or fewer than one more than a fix needs
-    COUNT_MAX = 1000000000  ///< of frames: more than a year's
+    CONFIRMED_BY_TIME = 8    ///< or fewer than one more than a fix needs
 };
 
 void bslam_recovery_restart(bslam_recovery_t *recovery)
 {
     *recovery = (bslam_recovery_t){.counters = recovery->counters};
-}
-
-static bool is_time(int64_t time_us)
-{
-    return time_us >= -INT64_MAX / 4 && time_us <= INT64_MAX / 2;
-}
-
-void bslam_recovery_mend(bslam_recovery_t *recovery)
-{
-    bool good = bslam_is_count(recovery->memory_count, BSLAM_CLUES_MAX) &&
-                bslam_is_count(recovery->evidence, COUNT_MAX) &&
-                bslam_is_count(recovery->undecided, COUNT_MAX) &&
-                bslam_is_count(recovery->silent, COUNT_MAX) &&
-                bslam_is_count(recovery->confirmed, COUNT_MAX) && is_time(recovery->doubted_us) &&
-                is_time(recovery->grew_us) && is_time(recovery->contradicted_us) && is_time(recovery->fix_us);
-    bslam_mend_flag(&recovery->several);
-    bslam_mend_flag(&recovery->has_grown);
-    bslam_mend_flag(&recovery->has_contradicted);
-    bslam_mend_flag(&recovery->has_fix);
-    for (int m = 0; good && m < recovery->memory_count; m++) {
-        good = is_time(recovery->memories[m].time_us);
-        bslam_mend_flag(&recovery->memories[m].sighting.has_range);
-    }
-    if (!good) {
-        bslam_recovery_restart(recovery);
-    }
 }
 
 bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, const bslam_slam_t *slam)
@@ -133,7 +106,7 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     clue->range_var_m2 = bslam_scaled_range_variance_m2(&slam->settings, sighting, clue->range_m, scale_var);
 }
 
-/// A remembered sighting, taken for a beacon, as it looks from where the robot is now, by odometry.
+/// A remembered sighting, taken for a beacon, as it is from where the robot is now, by odometry.
 static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memory, int beacon)
 {
     const bslam_ekf_t *ekf = &slam->ekf;
@@ -149,7 +122,7 @@ static bslam_clue_t clue_of(const bslam_slam_t *slam, const bslam_memory_t *memo
     const bslam_sym2_t place = bslam_ekf_beacon_covariance(ekf, beacon);
     const bslam_real_t turn_var = growth(heading_var(ekf), memory->heading_var_rad2);
     const bslam_real_t travel2_m2 = robot.x_m * robot.x_m + robot.y_m * robot.y_m;
-    // A heading that drifts evenly bends the way by its deviation over the root of 3.
+    // A heading that drifts evenly bends the path by its deviation over the root of 3.
     const bslam_real_t drift_m2 =
         travel2_m2 * (TRAVEL_SD * TRAVEL_SD + turn_var / 3) + (place.xx + place.yy) / 2;
     const bslam_real_t range_m = sighting->has_range && sighting->range_m > 1 ? sighting->range_m : 1;
@@ -231,9 +204,9 @@ static bool fits_any(const bslam_slam_t *slam, const bslam_pose_t *mount, const 
     return false;
 }
 
-/// What was recognised agrees or contradicts. What stands where some beacon is agrees, too, and does not
-/// contradict: it may be that one, and look like another from here. But not in doubt: then the pose is
-/// odometry's alone and grows vague, by which anything stands somewhere, so that identities alone count.
+/// What was recognised agrees or contradicts. What stands where some beacon is agrees, too: it may be that
+/// one. But not in doubt: then the pose is odometry's alone and grows vague, by which anything stands
+/// somewhere.
 static tally_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam, const view_t *view)
 {
     const bool in_doubt = recovery->evidence > 0;
@@ -302,8 +275,8 @@ static void add_evidence(bslam_recovery_t *recovery, const tally_t *verdict, int
     recovery->evidence++;
 }
 
-/// A frame that does not speak against the pose. A doubt that one beacon raised ends when another agrees, for
-/// then it is that one that is odd, and when nothing was recognised for a moment.
+/// A frame that does not speak against the pose. A doubt that one beacon raised ends when another agrees,
+/// since then it is that one that is odd; and when nothing was recognised for a moment.
 static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const tally_t *verdict)
 {
     if (verdict->agreeing > verdict->contradicting) {
@@ -320,8 +293,8 @@ static void doubt_less(bslam_recovery_t *recovery, bslam_slam_t *slam, const tal
     }
 }
 
-/// True if the frame may be used. In doubt it may not, unless more agree: a robot that was carried would
-/// learn from it that its beacons' looks are those of new ones.
+/// True if the frame may be used. In doubt it may not, unless more agree: a kidnapped robot would learn from
+/// it that its beacons are new ones.
 static bool notice(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us, const tally_t *verdict)
 {
     recovery->counters.contradicting += (uint32_t)verdict->contradicting;

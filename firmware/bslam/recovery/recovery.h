@@ -51,9 +51,6 @@ typedef struct bslam_recovery {
 /// The filter starts over: what is known against its pose is forgotten, counts stay.
 void bslam_recovery_restart(bslam_recovery_t *recovery);
 
-/// Of memory that may be damaged: forgets what is known against the pose unless all of it may be used.
-void bslam_recovery_mend(bslam_recovery_t *recovery);
-
 /// bslam_slam_sightings with a look at whether the robot is where the filter has it. O(count classifiers)
 /// more, and while lost or contradicted O(clues³).
 BSLAM_MUST_CHECK bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam,

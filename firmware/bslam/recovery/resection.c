@@ -8,7 +8,7 @@
 
 // A clue agrees with a pose up to this squared distance: of two values one in 3000 does not.
 static const bslam_real_t AGREE_D2 = BSLAM_R(16.0);
-// Which beacon a sighting shows of several is told if by any other all that agree are so much farther off.
+// A sighting of several beacons is unambiguous if by any other all that agree are so much farther off.
 static const bslam_real_t AMBIGUOUS_D2 = BSLAM_R(9.0);
 // Beacons closer together give no heading.
 static const bslam_real_t BASE_MIN_M = BSLAM_R(0.3);

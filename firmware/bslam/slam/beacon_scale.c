@@ -2,8 +2,8 @@
 #include "bslam/model/noise.h"
 #include "bslam/slam/slam_internal.h"
 
-/// What has been taken for two things, or measured as two sizes, may be neither: how much more its scale is
-/// then in doubt.
+/// What was taken for two things, or measured as two sizes, may be neither: by so much its scale is in doubt
+/// then.
 static const bslam_real_t CONFUSED_VAR = BSLAM_R(0.01);
 
 /// Its variance as a sighting with a distance tells it; 0: no beacon has a scale, or the smoother leads the

@@ -1,23 +1,21 @@
-// Whether what is seen is a beacon: by how often, from where and how surely it was seen. MATH "Position and
-// appearance".
+// Whether what is seen is a beacon: existence evidence. MATH "Position and appearance".
 #include "bslam/slam/slam_internal.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 // What one sighting says at most: the next frame shows the same, and may be wrong the same way. One that is
-// surer than that and has a distance is hardly ever of anything else, and says as much as a few.
+// surer than that and has a distance says as much as a few.
 static const bslam_real_t SCORE_LOW = -1, SCORE_HIGH = BSLAM_R(1.5), SURE = 4;
 // And one without a distance, of a sensor that measures some.
 static const bslam_real_t BLIND_HIGH = BSLAM_R(0.05);
 
-/// Whether a sighting's score counts: where beacons are told apart by looks, of a detector that gives scores.
+/// Whether a sighting's score counts: where appearance decides, of a detector that gives scores.
 static bool has_score(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
     return slam->settings.association == BSLAM_ASSOCIATION_SVM && sighting->score != 0;
 }
 
-/// What a sighting's score says for a beacon. What has no distance from a sensor that measures some is of
-/// another size than it is taken for, or stands elsewhere, or pale: however sure the detector is of it, that
-/// says next to nothing.
+/// What a sighting's score says for a beacon. What has no distance, of a sensor that measures some, is of
+/// another size than it is taken for: however sure the detector is of it, that says next to nothing.
 static bslam_real_t evidence(const bslam_slam_t *slam, const bslam_sighting_t *sighting)
 {
     const bslam_real_t above = sighting->score - slam->settings.existence_score;

@@ -108,8 +108,7 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_record_t *reco
     note_match(slam, time_us, record->sighting, beacon, fusion.distance2);
 }
 
-/// Where its identity was told, a beacon that starts although another has its label contradicts that one, as
-/// that one does it.
+/// Known data association: a new beacon contradicts another of its label, and that one it.
 static void note_competitors(bslam_slam_t *slam, int index)
 {
     bslam_beacon_t *beacons = slam->ekf.beacons;
@@ -150,8 +149,8 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     account->weight = 1;
 }
 
-/// The gate of a frame. Where looks have told whom a sighting shows, and for a while nothing has been where
-/// it should be, it is the pose that errs: all that association takes for a candidate is used.
+/// The gate of a frame. Where appearance decides, and for a while nothing has been where it should be, it is
+/// the pose that errs: all that association takes for a candidate is used.
 static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
 {
     const bslam_settings_t *settings = &slam->settings;
@@ -161,9 +160,9 @@ static bslam_real_t gate_of(const bslam_slam_t *slam, int64_t time_us)
     return opens ? settings->candidate_d2 : settings->gate_d2;
 }
 
-/// Whether a match would turn the robot to whatever it is taken for: it has no distance that might contradict
-/// it, nothing that the robot knows has been where it should be for a while, and either the heading is
-/// doubtful or it is nearly as well another beacon, or a new one.
+/// Whether a match would turn the robot to whatever it is taken for. It has no distance that might contradict
+/// it, and nothing known has been where it should be for a while. The heading is doubtful, or the match
+/// hardly leads.
 static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sighting,
                      const bslam_match_t *match)
 {
@@ -295,7 +294,7 @@ static bool was_tentative(const bslam_account_t *account)
     return account->reason == BSLAM_REASON_TENTATIVE && account->has_beacon;
 }
 
-/// Which matches wait, and how well those fit that were made. What has just begun is itself for sure.
+/// Which matches are delayed, and how well those fit that were made. What has just begun is itself for sure.
 static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -304,10 +303,10 @@ static void note_matches(bslam_slam_t *slam, int64_t time_us, int count)
         if (match->delayed_for >= 0) {
             bslam_appearance_note_delay(slam->appearance, &slam->settings, match->delayed_for, time_us);
         } else if (account->outcome == BSLAM_OUTCOME_NEW) {
-            bslam_appearance_note_view(slam->appearance, bslam_slam_find_beacon(slam, account->beacon_uid),
-                                       slam->settings.again_odds);
+            slam->appearance->of[bslam_slam_find_beacon(slam, account->beacon_uid)].view_score =
+                slam->settings.again_odds;
         } else if (account->outcome == BSLAM_OUTCOME_MATCHED || was_tentative(account)) {
-            bslam_appearance_note_view(slam->appearance, match->beacon, match->view_score);
+            slam->appearance->of[match->beacon].view_score = match->view_score;
         }
     }
 }
@@ -352,8 +351,8 @@ static void learn(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *s
 
 // ---- tidying ----------------------------------------------------------------------------------------------
 
-/// A tentative beacon leaves when its time is up, or as much spoke against it as for it. Where its identity
-/// was told, leaving the view early is no reason against it: it leaves if sightings contradicted it.
+/// A tentative beacon leaves when its time is up, or as much spoke against it as for it. With known data
+/// association leaving the view early is no reason: it leaves if sightings contradicted it.
 static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_t *beacon, int64_t time_us)
 {
     const int64_t window_us = settings->confirm_window_us;
@@ -370,7 +369,7 @@ static bool is_unconfirmed(const bslam_settings_t *settings, const bslam_beacon_
     return settings->association != BSLAM_ASSOCIATION_KNOWN || beacon->gated > 0;
 }
 
-/// The first that is confirmed of several with one told label stays, the others leave.
+/// Known data association: the first of a label that is confirmed stays, its competitors leave.
 static void drop_competitors(bslam_slam_t *slam)
 {
     const bool is_known = slam->settings.association == BSLAM_ASSOCIATION_KNOWN;
@@ -421,22 +420,12 @@ static void count_accounts(bslam_slam_t *slam, int count)
     bslam_slam_counters_t *counters = &slam->counters;
     counters->frames++;
     counters->sightings += (uint32_t)count;
+    uint32_t *const by_outcome[] = {[BSLAM_OUTCOME_REJECTED] = &counters->rejected,
+                                    [BSLAM_OUTCOME_MATCHED] = &counters->matched,
+                                    [BSLAM_OUTCOME_NEW] = &counters->added,
+                                    [BSLAM_OUTCOME_DEFERRED] = &counters->deferred};
     for (int i = 0; i < count; i++) {
-        switch (slam->accounts[i].outcome) {
-        case BSLAM_OUTCOME_MATCHED:
-            counters->matched++;
-            break;
-        case BSLAM_OUTCOME_NEW:
-            counters->added++;
-            break;
-        case BSLAM_OUTCOME_DEFERRED:
-            counters->deferred++;
-            break;
-        case BSLAM_OUTCOME_REJECTED:
-        default:
-            counters->rejected++;
-            break;
-        }
+        (*by_outcome[slam->accounts[i].outcome])++;
     }
     counters->insane += bslam_ekf_is_sane(&slam->ekf) ? 0u : 1u;
 }

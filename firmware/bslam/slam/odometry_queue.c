@@ -5,8 +5,7 @@
 static const bslam_real_t TRAVEL_MAX_M = BSLAM_R(1000.0);
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
 
-/// The length of a motion. Beyond 1 km it is 1 km: more than any way that correlation_m may name, and the
-/// filter's own speed has no bound that would keep the conversion defined.
+/// The length of a motion, or 1 km if it is longer, so that the conversion is defined.
 static uint32_t whole_micrometres(bslam_real_t forward_m)
 {
     return bslam_in_range(forward_m, -TRAVEL_MAX_M, TRAVEL_MAX_M)
@@ -98,7 +97,7 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
         const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
         bslam_robot_predict(&robot, &slam->settings, &motion, &moved);
     }
-    *pose = bslam_robot_pose(&robot);
+    *pose = bslam_pose_of(robot.mean);
     if (behind_us < 0) {
         const bslam_pose_t ahead = bslam_history_look_ahead(&slam->settings, &moved, -behind_us);
         *pose = bslam_pose_compose(pose, &ahead);

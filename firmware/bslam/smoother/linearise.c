@@ -1,4 +1,4 @@
-// What is known from before the first node, told about other points. MATH "The smoother".
+// What is known from before the first node, linear about other points. MATH "The smoother".
 #include "base/logarithm.h"
 #include "base/trig.h"
 #include "bslam/smoother/smoother_internal.h"

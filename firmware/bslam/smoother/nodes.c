@@ -11,14 +11,14 @@ static const bslam_real_t GUESS_SD_LN = BSLAM_R(0.5);
 
 // ---- as a node holds it -----------------------------------------------------------------------------------
 
-void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion)
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion, bslam_real_t share)
 {
-    sum->dt_s += motion->dt_s;
-    sum->forward_m += motion->forward_m;
-    sum->turn_rad += motion->turn_rad;
-    sum->forward_var_m2 += motion->forward_var_m2;
-    sum->turn_var_rad2 += motion->turn_var_rad2;
-    sum->forward_turn_cov_mrad += motion->forward_turn_cov_mrad;
+    sum->dt_s += share * motion->dt_s;
+    sum->forward_m += share * motion->forward_m;
+    sum->turn_rad += share * motion->turn_rad;
+    sum->forward_var_m2 += share * motion->forward_var_m2;
+    sum->turn_var_rad2 += share * motion->turn_var_rad2;
+    sum->forward_turn_cov_mrad += share * motion->forward_turn_cov_mrad;
 }
 
 int32_t bslam_smoother_units(bslam_real_t value)

@@ -9,20 +9,19 @@
 
 #define ROBOT BSLAM_ROBOT_DIM_MAX
 
-/// What a node costs on the ways up and back, where it costs the state's dimension on the way forth: about
-/// in proportion to a Cortex-M4F's instructions, so that all frames cost alike.
+/// What a node costs on the passes up and back, where it costs the state's dimension forth: about in
+/// proportion to a Cortex-M4F's instructions, so that all frames cost alike.
 enum { UP_COST = 8, BACK_COST = 12 };
 
 /// What may come in while a cycle lasts.
 #define SLACK_NODES (BSLAM_SMOOTHER_NODES_MAX / 16 + 2)
 #define SLACK_SEEN (BSLAM_SMOOTHER_SEEN_MAX / 12)
-/// Places move no farther at once, as a share of the distance from the robot, and of the least distance that
-/// they were seen from: beyond that the model is far from linear, and a beacon must neither jump to the robot
-/// nor over the robot's way, for directions from there would point the other way then.
+/// Places move no farther at once, as a share of the distance from the robot, and of the least that they were
+/// seen from: beyond that the model is far from linear. No beacon must jump to the robot or over its path.
 static const bslam_real_t STEP_MAX = BSLAM_R(0.3);
 static const bslam_real_t NEAREST_STEP_MAX = BSLAM_R(0.6);
-/// Sightings that fit worse by more than this than on the last way forth, or than they should, tell of a step
-/// that was too long. Halving it more often than this is of no use: then it is the readings that changed.
+/// Sightings that fit worse by more than this than on the last pass forth tell of a step that was too long.
+/// Halving it more often than this is of no use: then it is the readings that changed.
 static const bslam_real_t FIT_RATIO_MAX = BSLAM_R(1.5);
 static const bslam_real_t FIT_MIN = BSLAM_R(1.0);
 enum { HALVINGS_MAX = 4 };
@@ -32,7 +31,7 @@ static const bslam_real_t NEVER_SEEN_M2 = BSLAM_R(1e6);
 static const bslam_real_t NEAR_MIN_M = BSLAM_R(1.0);
 /// How exactly the map is given to the robot alone, (1 mm)².
 static const bslam_real_t PIN_VARIANCE = BSLAM_R(1e-6);
-/// What the way back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
+/// What the pass back takes a pose to be doubtful by at least, (1 mm)², (1 mrad)²: at the start it is not.
 static const bslam_real_t DOUBT_MIN = BSLAM_R(1e-6);
 
 // ---- forth ------------------------------------------------------------------------------------------------
@@ -147,8 +146,8 @@ static void end_forth(bslam_smoother_t *smoother)
     smoother->halvings = 0;
 }
 
-/// The way forth was linear about points that the last cycle changed. If its sightings fit worse by much than
-/// on the way before, a change was too large for the model to be linear on: all points go back half of it.
+/// The pass forth was linear about points that the last cycle changed. If its sightings fit much worse than
+/// before, the change was too large for the model to be linear on: all points go back half of it.
 static bool is_worse(const bslam_smoother_t *smoother)
 {
     const bslam_real_t most = FIT_RATIO_MAX * (smoother->fit > FIT_MIN ? smoother->fit : FIT_MIN);
@@ -286,7 +285,7 @@ static void cross_row(const bslam_real_t *p, int i, int n, const bslam_transitio
     }
 }
 
-/// The robot goes on from a node to the next one, and what the way back needs of it is kept.
+/// The robot goes on from a node to the next one, and what the pass back needs of it is kept.
 static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *next,
                     bslam_smoother_step_t *step)
 {
@@ -354,7 +353,7 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
 
 // ---- the work ---------------------------------------------------------------------------------------------
 
-/// One unit of the ways forth and up.
+/// One unit of the passes forth and up.
 static void advance(bslam_smoother_t *smoother)
 {
     const bslam_smoother_node_t *node = bslam_smoother_node(smoother, smoother->at);
@@ -368,7 +367,7 @@ static void advance(bslam_smoother_t *smoother)
     smoother->at_seen += node->seen;
 }
 
-/// The last part of those that are left on the way back.
+/// The last part of those that are left on the pass back.
 static void retreat(bslam_smoother_t *smoother)
 {
     const int first = (smoother->at - 1) / BSLAM_SMOOTHER_PART * BSLAM_SMOOTHER_PART;

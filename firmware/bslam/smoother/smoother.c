@@ -10,15 +10,16 @@
 /// So many blocks in a row that held fewer frames than a node is made of: frames are rare. One alone is the
 /// last moment before nothing is in view.
 enum { UNFILLED_MIN = 5 };
-/// Where nothing is seen a node ends after so long: ways that odometry alone tells add up, and are not to
-/// fill the window. Speeds that are states are read once a node, and no such node lasts longer than a block.
+/// Where nothing is seen a node ends after so long: odometry alone is not to fill the window. Speeds that are
+/// states are read once a node, and no such node lasts longer than a block.
 static const bslam_real_t UNSEEN_MAX_S = BSLAM_R(0.6);
-/// How a bearing changes besides by the turn that the filter has, rad/s: by the way, and by an error of that.
+/// How a bearing changes besides by the turn that the filter has, rad/s: by the travel, and by an error of
+/// that.
 static const bslam_real_t SLOPE_SD_RADPS = BSLAM_R(0.5);
-/// A beacon in direction only is first thought to be so far away.
+/// A bearing-only beacon is first thought to be so far away.
 static const bslam_real_t FIRST_RANGE_M = BSLAM_R(4.0);
 static const bslam_real_t FIRST_SD_M = BSLAM_R(2.5);
-/// The same where all sightings will be gone through again: that distance is told at the first of them.
+/// The same where all sightings will be gone through again.
 static const bslam_real_t UNSEEN_SD_M = BSLAM_R(20.0);
 /// Passes are wanted most while the map is young. In nodes a frame: at first, and less by one for each so
 /// many nodes.
@@ -196,7 +197,7 @@ static void close_block(bslam_smoother_t *smoother)
 /// The middle of the block is now, as far as one knows.
 static void set_middle(bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
 {
-    bslam_smoother_add_motion(&smoother->to_middle, &smoother->from_middle);
+    bslam_smoother_add_motion(&smoother->to_middle, &smoother->from_middle, 1);
     smoother->from_middle = (bslam_motion_t){0};
     smoother->middle_s = smoother->block_s;
     memcpy(smoother->middle, ekf->mean, (size_t)ekf->base_dim * sizeof smoother->middle[0]);
@@ -348,7 +349,7 @@ void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, con
     if (smoother->frames > 0 && smoother->block_s + motion->dt_s > BSLAM_SMOOTHER_BLOCK_MAX_S) {
         close_block(smoother);
     }
-    bslam_smoother_add_motion(&smoother->from_middle, motion);
+    bslam_smoother_add_motion(&smoother->from_middle, motion, 1);
     smoother->gap_s += motion->dt_s;
     if (smoother->frames > 0) {
         smoother->block_s += motion->dt_s;

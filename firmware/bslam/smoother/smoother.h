@@ -1,23 +1,19 @@
 /// A fixed-lag smoother: the filter, led through the last drive again and again, about better points each
 /// time. MATH "The smoother".
 ///
-/// A filter linearises each sighting once, at what it holds true then. In direction only that is wrong: a
-/// beacon's distance is not known for half a minute, and a wrong one enters every Jacobian. So the last
-/// BSLAM_SMOOTHER_NODES_MAX nodes (a node is the middle of three frames; of 6, 12 and 24 farther back) are
-/// kept with what was read and seen there, and the filter as it was before them, the *base*. A cycle is
+/// A filter linearises each sighting once, at what it holds true then. Bearing-only that is wrong: a beacon's
+/// distance is unknown for half a minute, and a wrong one enters every Jacobian. So the last
+/// BSLAM_SMOOTHER_NODES_MAX nodes are kept with what was read and seen there, and the filter before them, the
+/// *base*. A node is the middle of three frames, farther back of 6, 12 and 24. A cycle is
 ///
 ///     forth   from the base through all nodes, linear about their poses and the beacons' places: ends as the
-///             filter of now, which takes the place of the one that has been carried on frame by frame
+///             filter of now
 ///     up      from the base again, in the map that came of it: the robot alone
 ///     back    through the nodes in reverse: the poses that fit all readings best are the next ones to
-///             linearise at. They lie on a path as smooth as robots drive, for the jitter of one that rests
-///             on noisy wheels alone would look like parallax
+///             linearise at. They lie on a path as smooth as robots drive
 ///
-/// and then as many nodes as came in meanwhile are joined with their neighbours, or leave at the old end,
-/// into the base. Work is bounded a frame. All of it is the filter's own code (ekf/ekf.h) with its models,
-/// gate and Huber's rule.
-///
-/// The caller owns the struct; it serves one pipeline (slam/slam.h, bslam_slam_attach_smoother).
+/// Then as many nodes as came in meanwhile are joined with their neighbours, or leave into the base. Work is
+/// bounded a frame. All of it is the filter's own code (ekf/ekf.h) with its models, gate and Huber's rule.
 #ifndef BSLAM_SMOOTHER_SMOOTHER_H
 #define BSLAM_SMOOTHER_SMOOTHER_H
 
@@ -25,16 +21,15 @@
 
 /// Frames of a node.
 #define BSLAM_SMOOTHER_FRAMES 3
-/// Nodes of one of the parts in which the way back is gone.
+/// Nodes of one of the parts in which the pass back is gone.
 #define BSLAM_SMOOTHER_PART 20
 #define BSLAM_SMOOTHER_PARTS ((BSLAM_SMOOTHER_NODES_MAX + BSLAM_SMOOTHER_PART - 1) / BSLAM_SMOOTHER_PART)
 
 /// So many of the first frames are nodes of their own, and are not joined. Only there is the heading known
-/// without any beacon, so what is seen there tells how the map lies; a node's heading, which is that of its
-/// middle, would tell it as badly as that one is known.
+/// without any beacon, so what is seen there tells how the map lies.
 #define BSLAM_SMOOTHER_ANCHORS 12
 
-/// Two nodes of a level become one of the next where room is wanted: 1, 2, 4 and 8 times so many frames.
+/// Two nodes of a level become one of the next: 1, 2, 4 and 8 times so many frames.
 #define BSLAM_SMOOTHER_LEVELS 4
 
 /// In place of a number of distances: none, and nothing was known of the beacon before.
@@ -42,8 +37,8 @@
 /// In place of a beacon: this is the distance that belongs to the direction before it.
 #define BSLAM_SMOOTHER_RANGE 255
 
-/// What was seen of a beacon around a node, brought to its moment: its direction, and behind that, if there
-/// is more to say than that it was seen again, its distance. 4 bytes each, for most have none.
+/// What was seen of a beacon around a node, brought to its moment: its direction, and behind that its
+/// distance, if there is one. 4 bytes each.
 typedef struct bslam_smoother_seen {
     uint16_t
         value;  ///< bearing as an int16_t in 1/65536 of a turn: 0.1 mrad; or range in 5 mm, 327 m at most
@@ -56,9 +51,10 @@ typedef struct bslam_smoother_node {
     bslam_real_t at[BSLAM_ROBOT_DIM_MAX];  ///< the robot's values: where its models are linearised
     bslam_motion_t motion;                 ///< odometry since the node before, or since the base
     int16_t seen;                          ///< directions and distances
-    int16_t turned;                        ///< how its way differs from an arc: bslam_bend_t, in units of
+    int16_t turned;                        ///< how its path differs from an arc: bslam_bend_t, in units of
     int16_t stretched;                     ///< BSLAM_SMOOTHER_BEND, the latter less 1
-    int16_t moved[BSLAM_ROBOT_DIM_MAX];  ///< what the last way back changed, in units of BSLAM_SMOOTHER_MOVED
+    int16_t
+        moved[BSLAM_ROBOT_DIM_MAX];  ///< what the last pass back changed, in units of BSLAM_SMOOTHER_MOVED
 } bslam_smoother_node_t;
 
 /// Sums over the sightings of a beacon in the open block, for a line of bearing over time.
@@ -71,14 +67,14 @@ typedef struct bslam_smoother_line {
     bool is_first;  ///< nothing was known of the beacon before
 } bslam_smoother_line_t;
 
-/// What the way back needs of a node.
+/// What the pass back needs of a node.
 typedef struct bslam_smoother_step {
     bslam_real_t gain[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX];
     bslam_real_t here[BSLAM_ROBOT_DIM_MAX];  ///< correction by all that was read until the node
     bslam_real_t next[BSLAM_ROBOT_DIM_MAX];  ///< what that makes of the next node's
 } bslam_smoother_step_t;
 
-/// The robot on the way up, where a part begins.
+/// The robot on the pass up, where a part begins.
 typedef struct bslam_smoother_mark {
     bslam_real_t correction[BSLAM_ROBOT_DIM_MAX];
     bslam_real_t covariance[BSLAM_ROBOT_DIM_MAX * (BSLAM_ROBOT_DIM_MAX + 1) / 2];
@@ -90,7 +86,6 @@ typedef enum bslam_smoother_phase {
     BSLAM_SMOOTHER_BACK = 2
 } bslam_smoother_phase_t;
 
-/// All members are the smoother's own.
 typedef struct bslam_smoother {
     bslam_settings_t model;                        ///< the pipeline's, without gate and with Huber's rule
     bslam_real_t free_walk;                        ///< of v: what the estimate rests on
@@ -115,10 +110,10 @@ typedef struct bslam_smoother {
     bslam_smoother_mark_t marks[BSLAM_SMOOTHER_PARTS];
     bslam_smoother_step_t steps[BSLAM_SMOOTHER_PART];
     bslam_smoother_seen_t joined[2 * BSLAM_BEACONS_MAX];  ///< scratch: too much for a stack
-    bslam_real_t nearest_m2[BSLAM_BEACONS_MAX];  ///< of the way forth: squares of how near it was seen from
+    bslam_real_t nearest_m2[BSLAM_BEACONS_MAX];  ///< of the pass forth: squares of how near it was seen from
     bslam_real_t misfit;  ///< of the phase: sum of d² over its sightings, by Huber's rule
     int32_t fitted;       ///< and how many these are
-    bslam_real_t fit;     ///< mean of d² on the last way forth that was taken; 0 before the first
+    bslam_real_t fit;     ///< mean of d² on the last pass forth that was taken; 0 before the first
     int32_t halvings;     ///< in a row, of the last cycle's changes
     // The open block.
     bslam_smoother_line_t lines[BSLAM_BEACONS_MAX];
@@ -134,7 +129,7 @@ typedef struct bslam_smoother {
     bool rested;          ///< it worked at the latest odometry
     uint32_t cycles;      ///< that took the filter's place
     uint32_t insane;      ///< that did not, because they came out not finite
-    uint32_t halved;      ///< ways forth that were gone again, about points half as far from the old ones
+    uint32_t halved;      ///< passes forth that were gone again, about points half as far from the old ones
     uint32_t left_out;    ///< sightings that a phase could not use, each time it met them
 } bslam_smoother_t;
 
@@ -142,15 +137,11 @@ typedef struct bslam_smoother {
 void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *settings,
                             const bslam_ekf_t *ekf);
 
-/// Of memory that may be damaged: starts anew from this filter unless every count and number may be used.
-/// O(what is kept).
-void bslam_smoother_mend(bslam_smoother_t *smoother, const bslam_settings_t *settings, const bslam_ekf_t *ekf);
-
 /// The filter has gone through this motion (as odometry reported it, before any scale). O(1).
 void bslam_smoother_move(bslam_smoother_t *smoother, const bslam_ekf_t *ekf, const bslam_motion_t *motion);
 
 /// Odometry was read over so much time. Where no frame has come for a while, works as bslam_smoother_frame
-/// does, so that what was seen last is settled before something is seen again.
+/// does.
 void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_settings_t *settings, bslam_ekf_t *ekf,
                          bslam_real_t dt_s);
 
@@ -158,7 +149,7 @@ void bslam_smoother_rest(bslam_smoother_t *smoother, const bslam_settings_t *set
 void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sighting, int index);
 
 /// In place of bslam_ekf_add, for the filter and the base: a guess of the place, a few metres doubtful. The
-/// sighting is to be seen then, too (bslam_smoother_see). BSLAM_E_MAP_FULL. O(n).
+/// sighting is to be seen then, too. BSLAM_E_MAP_FULL. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, bslam_ekf_t *ekf,
                                                    const bslam_pose_t *mount,
                                                    const bslam_sighting_t *sighting, int *index);

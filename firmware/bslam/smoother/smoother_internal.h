@@ -1,4 +1,4 @@
-/// What the smoother's files share. Not for users.
+/// What the smoother's files share.
 #ifndef BSLAM_SMOOTHER_SMOOTHER_INTERNAL_H
 #define BSLAM_SMOOTHER_SMOOTHER_INTERNAL_H
 
@@ -16,10 +16,10 @@
 
 /// A block lasts no longer, nor does a node's motion where nothing is seen.
 #define BSLAM_SMOOTHER_BLOCK_MAX_S BSLAM_R(0.2)
-/// How a joined node's way was driven is known as well as it was when it was joined, and where the robot
-/// turned on the spot, hardly at all. A filter that took it for certain would shrink the map until it fits.
+/// How a joined node's path was driven is known as well as when it was joined; where the robot turned on the
+/// spot, hardly at all. A filter that took it for certain would shrink the map until it fits.
 #define BSLAM_SMOOTHER_JOINED_DOUBT BSLAM_R(0.5)
-/// The way within a block is an arc, as far as the points are right that it is to lead to.
+/// The path within a block is an arc, as far as the points are right that it leads to.
 #define BSLAM_SMOOTHER_BLOCK_DOUBT BSLAM_R(0.2)
 
 /// Node k, counted from the oldest.
@@ -57,14 +57,14 @@ static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *di
 
 // ---- linearise.c
 
-/// The base is linear about the map's places of now, and tells what it told: each beacon's bearing and the
-/// logarithm of its distance from the base's robot, which is what directions are nearly linear in. O(n²).
+/// The base is linear about the map's places of now, in each beacon's bearing and the logarithm of its
+/// distance from the base's robot, which is what directions are nearly linear in. O(n²).
 void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
 
 // ---- nodes.c
 
-/// sum += motion, which goes on from it or leads to it.
-void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion);
+/// sum += share * motion, which goes on from it or leads to it.
+void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion, bslam_real_t share);
 
 /// The nearest whole number, 65535 at most.
 int32_t bslam_smoother_units(bslam_real_t value);
@@ -86,7 +86,7 @@ void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);
 // ---- thin.c
 
 /// Of nodes beyond so many, the oldest two of a level become one of the next, whose room is used up first; at
-/// the last one the oldest leaves, into the base. The cycle must be begun anew. O(what is kept).
+/// the last level the oldest leaves, into the base. The cycle must be begun anew. O(what is kept).
 void bslam_smoother_thin(bslam_smoother_t *smoother, int nodes_max);
 
 // ---- passes.c

@@ -7,7 +7,7 @@
 #include "bslam/smoother/smoother_internal.h"
 #include "base/scalar.h"
 
-/// No way is bent by more: beyond that it has no direction to speak of.
+/// No path is bent by more: beyond that it has no direction to speak of.
 static const bslam_real_t TURNED_MAX_RAD = BSLAM_R(1.0);
 static const bslam_real_t STRETCHED_MAX = BSLAM_R(0.3);
 /// A chord shorter than this has no direction.
@@ -19,19 +19,14 @@ enum { RANGES_MAX = BSLAM_SMOOTHER_FIRST - 1 };
 
 enum { SPEEDS = BSLAM_ROBOT_DIM_MAX - BSLAM_STATE_FORWARD };
 
-/// Two neighbours on their way into one.
+/// Two neighbours that become one.
 typedef struct pair {
     bslam_pose_t pose[2];
     bslam_pose_t mean;
     int32_t first_seen[3];  ///< of the older, of the newer, and behind that
 } pair_t;
 
-static bslam_pose_t pose_at(const bslam_real_t *at)
-{
-    return (bslam_pose_t){at[BSLAM_STATE_X], at[BSLAM_STATE_Y], at[BSLAM_STATE_THETA]};
-}
-
-// ---- the way ----------------------------------------------------------------------------------------------
+// ---- the path ---------------------------------------------------------------------------------------------
 
 /// How far the node's speeds drive it and turn it; odometry's increments, times their scales, where there are
 /// no speeds.
@@ -51,7 +46,7 @@ static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, b
 {
     bslam_real_t forward_m, turn_rad;
     arc_to(model, node, &forward_m, &turn_rad);
-    const bslam_pose_t start = pose_at(from);
+    const bslam_pose_t start = bslam_pose_of(from);
     bslam_motion_jacobian_t unused;
     const bslam_pose_t end = bslam_motion_step(BSLAM_MOTION_ARC, &start, forward_m, turn_rad, &unused);
     const bslam_real_t arc[2] = {end.x_m - start.x_m, end.y_m - start.y_m};
@@ -73,26 +68,14 @@ static void bend_path(const bslam_settings_t *model, const bslam_real_t *from, b
     }
 }
 
-/// A node's way, at whose beginning there is more of it than the node knows: `motion`, at these speeds.
+/// A node's path, at whose beginning there is more than the node knows: `motion`, at these speeds.
 static void lengthen(bslam_smoother_node_t *node, const bslam_motion_t *motion, const bslam_real_t *speeds)
 {
     const bslam_real_t share = motion->dt_s / (motion->dt_s + node->motion.dt_s);
     for (int i = 0; i < SPEEDS; i++) {
         node->at[BSLAM_STATE_FORWARD + i] += share * (speeds[i] - node->at[BSLAM_STATE_FORWARD + i]);
     }
-    bslam_smoother_add_motion(&node->motion, motion);
-}
-
-static bslam_motion_t half_of(const bslam_motion_t *motion)
-{
-    return (bslam_motion_t){
-        .dt_s = motion->dt_s / 2,
-        .forward_m = motion->forward_m / 2,
-        .turn_rad = motion->turn_rad / 2,
-        .forward_var_m2 = motion->forward_var_m2 / 2,
-        .turn_var_rad2 = motion->turn_var_rad2 / 2,
-        .forward_turn_cov_mrad = motion->forward_turn_cov_mrad / 2,
-    };
+    bslam_smoother_add_motion(&node->motion, motion, 1);
 }
 
 /// Half way between two poses, where what was seen from both is seen from: what each of them errs by at
@@ -223,11 +206,11 @@ static int join_seen(bslam_smoother_t *smoother, const pair_t *pair, int beacon,
 typedef struct closing {
     int32_t node, seen, to_node, to_seen;
     bslam_real_t from[BSLAM_ROBOT_DIM_MAX];  ///< the robot at the node before
-    bslam_motion_t ahead;                    ///< from there to where the next node's way begins, if anywhere
-    bslam_real_t speeds[SPEEDS];             ///< on that way
+    bslam_motion_t ahead;                    ///< from there to where the next node's path begins, if anywhere
+    bslam_real_t speeds[SPEEDS];             ///< on that path
 } closing_t;
 
-/// The next node, with all of its way.
+/// The next node, with all of its path.
 static bslam_smoother_node_t read_node(bslam_smoother_t *smoother, closing_t *at)
 {
     bslam_smoother_node_t node = *bslam_smoother_node(smoother, at->node);
@@ -264,14 +247,14 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
 {
     const bslam_smoother_node_t older = read_node(smoother, at);
     bslam_smoother_node_t joined = read_node(smoother, at);
-    pair_t pair = {{pose_at(older.at), pose_at(joined.at)},
+    pair_t pair = {{bslam_pose_of(older.at), bslam_pose_of(joined.at)},
                    {0, 0, 0},
                    {at->seen, at->seen + older.seen, at->seen + older.seen + joined.seen}};
     go_half_way(older.at, joined.at);
     for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
         joined.moved[i] = (int16_t)((older.moved[i] + joined.moved[i]) / 2);
     }
-    pair.mean = pose_at(joined.at);
+    pair.mean = bslam_pose_of(joined.at);
     int count = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
         count += join_seen(smoother, &pair, b, &smoother->joined[count]);
@@ -280,7 +263,8 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
         *bslam_smoother_seen(smoother, at->to_seen + k) = smoother->joined[k];
     }
     at->seen = pair.first_seen[2];
-    at->ahead = half_of(&joined.motion);
+    at->ahead = (bslam_motion_t){0};
+    bslam_smoother_add_motion(&at->ahead, &joined.motion, BSLAM_R(0.5));
     memcpy(at->speeds, &joined.at[BSLAM_STATE_FORWARD], sizeof at->speeds);
     joined.motion = at->ahead;
     lengthen(&joined, &older.motion, &older.at[BSLAM_STATE_FORWARD]);

@@ -35,17 +35,7 @@ static void move_sample(bslam_codec_t *codec, bslam_sample_t *sample)
 /// The unit and the 16-bit weights that come nearest, for samples in units of 1/127.
 static float weights_to_words(const bslam_weights_t *weights, int16_t words[BSLAM_SAMPLE_SIZE])
 {
-    float largest = 0.0f;
-    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
-        const float size = weights->w[k] < 0.0f ? -weights->w[k] : weights->w[k];
-        largest = size > largest ? size : largest;
-    }
-    const float per_unit = largest > 0.0f ? 32767.0f / largest : 0.0f;
-    for (int k = 0; k < BSLAM_SAMPLE_SIZE; k++) {
-        const float w = weights->w[k] * per_unit;
-        words[k] = (int16_t)(w + (w < 0.0f ? -0.5f : 0.5f));
-    }
-    return weights->unit * largest / (32767.0f * 127.0f);
+    return weights->unit * bslam_weights_to_words(weights->w, words) / (32767.0f * 127.0f);
 }
 
 static void words_to_weights(float unit, const int16_t words[BSLAM_SAMPLE_SIZE], bslam_weights_t *weights)

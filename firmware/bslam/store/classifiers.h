@@ -1,4 +1,4 @@
-/// The classifiers of a map's blob: their weights, samples and competitors. Not for users.
+/// The classifiers of a map's blob: their weights, samples and competitors.
 #ifndef BSLAM_STORE_CLASSIFIERS_H
 #define BSLAM_STORE_CLASSIFIERS_H
 

@@ -5,35 +5,19 @@
 #include "base/crc32.h"
 #include "base/scalar.h"
 
-static void blame(bslam_codec_t *codec, bslam_map_fault_t fault)
-{
-    if (codec->fault == BSLAM_MAP_FINE) {
-        codec->fault = fault;
-    }
-}
-
 void bslam_codec_require(bslam_codec_t *codec, bool holds, bslam_map_fault_t fault)
 {
-    if (!holds) {
-        blame(codec, fault);
-    }
-}
-
-static bool is_reading(const bslam_codec_t *codec)
-{
-    return codec->source != NULL;
+    codec->fault = holds || codec->fault != BSLAM_MAP_FINE ? codec->fault : fault;
 }
 
 void bslam_codec_bytes(bslam_codec_t *codec, void *bytes, uint32_t count)
 {
     if (codec->fault == BSLAM_MAP_FINE) {
         bool moved = true;
-        if (is_reading(codec)) {
-            if (count > codec->source->size - codec->at) {
-                blame(codec, BSLAM_MAP_TRUNCATED);
-            } else {
-                moved = codec->source->read(codec->source->context, codec->at, bytes, count);
-            }
+        if (codec->source != NULL) {
+            const bool is_there = count <= codec->source->size - codec->at;
+            bslam_codec_require(codec, is_there, BSLAM_MAP_TRUNCATED);
+            moved = is_there && codec->source->read(codec->source->context, codec->at, bytes, count);
         } else if (codec->sink != NULL) {
             moved = codec->sink->write(codec->sink->context, bytes, count);
         }

@@ -1,6 +1,5 @@
 /// One description of the map's format serves measuring, writing, checking and loading: each field passes
-/// through one of these functions, which takes it from where it is to where it goes. docs/MAP.md has the
-/// same, byte by byte. Not for users.
+/// through one of these functions. docs/MAP.md has the same, byte by byte.
 #ifndef BSLAM_STORE_CODEC_H
 #define BSLAM_STORE_CODEC_H
 

@@ -7,7 +7,7 @@
 #define SEALED 0x5ea1ed01u
 #define FACTOR 0x85ebca6bu  // odd, so that every step can be undone
 
-static uint32_t add(uint32_t sum, const void *bytes, size_t size)
+uint32_t bslam_guard_sum(uint32_t sum, const void *bytes, size_t size)
 {
     const uint8_t *from = bytes;
     for (size_t at = 0; at + sizeof(uint32_t) <= size; at += sizeof(uint32_t)) {
@@ -32,14 +32,15 @@ static uint32_t checksum_of(const bslam_slam_t *slam)
     const size_t counts = offsetof(bslam_ekf_t, beacons) - offsetof(bslam_ekf_t, dim);
     const size_t flags = sizeof *ekf - offsetof(bslam_ekf_t, pending_count);
     const size_t rest = offsetof(bslam_slam_t, accounts) - offsetof(bslam_slam_t, odometry);
-    uint32_t sum = add(START, &slam->settings, sizeof slam->settings);
-    sum = add(sum, ekf->mean, sizeof ekf->mean);
-    sum = add(sum, ekf->covariance, rows * sizeof ekf->covariance[0]);
-    sum = add(sum, &ekf->dim, counts);
-    sum = add(sum, ekf->beacons, bounded(ekf->beacon_count, BSLAM_BEACONS_MAX) * sizeof ekf->beacons[0]);
-    sum = add(sum, ekf->correction, sizeof ekf->correction);  // 0 between frames, and added to
-    sum = add(sum, &ekf->pending_count, flags);
-    return add(sum, &slam->odometry, rest);
+    uint32_t sum = bslam_guard_sum(START, &slam->settings, sizeof slam->settings);
+    sum = bslam_guard_sum(sum, ekf->mean, sizeof ekf->mean);
+    sum = bslam_guard_sum(sum, ekf->covariance, rows * sizeof ekf->covariance[0]);
+    sum = bslam_guard_sum(sum, &ekf->dim, counts);
+    sum = bslam_guard_sum(sum, ekf->beacons,
+                          bounded(ekf->beacon_count, BSLAM_BEACONS_MAX) * sizeof ekf->beacons[0]);
+    sum = bslam_guard_sum(sum, ekf->correction, sizeof ekf->correction);  // 0 between frames, and added to
+    sum = bslam_guard_sum(sum, &ekf->pending_count, flags);
+    return bslam_guard_sum(sum, &slam->odometry, rest);
 }
 
 void bslam_guard_seal(bslam_guard_t *guard, const bslam_slam_t *slam)

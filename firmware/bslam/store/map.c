@@ -13,9 +13,8 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-// Rounding may leave a covariance short of positive semidefinite by a part of its variances: by 3e-5 where a
-// run by directions alone went astray, while those of all others were clear of it by 2e-5. One that lacks no
-// more than this is taken with its variances larger by as much: as one that is whole.
+// Rounding may leave a covariance short of positive semidefinite by a part of its variances. One that lacks
+// no more than this is taken with its variances larger by as much.
 static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
 // By pairs the same, as a squared correlation; a little more, so that rounding refuses nothing that goes.
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);

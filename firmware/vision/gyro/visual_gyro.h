@@ -22,7 +22,8 @@ typedef struct bslam_gyro_filter {
 
 static inline bslam_gyro_filter_t *bslam_gyro_filter(bslam_visual_gyro_t *gyro)
 {
-    return (bslam_gyro_filter_t *)(void *)gyro;
+    void *memory = gyro;
+    return memory;
 }
 
 #endif

@@ -26,7 +26,7 @@ class Bslam:
 
     def _new(self) -> Slam:
         setup = self._setup
-        params = setup.parameters | {"recovery": 0}  # nobody carries the robot away
+        params = {**setup.parameters, "recovery": 0}  # nobody carries the robot away
         return Slam(params, beacons_max=setup.beacons_max, real=setup.real, seeds=setup.seeds)
 
     def reset(self, seed: int) -> None:

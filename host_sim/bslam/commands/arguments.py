@@ -74,8 +74,8 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         type=_word(PRESETS),
         default=[],
         metavar=_names(PRESETS),
-        help="settings to start from; repeated: one on top of the other (default: by what the scenario or the "
-        "log says of itself)",
+        help="settings to start from; repeated: one on top of the other (default: by what the scenario or "
+        "the log says of itself)",
     )
     meaning = "wheel-speed sigma (default: what the scenario or log says, 0.3 for paper_room)"
     add("sigma", _sigma_mps, None, "M/S", meaning)
@@ -91,6 +91,11 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
         choices=WHEEL_NOISES,
         help="what errs: the reading or the motion (default: as the scenario or log says)",
     )
+    _add_core_options(group)
+
+
+def _add_core_options(group: Any) -> None:
+    """Which core runs where, and its settings one by one."""
     group.add_argument(
         "--target",
         type=_target,

@@ -37,7 +37,14 @@ dlr: DIR is the DLR Spatial Cognition data set, held against its least-squares s
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
 COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam", "dlr": ""}  # folders of the data directory
 _OF_THE_RECORDING = (
-    "observation", "association", "filter", "presets", "sigma", "motion", "velocity_states", "noise"
+    "observation",
+    "association",
+    "filter",
+    "presets",
+    "sigma",
+    "motion",
+    "velocity_states",
+    "noise",
 )
 """Options that a recording has decided."""
 

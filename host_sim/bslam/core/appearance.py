@@ -19,7 +19,7 @@ _SEEDS = Path(__file__).with_name("seeds.npy")  # tools/training/make_seeds.py w
 
 
 def encode(signatures: NDArray[np.float32], real: str = "float") -> NDArray[np.int8] | NDArray[np.float32]:
-    """Signatures (n, 71) as samples (n, 72), to the bit what firmware/bslam/appearance/sample.c makes of them.
+    """Signatures (n, 71) as samples (n, 72), to the bit those of firmware/bslam/appearance/sample.c.
 
     A value beyond -1 to 1 counts as that limit. Raises BslamError for another shape, or what is no number.
     """

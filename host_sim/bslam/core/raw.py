@@ -107,25 +107,25 @@ def _answer_callbacks(ffi: Any) -> None:
     a `Flash`.
     """
 
-    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    @ffi.def_extern(error=False)
     def sink_write(context: Any, data: Any, size: int) -> bool:
         ffi.from_handle(context).extend(ffi.buffer(data, size))
         return True
 
-    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    @ffi.def_extern(error=False)
     def source_read(context: Any, at: int, data: Any, size: int) -> bool:
         ffi.memmove(data, ffi.from_handle(context)[at : at + size], size)
         return True
 
-    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    @ffi.def_extern(error=False)
     def flash_erase(context: Any, slot: int) -> bool:
         return bool(ffi.from_handle(context).erase(slot))
 
-    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    @ffi.def_extern(error=False)
     def flash_write(context: Any, slot: int, at: int, data: Any, size: int) -> bool:
         return bool(ffi.from_handle(context).write(slot, at, bytes(ffi.buffer(data, size))))
 
-    @ffi.def_extern(error=False)  # type: ignore[untyped-decorator]
+    @ffi.def_extern(error=False)
     def flash_read(context: Any, slot: int, at: int, data: Any, size: int) -> bool:
         ffi.memmove(data, ffi.from_handle(context).read(slot, at, size), size)
         return True

@@ -91,7 +91,7 @@ UNKNOWN_IDENTITY_SETTINGS: Final[dict[str, int | float]] = {
     "new_d2": 100.0,
     "confirm_window_us": 3_000_000,
 }
-"""On top of them, with identity unknown: association wants sharp noise where consistency wants it inflated."""
+"""On top of them, with identity unknown: association wants sharp noise, consistency wants it inflated."""
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from bslam.core.slam import BY_APPEARANCE
 from bslam.errors import BslamError
 from bslam.log import SIGHTING_NUMBERS, TICK_KEYS, Beacons, Log, Odometry, Robot, Sightings, Truth, robot_text
 from bslam.parsing.settings import parse_table
-from bslam.core.slam import BY_APPEARANCE
 from bslam.recording.entries import Frame, Reading, Start, TruePose
 from bslam.recording.reader import Recording
 

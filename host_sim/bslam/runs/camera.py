@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import bslam.world as world_package
-from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.appearance import rendered_seeds
+from bslam.core.builds import FIRMWARE_DIR
 from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Turn
 from bslam.core.visual_gyro import VisualGyro
 from bslam.errors import BslamError

@@ -255,9 +255,13 @@ class RemoteSlam:
     def counters(self) -> dict[str, int]:
         """As `Slam.counters`."""
         values = iter(messages.read_counters(self._client.ask(Message.COUNTERS).body))
-        found = {name: next(values) for part in ("slam", "appearance", "learner") for name in self._names(part)}
+        found = {
+            name: next(values) for part in ("slam", "appearance", "learner") for name in self._names(part)
+        }
         health = self.health()
-        return found | {name: getattr(health, name) for part in ("recovery", "guard") for name in self._names(part)}
+        return found | {
+            name: getattr(health, name) for part in ("recovery", "guard") for name in self._names(part)
+        }
 
     def _names(self, part: str) -> list[str]:
         """Of the counters of a part of the library."""

@@ -9,7 +9,7 @@ import pytest
 from bslam.algorithms.causal_map import CausalMap
 from bslam.algorithms.noise import motion_covariance, range_sd_m
 from bslam.algorithms.smoother import _ARC_SD_M, _FIRST_RANGE_SD_M, Smoother, _Problem
-from bslam.core.slam import Slam
+from bslam.core.presets import preset_settings
 from bslam.log import first_steps
 from bslam.motion import move_on_arc
 from bslam.options import RunOptions
@@ -22,7 +22,7 @@ MOUNT = {"mount_x_m": 0.12, "mount_y_m": -0.05, "mount_yaw_rad": 0.3}
 
 
 def parameters(**changes):
-    return Slam.defaults() | MOUNT | changes
+    return preset_settings(["paper"], 0, 1) | MOUNT | changes
 
 
 def drive(p, steps, seed=4, has_range=True, has_gyro=False):

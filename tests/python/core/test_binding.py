@@ -22,7 +22,7 @@ REALS = pytest.mark.parametrize("real", ["float", "double"])
 
 
 def table_in_c() -> list[tuple[str, float, float, float, bool, str]]:
-    """The lines of the tables as they stand in the headers: name, default, low, high, is it whole, meaning."""
+    """The lines of the tables in the headers: name, default, low, high, is it whole, meaning."""
     headers = ("settings.h", "association/tuning.h")
     text = "".join(Path(FIRMWARE_DIR, "bslam", name).read_text(encoding="utf-8") for name in headers)
     line = re.compile(r'(REAL|INTEGER)\((\w+), ([-\w.]+), ([-\w.]+), ([-\w.]+),\s*"([^"]*)"\)')

@@ -51,7 +51,7 @@ def test_solver_looser_tolerance_takes_fewer_steps(real: str) -> None:
 def test_learner_tells_objects_apart(real: str) -> None:
     random = np.random.default_rng(1)
     views = signatures(random, 12 * 10, 12)
-    learner = Learner(signatures(random, 20, 20), machines=12, real=real)
+    learner = Learner(signatures(random, 20, 20), classifiers=12, real=real)
     machines = [learner.add() for _ in range(12)]
     for i in range(6 * 12):
         learner.show(machines[i % 12], views[i])
@@ -126,7 +126,9 @@ def test_encode_gives_the_samples_of_the_c_library_to_the_bit(real: str) -> None
     module = internals(real, 1)
     samples = module.ffi.new("bslam_sample_t[]", len(values))
     for row, sample in zip(values, samples, strict=True):
-        status = module.lib.bslam_sample_encode(module.ffi.from_buffer("float[]", row), module.ffi.addressof(sample))
+        status = module.lib.bslam_sample_encode(
+            module.ffi.from_buffer("float[]", row), module.ffi.addressof(sample)
+        )
         assert status == module.lib.BSLAM_OK
     assert encode(values, real).tobytes() == bytes(module.ffi.buffer(samples))
 

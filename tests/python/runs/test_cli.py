@@ -306,7 +306,10 @@ def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):
     assert not entry["velocity_states"]
     with pytest.raises(SystemExit):
         main([*run, "--preset", "wheels"])
-    assert "'wheels' does not exist; allowed: real-wheels, paper, camera, bearing-only" in capsys.readouterr().err
+    assert (
+        "'wheels' does not exist; allowed: real-wheels, paper, camera, bearing-only"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, capsys):

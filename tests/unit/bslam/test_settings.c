@@ -173,7 +173,7 @@ static void test_set_no_such_field_is_refused(void **state)
 
 // ---- check ------------------------------------------------------------------------------------------------
 
-/// One field of otherwise good parameters is set to `value`: the check must blame it.
+/// One field of otherwise good settings is set to `value`: the check must blame it.
 #define ASSERT_BLAMED(field, value) \
     do { \
         bslam_settings_t settings = unit_settings(); \

@@ -81,7 +81,7 @@ static void test_each_beacon_learns_its_own_look(void **state)
     assert_int_equal(appearance.counters.shared, 0);
 }
 
-static void test_nothing_is_known_of_a_beacon_without_a_machine(void **state)
+static void test_nothing_is_known_of_a_beacon_without_a_classifier(void **state)
 {
     bslam_sample_t sample = {{0}};
     const bslam_opinion_t opinion = bslam_appearance_ask(&appearance, &settings, 0, &sample);
@@ -120,7 +120,7 @@ static void learn_two(int views)
     }
 }
 
-static void test_a_new_beacon_that_looks_like_another_shares_its_machine(void **state)
+static void test_a_new_beacon_that_resembles_another_shares_its_classifier(void **state)
 {
     learn_two(8);
     for (int view = 20; view < 20 + SHARE; view++) {
@@ -143,7 +143,7 @@ static void test_a_beacon_that_only_once_looked_like_another_gets_its_own(void *
     assert_int_equal(appearance.counters.shared, 0);
 }
 
-static void test_a_beacon_that_looks_like_one_and_then_like_another_gets_its_own(void **state)
+static void test_a_beacon_that_resembles_one_and_then_another_gets_its_own(void **state)
 {
     learn_two(8);
     teach(2, 3, 0, 20);
@@ -154,7 +154,7 @@ static void test_a_beacon_that_looks_like_one_and_then_like_another_gets_its_own
     assert_int_not_equal(appearance.of[2].classifier, appearance.of[1].classifier);
 }
 
-static void test_a_shared_machine_is_kept_while_it_knows_its_beacons(void **state)
+static void test_a_shared_classifier_is_kept_while_it_knows_its_beacons(void **state)
 {
     learn_two(8);
     appearance.of[2].classifier = appearance.of[0].classifier;
@@ -166,7 +166,7 @@ static void test_a_shared_machine_is_kept_while_it_knows_its_beacons(void **stat
 }
 
 /// It has nothing to tell its beacons from, and so refuses nobody.
-static void test_a_shared_machine_without_rivals_is_kept(void **state)
+static void test_a_shared_classifier_without_competitors_is_kept(void **state)
 {
     teach(0, 2, 0, 0);
     appearance.of[1].classifier = appearance.of[0].classifier;
@@ -177,7 +177,7 @@ static void test_a_shared_machine_without_rivals_is_kept(void **state)
     assert_int_equal(appearance.counters.parted, 0);
 }
 
-static void test_a_shared_machine_that_refuses_a_beacon_is_left(void **state)
+static void test_a_shared_classifier_that_refuses_a_beacon_is_left(void **state)
 {
     learn_two(8);
     appearance.of[2].classifier = appearance.of[0].classifier;  // shared by mistake: beacon 2 looks otherwise
@@ -188,7 +188,7 @@ static void test_a_shared_machine_that_refuses_a_beacon_is_left(void **state)
     assert_int_not_equal(appearance.of[2].classifier, appearance.of[0].classifier);
 }
 
-static void test_forget_frees_a_machine_unless_another_beacon_has_it(void **state)
+static void test_forget_frees_a_classifier_unless_another_beacon_has_it(void **state)
 {
     learn_two(8);
     appearance.of[2].classifier = appearance.of[0].classifier;
@@ -204,7 +204,7 @@ static void test_forget_frees_a_machine_unless_another_beacon_has_it(void **stat
     assert_true(bslam_learner_samples(&appearance.learner, second) > 0);
 }
 
-static void test_forget_while_the_machine_is_in_training(void **state)
+static void test_forget_while_the_classifier_is_in_training(void **state)
 {
     for (int view = 0; view < 4; view++) {
         for (int b = 0; b < 3; b++) {
@@ -322,15 +322,15 @@ static void test_side_odds_fall_with_the_angle_to_where_it_was_seen_from(void **
                 0);  // each beacon has its own
 }
 
-static void test_all_beacons_alike_end_with_one_machine(void **state)
+static void test_all_beacons_alike_end_with_one_classifier(void **state)
 {
     for (int view = 0; view < 40; view++) {
         for (int b = 0; b < 4; b++) {
             teach(b, 4, 0, 4 * view + b);
         }
     }
-    // Whoever came first keeps its machine; the rest, which it takes for its own, share it, or have one that
-    // says nothing sure.
+    // Whoever came first keeps its classifier; the rest, which it takes for its own, share it, or have one
+    // that says nothing sure.
     for (int b = 0; b < 4; b++) {
         assert_true(appearance.of[b].classifier == appearance.of[0].classifier || value_of(b, 0, 777) < 1);
     }
@@ -409,18 +409,18 @@ int main(void)
         cmocka_unit_test_setup(test_sectors_are_equal_parts_of_a_turn, setup),
         cmocka_unit_test_setup(test_side_odds_fall_with_the_angle_to_where_it_was_seen_from, setup),
         cmocka_unit_test_setup(test_each_beacon_learns_its_own_look, setup),
-        cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_machine, setup),
+        cmocka_unit_test_setup(test_nothing_is_known_of_a_beacon_without_a_classifier, setup),
         cmocka_unit_test_setup(test_weight_grows_with_the_samples, setup),
         cmocka_unit_test_setup(test_a_robot_that_stands_still_teaches_once, setup),
-        cmocka_unit_test_setup(test_a_new_beacon_that_looks_like_another_shares_its_machine, setup),
+        cmocka_unit_test_setup(test_a_new_beacon_that_resembles_another_shares_its_classifier, setup),
         cmocka_unit_test_setup(test_a_beacon_that_only_once_looked_like_another_gets_its_own, setup),
-        cmocka_unit_test_setup(test_a_beacon_that_looks_like_one_and_then_like_another_gets_its_own, setup),
-        cmocka_unit_test_setup(test_a_shared_machine_is_kept_while_it_knows_its_beacons, setup),
-        cmocka_unit_test_setup(test_a_shared_machine_without_rivals_is_kept, setup),
-        cmocka_unit_test_setup(test_a_shared_machine_that_refuses_a_beacon_is_left, setup),
-        cmocka_unit_test_setup(test_forget_frees_a_machine_unless_another_beacon_has_it, setup),
-        cmocka_unit_test_setup(test_forget_while_the_machine_is_in_training, setup),
-        cmocka_unit_test_setup(test_all_beacons_alike_end_with_one_machine, setup),
+        cmocka_unit_test_setup(test_a_beacon_that_resembles_one_and_then_another_gets_its_own, setup),
+        cmocka_unit_test_setup(test_a_shared_classifier_is_kept_while_it_knows_its_beacons, setup),
+        cmocka_unit_test_setup(test_a_shared_classifier_without_competitors_is_kept, setup),
+        cmocka_unit_test_setup(test_a_shared_classifier_that_refuses_a_beacon_is_left, setup),
+        cmocka_unit_test_setup(test_forget_frees_a_classifier_unless_another_beacon_has_it, setup),
+        cmocka_unit_test_setup(test_forget_while_the_classifier_is_in_training, setup),
+        cmocka_unit_test_setup(test_all_beacons_alike_end_with_one_classifier, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_teaches_nothing, setup),
         cmocka_unit_test_setup(test_without_a_free_slot_a_beacon_goes_without, setup),
         cmocka_unit_test_setup(test_init_refuses_too_many_seeds_and_changes_nothing, setup),

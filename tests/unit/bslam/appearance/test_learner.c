@@ -114,7 +114,7 @@ static void assert_unchanged(void)
 // ---- what it learns
 // ---------------------------------------------------------------------------------------------
 
-static void test_one_sample_makes_a_machine_useful(void **state)
+static void test_one_sample_makes_a_classifier_useful(void **state)
 {
     learn_objects(1, 1);
     assert_true(value_of(0, 0, 0) > 0.5);
@@ -128,7 +128,7 @@ static void test_one_sample_makes_a_machine_useful(void **state)
     }
 }
 
-static void test_several_machines_tell_their_objects_apart(void **state)
+static void test_several_classifiers_tell_their_objects_apart(void **state)
 {
     learn_objects(OBJECTS, 6);
     for (int object = 0; object < OBJECTS; object++) {
@@ -150,12 +150,12 @@ static void test_decide_before_the_first_training_is_0(void **state)
     assert_near(value_of(classifier, 0, 0), 0, 0);
 }
 
-static void test_show_trains_a_machine_that_takes_it_for_its_own(void **state)
+static void test_show_trains_a_classifier_that_takes_it_for_its_own(void **state)
 {
     learn_objects(1, 3);
     const double fooled = value_of(0, 0, 50);
     assert_true(fooled > 0);
-    // A second beacon that looks like the first: the first machine learns it without being shown anything.
+    // A second beacon that looks like the first: the first classifier learns it without being shown anything.
     const int32_t other = add();
     show(other, 0, 50);
     train();
@@ -204,7 +204,7 @@ static bool is_on_list(int32_t classifier, int32_t sample)
     return found;
 }
 
-static void test_show_a_rival_gets_on_a_full_list(void **state)
+static void test_show_a_negative_gets_on_a_full_list(void **state)
 {
     begin();
     for (int m = 0; m < BSLAM_LEARNER_SLOTS; m++) {
@@ -212,7 +212,7 @@ static void test_show_a_rival_gets_on_a_full_list(void **state)
     }
     show(0, 0, 0);
     train();
-    // Untrained and so without a voice: their samples only fill the first machine's list.
+    // Untrained and so without a voice: their samples only fill the first classifier's list.
     for (int k = 0; k < BSLAM_NEGATIVES_MAX; k++) {
         show(1 + k / FULL, 0, 0);
     }
@@ -318,7 +318,7 @@ static void test_work_an_update_takes_a_bounded_number_of_pieces(void **state)
         (void)add();
     }
     for (int k = 0; k < 2 * FULL * BSLAM_LEARNER_SLOTS; k++) {
-        // All alike: as many rivals as there can be, and no end of conflict.
+        // All alike: as many competitors as there can be, and no end of conflict.
         show(k % BSLAM_LEARNER_SLOTS, k % 2, 0);
         const uint32_t updates = learner.counters.updates;
         (void)bslam_learner_work(&learner, PIECES_MAX);
@@ -335,7 +335,7 @@ static void test_work_goes_on_where_one_training_did_not_suffice(void **state)
     }
     for (int view = 0; view < 4; view++) {
         for (int m = 0; m < OBJECTS; m++) {
-            // Two objects a machine, each shared with another one: hard to tell, but not for ever.
+            // Two objects a classifier, each shared with another one: hard to tell, but not for ever.
             show(m, (m + view % 2) % OBJECTS, view);
         }
     }
@@ -479,13 +479,13 @@ static void test_show_no_number_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one_sample_makes_a_machine_useful),
-        cmocka_unit_test(test_several_machines_tell_their_objects_apart),
+        cmocka_unit_test(test_one_sample_makes_a_classifier_useful),
+        cmocka_unit_test(test_several_classifiers_tell_their_objects_apart),
         cmocka_unit_test(test_decide_before_the_first_training_is_0),
-        cmocka_unit_test(test_show_trains_a_machine_that_takes_it_for_its_own),
+        cmocka_unit_test(test_show_trains_a_classifier_that_takes_it_for_its_own),
         cmocka_unit_test(test_contradictory_labels_end_undecided),
         cmocka_unit_test(test_all_beacons_alike_stays_bounded),
-        cmocka_unit_test(test_show_a_rival_gets_on_a_full_list),
+        cmocka_unit_test(test_show_a_negative_gets_on_a_full_list),
         cmocka_unit_test(test_show_full_store_keeps_its_size),
         cmocka_unit_test(test_show_beyond_the_margin_of_a_full_store_changes_nothing),
         cmocka_unit_test(test_show_to_a_full_store_before_any_training_keeps_the_sample),

@@ -74,7 +74,7 @@ static int setup(void **state)
     return bslam_appearance_init(&appearance, NULL, 0) == BSLAM_OK ? 0 : -1;
 }
 
-/// Equation (47) without looks, for a beacon straight ahead at (4, 0).
+/// Equation (47) without appearance, for a beacon straight ahead at (4, 0).
 static double position_score(const bslam_settings_t *settings, double range_m, double bearing_rad)
 {
     const bslam_sighting_t plain = unit_polar(0, 4, -1);
@@ -89,7 +89,7 @@ static double position_score(const bslam_settings_t *settings, double range_m, d
 
 static const double ahead[1][2] = {{4, 0}};
 
-static void test_score_is_equation_47_without_looks(void **state)
+static void test_score_is_equation_47_without_appearance(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -113,7 +113,7 @@ static void test_score_adds_the_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     const bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     ekf.beacons[0].last_seen_us = 1000000;
-    bslam_appearance_note_view(&appearance, 0, BSLAM_R(2.1));  // enough for all of them
+    appearance.of[0].view_score = BSLAM_R(2.1);  // enough for all of them
     const int64_t times_us[] = {1000000, 1000001, 1200000, 1200001};
     const double odds[] = {0, 4.2, 4.2, 0};
     for (int i = 0; i < 4; i++) {
@@ -132,7 +132,7 @@ static void test_what_was_matched_with_little_is_hardly_held(void **state)
     ekf.beacons[0].last_seen_us = 1000000;
     const double views[] = {-3, 0, 0.5, 2, 50}, odds[] = {0, 0, 1, 4, 4.2};
     for (int i = 0; i < 5; i++) {
-        bslam_appearance_note_view(&appearance, 0, real(views[i]));
+        appearance.of[0].view_score = real(views[i]);
         const bslam_match_t just = decide_at(1100000, &ekf, &settings, &seen, 1).records[0].match;
         assert_near(just.score, alone + odds[i], 1e-4);
         assert_near(just.view_score, views[i] > alone ? views[i] : alone, 1e-4);
@@ -149,7 +149,7 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].beacon_class = 3;
-    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
+    appearance.of[0].view_score = settings.again_odds;
     bslam_sighting_t seen = unit_polar(0.01, 4.1, -1);
     seen.beacon_class = 3;
     assert_near(decide_at(1000001, &ekf, &settings, &seen, 1).records[0].match.score,
@@ -159,7 +159,7 @@ static void test_another_class_has_no_odds_of_being_seen_again(void **state)
                 position_score(&settings, 4.1, 0.01), 1e-4);
 }
 
-/// From afar position says little, and a beacon that waits each time is never learned.
+/// From afar position says little, and a beacon that is delayed each time is never learned.
 static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
 {
     const bslam_settings_t settings = again_params();
@@ -167,7 +167,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     bslam_ekf_t ekf = unit_map_of(&settings, far_away, 1);
     ekf.beacons[0].last_seen_us = 1000000;
     ekf.beacons[0].confirmed = true;
-    bslam_appearance_note_view(&appearance, 0, settings.again_odds);
+    appearance.of[0].view_score = settings.again_odds;
     float signature[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     give_classifier(0, 3.0, 1);
     bslam_sighting_t seen = seen_with(unit_polar(0, 20, -1), signature);
@@ -178,7 +178,7 @@ static void test_a_distant_beacon_seen_again_is_no_newcomer(void **state)
     unit_assert_decided(&again.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
 }
 
-static void test_score_adds_what_looks_say_as_samples_come(void **state)
+static void test_score_adds_what_appearance_says_as_samples_come(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -196,7 +196,7 @@ static void test_score_adds_what_looks_say_as_samples_come(void **state)
                 position_score(&settings, 4, 0) - 2.8, 0.01);
 }
 
-static void test_score_of_looks_is_clipped(void **state)
+static void test_score_of_appearance_is_clipped(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -222,7 +222,7 @@ static void test_a_signature_that_is_no_number_is_as_none(void **state)
                 1e-4);
 }
 
-static void test_a_machine_without_rivals_says_nothing(void **state)
+static void test_a_classifier_without_competitors_says_nothing(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -234,7 +234,7 @@ static void test_a_machine_without_rivals_says_nothing(void **state)
                 1e-4);
 }
 
-static void test_between_match_and_new_a_sighting_waits(void **state)
+static void test_between_match_and_new_a_sighting_is_deferred(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -292,7 +292,7 @@ static void test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count
     }
 }
 
-static void test_looks_that_say_no_make_a_sighting_in_the_gate_new(void **state)
+static void test_appearance_that_differs_makes_a_sighting_in_the_gate_new(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -423,7 +423,7 @@ static void test_far_but_clearly_alike_is_not_new(void **state)
     unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_NEW, BSLAM_REASON_NONE, -1);
 }
 
-static void test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another(void **state)
+static void test_far_and_alike_is_new_where_classifiers_are_young_or_the_class_is_another(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -497,18 +497,18 @@ static bslam_sighting_t seen_aside(void)
     return seen_with(unit_polar(0.06, 4, -1), ALIKE);
 }
 
-/// Where a match waits, and where nothing in the way of it does: a sighting in the beacon's place, or a
-/// little off it, 9 s after that was seen last, when a machine of so many samples has such a value.
+/// Where a match is delayed, and where nothing like it is: a sighting in the beacon's place, or a
+/// little off it, 9 s after that was seen last, when a classifier of so many samples has such a value.
 static void assert_waits(double value, int samples, int32_t decision_delay_us, bslam_sighting_t seen,
-                         bool waits)
+                         bool is_delayed)
 {
     bslam_settings_t settings = svm_params();
     settings.decision_delay_us = decision_delay_us;
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
     give_classifier(0, value, samples);
     const decision_t d = decide_at(9000000, &ekf, &settings, &seen, 1);
-    assert_int_equal(d.records[0].match.delayed_for, waits ? 0 : -1);
-    if (waits) {
+    assert_int_equal(d.records[0].match.delayed_for, is_delayed ? 0 : -1);
+    if (is_delayed) {
         unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
     } else {
         unit_assert_decided(&d.records[0].match, BSLAM_VERDICT_MATCH, BSLAM_REASON_NONE, 0);
@@ -516,7 +516,7 @@ static void assert_waits(double value, int samples, int32_t decision_delay_us, b
     bslam_appearance_forget(&appearance, 0, 1);
 }
 
-static void test_a_match_waits_where_a_young_machine_is_against_it(void **state)
+static void test_a_match_is_delayed_where_a_young_classifier_is_against_it(void **state)
 {
     assert_waits(0.1, 2, 1000000, seen_aside(), true);
     assert_waits(0.15, 2, 1000000, seen_aside(), false);  // for it: 4 * 0.15 - 0.5 > 0
@@ -552,7 +552,7 @@ static void test_a_match_that_has_waited_is_made(void **state)
                         BSLAM_REASON_NONE, 0);
 }
 
-static void test_what_matches_no_beacon_waits_for_none(void **state)
+static void test_what_matches_no_beacon_is_delayed_for_none(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -576,7 +576,7 @@ static bool waits_beside(const bslam_settings_t *settings, int64_t other_ago_us,
 }
 
 /// A robot that another beacon holds in its place loses nothing by waiting.
-static void test_a_match_that_little_speaks_for_waits_while_another_is_in_view(void **state)
+static void test_a_match_that_little_speaks_for_is_delayed_while_another_is_in_view(void **state)
 {
     bslam_settings_t settings = svm_params();
     settings.again_us = 200000;
@@ -596,8 +596,8 @@ static void test_a_match_that_little_speaks_for_waits_while_another_is_in_view(v
     assert_false(waits_beside(&settings, 200000, true));
 }
 
-/// What waits holds no beacon for itself.
-static void test_a_beacon_that_one_sighting_waits_for_goes_to_another(void **state)
+/// What is delayed holds no beacon for itself.
+static void test_a_beacon_that_one_sighting_is_delayed_for_goes_to_another(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -646,7 +646,7 @@ static void test_two_sightings_that_want_a_beacon_alike_both_wait(void **state)
     unit_assert_decided(&d.records[1].match, BSLAM_VERDICT_DEFER, BSLAM_REASON_AMBIGUOUS, -1);
 }
 
-static void test_looks_decide_between_two_in_the_gate(void **state)
+static void test_appearance_decides_between_two_in_the_gate(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, pair, 2);
@@ -675,7 +675,7 @@ static void test_sure_enough_to_learn_from(void **state)
     assert_false(decide(&ekf, &settings, &far, 1).records[0].match.sure);
     give_classifier(0, 1, 16);
     assert_true(decide(&ekf, &settings, &near, 1).records[0].match.sure);
-    // Grown up, and its machine says no.
+    // Grown up, and its classifier says no.
     appearance.learner.classifiers[0].weights.unit = -appearance.learner.classifiers[0].weights.unit;
     assert_false(decide(&ekf, &settings, &near, 1).records[0].match.sure);
     // Or says yes, but not enough, however much the beacon leads by what else is known of it.
@@ -712,7 +712,7 @@ static void test_an_unmappable_sighting_is_rejected(void **state)
 }
 
 /// A heading that is 0.1 rad off displaces all sightings alike: given one, the other is where it should be.
-static void test_given_a_match_the_others_are_surer(void **state)
+static void test_conditional_on_a_match_the_others_are_surer(void **state)
 {
     const bslam_settings_t settings = svm_params();
     static const double places[2][2] = {{4, 0}, {0, 4}};
@@ -743,7 +743,7 @@ static void test_given_a_match_the_others_are_surer(void **state)
                 1e-3);
 }
 
-static void test_given_takes_no_more_than_it_has_room_for(void **state)
+static void test_conditional_takes_no_more_than_it_has_room_for(void **state)
 {
     const bslam_settings_t settings = svm_params();
     const bslam_ekf_t ekf = unit_map_of(&settings, ahead, 1);
@@ -766,43 +766,44 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_a_class_counts_as_its_log_odds_say, setup),
         cmocka_unit_test_setup(test_a_distance_by_another_class_is_not_held_against_it, setup),
-        cmocka_unit_test_setup(test_score_is_equation_47_without_looks, setup),
+        cmocka_unit_test_setup(test_score_is_equation_47_without_appearance, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_being_seen_again, setup),
         cmocka_unit_test_setup(test_what_was_matched_with_little_is_hardly_held, setup),
         cmocka_unit_test_setup(test_another_class_has_no_odds_of_being_seen_again, setup),
         cmocka_unit_test_setup(test_a_distant_beacon_seen_again_is_no_newcomer, setup),
-        cmocka_unit_test_setup(test_score_adds_what_looks_say_as_samples_come, setup),
-        cmocka_unit_test_setup(test_score_of_looks_is_clipped, setup),
+        cmocka_unit_test_setup(test_score_adds_what_appearance_says_as_samples_come, setup),
+        cmocka_unit_test_setup(test_score_of_appearance_is_clipped, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_no_number_is_as_none, setup),
-        cmocka_unit_test_setup(test_a_machine_without_rivals_says_nothing, setup),
-        cmocka_unit_test_setup(test_between_match_and_new_a_sighting_waits, setup),
+        cmocka_unit_test_setup(test_a_classifier_without_competitors_says_nothing, setup),
+        cmocka_unit_test_setup(test_between_match_and_new_a_sighting_is_deferred, setup),
         cmocka_unit_test_setup(test_what_is_nearly_an_old_beacon_that_does_not_count_is_new, setup),
         cmocka_unit_test_setup(test_what_is_called_otherwise_than_an_old_beacon_that_does_not_count_is_new,
                                setup),
-        cmocka_unit_test_setup(test_looks_that_say_no_make_a_sighting_in_the_gate_new, setup),
+        cmocka_unit_test_setup(test_appearance_that_differs_makes_a_sighting_in_the_gate_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_not_new, setup),
         cmocka_unit_test_setup(test_far_but_clearly_alike_is_new_after_a_while, setup),
-        cmocka_unit_test_setup(test_far_and_alike_is_new_where_looks_are_young_or_the_class_is_another,
+        cmocka_unit_test_setup(test_far_and_alike_is_new_where_classifiers_are_young_or_the_class_is_another,
                                setup),
         cmocka_unit_test_setup(test_alike_but_where_the_robot_stands_is_new, setup),
-        cmocka_unit_test_setup(test_a_match_waits_where_a_young_machine_is_against_it, setup),
+        cmocka_unit_test_setup(test_a_match_is_delayed_where_a_young_classifier_is_against_it, setup),
         cmocka_unit_test_setup(test_a_match_does_not_wait_for_what_is_in_view, setup),
         cmocka_unit_test_setup(test_a_match_that_has_waited_is_made, setup),
-        cmocka_unit_test_setup(test_what_matches_no_beacon_waits_for_none, setup),
-        cmocka_unit_test_setup(test_a_match_that_little_speaks_for_waits_while_another_is_in_view, setup),
-        cmocka_unit_test_setup(test_a_beacon_that_one_sighting_waits_for_goes_to_another, setup),
+        cmocka_unit_test_setup(test_what_matches_no_beacon_is_delayed_for_none, setup),
+        cmocka_unit_test_setup(test_a_match_that_little_speaks_for_is_delayed_while_another_is_in_view,
+                               setup),
+        cmocka_unit_test_setup(test_a_beacon_that_one_sighting_is_delayed_for_goes_to_another, setup),
         cmocka_unit_test_setup(test_one_to_one_the_clearest_choice_first, setup),
         cmocka_unit_test_setup(test_a_worse_sighting_of_a_taken_beacon_is_a_duplicate, setup),
         cmocka_unit_test_setup(test_two_sightings_that_want_a_beacon_alike_both_wait, setup),
-        cmocka_unit_test_setup(test_looks_decide_between_two_in_the_gate, setup),
+        cmocka_unit_test_setup(test_appearance_decides_between_two_in_the_gate, setup),
         cmocka_unit_test_setup(test_score_adds_the_odds_of_the_side, setup),
         cmocka_unit_test_setup(test_in_doubt_of_its_place_a_robot_knows_no_side, setup),
         cmocka_unit_test_setup(test_only_what_has_a_place_in_the_map_has_sides, setup),
         cmocka_unit_test_setup(test_sure_enough_to_learn_from, setup),
         cmocka_unit_test_setup(test_directions_alone_have_their_own_density_of_new, setup),
         cmocka_unit_test_setup(test_an_unmappable_sighting_is_rejected, setup),
-        cmocka_unit_test_setup(test_given_a_match_the_others_are_surer, setup),
-        cmocka_unit_test_setup(test_given_takes_no_more_than_it_has_room_for, setup),
+        cmocka_unit_test_setup(test_conditional_on_a_match_the_others_are_surer, setup),
+        cmocka_unit_test_setup(test_conditional_takes_no_more_than_it_has_room_for, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -106,8 +106,8 @@ static void test_known_repeated_label_leaves_the_first(void **state)
     assert_rejected(&d.records[4].match, BSLAM_REASON_DUPLICATE);
 }
 
-/// A sighting far from all that a label may be starts another rival, but not without end.
-static void test_known_label_has_so_many_rivals_and_no_more(void **state)
+/// A sighting far from all that a label may be starts another competitor, but not without end.
+static void test_known_label_has_so_many_competitors_and_no_more(void **state)
 {
     enum { NEGATIVES = 8 };
     bslam_settings_t settings = unit_settings();
@@ -130,8 +130,8 @@ static void test_known_label_has_so_many_rivals_and_no_more(void **state)
     }
 }
 
-/// A rival where the robot stands has no direction, and so no distance to compare.
-static void test_known_rival_that_cannot_be_weighed_is_not_the_nearest(void **state)
+/// A competitor where the robot stands has no direction, and so no distance to compare.
+static void test_known_competitor_that_cannot_be_weighed_is_not_the_nearest(void **state)
 {
     const bslam_settings_t settings = unit_settings();
     static const double places[2][2] = {{4, 0}, {0, 0}};
@@ -415,8 +415,8 @@ int main(void)
         cmocka_unit_test(test_known_label_of_the_map_is_a_match_and_another_is_new),
         cmocka_unit_test(test_known_sighting_without_a_label_is_rejected),
         cmocka_unit_test(test_known_repeated_label_leaves_the_first),
-        cmocka_unit_test(test_known_label_has_so_many_rivals_and_no_more),
-        cmocka_unit_test(test_known_rival_that_cannot_be_weighed_is_not_the_nearest),
+        cmocka_unit_test(test_known_label_has_so_many_competitors_and_no_more),
+        cmocka_unit_test(test_known_competitor_that_cannot_be_weighed_is_not_the_nearest),
         cmocka_unit_test(test_known_not_mappable_sighting_does_not_use_its_label_up),
 
         cmocka_unit_test(test_by_distance_empty_map_makes_everything_new),

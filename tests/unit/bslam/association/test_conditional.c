@@ -39,7 +39,7 @@ static double distance2_of(const bslam_innovation_t *innovation)
     return (double)distance2;
 }
 
-static void test_given_nothing_an_innovation_weighs_as_the_filter_has_it(void **state)
+static void test_conditional_on_nothing_an_innovation_weighs_as_the_filter_has_it(void **state)
 {
     const bslam_innovation_t whole = innovation_of(unit_polar(0.35, 2.2, 1), 0);
     const bslam_innovation_t direction = innovation_of(unit_direction(-0.3, 2), 1);
@@ -52,7 +52,7 @@ static void test_given_nothing_an_innovation_weighs_as_the_filter_has_it(void **
 }
 
 /// p(a, b) = p(a) p(b given a) = p(b) p(a given b).
-static void test_given_in_either_order_the_distance_of_both_is_the_same(void **state)
+static void test_conditional_in_either_order_the_distance_of_both_is_the_same(void **state)
 {
     const bslam_innovation_t a = innovation_of(unit_polar(0.35, 2.2, 1), 0);
     const bslam_innovation_t b = innovation_of(unit_direction(-0.3, 2), 1);
@@ -71,7 +71,7 @@ static void test_given_in_either_order_the_distance_of_both_is_the_same(void **s
     assert_near(bslam_conditional_distance2(&conditional), both, 1e-3);
 }
 
-static void test_given_a_singular_innovation_is_refused_and_nothing_changes(void **state)
+static void test_conditional_singular_innovation_is_refused_and_nothing_changes(void **state)
 {
     const bslam_innovation_t good = innovation_of(unit_polar(0.35, 2.2, 1), 0);
     bslam_innovation_t cases[] = {good, good, good};
@@ -91,7 +91,7 @@ static void test_given_a_singular_innovation_is_refused_and_nothing_changes(void
     assert_int_equal(conditional.count, 1);
 }
 
-static void test_given_there_is_room_for_so_many_and_one_to_weigh(void **state)
+static void test_conditional_has_room_for_so_many_and_one_to_weigh(void **state)
 {
     const bslam_innovation_t one = innovation_of(unit_polar(0.35, 2.2, 1), 0);
     for (int i = 0; i < BSLAM_CONDITIONAL_MAX; i++) {
@@ -106,10 +106,10 @@ static void test_given_there_is_room_for_so_many_and_one_to_weigh(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_given_nothing_an_innovation_weighs_as_the_filter_has_it, setup),
-        cmocka_unit_test_setup(test_given_in_either_order_the_distance_of_both_is_the_same, setup),
-        cmocka_unit_test_setup(test_given_a_singular_innovation_is_refused_and_nothing_changes, setup),
-        cmocka_unit_test_setup(test_given_there_is_room_for_so_many_and_one_to_weigh, setup),
+        cmocka_unit_test_setup(test_conditional_on_nothing_an_innovation_weighs_as_the_filter_has_it, setup),
+        cmocka_unit_test_setup(test_conditional_in_either_order_the_distance_of_both_is_the_same, setup),
+        cmocka_unit_test_setup(test_conditional_singular_innovation_is_refused_and_nothing_changes, setup),
+        cmocka_unit_test_setup(test_conditional_has_room_for_so_many_and_one_to_weigh, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -54,7 +54,7 @@ static int go_round(double radius_m, bool sees_first, bool judges)
     return missed;
 }
 
-static void test_one_that_is_missed_from_where_it_was_seen_vanishes(void **state)
+static void test_one_that_is_missed_from_where_it_was_seen_is_removed(void **state)
 {
     assert_int_equal(go_round(4, true, true), 0);
     assert_true(go_round(4.5, false, true) > 0);
@@ -111,7 +111,7 @@ static void test_switched_off_it_finds_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_one_that_is_missed_from_where_it_was_seen_vanishes, setup),
+        cmocka_unit_test_setup(test_one_that_is_missed_from_where_it_was_seen_is_removed, setup),
         cmocka_unit_test_setup(test_from_elsewhere_nothing_is_missed, setup),
         cmocka_unit_test_setup(test_an_unclear_frame_says_nothing, setup),
         cmocka_unit_test_setup(test_a_doubtful_heading_says_nothing, setup),

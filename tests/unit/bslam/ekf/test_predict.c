@@ -160,7 +160,7 @@ static bslam_motion_t predict(bslam_ekf_t *ekf, const bslam_settings_t *settings
                         rounding);
         }
     }
-    const bslam_pose_t pose = bslam_robot_pose(&robot);
+    const bslam_pose_t pose = bslam_pose_of(robot.mean);
     assert_true(pose.x_m == robot.mean[X] && pose.y_m == robot.mean[Y] &&
                 pose.theta_rad == robot.mean[THETA]);
     assert_near(moved_alone.forward_m, moved.forward_m, rounding);

@@ -325,7 +325,7 @@ static void test_distance2_is_the_textbooks(void **state)
     }
 }
 
-static void test_fuse_distance2_is_given_what_was_fused_before(void **state)
+static void test_fuse_distance2_is_conditional_on_what_was_fused_before(void **state)
 {
     const bslam_settings_t settings = params_of(0, false);
     unit_random_t random = {9};
@@ -513,7 +513,7 @@ static void test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model
     }
 }
 
-static void test_innovation_in_direction_only_grows_with_doubt_of_length_and_direction(void **state)
+static void test_innovation_bearing_only_grows_with_doubt_of_length_and_direction(void **state)
 {
     // MATH "Bearing-only": e P eᵀ b P bᵀ + (e P bᵀ)², where b is the direction's row of H and e the
     // gradient of the log of the length: a point's distance, a ray's |g|, g = inverse (anchor - sensor) +
@@ -777,7 +777,7 @@ int main(void)
         cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
-        cmocka_unit_test(test_fuse_distance2_is_given_what_was_fused_before),
+        cmocka_unit_test(test_fuse_distance2_is_conditional_on_what_was_fused_before),
         cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),
         cmocka_unit_test(test_fuse_gated_sighting_between_others_has_no_effect),
@@ -785,7 +785,7 @@ int main(void)
         cmocka_unit_test(test_fuse_within_huber_has_full_weight),
 
         cmocka_unit_test(test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model),
-        cmocka_unit_test(test_innovation_in_direction_only_grows_with_doubt_of_length_and_direction),
+        cmocka_unit_test(test_innovation_bearing_only_grows_with_doubt_of_length_and_direction),
         cmocka_unit_test(test_innovation_with_a_distance_has_no_bend),
 
         cmocka_unit_test(test_innovation_of_a_beacon_at_the_sensor_is_singular),

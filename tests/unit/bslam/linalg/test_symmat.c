@@ -377,7 +377,7 @@ static void test_is_positive_value_of_no_variance_goes_with_no_other(void **stat
     }
 }
 
-static void test_factor_row_raises_the_diagonal_by_as_much_as_it_is_told(void **state)
+static void test_factor_row_raises_the_diagonal_by_as_much_as_it_should(void **state)
 {
     // Both values are the same to 0.05 %: one direction has a variance of -0.0005.
     const bslam_real_t values[3] = {1, real(1.0005), 1};
@@ -445,7 +445,7 @@ int main(void)
         cmocka_unit_test(test_is_positive_matrix_with_a_negative_eigenvalue_is_not),
         cmocka_unit_test(test_is_positive_three_values_that_fit_by_pairs_only_are_not),
         cmocka_unit_test(test_is_positive_value_of_no_variance_goes_with_no_other),
-        cmocka_unit_test(test_factor_row_raises_the_diagonal_by_as_much_as_it_is_told),
+        cmocka_unit_test(test_factor_row_raises_the_diagonal_by_as_much_as_it_should),
         cmocka_unit_test(test_is_positive_matrix_with_a_bad_element_is_not),
         cmocka_unit_test(test_is_positive_nan_off_the_diagonal_is_not),
     };

@@ -224,7 +224,7 @@ static void test_read_wheels_motion_and_noise_are_the_closed_form(void **state)
     assert_near(motion.forward_turn_cov_mrad, (right_var - left_var) / (2 * base), rounding_of(left_var));
 }
 
-static void test_read_noise_of_the_body_grows_with_time_way_and_turn(void **state)
+static void test_read_noise_of_the_body_grows_with_time_travel_and_turn(void **state)
 {
     bslam_settings_t settings = unit_settings();
     settings.left_speed_sd_mps = 0;
@@ -340,7 +340,7 @@ static void test_read_value_that_is_no_number_is_refused(void **state)
     }
 }
 
-static void test_read_looks_only_at_its_sources_fields(void **state)
+static void test_read_reads_only_its_sources_fields(void **state)
 {
     const bslam_settings_t settings = unit_settings();
     bslam_odometry_t odometry = started();
@@ -590,14 +590,14 @@ int main(void)
         cmocka_unit_test(test_read_first_time_out_of_range_is_refused),
 
         cmocka_unit_test(test_read_wheels_motion_and_noise_are_the_closed_form),
-        cmocka_unit_test(test_read_noise_of_the_body_grows_with_time_way_and_turn),
+        cmocka_unit_test(test_read_noise_of_the_body_grows_with_time_travel_and_turn),
         cmocka_unit_test(test_read_velocity_is_the_motion_of_its_wheels),
         cmocka_unit_test(test_read_ticks_motion_is_that_of_the_wheels),
         cmocka_unit_test(test_read_ticks_across_the_roll_over_at_any_width_go_on),
         cmocka_unit_test(test_read_ticks_beyond_the_counters_width_are_refused),
         cmocka_unit_test(test_read_unknown_source_is_refused),
         cmocka_unit_test(test_read_value_that_is_no_number_is_refused),
-        cmocka_unit_test(test_read_looks_only_at_its_sources_fields),
+        cmocka_unit_test(test_read_reads_only_its_sources_fields),
         cmocka_unit_test(test_read_denormal_travel_is_a_motion_like_any_other),
 
         cmocka_unit_test(test_read_wheel_faster_than_possible_is_a_jump),

@@ -139,7 +139,7 @@ static void test_look_back_from_the_filter_is_on_the_arc(void **state)
     }
 }
 
-static void test_look_back_goes_the_way_that_the_filter_took(void **state)
+static void test_look_back_follows_the_path_that_the_filter_took(void **state)
 {
     const bslam_settings_t settings = arc_params();
     bslam_history_t history = waiting_arc(2);
@@ -212,7 +212,7 @@ int main(void)
         cmocka_unit_test(test_walk_to_a_moment_within_a_step_splits_it),
         cmocka_unit_test(test_is_full_when_no_more_may_wait),
         cmocka_unit_test(test_look_back_from_the_filter_is_on_the_arc),
-        cmocka_unit_test(test_look_back_goes_the_way_that_the_filter_took),
+        cmocka_unit_test(test_look_back_follows_the_path_that_the_filter_took),
         cmocka_unit_test(test_look_back_before_the_history_is_refused),
         cmocka_unit_test(test_look_ahead_goes_on_as_in_the_newest_motion),
         cmocka_unit_test(test_clear_forgets_all),

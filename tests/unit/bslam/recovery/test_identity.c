@@ -1,4 +1,4 @@
-// Who is seen, by labels or by looks, in a map of three beacons.
+// Who is seen, by labels or by appearance, in a map of three beacons.
 #include "known_map.h"
 #include "support.h"
 
@@ -14,7 +14,7 @@ static const float alike[BSLAM_SAMPLE_FEATURES] = {1.0f};
 static bslam_slam_t slam;
 static bslam_appearance_t appearance;
 
-/// All confirmed, with the labels 10, 11, 12; without looks.
+/// All confirmed, with the labels 10, 11, 12; without appearance.
 static int setup(void **state)
 {
     bslam_settings_t settings = unit_settings();
@@ -30,7 +30,8 @@ static int setup(void **state)
     return 0;
 }
 
-/// The same by looks: the machine of beacon 0 says 1 of `alike`, that of beacon 1 says -1, beacon 2 has none.
+/// The same by appearance: the classifier of beacon 0 says 1 of `alike`, that of beacon 1 says -1, beacon 2
+/// has none.
 static int setup_looks(void **state)
 {
     setup(state);
@@ -64,7 +65,7 @@ static void test_label_tells_who_it_is(void **state)
     assert_int_equal(identify(unit_polar(0, 4, BSLAM_LABEL_NONE)), BSLAM_NOBODY);
 }
 
-static void test_label_of_an_unconfirmed_rival_is_passed_over(void **state)
+static void test_label_of_an_unconfirmed_competitor_is_passed_over(void **state)
 {
     slam.ekf.beacons[0].label = 12;
     slam.ekf.beacons[0].confirmed = false;
@@ -90,7 +91,7 @@ static void test_of_two_that_claim_to_be_the_same_neither_is_believed(void **sta
 
 static void test_label_may_be_that_beacon_alone(void **state)
 {
-    bslam_slam_attach_appearance(&slam, &appearance);  // looks that nobody goes by
+    bslam_slam_attach_appearance(&slam, &appearance);  // an appearance that nobody goes by
     assert_true(bslam_may_be(&slam, 1, 1));
     assert_false(bslam_may_be(&slam, 1, 2));
 }
@@ -103,16 +104,17 @@ static void test_two_confirmed_beacons_are_findable_by_label(void **state)
     assert_false(bslam_is_findable(&slam));
 }
 
-// ---- by looks ---------------------------------------------------------------------------------------------
+// ---- by appearance
+// ---------------------------------------------------------------------------------------------
 
-static void test_looks_tell_who_it_is(void **state)
+static void test_appearance_identifies(void **state)
 {
     const float opposite[BSLAM_SAMPLE_FEATURES] = {-1.0f};
     assert_int_equal(identify_looks(alike), 0);
     assert_int_equal(identify_looks(opposite), 1);
 }
 
-static void test_without_looks_to_go_by_nobody_is_told(void **state)
+static void test_without_appearance_nobody_is_identified(void **state)
 {
     const float broken[BSLAM_SAMPLE_FEATURES] = {1.0f, NAN};
     assert_int_equal(identify_looks(NULL), BSLAM_NOBODY);
@@ -121,7 +123,7 @@ static void test_without_looks_to_go_by_nobody_is_told(void **state)
     assert_int_equal(identify_looks(alike), BSLAM_NOBODY);
 }
 
-static void test_looks_that_are_not_sure_tell_nobody(void **state)
+static void test_appearance_that_is_not_sure_identifies_nobody(void **state)
 {
     const float faint[BSLAM_SAMPLE_FEATURES] = {0.25f};
     assert_int_equal(identify_looks(faint), BSLAM_NOBODY);
@@ -129,7 +131,7 @@ static void test_looks_that_are_not_sure_tell_nobody(void **state)
     assert_int_equal(identify_looks(alike), BSLAM_NOBODY);
 }
 
-static void test_looks_that_two_machines_claim_tell_nobody(void **state)
+static void test_appearance_that_two_classifiers_claim_identifies_nobody(void **state)
 {
     unit_give_machine(&appearance, 2, 0.75, GROWN);
     assert_int_equal(identify_looks(alike), BSLAM_NOBODY);
@@ -137,13 +139,13 @@ static void test_looks_that_two_machines_claim_tell_nobody(void **state)
     assert_int_equal(identify_looks(alike), 0);
 }
 
-static void test_a_shared_machine_is_no_rival_of_itself(void **state)
+static void test_a_shared_classifier_is_no_negative_of_itself(void **state)
 {
     appearance.of[2].classifier = appearance.of[0].classifier;
     assert_int_equal(identify_looks(alike), 0);
 }
 
-static void test_of_a_shared_machine_it_is_the_first_that_is_confirmed(void **state)
+static void test_of_a_shared_classifier_it_is_the_first_that_is_confirmed(void **state)
 {
     appearance.of[2].classifier = appearance.of[0].classifier;
     slam.ekf.beacons[0].confirmed = false;
@@ -152,7 +154,7 @@ static void test_of_a_shared_machine_it_is_the_first_that_is_confirmed(void **st
     assert_int_equal(identify_looks(alike), BSLAM_NOBODY);
 }
 
-static void test_looks_may_be_any_confirmed_beacon_of_the_machine(void **state)
+static void test_appearance_may_be_any_confirmed_beacon_of_the_classifier(void **state)
 {
     appearance.of[2].classifier = appearance.of[0].classifier;
     assert_true(bslam_may_be(&slam, 0, 0));
@@ -165,7 +167,7 @@ static void test_looks_may_be_any_confirmed_beacon_of_the_machine(void **state)
     assert_false(bslam_may_be(&slam, 0, 2));
 }
 
-static void test_two_grown_machines_are_findable(void **state)
+static void test_two_grown_classifiers_are_findable(void **state)
 {
     assert_true(bslam_is_findable(&slam));
     appearance.learner.classifiers[1].samples = YOUNG;
@@ -179,19 +181,19 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_label_tells_who_it_is, setup),
-        cmocka_unit_test_setup(test_label_of_an_unconfirmed_rival_is_passed_over, setup),
+        cmocka_unit_test_setup(test_label_of_an_unconfirmed_competitor_is_passed_over, setup),
         cmocka_unit_test_setup(test_what_is_not_to_be_mapped_is_nobody, setup),
         cmocka_unit_test_setup(test_of_two_that_claim_to_be_the_same_neither_is_believed, setup),
         cmocka_unit_test_setup(test_label_may_be_that_beacon_alone, setup),
         cmocka_unit_test_setup(test_two_confirmed_beacons_are_findable_by_label, setup),
-        cmocka_unit_test_setup(test_looks_tell_who_it_is, setup_looks),
-        cmocka_unit_test_setup(test_without_looks_to_go_by_nobody_is_told, setup_looks),
-        cmocka_unit_test_setup(test_looks_that_are_not_sure_tell_nobody, setup_looks),
-        cmocka_unit_test_setup(test_looks_that_two_machines_claim_tell_nobody, setup_looks),
-        cmocka_unit_test_setup(test_a_shared_machine_is_no_rival_of_itself, setup_looks),
-        cmocka_unit_test_setup(test_of_a_shared_machine_it_is_the_first_that_is_confirmed, setup_looks),
-        cmocka_unit_test_setup(test_looks_may_be_any_confirmed_beacon_of_the_machine, setup_looks),
-        cmocka_unit_test_setup(test_two_grown_machines_are_findable, setup_looks),
+        cmocka_unit_test_setup(test_appearance_identifies, setup_looks),
+        cmocka_unit_test_setup(test_without_appearance_nobody_is_identified, setup_looks),
+        cmocka_unit_test_setup(test_appearance_that_is_not_sure_identifies_nobody, setup_looks),
+        cmocka_unit_test_setup(test_appearance_that_two_classifiers_claim_identifies_nobody, setup_looks),
+        cmocka_unit_test_setup(test_a_shared_classifier_is_no_negative_of_itself, setup_looks),
+        cmocka_unit_test_setup(test_of_a_shared_classifier_it_is_the_first_that_is_confirmed, setup_looks),
+        cmocka_unit_test_setup(test_appearance_may_be_any_confirmed_beacon_of_the_classifier, setup_looks),
+        cmocka_unit_test_setup(test_two_grown_classifiers_are_findable, setup_looks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,7 +15,7 @@ static bslam_slam_t slam;
 static bslam_recovery_t recovery;
 static int64_t now_us;
 static double stretch = 1;  // by which all distances are measured too long
-static int cut = -1;        // the beacon that is seen in direction only
+static int cut = -1;        // the beacon that is seen bearing-only
 
 static int setup(void **state)
 {
@@ -147,7 +147,7 @@ static void test_recovery_by_two_beacons_takes_time(void **state)
     assert_at(1, 2, -1);
 }
 
-/// By turns one of two beacons is seen in direction only, as at the edge of a frame.
+/// By turns one of two beacons is seen bearing-only, as at the edge of a frame.
 static void test_recovery_by_two_beacons_that_are_never_seen_whole_together(void **state)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -262,7 +262,7 @@ static void test_recovery_of_a_short_glitch_does_not_get_lost(void **state)
     assert_at(0, 0, 0);
 }
 
-/// The beacon is provisional, and its time is up with the next frame.
+/// The beacon is tentative, and its time is up with the next frame.
 static void end_time_of(bslam_beacon_t *beacon)
 {
     slam.settings.confirm_window_us = (int32_t)now_us;
@@ -271,7 +271,7 @@ static void end_time_of(bslam_beacon_t *beacon)
     beacon->gated = 1;
 }
 
-/// What time alone does goes on: a provisional beacon whose time is up leaves, upon which the smoother begins
+/// What time alone does goes on: a tentative beacon whose time is up leaves, upon which the smoother begins
 /// its cycle anew.
 static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
 {
@@ -297,7 +297,7 @@ static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
     assert_int_equal(slam.ekf.beacon_count, BEACONS - 1);
 }
 
-/// A provisional beacon's time may be over when the robot is found again: it leaves with the frame after.
+/// A tentative beacon's time may be over when the robot is found again: it leaves with the frame after.
 static void test_recovery_of_a_robot_that_is_found_leaves_the_map_as_it_was(void **state)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -312,11 +312,12 @@ static void test_recovery_of_a_robot_that_is_found_leaves_the_map_as_it_was(void
     assert_int_equal(slam.ekf.beacon_count, BEACONS - 1);
 }
 
-// ---- by looks ---------------------------------------------------------------------------------------------
+// ---- by appearance
+// ---------------------------------------------------------------------------------------------
 
 static bslam_appearance_t appearance;
 
-/// From here on looks tell who is seen: beacon 1 has a machine of its own, 0 and 3 share one.
+/// From here on appearance tells who is seen: beacon 1 has a classifier of its own, 0 and 3 share one.
 static void go_by_looks(void)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -373,7 +374,7 @@ static void test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_p
 
 // ---- a map that grows -------------------------------------------------------------------------------------
 
-/// From here on looks tell who is seen: beacon b by feature b.
+/// From here on appearance tells who is seen: beacon b by feature b.
 static void go_by_own_looks(void)
 {
     look_on(50, 0, 0, 0, BEACONS);
@@ -390,8 +391,8 @@ static void go_by_own_looks(void)
     }
 }
 
-/// A frame of a robot that has not moved by its wheels, and sees the first `count` beacons, by their looks,
-/// as from (x, y, theta).
+/// A frame of a robot that has not moved by its wheels, and sees the first `count` beacons, by their
+/// appearance, as from (x, y, theta).
 static void look_alike_from(double x, double y, double theta, int count)
 {
     float signatures[BEACONS][BSLAM_SAMPLE_FEATURES] = {{0}};

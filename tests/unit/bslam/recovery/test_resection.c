@@ -64,7 +64,7 @@ static void test_relocate_leaves_out_a_clue_that_does_not_fit(void **state)
     assert_found(clues, 5, 2, 3, 1, 4);
 }
 
-static void test_relocate_by_clues_from_along_the_way(void **state)
+static void test_relocate_by_clues_from_along_the_path(void **state)
 {
     // Seen 1 m behind the robot, which then turned by 0.5.
     bslam_clue_t clues[] = {clue_of(0, 1, 3, 0.2, true), clue_of(1, 1, 3, 0.2, true),
@@ -253,8 +253,8 @@ static void test_relocate_tells_by_geometry_which_of_two_is_seen(void **state)
     assert_false(bslam_relocate(clues, 3, &fix));
     assert_int_equal(fix.agreeing, 77);
     // A third beacon tells.
-    const bslam_clue_t told[] = {clues[0], clues[1], clues[2], clue_of(2, 1, 3, 0.5, true)};
-    assert_true(bslam_relocate(told, 4, &fix));
+    const bslam_clue_t unambiguous[] = {clues[0], clues[1], clues[2], clue_of(2, 1, 3, 0.5, true)};
+    assert_true(bslam_relocate(unambiguous, 4, &fix));
     assert_near(fix.pose.x_m, 1, 2e-3);
     assert_int_equal(fix.agreeing, 3);
 }
@@ -299,7 +299,7 @@ int main(void)
         cmocka_unit_test(test_relocate_by_two_beacons_with_distance),
         cmocka_unit_test(test_relocate_by_three_directions),
         cmocka_unit_test(test_relocate_leaves_out_a_clue_that_does_not_fit),
-        cmocka_unit_test(test_relocate_by_clues_from_along_the_way),
+        cmocka_unit_test(test_relocate_by_clues_from_along_the_path),
         cmocka_unit_test(test_relocate_by_three_directions_of_which_any_have_a_distance),
         cmocka_unit_test(test_relocate_takes_a_beacon_that_is_seen_twice_for_one),
         cmocka_unit_test(test_relocate_by_directions_that_do_not_tell_finds_nothing),

@@ -157,7 +157,7 @@ static void test_a_score_that_speaks_against_it_starts_no_beacon(void **state)
 }
 
 /// Whether there are scores is asked of the beacon.
-static void test_a_sighting_without_a_score_does_not_end_a_trial(void **state)
+static void test_a_sighting_without_a_score_leaves_a_beacon_tentative(void **state)
 {
     (void)see(1.5);
     for (int i = 0; i < 5; i++) {
@@ -166,7 +166,7 @@ static void test_a_sighting_without_a_score_does_not_end_a_trial(void **state)
     assert_false(is_confirmed(0));
 }
 
-static void test_a_beacon_on_trial_has_no_time_to_be_confirmed_in(void **state)
+static void test_a_tentative_beacon_has_no_time_to_be_confirmed_in(void **state)
 {
     slam.settings.confirm_window_us = STEP_US;
     (void)see(1.0);
@@ -329,8 +329,8 @@ int main(void)
         cmocka_unit_test_setup(test_without_scores_a_beacon_is_believed_at_once, setup),
         cmocka_unit_test_setup(test_what_is_seen_surely_from_few_places_is_not_confirmed, setup),
         cmocka_unit_test_setup(test_a_score_that_speaks_against_it_starts_no_beacon, setup),
-        cmocka_unit_test_setup(test_a_sighting_without_a_score_does_not_end_a_trial, setup),
-        cmocka_unit_test_setup(test_a_beacon_on_trial_has_no_time_to_be_confirmed_in, setup),
+        cmocka_unit_test_setup(test_a_sighting_without_a_score_leaves_a_beacon_tentative, setup),
+        cmocka_unit_test_setup(test_a_tentative_beacon_has_no_time_to_be_confirmed_in, setup),
         cmocka_unit_test_setup(test_a_sighting_beyond_the_gate_does_not_speak_for_it, setup),
         cmocka_unit_test_setup(test_the_order_of_a_frame_does_not_matter, setup),
         cmocka_unit_test_setup(test_views_do_not_run_over_while_scores_are_missing, setup),

@@ -54,8 +54,8 @@ static void test_fingerprint_a_chain_that_differed_stays_different(void **state)
     }
 }
 
-/// With looks: every machine that has been trained counts, and no other.
-static void test_fingerprint_has_the_weights_of_trained_machines(void **state)
+/// With appearance: every classifier that has been trained counts, and no other.
+static void test_fingerprint_has_the_weights_of_trained_classifiers(void **state)
 {
     static bslam_appearance_t appearance;
     kept_make(&slam, &appearance, 3);
@@ -80,7 +80,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_fingerprint_the_lowest_bit_of_any_state_value_changes_it, start),
-        cmocka_unit_test(test_fingerprint_has_the_weights_of_trained_machines),
+        cmocka_unit_test(test_fingerprint_has_the_weights_of_trained_classifiers),
         cmocka_unit_test_setup(test_fingerprint_what_is_not_the_state_does_not_count, start),
         cmocka_unit_test_setup(test_fingerprint_a_chain_that_differed_stays_different, start),
     };

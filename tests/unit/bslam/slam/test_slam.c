@@ -121,7 +121,7 @@ static void assert_odometry_refused(bslam_slam_t *slam, bslam_odometry_reading_t
     assert_unchanged(slam, &before);
 }
 
-/// Parameters of a refusal's test: of the filter that its state names, or of the one that needs none.
+/// Settings of a refusal's test: of the filter that its state names, or of the one that needs none.
 static bslam_settings_t refusing_params(void **state)
 {
     bslam_settings_t settings = unit_settings();
@@ -596,7 +596,7 @@ static void test_sightings_order_within_a_frame_does_not_matter(void **state)
     assert_near(a.theta_rad, b.theta_rad, tolerance);
 }
 
-// ---- provisional and confirmed ----------------------------------------------------------------------------
+// ---- tentative and confirmed ----------------------------------------------------------------------------
 
 static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void **state)
 {
@@ -611,7 +611,7 @@ static void test_sightings_beacon_is_confirmed_by_its_number_of_sightings(void *
     }
 }
 
-static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts(void **state)
+static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_travel_counts(void **state)
 {
     bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 3;
@@ -637,7 +637,7 @@ static void test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_
     assert_true(beacon(&slam, 0).confirmed);
 }
 
-static void test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon(void **state)
+static void test_sightings_what_is_seen_elsewhere_speaks_against_a_tentative_beacon(void **state)
 {
     bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 3;
@@ -711,7 +711,7 @@ static void test_sightings_beacon_not_confirmed_in_time_is_removed(void **state)
     assert_int_equal(beacon(&slam, 1).uid, 2);
 }
 
-static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted(void **state)
+static void test_sightings_known_association_beacon_is_removed_only_if_contradicted(void **state)
 {
     bslam_settings_t settings = unit_settings();
     settings.confirm_window_us = 2 * STEP_US;
@@ -735,7 +735,7 @@ static void test_sightings_beacon_of_told_identity_is_removed_only_if_contradict
 }
 
 static void
-test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed(void **state)
+test_sightings_known_association_beacon_that_began_false_gives_way_to_the_first_confirmed(void **state)
 {
     bslam_settings_t settings = unit_settings();
     settings.confirm_sightings = 4;
@@ -1042,7 +1042,7 @@ static void test_odometry_beyond_the_room_to_wait_is_predicted_in_order(void **s
 
 /// The way that errors stay alike over is kept in a 32-bit counter: under the sanitizers, the largest
 /// motions.
-static void test_odometry_largest_motion_does_not_overflow_the_way(void **state)
+static void test_odometry_largest_motion_does_not_overflow_the_distance_travelled(void **state)
 {
     for (int kind = 0; kind < 6; kind++) {
         bslam_settings_t settings = form(kind);
@@ -1351,14 +1351,14 @@ int main(void)
         cmocka_unit_test(test_sightings_order_within_a_frame_does_not_matter),
 
         cmocka_unit_test(test_sightings_beacon_is_confirmed_by_its_number_of_sightings),
-        cmocka_unit_test(test_sightings_a_robot_that_stands_still_confirms_nothing_where_way_counts),
-        cmocka_unit_test(test_sightings_what_is_seen_elsewhere_speaks_against_a_provisional_beacon),
+        cmocka_unit_test(test_sightings_a_robot_that_stands_still_confirms_nothing_where_travel_counts),
+        cmocka_unit_test(test_sightings_what_is_seen_elsewhere_speaks_against_a_tentative_beacon),
         cmocka_unit_test(test_sightings_beacon_leaves_with_as_many_sightings_against_it_as_for_it),
         cmocka_unit_test(test_sightings_one_sighting_confirms_where_that_is_asked),
         cmocka_unit_test(test_sightings_beacon_not_confirmed_in_time_is_removed),
-        cmocka_unit_test(test_sightings_beacon_of_told_identity_is_removed_only_if_contradicted),
+        cmocka_unit_test(test_sightings_known_association_beacon_is_removed_only_if_contradicted),
         cmocka_unit_test(
-            test_sightings_beacon_of_told_identity_that_began_false_gives_way_to_the_first_confirmed),
+            test_sightings_known_association_beacon_that_began_false_gives_way_to_the_first_confirmed),
         cmocka_unit_test(test_sightings_known_beacon_is_never_removed_but_a_ray_is),
         cmocka_unit_test(test_remove_beacon_then_its_label_is_new_again),
         cmocka_unit_test(test_sightings_ray_seen_from_aside_settles_into_a_point),
@@ -1375,7 +1375,7 @@ int main(void)
         cmocka_unit_test(test_pose_and_covariance_between_frames_are_what_the_filter_arrives_at),
         cmocka_unit_test(test_odometry_beyond_the_room_to_wait_is_predicted_in_order),
 
-        cmocka_unit_test(test_odometry_largest_motion_does_not_overflow_the_way),
+        cmocka_unit_test(test_odometry_largest_motion_does_not_overflow_the_distance_travelled),
         cmocka_unit_test(test_resume_odometry_adds_the_doubt_and_starts_the_clock_anew),
         cmocka_unit_test(test_resume_odometry_after_an_encoder_reset_takes_the_new_ticks),
         cmocka_unit_test(test_resume_odometry_forgets_the_past_before_it),

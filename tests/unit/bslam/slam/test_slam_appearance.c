@@ -1,4 +1,4 @@
-// The pipeline with looks attached: what it refuses, learns and takes out.
+// The pipeline with appearance attached: what it refuses, learns and takes out.
 #include "support.h"
 
 #include <math.h>
@@ -142,7 +142,7 @@ static void test_what_is_surely_matched_is_learned(void **state)
     assert_true(bslam_learner_knows(&appearance.learner, appearance.of[0].classifier));
 }
 
-static void test_other_methods_leave_looks_alone(void **state)
+static void test_other_methods_leave_appearance_alone(void **state)
 {
     bslam_settings_t settings = svm_params();
     settings.association = BSLAM_ASSOCIATION_MAHALANOBIS;
@@ -151,7 +151,7 @@ static void test_other_methods_leave_looks_alone(void **state)
     assert_int_equal(appearance.counters.trained + appearance.counters.unsure, 0);
 }
 
-static void test_without_looks_position_decides(void **state)
+static void test_without_appearance_position_decides(void **state)
 {
     bslam_slam_attach_appearance(&slam, NULL);
     see_two(10);
@@ -168,7 +168,7 @@ static void test_attaching_again_forgets(void **state)
     assert_true(appearance.of[0].classifier >= 0);
 }
 
-static void test_a_beacon_removed_while_its_machine_trains_is_forgotten(void **state)
+static void test_a_beacon_removed_while_its_classifier_trains_is_forgotten(void **state)
 {
     slam.settings.learn_budget = 3;  // training is always under way
     see_two(8);
@@ -283,7 +283,7 @@ static void test_what_was_seen_a_few_times_in_front_of_another_is_retired(void *
     assert_near(left.x_m, 7, 0.5);
 }
 
-static void test_what_stands_apart_or_was_seen_often_is_not_retired(void **state)
+static void test_what_is_distant_or_was_seen_often_is_not_retired(void **state)
 {
     assert_int_equal(beacons_of_two_distances(3, 0.2, 7), 2);  // beside it
     assert_int_equal(beacons_of_two_distances(3, 0, 8.5), 2);  // more than twice as far
@@ -358,8 +358,8 @@ static uint32_t waits_of_another(int frames)
     return slam.counters.deferred - before;
 }
 
-/// Two beacons are known and out of view for long, their machines of few samples. However well a place fits,
-/// it does not settle which of them is seen.
+/// Two beacons are known and out of view for long, their classifiers of few samples. However well a place
+/// fits, it does not settle which of them is seen.
 static void start_to_wait(void)
 {
     bslam_settings_t settings = svm_params();
@@ -373,7 +373,7 @@ static void start_to_wait(void)
     }
 }
 
-static void test_a_match_that_a_young_machine_is_against_waits_for_a_second(void **state)
+static void test_a_match_that_a_young_classifier_is_against_is_delayed_for_a_second(void **state)
 {
     start_to_wait();
     const uint32_t matched = slam.counters.matched;
@@ -381,7 +381,7 @@ static void test_a_match_that_a_young_machine_is_against_waits_for_a_second(void
     assert_int_equal(slam.counters.matched - matched, 40 - 1000000 / STEP_US);
 }
 
-static void test_in_a_frozen_map_it_waits_no_longer(void **state)
+static void test_in_a_frozen_map_it_is_delayed_no_longer(void **state)
 {
     start_to_wait();
     slam.is_frozen = true;
@@ -417,8 +417,8 @@ static void pass_by(double from_m, double step_m, bool sees_the_gone, double tri
     }
 }
 
-/// A frame with something on trial in it is as clear as one without.
-static void test_what_has_vanished_is_noticed_while_another_is_on_trial(void **state)
+/// A frame with something tentative in it is as clear as one without.
+static void test_what_is_missed_is_noticed_while_another_is_tentative(void **state)
 {
     bslam_settings_t settings = svm_params();
     settings.missed_views = 3;
@@ -482,7 +482,7 @@ static bslam_account_t see_after(int64_t us, double heading_var_rad2, bool has_r
 }
 
 /// A direction alone turns the robot to whatever it is taken for.
-static void test_where_the_heading_is_in_doubt_a_direction_alone_waits(void **state)
+static void test_where_the_heading_is_in_doubt_a_bearing_alone_is_deferred(void **state)
 {
     const int64_t long_us = svm_params().decision_delay_us;
     const double score = (double)svm_params().decision_delay_score;
@@ -495,7 +495,7 @@ static void test_where_the_heading_is_in_doubt_a_direction_alone_waits(void **st
 }
 
 /// And where it is nearly as well another beacon, or a new one, however sure the heading is.
-static void test_where_little_speaks_for_its_beacon_a_direction_alone_waits(void **state)
+static void test_where_little_speaks_for_its_beacon_a_bearing_alone_is_deferred(void **state)
 {
     const int64_t long_us = svm_params().decision_delay_us;
     assert_int_equal(see_after(long_us, 0.009, false, 0).outcome, BSLAM_OUTCOME_MATCHED);
@@ -532,27 +532,28 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_how_well_a_match_fits_is_kept_while_its_beacon_is_in_view, setup),
         cmocka_unit_test_setup(test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while, setup),
-        cmocka_unit_test_setup(test_where_the_heading_is_in_doubt_a_direction_alone_waits, setup),
-        cmocka_unit_test_setup(test_where_little_speaks_for_its_beacon_a_direction_alone_waits, setup),
+        cmocka_unit_test_setup(test_where_the_heading_is_in_doubt_a_bearing_alone_is_deferred, setup),
+        cmocka_unit_test_setup(test_where_little_speaks_for_its_beacon_a_bearing_alone_is_deferred, setup),
         cmocka_unit_test_setup(test_a_signature_that_is_not_finite_is_refused_and_changes_nothing, setup),
         cmocka_unit_test_setup(test_a_signature_of_large_and_small_numbers_is_taken, setup),
         cmocka_unit_test_setup(test_what_is_surely_matched_is_learned, setup),
-        cmocka_unit_test_setup(test_other_methods_leave_looks_alone, setup),
-        cmocka_unit_test_setup(test_without_looks_position_decides, setup),
+        cmocka_unit_test_setup(test_other_methods_leave_appearance_alone, setup),
+        cmocka_unit_test_setup(test_without_appearance_position_decides, setup),
         cmocka_unit_test_setup(test_attaching_again_forgets, setup),
-        cmocka_unit_test_setup(test_a_beacon_removed_while_its_machine_trains_is_forgotten, setup),
+        cmocka_unit_test_setup(test_a_beacon_removed_while_its_classifier_trains_is_forgotten, setup),
         cmocka_unit_test_setup(test_a_beacon_in_anothers_place_never_seen_with_it_is_retired, setup),
         cmocka_unit_test_setup(test_what_was_seen_a_few_times_in_front_of_another_is_retired, setup),
         cmocka_unit_test_setup(test_a_ray_in_the_direction_of_another_is_retired, setup),
-        cmocka_unit_test_setup(test_what_stands_apart_or_was_seen_often_is_not_retired, setup),
+        cmocka_unit_test_setup(test_what_is_distant_or_was_seen_often_is_not_retired, setup),
         cmocka_unit_test_setup(test_what_keeps_being_replaced_is_gone_itself, setup),
         cmocka_unit_test_setup(test_what_is_seen_between_is_not_gone, setup),
         cmocka_unit_test_setup(test_a_neighbour_seen_with_the_other_stays, setup),
         cmocka_unit_test_setup(test_a_neighbour_of_another_class_stays_if_never_seen_with_it, setup),
         cmocka_unit_test_setup(test_what_is_called_of_two_classes_in_one_place_is_one, setup),
-        cmocka_unit_test_setup(test_a_match_that_a_young_machine_is_against_waits_for_a_second, setup),
-        cmocka_unit_test_setup(test_in_a_frozen_map_it_waits_no_longer, setup),
-        cmocka_unit_test_setup(test_what_has_vanished_is_noticed_while_another_is_on_trial, setup),
+        cmocka_unit_test_setup(test_a_match_that_a_young_classifier_is_against_is_delayed_for_a_second,
+                               setup),
+        cmocka_unit_test_setup(test_in_a_frozen_map_it_is_delayed_no_longer, setup),
+        cmocka_unit_test_setup(test_what_is_missed_is_noticed_while_another_is_tentative, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,7 +46,7 @@ static void move(drive_t *drive)
     assert_int_equal(bslam_slam_odometry(&drive->slam, &reading), BSLAM_OK);
 }
 
-/// How beacon `label` of the ring looks, with noise of about the parameters' size.
+/// How beacon `label` of the ring looks, with noise of about the settings' size.
 static bslam_sighting_t look(drive_t *drive, int label)
 {
     const double place = 6.2831853 * label / WORLD;

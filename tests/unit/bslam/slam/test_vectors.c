@@ -15,14 +15,14 @@ typedef struct vector_step {
     int dim;
 } vector_step_t;
 
-/// range_m is 0 where it is seen in direction only.
+/// range_m is 0 where it is seen bearing-only.
 typedef struct vector_sighting {
     int32_t label;
     double bearing_rad;
     double range_m;
 } vector_sighting_t;
 
-// For each run: its parameters, its steps, the sightings of all steps in a row, and likewise the expected
+// For each run: its settings, its steps, the sightings of all steps in a row, and likewise the expected
 // means and lower triangles of the covariance.
 #include "../vectors/filter_runs.h"
 

@@ -1,4 +1,4 @@
-// The base told about other points: a place that is turned and stretched about the robot, or shifted.
+// The base about other points: a place that is turned and stretched about the robot, or shifted.
 #include <math.h>
 
 #include "support.h"

@@ -568,7 +568,7 @@ static void fit_badly(bslam_real_t before[NODES][BASE], bslam_real_t place[2])
     bslam_smoother_begin(&smoother);
 }
 
-static void test_way_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back(void **state)
+static void test_pass_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back(void **state)
 {
     bslam_real_t before[NODES][BASE];
     bslam_real_t place[2];
@@ -694,7 +694,7 @@ int main(void)
         cmocka_unit_test(test_beacon_near_the_robot_is_linearised_about_a_metre_off),
         cmocka_unit_test(test_beacon_moves_by_a_part_of_its_least_distance_at_most),
         cmocka_unit_test(test_way_forth_notes_how_near_beacons_were_seen_from),
-        cmocka_unit_test(test_way_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back),
+        cmocka_unit_test(test_pass_forth_that_fits_badly_is_gone_again_four_times_from_half_way_back),
         cmocka_unit_test(test_way_forth_that_fits_as_the_last_one_is_taken),
         cmocka_unit_test(test_what_moved_belongs_to_its_beacon_when_others_come_and_leave),
         cmocka_unit_test(test_way_is_as_doubtful_as_a_part_of_what_it_misses_by),

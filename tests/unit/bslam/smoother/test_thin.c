@@ -116,7 +116,7 @@ static bslam_motion_t sum_of_motions(void)
 {
     bslam_motion_t sum = {0};
     for (int k = 0; k < smoother.node_count; k++) {
-        bslam_smoother_add_motion(&sum, &bslam_smoother_node(&smoother, k)->motion);
+        bslam_smoother_add_motion(&sum, &bslam_smoother_node(&smoother, k)->motion, 1);
     }
     return sum;
 }
@@ -146,7 +146,7 @@ static void test_window_that_has_room_stays_as_it_is(void **state)
     assert_memory_equal(&smoother, &before, sizeof smoother);
 }
 
-static void test_no_way_is_lost_and_neither_the_oldest_nor_the_newest_node(void **state)
+static void test_no_motion_is_lost_and_neither_the_oldest_nor_the_newest_node(void **state)
 {
     for (int most = NODES - 1; most > 20; most -= 3) {
         const bslam_motion_t before = sum_of_motions();
@@ -209,7 +209,7 @@ static void test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end(void
 
 // ---- what becomes of the rest -----------------------------------------------------------------------------
 
-static void test_bent_way_leads_from_a_node_to_the_next(void **state)
+static void test_bent_path_leads_from_a_node_to_the_next(void **state)
 {
     bslam_smoother_thin(&smoother, 30);
     bslam_smoother_thin(&smoother, 18);
@@ -412,11 +412,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_window_that_has_room_stays_as_it_is, setup),
-        cmocka_unit_test_setup(test_no_way_is_lost_and_neither_the_oldest_nor_the_newest_node, setup),
+        cmocka_unit_test_setup(test_no_motion_is_lost_and_neither_the_oldest_nor_the_newest_node, setup),
         cmocka_unit_test_setup(test_older_nodes_are_longer_ones, setup),
         cmocka_unit_test_setup(test_where_all_levels_are_full_the_oldest_leave, setup),
         cmocka_unit_test_setup(test_node_that_comes_into_a_full_ring_makes_room_at_the_old_end, setup),
-        cmocka_unit_test_setup(test_bent_way_leads_from_a_node_to_the_next, setup),
+        cmocka_unit_test_setup(test_bent_path_leads_from_a_node_to_the_next, setup),
         cmocka_unit_test_setup(test_joined_node_has_moved_by_the_mean_of_what_its_nodes_have, setup),
         cmocka_unit_test_setup(test_way_shorter_than_a_centimetre_has_no_bend, setup),
         cmocka_unit_test_setup(test_directions_are_those_from_where_the_node_is_and_weigh_as_many, setup),

@@ -8,7 +8,7 @@
 static bslam_slam_t slam;
 static bslam_appearance_t appearance;
 static bslam_slam_t other;
-static bslam_appearance_t other_looks;
+static bslam_appearance_t other_appearance;
 static uint8_t bytes[KEPT_BYTES_MAX];
 static uint32_t size;
 
@@ -18,7 +18,7 @@ static int setup(void **state)
 {
     kept_make(&slam, &appearance, 4);
     size = kept_write(&slam, bytes);
-    kept_empty(&other, &other_looks);
+    kept_empty(&other, &other_appearance);
     return 0;
 }
 
@@ -33,7 +33,7 @@ static uint32_t covariance_at(void)
     return values_at() + 4u * (uint32_t)(slam.ekf.dim - slam.ekf.base_dim);
 }
 
-/// Where the first machine stands in the blob, and its rivals.
+/// Where the first classifier stands in the blob, and its competitors.
 static uint32_t machine_at(void)
 {
     return covariance_at() + 4u * (uint32_t)((slam.ekf.dim - 3) * (slam.ekf.dim - 2) / 2);
@@ -139,7 +139,7 @@ static void test_map_load_living_gives_beacons_covariance_and_looks_back(void **
         assert_int_equal(bslam_sample_encode(kept_signature(object, 50, signature), &sample), BSLAM_OK);
         for (int b = 0; b < 4; b++) {
             const bslam_opinion_t was = bslam_appearance_ask(&appearance, &slam.settings, b, &sample);
-            const bslam_opinion_t is = bslam_appearance_ask(&other_looks, &other.settings, b, &sample);
+            const bslam_opinion_t is = bslam_appearance_ask(&other_appearance, &other.settings, b, &sample);
             assert_near(is.value, was.value, BSLAM_SAMPLE_FLOAT ? 0.02 : 0);
             assert_near(is.weight, was.weight, 0);
         }
@@ -194,10 +194,10 @@ static void test_map_load_frozen_changes_no_beacon_and_adds_none(void **state)
         assert_int_equal(bslam_slam_beacon(&other, b, &after), BSLAM_OK);
         assert_true(after.x_m == before[b].x_m && after.y_m == before[b].y_m);
     }
-    assert_int_equal(other_looks.counters.trained, 0);
+    assert_int_equal(other_appearance.counters.trained, 0);
 }
 
-static void test_map_write_leaves_out_provisional_beacons(void **state)
+static void test_map_write_leaves_out_tentative_beacons(void **state)
 {
     float signature[BSLAM_SAMPLE_FEATURES];
     bslam_sighting_t seen = unit_polar(2.9, 6.0, -1);
@@ -216,10 +216,10 @@ static void test_map_load_gives_the_counts_of_classes_back(void **state)
     }
     size = kept_write(&slam, bytes);
     for (int mode = BSLAM_MAP_LIVING; mode <= BSLAM_MAP_FROZEN; mode++) {
-        kept_empty(&other, &other_looks);
+        kept_empty(&other, &other_appearance);
         load((bslam_map_mode_t)mode);
         for (int b = 0; b < 4; b++) {
-            assert_memory_equal(other_looks.of[b].seen_as, appearance.of[b].seen_as,
+            assert_memory_equal(other_appearance.of[b].seen_as, appearance.of[b].seen_as,
                                 sizeof appearance.of[b].seen_as);
         }
     }
@@ -227,7 +227,7 @@ static void test_map_load_gives_the_counts_of_classes_back(void **state)
 
 static void test_map_load_frozen_keeps_the_scale_of_a_sized_beacon(void **state)
 {
-    bslam_settings_t settings = kept_params();
+    bslam_settings_t settings = kept_settings();
     settings.range_scale_sd = BSLAM_R(0.2);
     settings.confirm_sightings = 1;
     int bad_id;
@@ -298,14 +298,14 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
         {"beacons", 12, BSLAM_BEACONS_MAX + 1, BSLAM_MAP_BEACONS},
         {"no beacons, but values", 12, 12u << 16, BSLAM_MAP_CONTENT},
         {"values", 12, 5 | 60000u << 16, BSLAM_MAP_BEACONS},
-        {"machines", 16, (BSLAM_LEARNER_SLOTS + 1) | 71u << 16, BSLAM_MAP_CLASSIFIERS},
+        {"classifiers", 16, (BSLAM_LEARNER_SLOTS + 1) | 71u << 16, BSLAM_MAP_CLASSIFIERS},
         {"features", 16, 4 | 70u << 16, BSLAM_MAP_CLASSIFIERS},
         {"next uid", 20, 2, BSLAM_MAP_CONTENT},
         {"reserved", 24, 1, BSLAM_MAP_CONTENT},
         {"uid twice", first + BEACON_BYTES, 0, BSLAM_MAP_CONTENT},
         {"label", first + 4, 0x80000000, BSLAM_MAP_CONTENT},
         {"kind", first + 8, 3, BSLAM_MAP_CONTENT},
-        {"machine", first + 8, 4u << 16, BSLAM_MAP_CONTENT},
+        {"classifier", first + 8, 4u << 16, BSLAM_MAP_CONTENT},
         {"scale NaN", first + 16, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
         {"scale negative", first + 16, 0xbf800000, BSLAM_MAP_CONTENT},
         {"position NaN", first + 20, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
@@ -317,7 +317,7 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
         {"correlation", p + 4, 0x41200000, BSLAM_MAP_COVARIANCE},
         {"samples", classifier, 65, BSLAM_MAP_CLASSIFIERS},
         {"trained", classifier, 2u << 8, BSLAM_MAP_CONTENT},
-        {"rivals", classifier, 0xffff0100, BSLAM_MAP_CLASSIFIERS},
+        {"negatives", classifier, 0xffff0100, BSLAM_MAP_CLASSIFIERS},
         {"unit NaN", classifier + 4, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
         {"unit negative", classifier + 4, 0xbf800000, BSLAM_MAP_CONTENT},
     };
@@ -330,7 +330,7 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
     }
 }
 
-static void test_map_load_with_a_rival_that_is_no_sample_is_refused(void **state)
+static void test_map_load_with_a_negative_that_is_no_sample_is_refused(void **state)
 {
     const uint32_t wrong[] = {0x00ff | 1u << 8, 0 | 4u << 8, (BSLAM_SEEDS_MAX) | 255u << 8};
     for (int i = 0; i < COUNT_OF(wrong); i++) {
@@ -344,16 +344,16 @@ static void test_map_load_with_a_rival_that_is_no_sample_is_refused(void **state
 static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
 {
     load(BSLAM_MAP_LIVING);
-    const int negatives = other_looks.learner.classifiers[0].negatives;
+    const int negatives = other_appearance.learner.classifiers[0].negatives;
     put_u32(rivals_at(), 3 | 255u << 8);
     seal();
     load(BSLAM_MAP_LIVING);
-    assert_int_equal(other_looks.learner.classifiers[0].negatives, negatives - 1);
+    assert_int_equal(other_appearance.learner.classifiers[0].negatives, negatives - 1);
     static const bslam_sample_t seeds[4];
-    other_looks.learner.seeds = seeds;
-    other_looks.learner.seed_count = COUNT_OF(seeds);
+    other_appearance.learner.seeds = seeds;
+    other_appearance.learner.seed_count = COUNT_OF(seeds);
     load(BSLAM_MAP_LIVING);
-    assert_int_equal(other_looks.learner.classifiers[0].negatives, negatives);
+    assert_int_equal(other_appearance.learner.classifiers[0].negatives, negatives);
 }
 
 // ---- the covariance as a whole ----------------------------------------------------------------------------
@@ -422,7 +422,7 @@ static void test_map_load_of_a_value_without_variance_asks_that_it_goes_with_no_
 /// Twenty beacons, six of them with four values each: more than the robot's memory holds twice.
 static void make_largest_map(void)
 {
-    bslam_settings_t settings = kept_params();
+    bslam_settings_t settings = kept_settings();
     settings.association = 0;
     settings.confirm_sightings = 1;
     int bad_id;
@@ -569,14 +569,14 @@ static void test_map_load_of_a_source_that_changes_takes_no_byte_of_it(void **st
         if (load_changing(LOOKS, mode) == BSLAM_OK) {
             // A covariance that seemed none was looked at once more, as a whole.
             assert_int_equal(pass, 2 * LOOKS + 1);
-            kept_empty(&other, &other_looks);
+            kept_empty(&other, &other_appearance);
         }
         assert_memory_equal(&other, &before, sizeof other);
         assert_int_equal(load_changing(TAKES, mode), BSLAM_E_MAP);
         assert_int_equal(other.ekf.beacon_count, 0);
         assert_int_equal(other.ekf.dim, other.ekf.base_dim);
         assert_int_equal(other.ekf.next_uid, before.ekf.next_uid);
-        kept_empty(&other, &other_looks);
+        kept_empty(&other, &other_appearance);
     }
     load(BSLAM_MAP_LIVING);
 }
@@ -597,14 +597,14 @@ int main(void)
         cmocka_unit_test_setup(test_map_write_of_a_loaded_map_gives_the_same_bytes, setup),
         cmocka_unit_test_setup(test_map_load_leaves_the_robot_without_a_place, setup),
         cmocka_unit_test_setup(test_map_load_frozen_changes_no_beacon_and_adds_none, setup),
-        cmocka_unit_test_setup(test_map_write_leaves_out_provisional_beacons, setup),
+        cmocka_unit_test_setup(test_map_write_leaves_out_tentative_beacons, setup),
         cmocka_unit_test_setup(test_map_load_gives_the_counts_of_classes_back, setup),
         cmocka_unit_test_setup(test_map_load_frozen_keeps_the_scale_of_a_sized_beacon, setup),
         cmocka_unit_test_setup(test_map_load_truncated_anywhere_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_with_a_byte_too_many_is_refused, setup),
         cmocka_unit_test_setup(test_map_check_finds_every_flipped_bit, setup),
         cmocka_unit_test_setup(test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name, setup),
-        cmocka_unit_test_setup(test_map_load_with_a_rival_that_is_no_sample_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_with_a_negative_that_is_no_sample_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_of_values_that_fit_by_pairs_only_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_of_a_covariance_short_by_rounding_raises_its_variances, setup),
