@@ -12,6 +12,11 @@ LIBRARY_SOURCES_link := $(BASE_SOURCES) $(call library_files,link,c)
 CORE_SOURCES := $(sort $(foreach library,$(LIBRARIES),$(LIBRARY_SOURCES_$(library))))
 CORE_HEADERS := $(call library_files,base bslam vision link,h)
 
+# The application on top of them, but for its main loop; and what it has on this computer.
+ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,robot health camera_input gyro_wait param_store \
+    session messages records map_transfer own_sensors) firmware/bench/text.c
+HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DSESSION_MAP_BYTES=65536
+
 # Contraction (fused multiply-add) would change the last bit from one machine to the next.
 C_STANDARD := -std=c11 -ffp-contract=off
 

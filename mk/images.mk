@@ -14,8 +14,6 @@ HOST_SIZES := -DROBOT_VISION=1 -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DSESSION
 
 include $(BOARDS:%=firmware/port/%/board.mk)
 
-ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,robot health camera_input gyro_wait param_store \
-    session messages records map_transfer own_sensors) firmware/bench/text.c
 # What every board runs; a board with memory enough adds to (BOARD_PROGRAMS_<board>).
 PROGRAMS := robot selftest
 
@@ -69,7 +67,6 @@ build/microbit/shallow.elf: build/microbit/robot.elf
 
 # The application as a process of this computer, under the sanitizers, with the objects of the unit tests.
 HOST_ROBOT := build/host/robot
-HOST_ROBOT_FLAGS := -DROBOT_VISION=1 -DSESSION_MAP_BYTES=65536
 HOST_ROBOT_SOURCES := $(ROBOT_SOURCES) firmware/robot/main.c \
     $(patsubst %,firmware/port/%.c,absent film posix/port)
 HOST_ROBOT_OBJECTS := $(HOST_ROBOT_SOURCES:%.c=build/host/%.o)

@@ -5,6 +5,7 @@ UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c)
 # The library of a test, by its first folder; what a test of all of them links.
 UNIT_LIBRARY_base := bslam
 UNIT_LIBRARY_port := bslam
+UNIT_LIBRARY_robot := robot bslam vision link
 unit_library = $(or $(UNIT_LIBRARY_$(1)),$(1))
 
 # Helpers that several tests share (tests/unit/*.c); linked to every test.
@@ -34,6 +35,7 @@ UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1
 
 UNIT_CORE_$(1) := $$(CORE_SOURCES:%.c=build/unit/$(1)/%.o)
 UNIT_ARCHIVES_$(1) := $$(LIBRARIES:%=build/unit/$(1)/lib%.a)
+UNIT_ROBOT_$(1) := $$(ROBOT_SOURCES:%.c=build/unit/$(1)/%.o)
 UNIT_PROGRAMS_$(1) := $$(UNIT_SOURCES:tests/unit/%.c=build/unit/$(1)/bin/%)
 
 .PHONY: unit-$(1)
@@ -51,14 +53,22 @@ build/unit/$(1)/tests/%.o: tests/%.c mk/config.mk mk/unit.mk
 build/unit/$(1)/helpers.a: $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.o)
 	@rm -f $$@ && ar rcs $$@ $$^
 
+$$(UNIT_ROBOT_$(1)): build/unit/$(1)/%.o: %.c mk/config.mk mk/unit.mk mk/images.mk
+	@mkdir -p $$(@D)
+	@$$(UNIT_COMPILE_$(1)) $$(UNIT_CORE_WARNINGS_$(1)) $$(HOST_ROBOT_FLAGS) -c $$< -o $$@
+
+build/unit/$(1)/librobot.a: $$(UNIT_ROBOT_$(1))
+	@rm -f $$@ && ar rcs $$@ $$^
+
 $$(UNIT_ARCHIVES_$(1)): build/unit/$(1)/lib%.a: $$(UNIT_CORE_$(1))
 	@rm -f $$@ && ar rcs $$@ $$(LIBRARY_SOURCES_$$*:%.c=build/unit/$(1)/%.o)
 
 $$(UNIT_PROGRAMS_$(1)): build/unit/$(1)/bin/%: build/unit/$(1)/tests/unit/%.o build/unit/$(1)/helpers.a \
-    $$(UNIT_ARCHIVES_$(1))
+    $$(UNIT_ARCHIVES_$(1)) build/unit/$(1)/librobot.a
 	@mkdir -p $$(@D)
 	@$$(CC) $$(SANITIZE) $$< build/unit/$(1)/helpers.a \
-	    build/unit/$(1)/lib$$(call unit_library,$$(firstword $$(subst /, ,$$*))).a $$(CMOCKA_LIBS) -lm -o $$@
+	    $$(patsubst %,build/unit/$(1)/lib%.a,$$(call unit_library,$$(firstword $$(subst /, ,$$*)))) \
+	    $$(CMOCKA_LIBS) -lm -o $$@
 
 # One line for a program that passes, everything it wrote for one that fails.
 .PHONY: $$(UNIT_PROGRAMS_$(1):%=%.run)
@@ -66,7 +76,7 @@ $$(UNIT_PROGRAMS_$(1):%=%.run): %.run: %
 	@if $$< >$$<.log 2>&1; then sed -n 's|^\[  PASSED  \]|unit $(1) $$(notdir $$<):|p' $$<.log; \
 	 else cat $$<.log >&2; echo "unit $(1) $$(notdir $$<): FAILED" >&2; exit 1; fi
 
--include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.d)
+-include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_ROBOT_$(1):.o=.d) $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.d)
 -include $$(UNIT_SOURCES:%.c=build/unit/$(1)/%.d)
 endef
 $(foreach real,$(UNIT_REALS),$(eval $(call unit_rules,$(real))))
