@@ -356,7 +356,7 @@ bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint
     if (slam == NULL) {
         return BSLAM_E_STATE;
     }
-    return sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault);
+    return ended(robot, sink == NULL ? BSLAM_OK : bslam_map_write(slam, sink, &fault));
 }
 
 /// A robot whose map is frozen takes another one frozen.
@@ -376,7 +376,7 @@ bslam_status_t bslam_save_to_flash(bslam_t *robot, const bslam_flash_t *flash, b
 {
     *fault = BSLAM_MAP_FINE;
     const bslam_slam_t *slam = begin_step(robot);
-    return slam == NULL ? BSLAM_E_STATE : bslam_slots_save(flash, slam, fault);
+    return slam == NULL ? BSLAM_E_STATE : ended(robot, bslam_slots_save(flash, slam, fault));
 }
 
 bslam_status_t bslam_load_from_flash(bslam_t *robot, const bslam_flash_t *flash, bslam_map_fault_t *fault)

@@ -6,6 +6,12 @@ static health_counts_t counts_of(const bslam_t *slam)
     return (health_counts_t){counters.recovery, counters.guard, counters.slam.insane};
 }
 
+/// A part of the estimator that was damaged has begun anew, and counts from 0.
+static uint32_t since(uint32_t now, uint32_t last)
+{
+    return now >= last ? now - last : now;
+}
+
 void health_init(health_t *health, const bslam_t *slam)
 {
     *health = (health_t){.last = counts_of(slam)};
@@ -28,15 +34,15 @@ void health_look(health_t *health, const bslam_t *slam, int64_t time_us)
     const health_counts_t now = counts_of(slam);
     const health_counts_t *last = &health->last;
     health_counts_t *counts = &health->counts;
-    const uint32_t lost = now.recovery.lost - last->recovery.lost;
-    const uint32_t found = now.recovery.found - last->recovery.found;
-    const uint32_t insane = now.insane - last->insane;
-    counts->recovery.contradicting += now.recovery.contradicting - last->recovery.contradicting;
-    counts->recovery.withheld += now.recovery.withheld - last->recovery.withheld;
+    const uint32_t lost = since(now.recovery.lost, last->recovery.lost);
+    const uint32_t found = since(now.recovery.found, last->recovery.found);
+    const uint32_t insane = since(now.insane, last->insane);
+    counts->recovery.contradicting += since(now.recovery.contradicting, last->recovery.contradicting);
+    counts->recovery.withheld += since(now.recovery.withheld, last->recovery.withheld);
     counts->recovery.lost += lost;
     counts->recovery.found += found;
-    counts->guard.corrupt += now.guard.corrupt - last->guard.corrupt;
-    counts->guard.restored += now.guard.restored - last->guard.restored;
+    counts->guard.corrupt += since(now.guard.corrupt, last->guard.corrupt);
+    counts->guard.restored += since(now.guard.restored, last->guard.restored);
     counts->insane += insane;
     health->last = now;
     if (lost > 0) {

@@ -30,8 +30,8 @@ def stored(signatures: NDArray[np.float32]) -> NDArray[np.int8]:
 def header(seeds: NDArray[np.int8]) -> str:
     """The seeds (n, 71) as a C header."""
     rows = "".join(f"    {{{{{', '.join(map(str, [*row, 127]))}}}}},\n" for row in seeds.tolist())
-    return f"""/// Signatures of rendered beacons, none of them a user's, for classifiers to start from (settings.seeds).
-/// tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
+    return f"""/// Signatures of rendered beacons, none of them a user's, for classifiers to start from
+/// (settings.seeds). tools/training/make_seeds.py writes it from host_sim/bslam/core/seeds.npy.
 #ifndef BSLAM_MODELS_SEEDS_H
 #define BSLAM_MODELS_SEEDS_H
 
