@@ -1,11 +1,11 @@
 """Writes host_sim/bslam/core/seeds.npy: signatures of rendered beacons of training worlds, one a world; and
 firmware/models/seeds.h, which has the same for a robot.
 
-None of them is a user's: the learner (firmware/bslam/appearance/learner.h) sets a new beacon against them. They are
-to be made anew when signatures change; the same call writes the same bytes:
+None of them is a user's: the learner (firmware/bslam/appearance/learner.h) sets a new beacon against them.
+They are to be made anew when signatures change; the same call writes the same bytes:
 
     .venv/bin/python -m tools.training.make_seeds [--count 64] [--first-world 5000]
-    .venv/bin/python -m tools.training.make_seeds --header    writes the header alone, of the seeds as they are
+    .venv/bin/python -m tools.training.make_seeds --header  # the header alone, of these seeds
 """
 
 import argparse
