@@ -21,7 +21,7 @@ from datetime import date
 from pathlib import Path
 
 from tools.bench.peers import filters, machines
-from tools.bench.peers.programs import PEERS, ROOT
+from tools.bench.peers.programs import ESTIMATOR, PEERS, ROOT
 from tools.checks.markdown import Row, table
 
 BUILD = ROOT / "build" / "bench"
@@ -30,8 +30,8 @@ NEAR_OPTIMAL = {6: 7_500, 20: 35_000, 50: 153_000, 100: 550_000}
 """Instructions of near-optimal plain C for the same step without velocity states, by a study before this."""
 
 PARTS = {
-    "covariance and state (`math`, `ekf`)": ("math", "ekf"),
-    "motion and observation, their derivatives (`model`, `odometry`)": ("model", "odometry"),
+    "covariance and state (`linalg`, `ekf`)": ("linalg", "ekf"),
+    "motion and observation, their derivatives (`model`)": ("model",),
     "whose sighting it is (`association`)": ("association",),
     "checks, accounts, history, order of time (`slam`, `base`)": ("slam", "base"),
 }
@@ -42,7 +42,7 @@ def build(beacons: int, *more: str) -> Path:
     """The bench program for a map of that many beacons; `more` are flags that follow the others."""
     BUILD.mkdir(parents=True, exist_ok=True)
     program = BUILD / f"step_{beacons}{''.join(more)}"
-    sources = [ROOT / "tests/bench/bench_step.c", *sorted((ROOT / "firmware/bslam").rglob("*.c"))]
+    sources = [ROOT / "tests/bench/bench_step.c", *ESTIMATOR]
     command = ["cc", *FLAGS, *more, f"-DBSLAM_BEACONS_MAX={beacons}", "-DBSLAM_RAYS_MAX=0"]
     subprocess.run([*command, *map(str, sources), "-lm", "-o", str(program)], check=True)
     return program
@@ -99,7 +99,7 @@ def parts_of(profile: Path) -> dict[str, float]:
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     counts: dict[str, int] = {}
     for count, file in re.findall(r"^ *([\d,]+) \([^)]*\) +([^:\n]+):", said, re.MULTILINE):
-        found = re.search(r"firmware/bslam/(\w+)/", file)
+        found = re.search(r"firmware/(?:bslam/)?(\w+)/", file)
         folder = found[1] if found else "other"
         counts[folder] = counts.get(folder, 0) + int(count.replace(",", ""))
     return {folder: count / sum(counts.values()) for folder, count in counts.items()}

@@ -29,7 +29,10 @@ def build(machines: int) -> Path:
     """The bench program for that many machines."""
     BUILD.mkdir(parents=True, exist_ok=True)
     program = BUILD / f"learner_{machines}"
-    sources = [ROOT / "tests/bench/bench_learner.c", *sorted((ROOT / "firmware/bslam/svm").glob("*.c"))]
+    learner = [
+        ROOT / f"firmware/bslam/appearance/{name}.c" for name in ("learner", "sample", "solver", "training")
+    ]
+    sources = [ROOT / "tests/bench/bench_learner.c", *learner]
     command = ["cc", *FLAGS, f"-DBSLAM_LEARNER_SLOTS={machines}", *map(str, sources), "-lm"]
     subprocess.run([*command, "-o", str(program)], check=True)
     return program

@@ -5,7 +5,7 @@ Examples:
     python -m tools.bench.profile_image cost_vision --lens wide
     python -m tools.bench.profile_image cost_vision --worlds 7000:7020 --frames 8
 
-A program of firmware/app that ends by itself: cost, cost_vision, selftest. cost_vision is given a walk
+A program of firmware/bench that ends by itself: cost, cost_vision, selftest. cost_vision is given a walk
 through each of some rendered worlds, and what its frames cost by its own count is printed besides: the
 functions' counts are of the whole program, from its start. Counts come from a plugin in QEMU's translator and
 are the same at every run. Instructions are not cycles.

@@ -40,7 +40,7 @@ def run_image(board: str, program: str, *more: str) -> Ended:
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("program", help="selftest, or another one of firmware/app")
+    parser.add_argument("program", help="selftest, or another one of firmware/bench")
     parser.add_argument("--boards", nargs="+", default=boards_here(), help="default: all that are here")
     options = parser.parse_args(argv)
     failed = 0

@@ -45,7 +45,7 @@ def _array(kind: str, name: str, items: Iterable[str]) -> Iterator[str]:
 def _params(name: str, params: dict[str, float]) -> Iterator[str]:
     yield f"static void {name}_params(bslam_settings_t *p)"
     yield "{"
-    yield "    bslam_settings_default(p);"
+    yield "    bslam_settings_preset(p, BSLAM_PRESET_PAPER);"
     for key, value in params.items():
         yield f"    p->{key} = {value};" if isinstance(value, int) else f"    p->{key} = BSLAM_R({value!r});"
     yield "}"

@@ -35,4 +35,4 @@ def test_help_promised_target_is_listed(listed: set[str], target: str) -> None:
 def test_firmware_unknown_target_names_the_allowed_ones() -> None:
     result = make("firmware", "TARGET=avr")
     assert result.returncode == 2
-    assert "TARGET is avr; allowed: m0plus m33 m4f m55 m7 rv32" in result.stderr
+    assert "TARGET is avr; allowed: m0plus m33 m4f m4f_whole m55 m7 rv32" in result.stderr

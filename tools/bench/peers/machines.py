@@ -139,7 +139,7 @@ def _flash(sources: Sequence[str]) -> int | None:
 
 
 def _on_robot(_task: Task) -> list[str]:
-    core = [str(ROOT / f"firmware/bslam/svm/{name}.c") for name in ("solver", "sample")]
+    core = [str(ROOT / f"firmware/bslam/appearance/{name}.c") for name in ("solver", "sample")]
     return [str(SOURCES / "svm_bslam.c"), *core, f"-I{ROOT / 'firmware'}"]
 
 

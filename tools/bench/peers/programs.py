@@ -11,6 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ROOT / "tests/bench/peers"
 BUILD = ROOT / "build/bench/peers"
+ESTIMATOR = sorted(path for part in ("base", "bslam") for path in (ROOT / "firmware" / part).rglob("*.c"))
+"""The library's own files."""
 INCLUDE = Path("/usr/include")
 OPTIMISED = ["-O2", "-g", "-ffp-contract=off"]  # the same for all
 MRPT_PARTS = ("slam", "obs", "bayes", "poses", "math", "rtti", "system", "serialization", "core")
@@ -63,7 +65,7 @@ def instructions(program: Path, words: Sequence[str], drive: str, measured: int)
 
 def core(beacons: int) -> Path:
     """The core for a map of that many beacons."""
-    sources = [SOURCES / "peer_bslam.c", *sorted((ROOT / "firmware/bslam").rglob("*.c"))]
+    sources = [SOURCES / "peer_bslam.c", *ESTIMATOR]
     words = [*OPTIMISED, f"-I{ROOT / 'firmware'}", f"-DBSLAM_BEACONS_MAX={beacons}", "-DBSLAM_RAYS_MAX=0"]
     return _compiled(["cc", "-std=c11"], f"bslam_{beacons}", sources, words, ["-lm"])
 
