@@ -131,6 +131,7 @@ typedef struct bslam_innovation {
     bslam_real_t range_var_m2;  ///< of the measurement, at the predicted distance
     bslam_real_t bearing_var_rad2;
     bslam_real_t gate_d2;  ///< beyond this squared Mahalanobis distance it is not used; 0: no gate
+    bool gate_is_open;     ///< beyond it, it is used and weighs as much as if it were at the gate
     bslam_row_t range_row;
     bslam_row_t bearing_row;
 } bslam_innovation_t;

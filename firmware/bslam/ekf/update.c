@@ -200,6 +200,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
         return BSLAM_E_SINGULAR;
     }
     innovation->gate_d2 = settings->gate_d2;
+    innovation->gate_is_open = false;
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
@@ -345,13 +346,16 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
-static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_d2, bslam_fusion_t *fusion)
+static bslam_status_t judge(const bslam_settings_t *settings, const bslam_innovation_t *innovation,
+                            bslam_fusion_t *fusion)
 {
-    if (gate_d2 > 0 && !(fusion->distance2 <= gate_d2)) {
+    const bslam_real_t gate_d2 = innovation->gate_d2;
+    if (gate_d2 > 0 && !innovation->gate_is_open && !(fusion->distance2 <= gate_d2)) {
         fusion->weight = 0;
         return BSLAM_E_RANGE;
     }
-    const bslam_real_t limit = settings->huber_d;
+    const bslam_real_t at_gate = innovation->gate_is_open ? bslam_sqrt(gate_d2) : 0;
+    const bslam_real_t limit = settings->huber_d > 0 ? settings->huber_d : at_gate;
     fusion->weight =
         limit > 0 && fusion->distance2 > limit * limit ? limit / bslam_sqrt(fusion->distance2) : 1;
     return BSLAM_OK;
@@ -397,7 +401,7 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
     if (status != BSLAM_OK) {
         return status;
     }
-    status = judge(settings, innovation->gate_d2, fusion);
+    status = judge(settings, innovation, fusion);
     if (status != BSLAM_OK) {
         return status;
     }

@@ -215,6 +215,7 @@ static void take_innovation(bslam_slam_t *slam, const bslam_pose_t *mount, bslam
     }
     innovation->has_range = innovation->has_range && !match->range_used;
     innovation->gate_d2 = gate_d2;
+    innovation->gate_is_open = bslam_slam_opens_gate(slam, beacon);
 }
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
@@ -283,6 +284,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t ti
 {
     measure(slam, time_us, mount, count);
     fuse(slam, time_us, count);
+    bslam_slam_note_misfit(slam, count);
     correct(slam, count);
     augment(slam, time_us, mount, count);
 }

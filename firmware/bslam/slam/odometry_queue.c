@@ -17,8 +17,9 @@ static uint32_t whole_micrometres(bslam_real_t forward_m)
 static void predict_step(bslam_slam_t *slam, int64_t until_us)
 {
     bslam_history_place_t place = slam->history.filter;
-    const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+    bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
+    bslam_slam_doubt_motion(slam, &motion);
     bslam_ekf_predict(&slam->ekf, &slam->settings, &motion, &moved);
     if (bslam_slam_smooths(slam)) {
         bslam_smoother_move(slam->smoother, &slam->ekf, &motion);

@@ -14,6 +14,7 @@ typedef struct bslam_slam {
     bslam_odometry_t odometry;
     bslam_history_t history;
     uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
+    bslam_real_t misfit;    ///< of the newest sightings to the pose: 0 all fit, 1 none does
     int64_t last_frame_us;
     bool has_frame;
     bool confirmed_now;              ///< within a frame: it has confirmed a beacon

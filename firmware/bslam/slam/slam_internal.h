@@ -37,6 +37,17 @@ void bslam_slam_confirm_match(bslam_slam_t *slam, bslam_beacon_t *beacon, const 
 /// matter.
 void bslam_slam_mark_tentative(bslam_slam_t *slam, int count);
 
+// ---- misfit.c ---------------------------------------------------------------------------------------------
+
+/// How well the sightings of a frame fit that were just fused or rejected. Once a frame, before the mean moves.
+void bslam_slam_note_misfit(bslam_slam_t *slam, int count);
+
+/// Whether a beacon's sightings are used beyond their gate: of late so much was beyond it that the pose errs.
+bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beacon);
+
+/// Raises the noise of a motion while sightings do not fit: wheels that slip say nothing of it.
+void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion);
+
 // ---- beacon_scale.c ---------------------------------------------------------------------------------------
 
 /// A beacon whose place came of directions has a scale from its first sighting with a distance on. True: the

@@ -1,0 +1,50 @@
+// A gate takes the pose for right. If few sightings pass it, the pose is wrong: wheels slipped, somebody pushed
+// the robot, or it was blind for long. MATH "Gate".
+#include "bslam/slam/slam_internal.h"
+
+/// So many sightings the mean of how well they fit goes back.
+static const bslam_real_t MEMORY = BSLAM_R(16.0);
+/// Where the noise is right the misfit is 0.15, where one sighting in ten means nothing 0.25.
+static const bslam_real_t DOUBTFUL = BSLAM_R(0.35);
+static const bslam_real_t WRONG = BSLAM_R(0.5);
+/// Times the misfit beyond DOUBTFUL, what the variance of a motion grows by: a wheel of an encoder that spins
+/// errs by ten times its noise and more.
+static const bslam_real_t SLIP_FACTOR = BSLAM_R(1000.0);
+/// A beacon is believed until it was rejected this much more often than matched.
+enum { REJECTED_MORE = 4 };
+
+/// A beacon that contradicts the others for long is in the wrong place itself.
+static bool is_believed(const bslam_beacon_t *beacon)
+{
+    return beacon->kind == BSLAM_BEACON_KNOWN || beacon->gated < beacon->sightings + REJECTED_MORE;
+}
+
+void bslam_slam_note_misfit(bslam_slam_t *slam, int count)
+{
+    bslam_real_t sum = 0, weight = 0;
+    for (int i = 0; i < count; i++) {
+        const bslam_record_t *record = &slam->records[i];
+        const bslam_real_t ratio = record->account->test_ratio;
+        if (record->match.verdict == BSLAM_VERDICT_MATCH && ratio >= 0 &&
+            is_believed(&slam->ekf.beacons[record->match.beacon])) {
+            sum += ratio < 1 ? ratio : 1;
+            weight++;
+        }
+    }
+    slam->misfit += (sum - weight * slam->misfit) / (MEMORY + weight);
+}
+
+bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beacon)
+{
+    return slam->misfit > WRONG && is_believed(beacon);
+}
+
+void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion)
+{
+    if (slam->misfit > DOUBTFUL) {
+        const bslam_real_t factor = 1 + SLIP_FACTOR * (slam->misfit - DOUBTFUL);
+        motion->forward_var_m2 *= factor;
+        motion->turn_var_rad2 *= factor;
+        motion->forward_turn_cov_mrad *= factor;
+    }
+}
