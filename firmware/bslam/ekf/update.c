@@ -8,59 +8,40 @@
 #include "bslam/model/pose.h"
 #include "base/scalar.h"
 
-/// Sixteen roundings of one: what the sums of an update may be off by, as part of their largest term.
-static const bslam_real_t ROUNDINGS = 8 * BSLAM_REAL_EPSILON;
-
 // ---- rows of H --------------------------------------------------------------------------------------------
 
 bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
     const bslam_real_t *others = vector + row->at;
-    if (row->dim == 2) {  // a beacon that is a point
-        return sum + row->other[0] * others[0] + row->other[1] * others[1];
-    }
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
     }
     return sum;
 }
 
-/// Adds to P rowᵀ what the waiting down-dates make of it. Returns by how much less row P rowᵀ is for it.
-static bslam_real_t add_pending(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+/// f += weight times row `place` of L, in the columns from `from` up to `to`, whose first one is f[0].
+static void add_row(const bslam_factor_t *factor, int place, bslam_real_t weight, int from, int to,
+                    bslam_real_t *f)
 {
-    bslam_real_t less = 0;
-    for (int p = 0; p < ekf->pending_count; p++) {
-        const bslam_real_t *column = ekf->pending[p];
-        const bslam_real_t by_row = bslam_ekf_dot(row, column);
-        const bslam_real_t factor = ekf->pending_scale[p] * by_row;
-        bslam_ekf_add_scaled(out, factor, column, ekf->dim);
-        less -= factor * by_row;
+    const bslam_real_t *row = bslam_factor_row(factor, place);
+    const int end = place + 1 < to ? place + 1 : to;
+    for (int j = from; j < end; j++) {
+        f[j - from] += weight * row[4 * j];
     }
-    return less;
 }
 
-bslam_real_t bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+void bslam_ekf_look(const bslam_ekf_t *ekf, const bslam_row_t *row, int from, int to, bslam_real_t *f)
 {
-    bslam_symmat_times(ekf->covariance, ekf->dim, row, out);
-    return add_pending(ekf, row, out);
-}
-
-/// P times the rows of a sighting's bearing (y) and, if it has one, range (x). Returns by how much less their
-/// variances are for what waits.
-static bslam_sym2_t project_sighting(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
-                                     bslam_real_t *by_bearing, bslam_real_t *by_range)
-{
-    bslam_sym2_t less = {0, 0, 0};
-    if (!innovation->has_range) {
-        less.yy = bslam_ekf_project(ekf, &innovation->bearing_row, by_bearing);
-        return less;
+    const bslam_factor_t *factor = &ekf->factor;
+    const bslam_real_t *tail = factor->tail + factor->tail_count - 2;  // x, and y behind it
+    for (int j = from; j < to; j++) {
+        f[j - from] = row->base[0] * tail[4 * j] + row->base[1] * tail[4 * j + 1];
     }
-    bslam_symmat_times_two(ekf->covariance, ekf->dim, &innovation->bearing_row, &innovation->range_row,
-                           by_bearing, by_range);
-    less.yy = add_pending(ekf, &innovation->bearing_row, by_bearing);
-    less.xx = add_pending(ekf, &innovation->range_row, by_range);
-    return less;
+    add_row(factor, bslam_ekf_place(ekf, BSLAM_STATE_THETA), row->base[2], from, to, f);
+    for (int k = 0; k < row->dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, row->at + k), row->other[k], from, to, f);
+    }
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
@@ -72,53 +53,28 @@ static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3]
     memcpy(row->other, by_beacon, sizeof row->other);
 }
 
-enum { SEEN_DIM_MAX = POSE_DIM + BSLAM_RAY_DIM };
-
-/// Covariance of the i-th value that row a looks at with all that row b does: the robot's pose and a beacon
-/// each.
-static void fill_line(const bslam_ekf_t *ekf, const bslam_row_t *a, int i, const bslam_row_t *b,
-                      bslam_real_t line[SEEN_DIM_MAX])
-{
-    const int at = i < POSE_DIM ? i : a->at + i - POSE_DIM;
-    for (int j = 0; j < POSE_DIM; j++) {
-        line[j] = bslam_symmat_get(ekf->covariance, at, j);
-    }
-    for (int j = 0; j < b->dim; j++) {
-        line[POSE_DIM + j] = bslam_symmat_get(ekf->covariance, b->at + j, at);
-    }
-}
-
-/// row · line.
-static bslam_real_t weigh(const bslam_row_t *row, const bslam_real_t *line)
-{
-    bslam_real_t sum = 0;
-    for (int k = 0; k < POSE_DIM; k++) {
-        sum += line[k] * row->base[k];
-    }
-    for (int k = 0; k < row->dim; k++) {
-        sum += line[POSE_DIM + k] * row->other[k];
-    }
-    return sum;
-}
-
-/// Of two rows a P bᵀ; and a P aᵀ and b P bᵀ, if they look at the same beacon. From the covariance as it is
-/// stored.
+/// Of two rows a P bᵀ, a P aᵀ and b P bᵀ. From the covariance but for what waits.
 typedef struct forms {
     bslam_real_t ab, aa, bb;
 } forms_t;
 
+enum { COLUMNS = 16 };  // at once, so that no row of L need be kept
+
 static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
+    const int places = bslam_factor_places(&ekf->factor);
     forms_t sums = {0, 0, 0};
-    bslam_real_t line[SEEN_DIM_MAX] = {0};
-    for (int i = 0; i < POSE_DIM + a->dim; i++) {
-        fill_line(ekf, a, i, b, line);
-        const bslam_real_t of_a = i < POSE_DIM ? a->base[i] : a->other[i - POSE_DIM];
-        const bslam_real_t of_b = i < POSE_DIM ? b->base[i] : b->other[i - POSE_DIM];
-        const bslam_real_t by_b = weigh(b, line);
-        sums.ab += of_a * by_b;
-        sums.aa += of_a * weigh(a, line);
-        sums.bb += of_b * by_b;
+    for (int from = 0; from < places; from += COLUMNS) {
+        const int to = from + COLUMNS < places ? from + COLUMNS : places;
+        bslam_real_t of_a[COLUMNS], of_b[COLUMNS];
+        bslam_ekf_look(ekf, a, from, to, of_a);
+        bslam_ekf_look(ekf, b, from, to, of_b);
+        for (int j = 0; j < to - from; j++) {
+            const bslam_real_t d = ekf->factor.d[from + j];
+            sums.ab += d * of_a[j] * of_b[j];
+            sums.aa += d * of_a[j] * of_a[j];
+            sums.bb += d * of_b[j] * of_b[j];
+        }
     }
     return sums;
 }
@@ -251,97 +207,88 @@ bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t 
 
 // ---- gain and down-date -----------------------------------------------------------------------------------
 
-/// The first `count` waiting down-dates as terms of a pass; places without one add nothing.
-static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t *terms, int count)
+static bslam_waiting_t waiting(bslam_ekf_t *ekf, int k)
 {
-    for (int p = 0; p < count; p++) {
-        const bool waits = p < ekf->pending_count;
-        terms[p].row_factors = ekf->pending[waits ? p : 0];
-        terms[p].columns = ekf->pending[waits ? p : 0];
-        terms[p].scale = waits ? ekf->pending_scale[p] : 0;
-    }
+    return (bslam_waiting_t){ekf->v[k], ekf->lambda[k], ekf->gain[k]};
 }
 
 void bslam_ekf_settle(bslam_ekf_t *ekf)
 {
-    if (ekf->pending_count > 0) {
-        bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-        fill_terms(ekf, terms, BSLAM_PENDING_MAX);
-        bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, ekf->pending_count);
-        ekf->pending_count = 0;
+    if (ekf->pending_count == 0) {
+        return;
     }
+    const int tail = ekf->factor.tail_count;
+    bslam_waiting_t list[BSLAM_PENDING_MAX];
+    for (int k = 0; k < ekf->pending_count; k++) {
+        list[k] = waiting(ekf, k);
+    }
+    memcpy(ekf->factor.d, ekf->d, sizeof ekf->d);
+    bslam_real_t *change = ekf->d;  // whose room is free now
+    memset(change, 0, sizeof ekf->d);
+    bslam_factor_settle(&ekf->factor, list, ekf->pending_count, change);
+    for (int i = 0; i < ekf->base_dim; i++) {
+        ekf->correction[i] += change[bslam_ekf_place(ekf, i)];
+    }
+    for (int i = ekf->base_dim; i < ekf->dim; i++) {
+        ekf->correction[i] += change[i - tail];
+    }
+    ekf->pending_count = 0;
 }
 
-/// What the correction so far says of a measurement.
-static bslam_real_t foreseen(const bslam_ekf_t *ekf, const bslam_row_t *row)
+/// f of a row, behind all that waits, into place `slot`. Returns what the correction so far says of the
+/// measurement.
+static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
 {
-    return ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
+    const int places = bslam_factor_places(&ekf->factor);
+    bslam_real_t foreseen = ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
+    bslam_ekf_look(ekf, row, 0, places, ekf->lambda[slot]);
+    for (int k = 0; k < ekf->pending_count; k++) {
+        const bslam_waiting_t before = waiting(ekf, k);
+        foreseen += before.gain * bslam_factor_carry(&before, places, ekf->lambda[slot]);
+    }
+    return foreseen;
 }
 
-/// How far a scalar measurement moves the mean and the covariance along its column P hᵀ.
-typedef struct gain {
-    bslam_real_t step;   ///< innovation / S
-    bslam_real_t scale;  ///< -1 / S
-} gain_t;
-
-static gain_t gain_of(bslam_real_t innovation, bslam_real_t s)
+/// f D gᵀ of two slots: what is common to two rows' predictions.
+static bslam_real_t common(const bslam_ekf_t *ekf, int a, int b)
 {
-    return (gain_t){innovation / s, -1 / s};
+    bslam_real_t sum = 0;
+    for (int j = 0; j < bslam_factor_places(&ekf->factor); j++) {
+        sum += ekf->d[j] * (ekf->lambda[a][j] * ekf->lambda[b][j]);
+    }
+    return sum;
 }
 
-static void begin_correction(bslam_ekf_t *ekf)
+static void make_room(bslam_ekf_t *ekf, int count)
 {
+    if (ekf->pending_count + count > BSLAM_PENDING_MAX) {
+        bslam_ekf_settle(ekf);
+    }
+    if (ekf->pending_count == 0) {
+        memcpy(ekf->d, ekf->factor.d, sizeof ekf->d);
+    }
     if (!ekf->has_correction) {
         memset(ekf->correction, 0, sizeof ekf->correction);
-        ekf->has_correction = true;
     }
 }
 
-/// Takes the column in the next free pending slot into the correction and the pending down-dates.
-static void accept_column(bslam_ekf_t *ekf, gain_t gain)
+/// Takes the measurement in the next slot.
+static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s, bslam_real_t variance)
 {
-    begin_correction(ekf);
-    bslam_ekf_add_scaled(ekf->correction, gain.step, ekf->pending[ekf->pending_count], ekf->dim);
-    ekf->pending_scale[ekf->pending_count] = gain.scale;
+    ekf->gain[ekf->pending_count] = innovation / s;
+    const bslam_waiting_t next = waiting(ekf, ekf->pending_count);
+    bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
     ekf->pending_count++;
-}
-
-/// The range's column becomes conditional on the bearing, and both go into the correction.
-static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *restrict by_bearing,
-                         bslam_real_t *restrict by_range, int n, const gain_t gains[2], bslam_real_t share)
-{
-    const bslam_real_t by = gains[0].step, to = gains[1].step;
-    for (int i = 0; i < n; i += 4) {
-        const bslam_four_t bearing = bslam_four(by_bearing + i);
-        const bslam_four_t own = bslam_four(by_range + i) - share * bearing;
-        *(bslam_four_at_t *)(by_range + i) = own;
-        *(bslam_four_at_t *)(correction + i) = bslam_four(correction + i) + by * bearing + to * own;
-    }
-}
-
-/// The same for the columns of a bearing and a range in the next two slots, the range's conditional on the
-/// bearing.
-static void accept_two(bslam_ekf_t *ekf, gain_t bearing, gain_t range, bslam_real_t share)
-{
-    const int at = ekf->pending_count;
-    begin_correction(ekf);
-    const gain_t gains[2] = {bearing, range};
-    take_columns(ekf->correction, ekf->pending[at], ekf->pending[at + 1], ekf->dim, gains, share);
-    ekf->pending_scale[at] = bearing.scale;
-    ekf->pending_scale[at + 1] = range.scale;
-    ekf->pending_count += 2;
+    ekf->has_correction = true;
 }
 
 void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
                             bslam_real_t variance)
 {
-    if (ekf->pending_count == BSLAM_PENDING_MAX) {
-        bslam_ekf_settle(ekf);
-    }
-    bslam_real_t *column = ekf->pending[ekf->pending_count];
-    (void)bslam_ekf_project(ekf, row, column);
-    const bslam_real_t left = innovation - foreseen(ekf, row);
-    accept_column(ekf, gain_of(left, bslam_ekf_dot(row, column) + variance));
+    make_room(ekf, 1);
+    const int slot = ekf->pending_count;
+    const bslam_real_t left = innovation - foresee(ekf, row, slot);
+    accept(ekf, left, common(ekf, slot, slot) + variance, variance);
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
@@ -357,63 +304,40 @@ static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_
     return BSLAM_OK;
 }
 
-/// A measurement's variance, and at least what h P hᵀ is rounded by: a sighting surer than that would leave
-/// no positive definite covariance. The doubt that a robot shares with a beacon cancels out, but not its
-/// rounding. So `before`, which is h P hᵀ without what waits, and the robot's own part of it. MATH "Update".
-static bslam_real_t noise_of(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t variance,
-                             bslam_real_t before)
-{
-    bslam_real_t terms = before;
-    for (int k = 0; k < POSE_DIM; k++) {
-        terms += row->base[k] * row->base[k] * ekf->covariance[5 * k];  // the first rows lie four apart
-    }
-    const bslam_real_t rounding = ROUNDINGS * terms;
-    return variance > rounding ? variance : rounding;
-}
-
 bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                               const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
-    if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
-        bslam_ekf_settle(ekf);
-    }
-    const bslam_row_t *bearing_row = &innovation->bearing_row;
-    bslam_real_t *bearing_column = ekf->pending[ekf->pending_count];
-    bslam_real_t *range_column = ekf->pending[ekf->pending_count + 1];
+    make_room(ekf, 2);
+    const int of_bearing = ekf->pending_count, of_range = of_bearing + 1;
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
-    const bslam_real_t bearing_left = innovation->bearing_rad - foreseen(ekf, bearing_row);
-    const bslam_sym2_t less = project_sighting(ekf, innovation, bearing_column, range_column);
-    hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
+    const bslam_real_t bearing_left =
+        innovation->bearing_rad - foresee(ekf, &innovation->bearing_row, of_bearing);
+    hph.yy = common(ekf, of_bearing, of_bearing);
     if (innovation->has_range) {
-        range_left = innovation->range_m - foreseen(ekf, &innovation->range_row);
-        hph.xx = bslam_ekf_dot(&innovation->range_row, range_column);
-        hph.xy = bslam_ekf_dot(&innovation->range_row, bearing_column);
+        range_left = innovation->range_m - foresee(ekf, &innovation->range_row, of_range);
+        hph.xx = common(ekf, of_range, of_range);
+        hph.xy = common(ekf, of_range, of_bearing);
     }
     const bslam_sym2_t s = {.xx = innovation->has_range ? hph.xx + innovation->range_var_m2 : 1,
                             .xy = hph.xy,
                             .yy = hph.yy + innovation->bearing_var_rad2};
     bslam_status_t status = bslam_sym2_mahalanobis(&s, range_left, bearing_left, &fusion->distance2);
-    if (status != BSLAM_OK) {
-        return status;
+    if (status == BSLAM_OK) {
+        status = judge(settings, innovation->gate_d2, fusion);
     }
-    status = judge(settings, innovation->gate_d2, fusion);
     if (status != BSLAM_OK) {
         return status;
     }
     const bslam_real_t bearing_var = innovation->bearing_var_rad2 / fusion->weight;
-    const bslam_real_t bearing_s = hph.yy + noise_of(ekf, bearing_row, bearing_var, hph.yy + less.yy);
-    const gain_t bearing = gain_of(bearing_left, bearing_s);
-    if (!innovation->has_range) {
-        accept_column(ekf, bearing);
-        return BSLAM_OK;
+    accept(ekf, bearing_left, hph.yy + bearing_var, bearing_var);
+    if (innovation->has_range) {  // conditional on the bearing
+        const bslam_waiting_t bearing = waiting(ekf, of_bearing);
+        const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
+        range_left -= bearing.gain *
+                      bslam_factor_carry(&bearing, bslam_factor_places(&ekf->factor), ekf->lambda[of_range]);
+        accept(ekf, range_left, common(ekf, of_range, of_range) + range_var, range_var);
     }
-    // The range's variance and innovation, conditional on the bearing.
-    const bslam_real_t share = hph.xy / bearing_s;
-    const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
-    const bslam_real_t range_s =
-        hph.xx - share * hph.xy + noise_of(ekf, &innovation->range_row, range_var, hph.xx + less.xx);
-    accept_two(ekf, bearing, gain_of(range_left - share * bearing_left, range_s), share);
     return BSLAM_OK;
 }
 
@@ -471,27 +395,16 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need:
-/// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction: L's first columns. O(n).
 static void transport_covariance(bslam_ekf_t *ekf)
 {
-    static const bslam_row_t theta_row = {.base = {0, 0, 1}};
-    const bslam_real_t *shift = ekf->correction;
-    bslam_real_t *mirror = ekf->pending[BSLAM_PENDING_MAX - 1];
-    if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
-        bslam_ekf_settle(ekf);
+    bslam_factor_t *factor = &ekf->factor;
+    const int theta = bslam_ekf_place(ekf, BSLAM_STATE_THETA);
+    for (int i = 0; i < ekf->dim; i++) {
+        if (ekf->correction[i] != 0) {
+            bslam_factor_add_row(factor, bslam_ekf_place(ekf, i), theta, ekf->correction[i]);
+        }
     }
-    bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, mirror);
-    add_pending(ekf, &theta_row, mirror);
-    const bslam_real_t half_variance = mirror[BSLAM_STATE_THETA] / 2;
-    bslam_ekf_add_scaled(mirror, half_variance, shift, ekf->dim);
-    bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-    const int behind = ekf->pending_count > 0 ? 2 : 0;
-    fill_terms(ekf, terms, BSLAM_PENDING_MAX);
-    terms[behind] = (bslam_symmat_term_t){.row_factors = shift, .scale = 1, .columns = mirror};
-    terms[behind + 1] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
-    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, behind + 2);
-    ekf->pending_count = 0;
 }
 
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance)
@@ -506,11 +419,10 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings)
         return;
     }
     const bool invariant = settings->filter != BSLAM_FILTER_STANDARD;
+    bslam_ekf_settle(ekf);
     move_mean(ekf, invariant ? ekf->correction[BSLAM_STATE_THETA] : 0);
     if (invariant) {
         transport_covariance(ekf);
-    } else {
-        bslam_ekf_settle(ekf);
     }
     ekf->has_correction = false;
 }
