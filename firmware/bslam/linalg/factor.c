@@ -15,9 +15,10 @@ static inline bslam_four_t load(const bslam_real_t *block, int j)
     return bslam_four(block + 4 * (size_t)j);
 }
 
-static inline void store(bslam_real_t *block, int j, bslam_four_t four)
+/// What four rows have of column j. (A function that is passed four numbers draws a note on how, from GCC.)
+static inline bslam_four_at_t *column(bslam_real_t *block, int j)
 {
-    *(bslam_four_at_t *)(block + 4 * (size_t)j) = four;
+    return (bslam_four_at_t *)(block + 4 * (size_t)j);
 }
 
 bslam_real_t bslam_factor_get(const bslam_factor_t *factor, int i, int j)
@@ -87,8 +88,8 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by)
 /// A variance that becomes more than this many times larger leaves nothing to add to.
 static const bslam_real_t GROWTH_MAX = 4;
 
-/// What column j's own value takes of a sum; what its row has of w is p. *keep: of the column, 1 if that is
-/// added to.
+/// What column j's own value takes of a sum; what its row has of w is p. The column becomes l + by (w - p l), or
+/// by w and what it is to *keep: the same, but where little is kept the first is a difference of large numbers.
 static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by, bslam_real_t *keep)
 {
     const bslam_real_t sum = *d + *share * p * p;
@@ -101,14 +102,6 @@ static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bsl
         *share *= left;
         *d = sum;
     }
-}
-
-/// A column's part of four rows, of which w had so much before it and behind it. Both are the same, but where
-/// little is kept the difference would be that of large numbers.
-static inline bslam_four_t add_to_column(bslam_four_t l, bslam_four_t before, bslam_four_t behind,
-                                         bslam_real_t by, bslam_real_t keep)
-{
-    return keep < 1 ? keep * l + by * before : l + by * behind;
 }
 
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
@@ -124,14 +117,14 @@ void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bsl
         for (int j = first; j < at; j++) {
             const bslam_four_t l = load(block, j), before = rest;
             rest -= w[j] * l;
-            store(block, j, add_to_column(l, before, rest, by[j], keep[j]));
+            *column(block, j) = keep[j] < 1 ? keep[j] * l + by[j] * before : l + by[j] * rest;
         }
         for (int j = first > at ? first : at; j < at + 4; j++) {
             const bslam_real_t p = rest[j - at];
             add_to_own(&factor->d[j], p, &share, &by[j], &keep[j]);
             const bslam_four_t l = load(block, j), before = rest;
             rest -= p * l;  // of its own row nothing is left
-            store(block, j, add_to_column(l, before, rest, by[j], keep[j]));
+            *column(block, j) = keep[j] < 1 ? keep[j] * l + by[j] * before : l + by[j] * rest;
             block[4 * j + j - at] = l[j - at];
             w[j] = p;
         }
@@ -203,11 +196,11 @@ void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_rea
         factor->d[i] = factor->d[i + count];
     }
     for (int j = first; j < left; j++) {
-        store(factor->tail, j, load(factor->tail, j + count));
+        *column(factor->tail, j) = load(factor->tail, j + count);
     }
     for (int i = left; i < bslam_factor_tail_at(factor); i++) {
         begin_row(factor, i, 0);
-        store(factor->tail, i, (bslam_four_t){0, 0, 0, 0});
+        *column(factor->tail, i) = (bslam_four_t){0, 0, 0, 0};
         factor->d[i] = 0;
     }
     move_tail(factor, left);
@@ -358,7 +351,7 @@ COPIED void settle_rows(bslam_real_t *block, int columns, const bslam_waiting_t 
             l += waiting[p].lambda[j] * sums[p];
             sums[p] += waiting[p].v[j] * before;
         }
-        store(block, j, l);
+        *column(block, j) = l;
     }
     bslam_four_t all = bslam_four(change);
     for (int p = 0; p < count; p++) {
