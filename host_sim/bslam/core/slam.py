@@ -355,7 +355,7 @@ class Slam:
             self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
 
     def map_fault(self, blob: bytes) -> str:
-        """What `load_map` would say of a blob if there were no map yet: "fine", "bad crc", ..."""
+        """What `load_map` would say of a blob: "fine", "bad crc", ..."""
         empty = self._ffi.new("bslam_t *")
         self._begin(empty)
         return self._load(empty, blob)[1]

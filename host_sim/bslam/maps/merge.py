@@ -274,7 +274,8 @@ def _solve(a: _Points, b: _Points, layout: _Layout, move: Floats) -> tuple[Float
         normal = by_a.T @ weight_a @ by_a + by_b.T @ weight_b @ by_b
         right = by_a.T @ weight_a @ (a.values - by_a @ x) + by_b.T @ weight_b @ (b.values - seen_b)
         x = x + np.linalg.solve(normal, right)
-    covariance: Floats = np.asarray(np.linalg.inv(normal), np.float64)
+    root = np.linalg.inv(np.linalg.cholesky(normal))
+    covariance: Floats = root.T @ root
     end = layout.size
     x[end + 2] = _wrapped(float(x[end + 2]))
     return x[:end], covariance[:end, :end], x[end:], np.sqrt(np.diag(covariance)[end:])

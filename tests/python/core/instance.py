@@ -1,6 +1,5 @@
 """The filter's state as the C instance holds it."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,15 +9,12 @@ from bslam.core import Slam
 from internals import inside, module_of
 
 
-@cache
-def _places(dim: int) -> NDArray[np.int64]:
-    """(dim, dim) places of the elements in the packed triangle: bslam/linalg/symmat.h."""
-    row, column = (
-        np.maximum.outer(np.arange(dim), np.arange(dim)),
-        np.minimum.outer(np.arange(dim), np.arange(dim)),
-    )
-    block = row // 4
-    return 4 * (block + 1) * (2 * block + row % 4) + column
+def _places(slam: Slam) -> NDArray[np.int64]:
+    """(n,) where each value of the state stands in the factor: bslam_ekf_place."""
+    ekf = inside(slam).slam.ekf
+    tail, tail_at = ekf.factor.tail_count, -(-ekf.factor.body_count // 4) * 4
+    robot = [tail_at + tail - 2, tail_at + tail - 1, ekf.base_dim - tail - 1, tail_at, 0][: ekf.base_dim]
+    return np.array([*robot, *(np.arange(ekf.base_dim, ekf.dim) - tail)])
 
 
 def _array(slam: Slam, field: object) -> NDArray[np.float64]:
@@ -38,8 +34,16 @@ def mean(slam: Slam) -> NDArray[np.float64]:
 
 
 def covariance(slam: Slam) -> NDArray[np.float64]:
-    """(n, n) its covariance."""
-    return _array(slam, inside(slam).slam.ekf.covariance)[_places(dim(slam))]
+    """(n, n) its covariance, L D Lᵀ: bslam/linalg/factor.h."""
+    factor, places = inside(slam).slam.ekf.factor, _places(slam)
+    tail_at = -(-factor.body_count // 4) * 4
+    lower = np.zeros((tail_at + 4, tail_at + 4))
+    body, tail = _array(slam, factor.body), _array(slam, factor.tail)
+    for at in range(0, tail_at, 4):
+        begin = at * (at + 4) // 2
+        lower[at : at + 4, : at + 4] = body[begin : begin + 4 * (at + 4)].reshape(-1, 4).T
+    lower[tail_at:] = tail[: 4 * (tail_at + 4)].reshape(-1, 4).T
+    return ((lower * _array(slam, factor.d)[: tail_at + 4]) @ lower.T)[np.ix_(places, places)]
 
 
 def beacons(slam: Slam) -> list[Any]:
