@@ -72,9 +72,13 @@ bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf)
 {
     for (int i = 0; i < ekf->dim; i++) {
+        if (!bslam_is_number(ekf->mean[i])) {
+            return false;
+        }
+    }
+    for (int i = 0; i < bslam_factor_places(&ekf->factor); i++) {
         // Exactly zero is the pose before the first motion, and a ray's anchor taken from it.
-        if (!bslam_is_number(ekf->mean[i]) ||
-            !bslam_in_range(ekf->factor.d[bslam_ekf_place(ekf, i)], 0, BSLAM_R(1e30))) {
+        if (!bslam_in_range(ekf->factor.d[i], 0, BSLAM_R(1e30))) {
             return false;
         }
     }
