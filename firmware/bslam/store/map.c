@@ -13,8 +13,8 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-/// What the values of a full map may hang on: two of the robot's, and the beacons'.
-enum { COLUMNS_MAX = 2 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
+/// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
+enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
 
 static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e30);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
@@ -126,7 +126,7 @@ static void take_record(const target_t *target, const stored_beacon_t *record)
     beacon->known_scale = beacon->kind == BSLAM_BEACON_KNOWN ? record->scale : 0;
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
-    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->base_dim + (int32_t)record->column;
+    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_map_at(ekf) + (int32_t)record->column;
     if (bslam_slam_learns(target->slam)) {
         bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
         known->classifier =
@@ -201,7 +201,7 @@ static void read_factor(bslam_codec_t *codec, const header_t *header, const colu
                         bslam_ekf_t *ekf)
 {
     const uint32_t d_begins = codec->at;
-    const int first = ekf != NULL ? ekf->base_dim - ekf->factor.tail_count : 0;
+    const int first = ekf != NULL ? bslam_ekf_map_at(ekf) - ekf->factor.tail_count : 0;
     for (uint32_t c = 0; c < header->columns; c++) {
         const bslam_real_t d = bslam_codec_real(codec, 0);
         bslam_codec_require(codec, d >= 0, BSLAM_MAP_COVARIANCE);
@@ -227,7 +227,7 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 {
     for (int c = (int)header->columns - 1; c >= 0; c--) {
         if (!columns->are_values[c]) {
-            bslam_ekf_remove_value(ekf, ekf->base_dim + c);
+            bslam_ekf_remove_value(ekf, bslam_ekf_map_at(ekf) + c);
         }
     }
 }
@@ -245,7 +245,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
     for (uint32_t c = 0; c < header->columns; c++) {
         const bslam_real_t value = columns->are_values[c] ? bslam_codec_real(codec, 0) : 0;
         if (ekf != NULL) {
-            ekf->mean[ekf->base_dim + (int)c] = value;
+            ekf->mean[bslam_ekf_map_at(ekf) + (int)c] = value;
         }
     }
     read_factor(codec, header, columns, ekf);
