@@ -12,8 +12,8 @@
 #define BSLAM_SIZE_POINTER ((int)sizeof(void *))
 #define BSLAM_SIZE_ENUM ((int)sizeof(bslam_status_t))
 
-/// State values: 5 for the robot, 5 for its sensor, 2 a beacon, and room for 2 more a ray and 7 in passing; filled up to a
-/// multiple of four.
+/// State values: 5 for the robot, 5 for its sensor, 2 a beacon, and room for 2 more a ray and 7 in passing;
+/// filled up to a multiple of four.
 #define BSLAM_SIZE_STATE ((10 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)
 /// A filter: means; triangle and tail of the factor, measurements that wait; beacons.
 #define BSLAM_SIZE_BODY ((7 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)

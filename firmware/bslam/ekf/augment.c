@@ -47,8 +47,8 @@ static void append_values(bslam_ekf_t *ekf, new_values_t *values)
 
 /// The distance that a value's noise comes from may be too long by a scale: where that is larger, the point
 /// is nearer. The scale itself is the third value.
-static void add_scale(new_values_t *values, bslam_real_t scale_var, bslam_real_t range_m, bslam_real_t x_by_range,
-                      bslam_real_t y_by_range)
+static void add_scale(new_values_t *values, bslam_real_t scale_var, bslam_real_t range_m,
+                      bslam_real_t x_by_range, bslam_real_t y_by_range)
 {
     const bslam_real_t by_scale[BSLAM_SIZED_DIM] = {-range_m * x_by_range, -range_m * y_by_range, 1};
     add_noise(values, scale_var, by_scale, BSLAM_SIZED_DIM);
@@ -64,8 +64,8 @@ static void append_point(bslam_ekf_t *ekf, const bslam_settings_t *settings, con
     const bslam_pose_t pose = bslam_ekf_pose(ekf), mount = bslam_ekf_mount(ekf, told);
     const bslam_real_t scale = bslam_ekf_range_scale(ekf), range_m = sighting->range_m / scale;
     const bslam_sighted_point_t point = bslam_locate_point(&pose, &mount, range_m, sighting->bearing_rad);
-    const bslam_real_t range_var = bslam_scaled_range_variance_m2(settings, sighting, sighting->range_m,
-                                                                  is_sized ? 0 : scale_var);
+    const bslam_real_t range_var =
+        bslam_scaled_range_variance_m2(settings, sighting, sighting->range_m, is_sized ? 0 : scale_var);
     const bslam_real_t by_range[BSLAM_POINT_DIM] = {point.x_by_range / scale, point.y_by_range / scale};
     const bslam_real_t by_bearing[BSLAM_POINT_DIM] = {point.x_by_bearing, point.y_by_bearing};
     new_values_t values = {.rows = {{.base = {1, 0, point.x_by_theta}}, {.base = {0, 1, point.y_by_theta}}},
@@ -91,13 +91,16 @@ static int room_of(const bslam_ekf_t *ekf)
 static void append_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *told,
                        const bslam_sighting_t *sighting)
 {
-    static const bslam_real_t OF_DIRECTION[BSLAM_RAY_DIM] = {0, 0, 1, 0}, OF_DISTANCE[BSLAM_RAY_DIM] = {0, 0, 0, 1};
+    static const bslam_real_t OF_DIRECTION[BSLAM_RAY_DIM] = {0, 0, 1, 0},
+                              OF_DISTANCE[BSLAM_RAY_DIM] = {0, 0, 0, 1};
     const bslam_pose_t pose = bslam_ekf_pose(ekf), mount = bslam_ekf_mount(ekf, told);
     const bslam_sensor_t sensor = bslam_sensor_at(&pose, &mount);
     const bslam_real_t direction_rad = bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad);
     const bslam_real_t sd = settings->ray_inverse_distance_sd_per_m;
     new_values_t values = {
-        .rows = {{.base = {1, 0, sensor.x_by_theta}}, {.base = {0, 1, sensor.y_by_theta}}, {.base = {0, 0, 1}}},
+        .rows = {{.base = {1, 0, sensor.x_by_theta}},
+                 {.base = {0, 1, sensor.y_by_theta}},
+                 {.base = {0, 0, 1}}},
         .mean = {sensor.pose.x_m, sensor.pose.y_m, direction_rad, settings->ray_inverse_distance_per_m},
         .growth = {.count = BSLAM_RAY_DIM}};
     for (int k = 0; k < BSLAM_RAY_DIM - 1; k++) {

@@ -1,14 +1,13 @@
 /// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its
 /// right-invariant form. MATH "The filter".
 ///
-/// State: x, y, theta | v, omega or their scale factors | what the sensor is told wrong, both if switched on |
-/// beacons, 2 to 4 values each. The
-/// covariance is held in these coordinates in both forms; the invariant form transports it after each
-/// correction. It is held as a factor (linalg/factor.h), in the order omega, theta | sensor, beacons | v, x, y: then a
-/// motion, the transport and a new beacon keep that triangular.
+/// State: x, y, theta | v, omega or their scale factors | what the sensor is told wrong, both if switched on
+/// | beacons, 2 to 4 values each. The covariance is held in these coordinates in both forms; the invariant
+/// form transports it after each correction. It is held as a factor (linalg/factor.h), in the order omega,
+/// theta | sensor, beacons | v, x, y: then a motion, the transport and a new beacon keep that triangular.
 ///
-/// Cost in multiply-adds for n values: a motion n², for the noise of its turn. Each scalar of a sighting 10 n,
-/// and n² for its part in the factor, which waits until four scalars share one pass. The transport 2 n.
+/// Cost in multiply-adds for n values: a motion n², for the noise of its turn. Each scalar of a sighting 10
+/// n, and n² for its part in the factor, which waits until four scalars share one pass. The transport 2 n.
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
@@ -85,15 +84,16 @@ typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
     bslam_factor_t factor;  ///< of the covariance, but for what waits
     int32_t dim;
-    int32_t base_dim;  ///< 3, or 5 with velocity or scale states
-    int32_t sensor_dim;  ///< 0, or BSLAM_SENSOR_DIM behind those
+    int32_t base_dim;                    ///< 3, or 5 with velocity or scale states
+    int32_t sensor_dim;                  ///< 0, or BSLAM_SENSOR_DIM behind those
     bslam_real_t speed_mps, turn_radps;  ///< of late, by which a delay shows
     int32_t beacon_count, ray_count, sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
     // Scratch: holds nothing between calls.
     bslam_real_t d[BSLAM_FACTOR_PLACES_MAX];  ///< the factor's with what waits
-    bslam_real_t v[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX], lambda[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX];
+    bslam_real_t v[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX],
+        lambda[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX];
     bslam_real_t gain[BSLAM_PENDING_MAX];
     bslam_real_t correction[BSLAM_STATE_PADDED];
     int32_t pending_count;

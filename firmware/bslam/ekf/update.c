@@ -313,7 +313,7 @@ static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
     return foreseen;
 }
 
-static bslam_real_t total(bslam_four_t four)
+COPIED bslam_real_t total(bslam_four_t four)
 {
     return (four[0] + four[1]) + (four[2] + four[3]);
 }
@@ -490,7 +490,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 }
 
 /// Four rows get so much of the heading's, which has `by_turn` of the turn rate's, if there is one.
-static void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
+COPIED void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
 {
     bslam_real_t *rows = bslam_factor_element(factor, at, 0);
     *(bslam_four_at_t *)(rows + 4 * theta) += shift;
@@ -499,8 +499,8 @@ static void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t b
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions: L's
-/// first columns. O(n).
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions:
+/// L's first columns. O(n).
 static void transport_covariance(bslam_ekf_t *ekf)
 {
     bslam_factor_t *factor = &ekf->factor;

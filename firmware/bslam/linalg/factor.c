@@ -10,12 +10,12 @@
 /// Variances below this are none: quotients by them would overflow.
 static const bslam_real_t VARIANCE_MIN = BSLAM_R(1e-30);
 
-static inline bslam_four_t load(const bslam_real_t *block, int j)
+COPIED bslam_four_t load(const bslam_real_t *block, int j)
 {
     return bslam_four(block + 4 * (size_t)j);
 }
 
-static inline void store(bslam_real_t *block, int j, bslam_four_t four)
+COPIED void store(bslam_real_t *block, int j, bslam_four_t four)
 {
     *(bslam_four_at_t *)(block + 4 * (size_t)j) = four;
 }
@@ -108,7 +108,8 @@ COPIED bslam_four_t add_before(bslam_real_t *block, int first, int end, const bs
     return rest;
 }
 
-void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w, bslam_real_t *by)
+void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
+                      bslam_real_t *by)
 {
     if (!(share > 0)) {
         return;
@@ -309,7 +310,7 @@ void bslam_factor_cut(bslam_factor_t *factor, int first)
 // ---- scalar measurements ----------------------------------------------------------------------------------
 
 /// Of four numbers, what those behind each sum up to, and `behind` with them.
-static inline bslam_four_t sums_behind(bslam_four_t own, bslam_real_t behind)
+COPIED bslam_four_t sums_behind(bslam_four_t own, bslam_real_t behind)
 {
     const bslam_real_t three = behind + own[3], two = three + own[2];
     return (bslam_four_t){two + own[1], two, three, behind};
@@ -374,8 +375,8 @@ COPIED void settle_rows(bslam_real_t *block, int columns, const bslam_waiting_t 
         store(block, j, count == 3 ? d : d + lambda3[j] * sum3);
         sum3 += v3[j] * d;
     }
-    *(bslam_four_at_t *)change += waiting[0].gain * sum0 + waiting[1].gain * sum1 + waiting[2].gain * sum2 +
-                                  waiting[3].gain * sum3;
+    *(bslam_four_at_t *)change +=
+        waiting[0].gain * sum0 + waiting[1].gain * sum1 + waiting[2].gain * sum2 + waiting[3].gain * sum3;
 }
 
 COPIED void settle_all(bslam_factor_t *factor, const bslam_waiting_t waiting[4], const int count,

@@ -62,7 +62,8 @@ static inline const bslam_real_t *bslam_factor_row(const bslam_factor_t *factor,
 /// Element (i, j) of L, j <= i.
 static inline bslam_real_t *bslam_factor_element(bslam_factor_t *factor, int i, int j)
 {
-    bslam_real_t *rows = i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
+    bslam_real_t *rows =
+        i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
     return rows + 4 * (size_t)j + i % 4;
 }
 
@@ -81,7 +82,8 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by);
 // ---- what makes it larger or smaller ----------------------------------------------------------------------
 
 /// P += share w wᵀ, share >= 0. w[places], 0 before `first`, is overwritten; by[places] is scratch. O(n²).
-void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w, bslam_real_t *by);
+void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
+                      bslam_real_t *by);
 
 /// Value k goes with no other one from now on, and has this variance. O(n²).
 void bslam_factor_forget(bslam_factor_t *factor, int k, bslam_real_t variance, bslam_real_t *w,

@@ -64,7 +64,7 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
-    uint32_t column;  ///< of its first state value
+    uint32_t column;     ///< of its first state value
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
@@ -236,8 +236,7 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 static void read_values(bslam_codec_t *codec, const header_t *header, const target_t *target,
                         const columns_t *columns)
 {
-    bslam_ekf_t *ekf =
-        target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
+    bslam_ekf_t *ekf = target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
     if (ekf != NULL) {
         bslam_factor_widen(&ekf->factor, (int)header->columns);
         ekf->dim += (int32_t)header->columns;
@@ -286,9 +285,7 @@ static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beaco
 /// Of a beacon's first state value.
 static int column_of(const bslam_ekf_t *ekf, int index)
 {
-    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN
-               ? 0
-               : bslam_ekf_place(ekf, ekf->beacons[index].at);
+    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_place(ekf, ekf->beacons[index].at);
 }
 
 // ---- the whole --------------------------------------------------------------------------------------------
