@@ -180,7 +180,7 @@ bslam_status_t bslam_ekf_add_known(bslam_ekf_t *ekf, bslam_real_t x_m, bslam_rea
 /// Takes `count` state values out; those behind them move up.
 static void remove_values(bslam_ekf_t *ekf, int first, int count)
 {
-    bslam_factor_remove(&ekf->factor, bslam_ekf_place(ekf, first), count, ekf->v[0], ekf->lambda[0]);
+    bslam_factor_remove(&ekf->factor, bslam_ekf_place(ekf, first), count, ekf->v[0], ekf->lambda);
     ekf->dim -= count;
     for (int i = first; i < ekf->dim; i++) {
         ekf->mean[i] = ekf->mean[i + count];
@@ -283,7 +283,7 @@ static void doubt_scale(bslam_ekf_t *ekf, int at, bslam_real_t scale_var, bslam_
         const int other = bslam_ekf_place(ekf, i);
         with_scale[other] = bslam_factor_get(factor, other, place);
     }
-    bslam_factor_add(factor, 0, 1 / (var + var * var / more_var - left_var), with_scale, ekf->lambda[0]);
+    bslam_factor_add(factor, 0, 1 / (var + var * var / more_var - left_var), with_scale, ekf->lambda);
 }
 
 void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var, bslam_real_t more_var)
@@ -293,7 +293,7 @@ void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var, 
         const int at = beacon->at + BSLAM_POINT_DIM;
         doubt_scale(ekf, at, scale_var, more_var);
         bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), scale_var + more_var, ekf->v[0],
-                            ekf->lambda[0]);
+                            ekf->lambda);
         ekf->mean[at] = 1;
     }
 }

@@ -154,7 +154,7 @@ static void add_noise(const moving_t *state, bslam_real_t variance, const bslam_
         w[place] = by[i];
         first = by[i] != 0 && place < first ? place : first;
     }
-    bslam_factor_add(&ekf->factor, first, variance, w, ekf->lambda[0]);
+    bslam_factor_add(&ekf->factor, first, variance, w, ekf->lambda);
 }
 
 /// One value of the robot's becomes more doubtful.
@@ -499,7 +499,7 @@ static void add_variance(bslam_ekf_t *ekf, int at, bslam_real_t addition, bslam_
 static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t mean, bslam_real_t variance)
 {
     ekf->mean[at] = mean;
-    bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), variance, ekf->v[0], ekf->lambda[0]);
+    bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), variance, ekf->v[0], ekf->lambda);
 }
 
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,

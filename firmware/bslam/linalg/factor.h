@@ -8,7 +8,8 @@
 /// L is held in blocks of four rows whose columns are four neighbouring numbers, one a row, so that four rows
 /// go through a recurrence at once. It has 1 on the diagonal, and 0 above it and in rows that do not exist.
 /// The body is filled up to a multiple of four, and the tail is the block behind it, kept apart. Literature:
-/// Agee and Turner 1972; Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977.
+/// Agee and Turner 1972; Fletcher and Powell 1974; Bierman, "Factorization Methods for Discrete Sequential
+/// Estimation", 1977.
 #ifndef BSLAM_LINALG_FACTOR_H
 #define BSLAM_LINALG_FACTOR_H
 
@@ -81,16 +82,17 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by);
 
 // ---- what makes it larger or smaller ----------------------------------------------------------------------
 
-/// P += share w wᵀ, share >= 0. w[places], 0 before `first`, is overwritten; by[places] is scratch. O(n²).
+/// P += share w wᵀ, share >= 0. w[places], 0 before `first`, is overwritten. O(n²).
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
-                      bslam_real_t *by);
+                      bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// Value k goes with no other one from now on, and has this variance. O(n²).
 void bslam_factor_forget(bslam_factor_t *factor, int k, bslam_real_t variance, bslam_real_t *w,
-                         bslam_real_t *by);
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// Takes `count` values of the body out; those behind move up. O(count n²).
-void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w, bslam_real_t *by);
+void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w,
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// The same of all values of the body from `first` on. O(n).
 void bslam_factor_cut(bslam_factor_t *factor, int first);
