@@ -45,14 +45,10 @@ bslam_pose_t bslam_ekf_mount(const bslam_ekf_t *ekf, const bslam_pose_t *told)
     return bslam_pose_compose(&then, &beside);
 }
 
-void bslam_ekf_fill_sensor(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t by_yaw,
-                           bslam_real_t by_scale, bslam_row_t *row)
+void bslam_ekf_fill_row(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t by_yaw,
+                        bslam_real_t by_scale, bslam_row_t *row)
 {
-    row->sensor_dim = (uint16_t)ekf->sensor_dim;
     row->sensor_at = (uint16_t)ekf->base_dim;
-    if (ekf->sensor_dim == 0) {
-        return;
-    }
     const bslam_real_t theta_rad = ekf->mean[BSLAM_STATE_THETA];
     const bslam_real_t by_x = row->base[0], by_y = row->base[1];
     bslam_real_t cos_robot, sin_robot, cos_sensor, sin_sensor;

@@ -20,9 +20,19 @@ static inline bslam_real_t bslam_ekf_range_scale(const bslam_ekf_t *ekf)
     return ekf->sensor_dim > 0 ? ekf->mean[ekf->base_dim + BSLAM_SENSOR_SCALE] : 1;
 }
 
+/// bslam_ekf_fill_sensor where there are such values.
+void bslam_ekf_fill_row(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t by_yaw,
+                        bslam_real_t by_scale, bslam_row_t *row);
+
 /// Completes a row that has its part by the robot's pose, for a sensor at this mount. by_yaw, by_scale: what
 /// it has of these.
-void bslam_ekf_fill_sensor(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bslam_real_t by_yaw,
-                           bslam_real_t by_scale, bslam_row_t *row);
+static inline void bslam_ekf_fill_sensor(const bslam_ekf_t *ekf, const bslam_pose_t *mount,
+                                         bslam_real_t by_yaw, bslam_real_t by_scale, bslam_row_t *row)
+{
+    row->sensor_dim = (uint16_t)ekf->sensor_dim;
+    if (ekf->sensor_dim > 0) {
+        bslam_ekf_fill_row(ekf, mount, by_yaw, by_scale, row);
+    }
+}
 
 #endif

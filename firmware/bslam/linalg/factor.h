@@ -124,8 +124,9 @@ typedef struct bslam_waiting {
 /// this one met. O(n).
 bslam_real_t bslam_factor_carry(const bslam_waiting_t *waiting, int places, bslam_real_t *f);
 
-/// Takes a measurement with this noise > 0 into D. O(n).
-void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance, bslam_real_t *d);
+/// Takes a measurement with this noise > 0 into D. Returns S, the variance of its innovation. O(n).
+bslam_real_t bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance,
+                                  bslam_real_t *d);
 
 /// Brings L up to date for `count` <= 4 measurements. change[places] += what they change of each value's
 /// mean. O(count n²).
