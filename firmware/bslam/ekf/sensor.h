@@ -1,4 +1,4 @@
-/// What the sensor is told wrong, as state values: its place and yaw, the scale of its distances, its delay.
+/// What the sensor is told wrong, as state values: its place and yaw, the scale of its distances.
 /// MATH "Sensor states". The setting sensor_doubt switches them on; a smoother has none.
 #ifndef BSLAM_EKF_SENSOR_H
 #define BSLAM_EKF_SENSOR_H
@@ -8,10 +8,7 @@
 /// Puts them into a state that has no beacons yet.
 void bslam_ekf_begin_sensor(bslam_ekf_t *ekf, const bslam_settings_t *settings);
 
-/// How fast the robot has been of late: it has moved so.
-void bslam_ekf_note_speed(bslam_ekf_t *ekf, const bslam_motion_t *moved);
-
-/// The mount as the state has it: what a frame is told of, moved back by the delay, and the sensor beside it.
+/// The mount as the state has it: the sensor beside where it is told to be.
 bslam_pose_t bslam_ekf_mount(const bslam_ekf_t *ekf, const bslam_pose_t *told);
 
 /// All distances are too long by this factor.
