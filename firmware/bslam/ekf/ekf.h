@@ -326,7 +326,7 @@ void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *
 /// Covariance of a beacon's position in the map; zero for a known one.
 bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index);
 
-/// Whether all means and variances are finite, and no variance is negative. O(n).
+/// Whether all means are finite, and so is D, which is not negative. O(n).
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf);
 
 #endif
