@@ -155,12 +155,11 @@ class _Run:
     ) -> None:
         self.slam, self.watcher = slam, watcher
         self.recorded = isinstance(slam, Recorder)
-        self.frames = frames
+        self.frames, self.resume_sd = frames, options.resume_sd
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
             self._give_map(log)
         self.lead_us = odometry_lead_us(options, log)
-        self.resume_sd = options.resume_sd
         self.refusals: Counter[str] = Counter()
         self.poses: list[tuple[float, float, float]] = []
         self.covariances: list[tuple[float, ...]] = []  # lower triangles
