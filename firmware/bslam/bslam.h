@@ -352,19 +352,20 @@ BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_s
 BSLAM_MUST_CHECK bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source,
                                                bslam_map_fault_t *fault);
 
-/// Bytes that the flash takes at once, at places that are multiples of it, are a divisor of this.
-#define BSLAM_FLASH_PIECE 16
+/// Written at once, at a multiple of it, from memory aligned to 8, and once between two erases: flash takes
+/// that whose word is any divisor of it, 1 to 64 bytes.
+#define BSLAM_FLASH_PIECE 64
 /// Areas of a bslam_flash_t.
 #define BSLAM_SLOTS 2
 
-/// What a board gives to keep a map over a power cut: two areas, each erased as a whole (bytes become 0xff),
-/// of which one always holds a whole map. False: it failed.
+/// What a board gives to keep a map over a power cut: two areas, each erased as a whole (to 0xff, or 0), of
+/// which one always holds a whole map. False: it failed.
 typedef struct bslam_flash {
     bool (*erase)(void *context, int slot);
     bool (*write)(void *context, int slot, uint32_t at, const void *bytes, uint32_t count);
     bool (*read)(void *context, int slot, uint32_t at, void *bytes, uint32_t count);
     void *context;
-    uint32_t slot_bytes;  ///< of each area: a map takes BSLAM_FLASH_PIECE more than bslam_save_map counts
+    uint32_t slot_bytes;  ///< of each area: a map takes a piece, and what bslam_save_map counts in whole ones
 } bslam_flash_t;
 
 /// Saves the map in the slot that is older or damaged, and reads it back. BSLAM_E_MAP with *fault: the flash
