@@ -119,15 +119,33 @@ static void note_competitors(bslam_slam_t *slam, int index)
     }
 }
 
+/// Whether there is room for what a sighting shows, or for the sensor where that has no distance.
+static bool may_begin(const bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sighting)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(&slam->ekf);
+    const bslam_real_t range_m = sighting->has_range ? sighting->range_m : 0;
+    const bslam_sighted_point_t place = bslam_locate_point(&pose, mount, range_m, sighting->bearing_rad);
+    return bslam_slam_reaches(place.x_m, place.y_m) && bslam_slam_has_uid(slam);
+}
+
+/// As the filter takes it, or the smoother in its place.
+static bslam_status_t begin_beacon(bslam_slam_t *slam, const bslam_pose_t *mount,
+                                   const bslam_sighting_t *sighting, int *index)
+{
+    if (!may_begin(slam, mount, sighting)) {
+        return BSLAM_E_MAP_FULL;
+    }
+    return bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, sighting, index)
+                                    : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, index);
+}
+
 static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
                     const bslam_record_t *record)
 {
     const bslam_sighting_t *sighting = record->sighting;
     bslam_account_t *account = record->account;
     int index;
-    const bslam_status_t status =
-        bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, sighting, &index)
-                                 : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, &index);
+    const bslam_status_t status = begin_beacon(slam, mount, sighting, &index);
     if (status != BSLAM_OK) {
         reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;

@@ -122,7 +122,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
     if (!bslam_is_number(x_m) || !bslam_is_number(y_m)) {
         return BSLAM_E_NOT_FINITE;
     }
-    if (label < 0) {
+    if (label < 0 || !bslam_slam_reaches(x_m, y_m)) {
         return BSLAM_E_RANGE;
     }
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
@@ -131,7 +131,9 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
         }
     }
     int index;
-    const bslam_status_t status = bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index);
+    const bslam_status_t status = bslam_slam_has_uid(slam)
+                                      ? bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index)
+                                      : BSLAM_E_MAP_FULL;
     if (status == BSLAM_OK) {
         slam->ekf.beacons[index].label = label;
         bslam_slam_restart_smoother(slam);

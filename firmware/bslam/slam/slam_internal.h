@@ -2,6 +2,7 @@
 #ifndef BSLAM_SLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_SLAM_INTERNAL_H
 
+#include "base/scalar.h"
 #include "bslam/slam/slam.h"
 
 // ---- odometry_queue.c: odometry waits until a frame shows what comes after it -----------------------------
@@ -70,6 +71,19 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
 
 /// Where a beacon is in the map, or -1.
 int bslam_slam_find_beacon(const bslam_slam_t *slam, uint32_t uid);
+
+/// Whether the map reaches to a place.
+static inline bool bslam_slam_reaches(bslam_real_t x_m, bslam_real_t y_m)
+{
+    return bslam_in_range(x_m, -BSLAM_PLACE_MAX_M, BSLAM_PLACE_MAX_M) &&
+           bslam_in_range(y_m, -BSLAM_PLACE_MAX_M, BSLAM_PLACE_MAX_M);
+}
+
+/// Whether a uid is left for one more beacon.
+static inline bool bslam_slam_has_uid(const bslam_slam_t *slam)
+{
+    return slam->ekf.next_uid != BSLAM_ALL_BEACONS;
+}
 
 /// Takes a beacon out of the map, and what is known of its appearance with it.
 void bslam_slam_drop_beacon(bslam_slam_t *slam, int index);

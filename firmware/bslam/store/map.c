@@ -19,6 +19,8 @@ static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
 // By pairs the same, as a squared correlation; a little more, so that rounding refuses nothing that goes.
 static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
+// A beacon may have moved away from where it began; no other value is as large.
+static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
@@ -67,6 +69,13 @@ typedef struct stored_beacon {
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } stored_beacon_t;
 
+static bslam_real_t move_value(bslam_codec_t *codec, bslam_real_t value)
+{
+    const bslam_real_t moved = bslam_codec_real(codec, value);
+    bslam_codec_require(codec, bslam_in_range(moved, -VALUE_MAX, VALUE_MAX), BSLAM_MAP_CONTENT);
+    return moved;
+}
+
 static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
     bslam_beacon_t *beacon = &record->beacon;
@@ -78,8 +87,8 @@ static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
     beacon->sightings = bslam_codec_whole(codec, beacon->sightings, 4);
     record->scale = bslam_codec_real(codec, record->scale);
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
-    record->x_m = bslam_codec_real(codec, record->x_m);
-    record->y_m = bslam_codec_real(codec, record->y_m);
+    record->x_m = move_value(codec, record->x_m);
+    record->y_m = move_value(codec, record->y_m);
     bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
@@ -232,7 +241,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
 {
     const bool is_taken = target != NULL && target->mode == BSLAM_MAP_LIVING;
     for (uint32_t i = 0; i < header->values; i++) {
-        const bslam_real_t value = bslam_codec_real(codec, 0);
+        const bslam_real_t value = move_value(codec, 0);
         if (is_taken) {
             target->slam->ekf.mean[target->slam->ekf.base_dim + (int)i] = value;
         }
@@ -363,7 +372,8 @@ static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target,
     bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
     bslam_codec_require(codec, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
     if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
-        target->slam->ekf.next_uid = header.next_uid;
+        uint32_t *next_uid = &target->slam->ekf.next_uid;
+        *next_uid = header.next_uid > *next_uid ? header.next_uid : *next_uid;
     }
 }
 

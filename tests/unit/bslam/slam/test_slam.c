@@ -333,6 +333,8 @@ static void test_add_known_beacon_every_refusal_changes_nothing(void **state)
         {9, NAN, 0, BSLAM_E_NOT_FINITE},  {9, 0, INFINITY, BSLAM_E_NOT_FINITE},
         {9, 1e13, 0, BSLAM_E_NOT_FINITE}, {-1, 0, 0, BSLAM_E_RANGE},
         {INT32_MIN, 0, 0, BSLAM_E_RANGE}, {2, 1, 1, BSLAM_E_DUPLICATE},
+        {9, 10001, 0, BSLAM_E_RANGE},     {9, 0, -10001, BSLAM_E_RANGE},
+        {9, 448000, 5e6, BSLAM_E_RANGE},
     };
     for (int i = 0; i < COUNT_OF(cases); i++) {
         bslam_slam_t before;
