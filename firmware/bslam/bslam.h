@@ -193,6 +193,7 @@ typedef struct bslam_slam_counters {
     uint32_t odometry;          ///< readings taken
     uint32_t odometry_refused;  ///< readings refused, any status
     uint32_t jumps;             ///< of these, BSLAM_E_JUMP
+    uint32_t clock_restarts;    ///< times that the clock began again without bslam_resume_odometry
     uint32_t frames;            ///< frames taken
     uint32_t frames_refused;    ///< frames refused, any status
     uint32_t sightings;         ///< in the frames taken

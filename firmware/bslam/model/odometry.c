@@ -5,9 +5,6 @@
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const int64_t TIME_MAX_US = INT64_MAX / 2;
-/// Longer than this is no interval of odometry but an interruption. It also keeps the variance that one
-/// interval can add within what float's digits carry through the next update.
-static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
 /// More than this in one interval is no motion of a robot: 16 turns.
 static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
 /// Limits of a reading's own gyro noise, as of the setting gyro_sd_radps.
@@ -151,7 +148,14 @@ static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
         return false;
     }
     return !odometry->has_time ||
-           (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
+           (time_us > odometry->time_us && time_us - odometry->time_us <= BSLAM_INTERVAL_MAX_US);
+}
+
+bool bslam_odometry_is_elsewhere(const bslam_odometry_t *odometry, int64_t time_us)
+{
+    return odometry->has_time && time_us >= 0 && time_us <= TIME_MAX_US &&
+           (time_us > odometry->time_us + BSLAM_INTERVAL_MAX_US ||
+            time_us < odometry->time_us - BSLAM_INTERVAL_MAX_US);
 }
 
 /// True if the wheels cannot have moved like this.

@@ -8,6 +8,10 @@
 #include "bslam/bslam.h"
 #include "base/types.h"
 
+/// Longer than this is no interval of odometry but an interruption. It also keeps the variance that one
+/// interval can add within what float's digits carry through the next update.
+#define BSLAM_INTERVAL_MAX_US INT64_C(4000000)
+
 /// What the next reading is compared with. All zero: no reading yet; the first one starts the clock.
 typedef struct bslam_odometry {
     int64_t time_us;  ///< of the last reading
@@ -24,6 +28,9 @@ void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us);
 
 /// Forgets the clock and the tick reference: the next reading starts both. Its motion since is not known.
 void bslam_odometry_restart(bslam_odometry_t *odometry);
+
+/// Whether a stamp is a possible one, and farther from the clock than an interval may be, ahead or back.
+bool bslam_odometry_is_elsewhere(const bslam_odometry_t *odometry, int64_t time_us);
 
 /// The motion since the reading before, with the statuses of bslam_odometry. On any of these nothing changes,
 /// but that BSLAM_E_JUMP notes odd counts. A first reading has no interval: BSLAM_OK with motion->dt_s = 0.
