@@ -28,7 +28,7 @@ extern "C" {
     REAL(right_radius_m, 0.05, 1e-4, 10.0, "radius of the right wheel") \
     INTEGER(ticks_per_revolution, 1024, 1, 10000000, "encoder ticks in a turn of the wheel") \
     INTEGER(counter_bits, 16, 2, 32, "width of the tick counters, which roll over") \
-    INTEGER(counter_modulus, 0, 0, 16777216, "or the count, 3 or more, that they start at 0 in place of") \
+    INTEGER(counter_modulus, 0, 0, 16000000, "the count in place of which they are 0 (0: 2^counter_bits)") \
     REAL(mount_x_m, 0.0, -100.0, 100.0, "sensor on the robot, forward of the wheel axle") \
     REAL(mount_y_m, 0.0, -100.0, 100.0, "sensor on the robot, to the left") \
     REAL(mount_yaw_rad, 0.0, -3.2, 3.2, "sensor on the robot, turned to the left") \

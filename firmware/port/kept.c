@@ -88,8 +88,7 @@ bool kept_save(const bslam_flash_t *flash, const uint8_t *bytes, uint32_t count)
     head.crc = ~bslam_crc32_add(crc_of_head(&head), bytes, count);
     head_t written;
     return count + 2 * BSLAM_FLASH_PIECE <= flash->slot_bytes && flash->erase(flash->context, slot) &&
-           write_bytes(flash, slot, bytes, count) &&
-           write_piece(flash, slot, 0, &head, sizeof head) &&
+           write_bytes(flash, slot, bytes, count) && write_piece(flash, slot, 0, &head, sizeof head) &&
            read_head(flash, slot, count, &written) && memcmp(&written, &head, sizeof head) == 0;
 }
 

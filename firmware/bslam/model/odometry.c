@@ -271,9 +271,8 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_setti
     }
     // A reading of another source covers motion that the counters saw too: the next tick reading starts
     // afresh.
-    *odometry = (bslam_odometry_t){.time_us = reading->time_us,
-                                   .has_time = true,
-                                   .has_ticks = reading->source == BSLAM_ODOMETRY_TICKS};
+    *odometry = (bslam_odometry_t){
+        .time_us = reading->time_us, .has_time = true, .has_ticks = reading->source == BSLAM_ODOMETRY_TICKS};
     if (odometry->has_ticks) {
         odometry->left_ticks = reading->left_ticks;
         odometry->right_ticks = reading->right_ticks;

@@ -16,9 +16,10 @@
 typedef struct bslam_odometry {
     int64_t time_us;  ///< of the last reading
     uint32_t left_ticks, right_ticks;
-    uint32_t odd_left_ticks, odd_right_ticks;  ///< refused as a jump: either a glitch or the counters' new start
-    int32_t odd_after_us;                      ///< since the last reading
-    uint8_t odd_count;                         ///< refused readings that go with it, itself included; 0: none
+    uint32_t odd_left_ticks,
+        odd_right_ticks;   ///< refused as a jump: either a glitch or the counters' new start
+    int32_t odd_after_us;  ///< since the last reading
+    uint8_t odd_count;     ///< refused readings that go with it, itself included; 0: none
     bool has_time;
     bool has_ticks;  ///< false: the next tick reading only sets the reference
 } bslam_odometry_t;

@@ -86,8 +86,7 @@ static bslam_history_step_t taken_step(const bslam_history_t *history, int32_t b
 {
     bslam_history_step_t step = history->steps[index_back(history, back)];
     if (back < history->filter.waiting) {
-        const bslam_real_t share =
-            (bslam_real_t)history->filter.gone_us / (bslam_real_t)step.duration_us;
+        const bslam_real_t share = (bslam_real_t)history->filter.gone_us / (bslam_real_t)step.duration_us;
         step.duration_us = history->filter.gone_us;
         step.forward_var_m2 *= share;
         step.turn_var_rad2 *= share;

@@ -219,7 +219,8 @@ static tally_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam,
             verdict.agreeing++;
         } else if (who < 0) {
             verdict.agreeing += !in_doubt && fits_any(slam, &view->vantage.mount, sighting) ? 1 : 0;
-        } else if (distance2 > CONTRADICT_D2 && (in_doubt || !fits_any(slam, &view->vantage.mount, sighting))) {
+        } else if (distance2 > CONTRADICT_D2 &&
+                   (in_doubt || !fits_any(slam, &view->vantage.mount, sighting))) {
             verdict.contradicting++;
             verdict.uid = slam->ekf.beacons[who].uid;
         }

@@ -61,7 +61,8 @@ static bslam_status_t begin_again(bslam_slam_t *slam, const bslam_odometry_readi
     bslam_motion_t none;
     const bslam_status_t status = bslam_odometry_read(&begun, settings, reading, &none);
     if (status == BSLAM_OK) {
-        const bslam_real_t gap_s = (bslam_real_t)(slam->watch.to_us - slam->watch.from_us) * SECONDS_PER_US;
+        const int32_t gap_us = (int32_t)(slam->watch.to_us - slam->watch.from_us);  // two of the longest
+        const bslam_real_t gap_s = (bslam_real_t)gap_us * SECONDS_PER_US;           // intervals at most
         resume(slam, least(settings->gap_speed_sd_mps * gap_s, BSLAM_POSITION_SD_MAX_M),
                least(settings->gap_turn_sd_radps * gap_s, BSLAM_HEADING_SD_MAX_RAD));
         slam->odometry = begun;

@@ -25,7 +25,8 @@ static bslam_pose_t look_back(const bslam_slam_t *slam, int64_t back_us, bslam_v
     if (slam->settings.velocity_states != 0) {
         const bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
         const bslam_real_t back_s = (bslam_real_t)(int32_t)back_us * SECONDS_PER_US, square = back_s * back_s;
-        forward_var_m2 = square * bslam_symmat_get(robot.covariance, BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD);
+        forward_var_m2 =
+            square * bslam_symmat_get(robot.covariance, BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD);
         turn_var_rad2 = square * bslam_symmat_get(robot.covariance, BSLAM_STATE_TURN, BSLAM_STATE_TURN);
     }
     const bslam_real_t way2_m2 = view.robot.x_m * view.robot.x_m + view.robot.y_m * view.robot.y_m;
@@ -62,15 +63,15 @@ static void doubt(const bslam_slam_t *slam, const bslam_vantage_t *vantage, bsla
     const bslam_real_t sd_rad = seen->bearing_sd_rad > 0 ? seen->bearing_sd_rad : settings->bearing_sd_rad;
     const bslam_real_t per_m = seen->has_range ? 1 / seen->range_m : settings->ray_inverse_distance_per_m;
     if (seen->has_range) {
-        seen->range_sd_m = bslam_sqrt(bslam_range_variance_m2(settings, seen, seen->range_m) +
-                                      vantage->position_var_m2);
+        seen->range_sd_m =
+            bslam_sqrt(bslam_range_variance_m2(settings, seen, seen->range_m) + vantage->position_var_m2);
     }
-    seen->bearing_sd_rad = bslam_sqrt(sd_rad * sd_rad + vantage->heading_var_rad2 +
-                                      vantage->position_var_m2 * per_m * per_m);
+    seen->bearing_sd_rad =
+        bslam_sqrt(sd_rad * sd_rad + vantage->heading_var_rad2 + vantage->position_var_m2 * per_m * per_m);
 }
 
-/// For the smoother, which knows no place but the filter's: the sighting of a beacon that is off as much there
-/// as the frame's is from where it was taken.
+/// For the smoother, which knows no place but the filter's: the sighting of a beacon that is off as much
+/// there as the frame's is from where it was taken.
 static void carry_on(const bslam_slam_t *slam, const bslam_vantage_t *vantage, int beacon,
                      bslam_sighting_t *seen)
 {

@@ -113,9 +113,8 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
         }
     }
     int index;
-    const bslam_status_t status = bslam_slam_has_uid(slam)
-                                      ? bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index)
-                                      : BSLAM_E_MAP_FULL;
+    const bslam_status_t status =
+        bslam_slam_has_uid(slam) ? bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index) : BSLAM_E_MAP_FULL;
     if (status == BSLAM_OK) {
         slam->ekf.beacons[index].label = label;
         bslam_slam_restart_smoother(slam);

@@ -153,7 +153,8 @@ static void test_known_repeated_label_that_is_new_begins_with_the_surest_in_any_
     const bslam_sighting_t twins[][3] = {
         {unit_polar(0.3, 4, 7), unit_polar(0.3, 5, 7), unit_direction(0.3, 7)},
         {with_sd(unit_polar(0.3, 5, 7), 0.01, 0.01), unit_polar(0.3, 4, 7), unit_direction(1, 7)},
-        {unit_polar(-0.3, 4, 7), unit_polar(0.3, 4, 7), unit_polar(1.3, 4, 7)},  // the same, but for the place
+        {unit_polar(-0.3, 4, 7), unit_polar(0.3, 4, 7),
+         unit_polar(1.3, 4, 7)},  // the same, but for the place
         {with_sd(unit_direction(0.3, 7), 0.001, 0), unit_direction(-0.3, 7), unit_direction(0.1, 7)},
     };
     for (int i = 0; i < COUNT_OF(twins); i++) {
