@@ -136,6 +136,11 @@ void bslam_settings_preset(bslam_settings_t *settings, bslam_preset_t preset)
 
 // ---- checking ---------------------------------------------------------------------------------------------
 
+/// A millimetre's, as the least noise that a sighting may bring; less, as the sum of squares is rounded.
+static const bslam_real_t RANGE_VARIANCE_MIN_M2 = BSLAM_R(0.99e-6);
+/// Of fewer counts none tells forward from back.
+enum { COUNTER_MODULUS_MIN = 3 };
+
 static bool is_allowed(const bslam_settings_t *settings, int id)
 {
     if (infos[id].is_integer) {
@@ -156,7 +161,7 @@ int bslam_settings_at(size_t offset)
 }
 
 /// The field that contradicts velocity states; negative: none does.
-static int contradiction(const bslam_settings_t *settings)
+static int velocity_contradiction(const bslam_settings_t *settings)
 {
     const size_t scale = offsetof(bslam_settings_t, scale_states);
     const size_t left = offsetof(bslam_settings_t, left_speed_sd_mps);
@@ -166,6 +171,26 @@ static int contradiction(const bslam_settings_t *settings)
            : !(settings->left_speed_sd_mps > 0)  ? bslam_settings_at(left)
            : !(settings->right_speed_sd_mps > 0) ? bslam_settings_at(right)
                                                  : -1;
+}
+
+/// Variance of a distance of 1 m.
+static bslam_real_t range_variance_at_1_m(const bslam_settings_t *settings)
+{
+    return settings->range_sd_floor_m * settings->range_sd_floor_m +
+           settings->range_sd_fraction * settings->range_sd_fraction +
+           settings->range_sd_per_m * settings->range_sd_per_m;
+}
+
+/// A field within its range that cannot be beside the others; negative: there is none.
+static int contradiction(const bslam_settings_t *settings)
+{
+    if (range_variance_at_1_m(settings) < RANGE_VARIANCE_MIN_M2) {
+        return bslam_settings_at(offsetof(bslam_settings_t, range_sd_floor_m));
+    }
+    if (settings->counter_modulus != 0 && settings->counter_modulus < COUNTER_MODULUS_MIN) {
+        return bslam_settings_at(offsetof(bslam_settings_t, counter_modulus));
+    }
+    return velocity_contradiction(settings);
 }
 
 bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id)

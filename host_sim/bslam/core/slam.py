@@ -14,11 +14,15 @@ from bslam.errors import BslamError
 BY_APPEARANCE = 3
 """The setting `association` by which classifiers learn (BSLAM_ASSOCIATION_SVM)."""
 _NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE
-# What velocity_states = 1 allows of other parameters: the only contradictions that there are.
-_BESIDE_VELOCITY_STATES = {
-    "scale_states": "0",
-    "left_speed_sd_mps": "a number above 0",
-    "right_speed_sd_mps": "a number above 0",
+_BESIDE_SPEEDS = "contradicts velocity_states = 1: allowed beside it is"
+# What is wrong with a parameter that is within its range.
+_CONTRADICTIONS = {
+    "scale_states": f"{_BESIDE_SPEEDS} 0",
+    "left_speed_sd_mps": f"{_BESIDE_SPEEDS} a number above 0",
+    "right_speed_sd_mps": f"{_BESIDE_SPEEDS} a number above 0",
+    "range_sd_floor_m": "leaves distances without noise: allowed are range_sd_floor_m, range_sd_fraction and "
+    "range_sd_per_m that make 1 mm or more at 1 m",
+    "counter_modulus": "tells no direction: allowed are 0 and whole numbers from 3",
 }
 
 
@@ -129,8 +133,8 @@ class Slam:
         status = self._lib.bslam_init_sized(robot, size, sizes, self._settings, bad)
         if bad[0] >= 0:
             name = self._raw.text(self._lib.bslam_settings_info(bad[0]).name)
-            message = f"parameter {name} = {getattr(self._settings, name):g} contradicts velocity_states = 1"
-            self._raw.ensure(status, f"{message}: allowed beside it is {_BESIDE_VELOCITY_STATES[name]}")
+            value = getattr(self._settings, name)
+            self._raw.ensure(status, f"parameter {name} = {value:g} {_CONTRADICTIONS[name]}")
         self._raw.ensure(status, f"{self._settings.seed_count} seeds")
 
     def restart(self, position_sd_m: float, heading_sd_rad: float) -> None:

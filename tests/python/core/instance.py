@@ -65,10 +65,11 @@ def copy_of(slam: Slam) -> Slam:
 
 
 def state_without_counters(slam: Slam) -> bytes:
-    """Every byte of the instance but those that a refusal may change: the counters, and which sighting was
-    bad.
+    """Every byte of the instance but those that a refusal may change: the counters, which sighting was bad,
+    and stamps that were refused.
     """
-    return _blanked(slam, ("slam", "counters"), ("slam", "bad_sighting"), ("guard", "counters"))
+    changing = (("slam", name) for name in ("counters", "bad_sighting", "watch"))
+    return _blanked(slam, *changing, ("guard", "counters"))
 
 
 def state_without_addresses(slam: Slam) -> bytes:

@@ -104,6 +104,25 @@ def test_params_that_contradict_each_other_are_both_named(name: str, value: floa
     assert refusal.value.status == "BSLAM_E_PARAMETER"
 
 
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        (
+            {"range_sd_floor_m": 0.0, "range_sd_fraction": 0.0, "range_sd_per_m": 0.0},
+            "distances without noise",
+        ),
+        (
+            {"counter_modulus": 2},
+            "counter_modulus = 2 tells no direction: allowed are 0 and whole numbers from 3",
+        ),
+    ],
+)
+def test_params_within_their_ranges_that_cannot_be_are_named(params: dict[str, float], message: str) -> None:
+    with pytest.raises(CoreError, match=message) as refusal:
+        Slam(params)
+    assert refusal.value.status == "BSLAM_E_PARAMETER"
+
+
 def test_slam_numbers_of_beacons_that_no_build_holds_are_refused() -> None:
     for beacons_max in (-1, 0, max(SIZE_CLASSES) + 1):
         with pytest.raises(BslamError, match=f"{beacons_max} beacons: allowed are 1 to {max(SIZE_CLASSES)}"):
@@ -173,6 +192,7 @@ def damaged() -> Slam:
 
 REFUSALS: list[tuple[str, Callable[[], Slam], Callable[[Slam], object], str]] = [
     ("BSLAM_E_TIME", started, lambda s: s.odometry("wheels", 0, 0.0, 0.0), "odometry at 0 us"),
+    ("BSLAM_E_TIME", started, lambda s: s.odometry("wheels", 10_000_000, 0.0, 0.0), "odometry at 10000000"),
     ("BSLAM_E_TIME", started, lambda s: s.sightings(0, *ONE), "frame at 0 us"),
     ("BSLAM_E_TIME", started, lambda s: s.pose_at(10_000_000), "pose at 10000000 us"),
     ("BSLAM_E_NOT_FINITE", started, lambda s: s.odometry("wheels", 40_000, math.nan, 0.0), "left_m nan"),
