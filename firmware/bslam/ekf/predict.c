@@ -4,6 +4,7 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
 #include "bslam/model/motion.h"
 #include "bslam/model/pose.h"
@@ -12,8 +13,8 @@
 /// What moves: the filter's robot, or a copy of it alone. The robot's values come first in the mean.
 typedef struct moving {
     bslam_real_t *mean;
-    bslam_ekf_t *ekf;      ///< NULL: the copy
-    bslam_robot_t *robot;  ///< NULL: the filter's
+    bslam_ekf_t *ekf;           ///< NULL: the copy
+    bslam_robot_t *robot;       ///< NULL: the filter's
     bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
     bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
     int base_dim;
@@ -78,8 +79,8 @@ static void move_robot(bslam_robot_t *robot, const bslam_transition_t *transitio
     bslam_real_t moved[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX] = {{0}};
     for (int j = 0; j < base; j++) {
         for (int i = 0; i < base; i++) {
-            moved[j][i] = i < POSE_DIM ? row_times(transition, i, base, robot->covariance[j])
-                                       : robot->covariance[j][i];
+            moved[j][i] =
+                i < POSE_DIM ? row_times(transition, i, base, robot->covariance[j]) : robot->covariance[j][i];
         }
     }
     for (int i = 0; i < base; i++) {
@@ -153,7 +154,7 @@ static void add_noise(const moving_t *state, bslam_real_t variance, const bslam_
         w[place] = by[i];
         first = by[i] != 0 && place < first ? place : first;
     }
-    bslam_factor_add(&ekf->factor, first, variance, w, ekf->lambda[0]);
+    bslam_factor_add(&ekf->factor, first, variance, w, ekf->lambda);
 }
 
 /// One value of the robot's becomes more doubtful.
@@ -388,6 +389,9 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
         bslam_ekf_correct(ekf, settings);
         note_velocity(ekf->mean, moved);
     }
+    if (ekf->sensor_dim > 0) {
+        bslam_ekf_note_speed(ekf, moved);
+    }
 }
 
 /// A walk of v makes the travel no more doubtful than this: beside more, the millimetres that are known of it
@@ -495,7 +499,7 @@ static void add_variance(bslam_ekf_t *ekf, int at, bslam_real_t addition, bslam_
 static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t mean, bslam_real_t variance)
 {
     ekf->mean[at] = mean;
-    bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), variance, ekf->v[0], ekf->lambda[0]);
+    bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), variance, ekf->v[0], ekf->lambda);
 }
 
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,

@@ -1,6 +1,7 @@
 // The state as it begins, and what is read of it.
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/scalar.h"
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
@@ -18,6 +19,7 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
         ekf->factor.d[bslam_ekf_place(ekf, BSLAM_STATE_FORWARD)] = forward_sd * forward_sd;
         ekf->factor.d[bslam_ekf_place(ekf, BSLAM_STATE_TURN)] = turn_sd * turn_sd;
     }
+    bslam_ekf_begin_sensor(ekf, settings);
 }
 
 /// A ray's values with an inverse distance that has a point.

@@ -3,6 +3,7 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
 #include "bslam/linalg/four.h"
 #include "bslam/model/noise.h"
@@ -20,6 +21,9 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
     const bslam_real_t *others = vector + row->at;
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
+    }
+    for (int k = 0; k < row->sensor_dim; k++) {
+        sum += row->sensor[k] * vector[row->sensor_at + k];
     }
     return sum;
 }
@@ -61,6 +65,9 @@ COPIED void look(const bslam_ekf_t *ekf, const looks_t *looks, const bool two)
         }
     }
     add_row(factor, bslam_ekf_place(ekf, BSLAM_STATE_THETA), a->base[2], b->base[2], looks, two);
+    for (int k = 0; k < a->sensor_dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, a->sensor_at + k), a->sensor[k], b->sensor[k], looks, two);
+    }
     for (int k = 0; k < a->dim; k++) {
         add_row(factor, bslam_ekf_place(ekf, a->at + k), a->other[k], b->other[k], looks, two);
     }
@@ -82,10 +89,21 @@ static void look_twice(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
+    row->sensor_dim = 0;
     row->at = (uint16_t)beacon->at;
     row->dim = (uint16_t)bslam_beacon_dim(beacon->kind);
     memcpy(row->base, by_pose, sizeof row->base);
     memcpy(row->other, by_beacon, sizeof row->other);
+}
+
+static void scale_row(bslam_row_t *row, bslam_real_t scale)
+{
+    for (int k = 0; scale != 1 && k < POSE_DIM; k++) {
+        row->base[k] *= scale;
+    }
+    for (int k = 0; scale != 1 && k < row->dim; k++) {
+        row->other[k] *= scale;
+    }
 }
 
 /// Of two rows a P bᵀ, a P aᵀ and b P bᵀ. From the covariance but for what waits.
@@ -177,12 +195,14 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
-                                    const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
+                                    const bslam_pose_t *told, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const bslam_pose_t mount = bslam_ekf_mount(ekf, told);
+    const bslam_real_t scale = bslam_ekf_range_scale(ekf);
     bslam_observation_t seen;
-    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
+    const bslam_status_t status = observe(ekf, beacon, &mount, &seen);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -194,14 +214,17 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    bslam_ekf_fill_sensor(ekf, &mount, -1, 0, &innovation->bearing_row);
     if (!sighting->has_range && settings->bearing_only_curvature_factor > 0) {
         innovation->bearing_var_rad2 += settings->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
     if (sighting->has_range) {
-        innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, seen.range_m);
+        innovation->range_m = sighting->range_m - scale * seen.range_m;
+        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, scale * seen.range_m);
         fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+        scale_row(&innovation->range_row, scale);
+        bslam_ekf_fill_sensor(ekf, &mount, 0, seen.range_m, &innovation->range_row);
     }
     return BSLAM_OK;
 }
@@ -290,7 +313,7 @@ static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
     return foreseen;
 }
 
-static bslam_real_t total(bslam_four_t four)
+COPIED bslam_real_t total(bslam_four_t four)
 {
     return (four[0] + four[1]) + (four[2] + four[3]);
 }
@@ -447,7 +470,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     const bslam_turning_t turning = bslam_turning(turn_rad);
     move_position(ekf, BSLAM_STATE_X, &turning);
     move_angle(ekf, BSLAM_STATE_THETA);
-    for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
+    for (int i = BSLAM_STATE_FORWARD; i < bslam_ekf_map_at(ekf); i++) {
         move_value(ekf, i);
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
@@ -467,7 +490,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
 }
 
 /// Four rows get so much of the heading's, which has `by_turn` of the turn rate's, if there is one.
-static void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
+COPIED void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
 {
     bslam_real_t *rows = bslam_factor_element(factor, at, 0);
     *(bslam_four_at_t *)(rows + 4 * theta) += shift;
@@ -476,8 +499,8 @@ static void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t b
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions: L's
-/// first columns. O(n).
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions:
+/// L's first columns. O(n).
 static void transport_covariance(bslam_ekf_t *ekf)
 {
     bslam_factor_t *factor = &ekf->factor;

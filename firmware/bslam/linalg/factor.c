@@ -10,12 +10,12 @@
 /// Variances below this are none: quotients by them would overflow.
 static const bslam_real_t VARIANCE_MIN = BSLAM_R(1e-30);
 
-static inline bslam_four_t load(const bslam_real_t *block, int j)
+COPIED bslam_four_t load(const bslam_real_t *block, int j)
 {
     return bslam_four(block + 4 * (size_t)j);
 }
 
-static inline void store(bslam_real_t *block, int j, bslam_four_t four)
+COPIED void store(bslam_real_t *block, int j, bslam_four_t four)
 {
     *(bslam_four_at_t *)(block + 4 * (size_t)j) = four;
 }
@@ -84,45 +84,74 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by)
 
 // ---- a rank-one sum ---------------------------------------------------------------------------------------
 
-/// What column j's own value takes of a sum; what its row has of w is p.
-static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by)
+/// A variance that becomes more than this many times larger leaves nothing to add to.
+static const bslam_real_t GROWTH_MAX = 4;
+
+/// What a sum leaves of a column of L, and takes of w.
+typedef struct shares {
+    const bslam_real_t *w, *by, *keep;
+    bool grows;  ///< some column keeps less than all
+} shares_t;
+
+/// What column j's own value takes of a sum; what its row has of w is p. *keep: of the column, 1 if that is
+/// added to.
+static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by,
+                       bslam_real_t *keep)
 {
     const bslam_real_t sum = *d + *share * p * p;
     *by = 0;
+    *keep = 1;
     if (sum > VARIANCE_MIN && p != 0) {
+        const bslam_real_t left = *d / sum;
+        *keep = sum > GROWTH_MAX * *d ? left : 1;
         *by = *share * p / sum;
-        *share *= *d / sum;
+        *share *= left;
         *d = sum;
     }
 }
 
+/// A column's part of four rows, of which w had so much before it and behind it. Both ways are the same, but
+/// where little is kept the second one would be a difference of large numbers.
+COPIED bslam_four_t add_to_column(bslam_four_t l, bslam_four_t before, bslam_four_t behind, bslam_real_t by,
+                                  bslam_real_t keep)
+{
+    return keep < 1 ? keep * l + by * before : l + by * behind;
+}
+
 /// Four rows through the columns from `first` up to `end`, which are others' own. Returns what is left of w.
-COPIED bslam_four_t add_before(bslam_real_t *block, int first, int end, const bslam_real_t *w,
-                               const bslam_real_t *by, bslam_four_t rest)
+COPIED bslam_four_t add_to_rows(bslam_real_t *block, int first, int end, const shares_t *shares,
+                                const bool grows, bslam_four_t rest)
 {
     for (int j = first; j < end; j++) {
-        const bslam_four_t l = load(block, j);
-        rest -= w[j] * l;
-        store(block, j, l + by[j] * rest);
+        const bslam_four_t l = load(block, j), before = rest;
+        rest -= shares->w[j] * l;
+        store(block, j, add_to_column(l, before, rest, shares->by[j], grows ? shares->keep[j] : 1));
     }
     return rest;
 }
 
-void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w, bslam_real_t *by)
+void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
+                      bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
+    bslam_real_t *by = scratch[0], *keep = scratch[1];
+    shares_t shares = {w, by, keep, false};
     if (!(share > 0)) {
         return;
     }
     for (int at = first / 4 * 4; at < bslam_factor_places(factor); at += 4) {
         bslam_real_t *block = block_of(factor, at);
-        bslam_four_t rest = add_before(block, first, at, w, by, bslam_four(w + at));
+        bslam_four_t rest = bslam_four(w + at);
+        rest = shares.grows ? add_to_rows(block, first, at, &shares, true, rest)
+                            : add_to_rows(block, first, at, &shares, false, rest);
         for (int j = first > at ? first : at; j < at + 4; j++) {
             const bslam_real_t p = rest[j - at];
-            add_to_own(&factor->d[j], p, &share, &by[j]);
-            const bslam_four_t l = load(block, j);
+            add_to_own(&factor->d[j], p, &share, &by[j], &keep[j]);
+            const bslam_four_t l = load(block, j), before = rest;
             rest -= p * l;  // of its own row nothing is left
-            store(block, j, l + by[j] * rest);
+            store(block, j, add_to_column(l, before, rest, by[j], keep[j]));
+            block[4 * j + j - at] = l[j - at];
             w[j] = p;
+            shares.grows = shares.grows || keep[j] < 1;
         }
     }
 }
@@ -140,10 +169,10 @@ static int take_column(bslam_factor_t *factor, int k, bslam_real_t *w)
 }
 
 void bslam_factor_forget(bslam_factor_t *factor, int k, bslam_real_t variance, bslam_real_t *w,
-                         bslam_real_t *by)
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
     const int behind = take_column(factor, k, w);
-    bslam_factor_add(factor, behind, factor->d[k], w, by);
+    bslam_factor_add(factor, behind, factor->d[k], w, scratch);
     begin_row(factor, k, 1);
     factor->d[k] = variance;
 }
@@ -176,10 +205,11 @@ void bslam_factor_widen(bslam_factor_t *factor, int count)
     }
 }
 
-void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w, bslam_real_t *by)
+void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w,
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
     for (int k = first; k < first + count; k++) {
-        bslam_factor_forget(factor, k, 0, w, by);
+        bslam_factor_forget(factor, k, 0, w, scratch);
     }
     const int left = factor->body_count - count;
     for (int i = first; i < left; i++) {
@@ -309,7 +339,7 @@ void bslam_factor_cut(bslam_factor_t *factor, int first)
 // ---- scalar measurements ----------------------------------------------------------------------------------
 
 /// Of four numbers, what those behind each sum up to, and `behind` with them.
-static inline bslam_four_t sums_behind(bslam_four_t own, bslam_real_t behind)
+COPIED bslam_four_t sums_behind(bslam_four_t own, bslam_real_t behind)
 {
     const bslam_real_t three = behind + own[3], two = three + own[2];
     return (bslam_four_t){two + own[1], two, three, behind};
@@ -374,8 +404,8 @@ COPIED void settle_rows(bslam_real_t *block, int columns, const bslam_waiting_t 
         store(block, j, count == 3 ? d : d + lambda3[j] * sum3);
         sum3 += v3[j] * d;
     }
-    *(bslam_four_at_t *)change += waiting[0].gain * sum0 + waiting[1].gain * sum1 + waiting[2].gain * sum2 +
-                                  waiting[3].gain * sum3;
+    *(bslam_four_at_t *)change +=
+        waiting[0].gain * sum0 + waiting[1].gain * sum1 + waiting[2].gain * sum2 + waiting[3].gain * sum3;
 }
 
 COPIED void settle_all(bslam_factor_t *factor, const bslam_waiting_t waiting[4], const int count,

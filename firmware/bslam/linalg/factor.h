@@ -8,7 +8,8 @@
 /// L is held in blocks of four rows whose columns are four neighbouring numbers, one a row, so that four rows
 /// go through a recurrence at once. It has 1 on the diagonal, and 0 above it and in rows that do not exist.
 /// The body is filled up to a multiple of four, and the tail is the block behind it, kept apart. Literature:
-/// Agee and Turner 1972; Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977.
+/// Agee and Turner 1972; Fletcher and Powell 1974; Bierman, "Factorization Methods for Discrete Sequential
+/// Estimation", 1977.
 #ifndef BSLAM_LINALG_FACTOR_H
 #define BSLAM_LINALG_FACTOR_H
 
@@ -22,9 +23,9 @@ enum { BSLAM_FACTOR_TAIL_MAX = 3, BSLAM_FACTOR_GROWTH_MAX = 4 };
 
 /// n filled up to a multiple of four.
 #define BSLAM_FACTOR_PADDED(n) (((n) + 3) / 4 * 4)
-/// The largest body: two values of the robot, two a beacon, two more a ray; and room for three that come
-/// before those leave that they are made of.
-#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(2 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 3)
+/// The largest body: two values of the robot, five of the sensor, two a beacon, two more a ray; and room for
+/// seven that come before others leave: what a stored map hung on, or what a new value is made of.
+#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(7 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7)
 /// Places of the largest: the length of D, and of every vector that goes with it.
 #define BSLAM_FACTOR_PLACES_MAX (BSLAM_FACTOR_BODY_MAX + 4)
 
@@ -62,7 +63,8 @@ static inline const bslam_real_t *bslam_factor_row(const bslam_factor_t *factor,
 /// Element (i, j) of L, j <= i.
 static inline bslam_real_t *bslam_factor_element(bslam_factor_t *factor, int i, int j)
 {
-    bslam_real_t *rows = i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
+    bslam_real_t *rows =
+        i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
     return rows + 4 * (size_t)j + i % 4;
 }
 
@@ -80,15 +82,17 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by);
 
 // ---- what makes it larger or smaller ----------------------------------------------------------------------
 
-/// P += share w wᵀ, share >= 0. w[places], 0 before `first`, is overwritten; by[places] is scratch. O(n²).
-void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w, bslam_real_t *by);
+/// P += share w wᵀ, share >= 0. w[places], 0 before `first`, is overwritten. O(n²).
+void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
+                      bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// Value k goes with no other one from now on, and has this variance. O(n²).
 void bslam_factor_forget(bslam_factor_t *factor, int k, bslam_real_t variance, bslam_real_t *w,
-                         bslam_real_t *by);
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// Takes `count` values of the body out; those behind move up. O(count n²).
-void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w, bslam_real_t *by);
+void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_real_t *w,
+                         bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX]);
 
 /// The same of all values of the body from `first` on. O(n).
 void bslam_factor_cut(bslam_factor_t *factor, int first);

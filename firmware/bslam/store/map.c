@@ -13,8 +13,8 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-/// What the values of a full map may hang on: two of the robot's, and the beacons'.
-enum { COLUMNS_MAX = 2 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
+/// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
+enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
 
 static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e30);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
@@ -64,7 +64,7 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
-    uint32_t column;  ///< of its first state value
+    uint32_t column;     ///< of its first state value
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
@@ -126,7 +126,7 @@ static void take_record(const target_t *target, const stored_beacon_t *record)
     beacon->known_scale = beacon->kind == BSLAM_BEACON_KNOWN ? record->scale : 0;
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
-    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->base_dim + (int32_t)record->column;
+    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_map_at(ekf) + (int32_t)record->column;
     if (bslam_slam_learns(target->slam)) {
         bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
         known->classifier =
@@ -201,7 +201,7 @@ static void read_factor(bslam_codec_t *codec, const header_t *header, const colu
                         bslam_ekf_t *ekf)
 {
     const uint32_t d_begins = codec->at;
-    const int first = ekf != NULL ? ekf->base_dim - ekf->factor.tail_count : 0;
+    const int first = ekf != NULL ? bslam_ekf_map_at(ekf) - ekf->factor.tail_count : 0;
     for (uint32_t c = 0; c < header->columns; c++) {
         const bslam_real_t d = bslam_codec_real(codec, 0);
         bslam_codec_require(codec, d >= 0, BSLAM_MAP_COVARIANCE);
@@ -227,7 +227,7 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 {
     for (int c = (int)header->columns - 1; c >= 0; c--) {
         if (!columns->are_values[c]) {
-            bslam_ekf_remove_value(ekf, ekf->base_dim + c);
+            bslam_ekf_remove_value(ekf, bslam_ekf_map_at(ekf) + c);
         }
     }
 }
@@ -236,8 +236,7 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 static void read_values(bslam_codec_t *codec, const header_t *header, const target_t *target,
                         const columns_t *columns)
 {
-    bslam_ekf_t *ekf =
-        target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
+    bslam_ekf_t *ekf = target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
     if (ekf != NULL) {
         bslam_factor_widen(&ekf->factor, (int)header->columns);
         ekf->dim += (int32_t)header->columns;
@@ -245,7 +244,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
     for (uint32_t c = 0; c < header->columns; c++) {
         const bslam_real_t value = columns->are_values[c] ? bslam_codec_real(codec, 0) : 0;
         if (ekf != NULL) {
-            ekf->mean[ekf->base_dim + (int)c] = value;
+            ekf->mean[bslam_ekf_map_at(ekf) + (int)c] = value;
         }
     }
     read_factor(codec, header, columns, ekf);
@@ -286,9 +285,7 @@ static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beaco
 /// Of a beacon's first state value.
 static int column_of(const bslam_ekf_t *ekf, int index)
 {
-    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN
-               ? 0
-               : bslam_ekf_place(ekf, ekf->beacons[index].at);
+    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_place(ekf, ekf->beacons[index].at);
 }
 
 // ---- the whole --------------------------------------------------------------------------------------------
