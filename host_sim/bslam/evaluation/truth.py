@@ -35,9 +35,12 @@ def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float
     return poses, known
 
 
-def starts_at_origin(truth: Truth) -> bool:
-    """True if the truth's frame is that of the start pose, as the map's is."""
-    return max(abs(truth.x_m[0]), abs(truth.y_m[0]), abs(truth.theta_rad[0])) <= 1e-6
+def starts_at_origin(log: Log) -> bool:
+    """True if the truth says that the drive starts at its origin: then its frame is the map's."""
+    if log.truth is None:
+        return False
+    pose, known = truth_at(log.truth, step_times_us(log)[:1])
+    return bool(known[0] and np.all(np.abs(pose[0]) <= 1e-6))
 
 
 def is_dense(truth: Truth) -> bool:
