@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
+from bslam.core.inputs import frame_rows
 from bslam.core.raw import library
-from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam, told_classes
+from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam
 from bslam.errors import BslamError
 from bslam.link import messages
 from bslam.link.frames import crc16
@@ -163,10 +164,18 @@ class RemoteSlam:
         score: Sequence[float] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
-        silent = [0.0] * len(bearing_rad)
-        noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
-        classes = told_classes(mappable, beacon_class)
-        rows = list(zip(bearing_rad, range_m, label, classes, *noise, score or silent, strict=True))
+        rows = frame_rows(
+            f"frame at {time_us} us",
+            bearing_rad=bearing_rad,
+            range_m=range_m,
+            label=label,
+            mappable=mappable,
+            bearing_sd_rad=bearing_sd_rad,
+            range_sd_m=range_sd_m,
+            range_scale_sd=range_scale_sd,
+            beacon_class=beacon_class,
+            score=score,
+        )
         signed, most = signature is not None, self._client.info.sightings_max
         payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
         if signature is not None:
