@@ -55,6 +55,7 @@ class RunOptions:
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
     odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: as the presets say
     align: str | None = None  # one of ALIGNMENTS, of the estimate to the truth; None: by the truth's frame
+    map_align: str | None = None  # the same of the map, where `align` is not said; None: as the estimate
     parameters: tuple[tuple[str, Number], ...] = ()  # --params and --set: they win over all else
 
     @property

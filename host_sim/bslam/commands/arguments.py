@@ -294,6 +294,8 @@ def run_options(
         "parameters": tuple(core_parameters(arguments).items()),
     }
     values |= changes
+    if values["sensor"] == "recorded":  # how a map lies as a whole is an error of the first metres
+        values.setdefault("map_align", "rigid")
     if values["filter"] is None:
         has_map = values["known_map"] or values["kept_map"] is not None
         values["filter"] = "invariant" if has_map else usual_filter(values["observation"])

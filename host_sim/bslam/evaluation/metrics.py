@@ -57,13 +57,12 @@ def evaluate(log: Log, trace: Trace, options: RunOptions) -> Evaluation | None:
     """Errors of a run; None if the log has neither truth nor true beacons.
 
     The estimate is aligned as the options say; else not at all where the truth starts at the robot, and
-    rigidly where it has a frame of its own. The map of a recorded log has its own alignment there, too: how
-    it lies as a whole is an error of the first metres.
+    rigidly where it has a frame of its own. The map's alignment is its own, and may be of another kind.
     """
     if log.truth is None and log.beacons is None:
         return None
     align = options.align or ("none" if starts_at_origin(log) else "rigid")
-    map_align = options.align or ("rigid" if options.sensor == "recorded" else align)
+    map_align = options.align or options.map_align or align
     truth, known = np.full_like(trace.pose, np.nan), np.zeros(len(trace.pose), dtype=np.bool_)
     if log.truth is not None:
         truth, known = truth_at(log.truth, trace.time_us)

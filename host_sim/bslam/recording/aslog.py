@@ -37,6 +37,7 @@ def as_log(recording: Recording) -> Log:
         robot=_robot(recording.start, odometry),
         seeds=recording.start.seeds,
         words=recording.start.words,
+        notes=() if recording.complete else (f"{recording.path}: it was cut short; its end is missing",),
     )
 
 
