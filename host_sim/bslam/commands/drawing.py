@@ -26,6 +26,8 @@ _ALIGNED = {
 def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> None:
     """Write NAME.map.png and, if there is a truth, NAME.error.png."""
     write_atomically(out / f"{name}.map.png", png(draw_room(room(name, source, log, trace, evaluation))))
+    path = out / f"{name}.error.png"
+    path.unlink(missing_ok=True)
     if evaluation is not None and np.isfinite(evaluation.error_m).any():
         series = Series(
             name,
@@ -35,7 +37,7 @@ def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluatio
             nees_band_95(1),
             WINDOW_S,
         )
-        write_atomically(out / f"{name}.error.png", png(draw_run(series)))
+        write_atomically(path, png(draw_run(series)))
 
 
 def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> Room:

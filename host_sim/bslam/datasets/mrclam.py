@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth
+from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
 from bslam.parsing.csvtable import began_at, rows_text
 
 ROBOTS: Final = 5
@@ -146,7 +146,7 @@ def _read_sightings(folder: Path, robot: int, subject_of: dict[int, int], notes:
     return Sightings(
         time_us=table.time_us(),
         beacon_id=subject,
-        bearing_rad=table.rows[:, 3],
+        bearing_rad=wrap_rad(table.rows[:, 3]),
         range_m=table.rows[:, 2],
         mappable=(subject > ROBOTS) | (subject < 0),
     )
@@ -179,7 +179,7 @@ def _read_truth(path: Path, notes: list[str]) -> Truth:
     if not first.all():
         notes.append(f"{path}: left out {rows_text(int((~first).sum()))} stamped as the row above")
     _, x_m, y_m, theta_rad = table.rows[first, :4].T
-    return Truth(times_us[first], x_m, y_m, theta_rad)
+    return Truth(times_us[first], x_m, y_m, wrap_rad(theta_rad))
 
 
 def _find(folder: Path, stem: str) -> Path | None:

@@ -84,8 +84,10 @@ def write_run(
     them.
     """
     write_atomically(out / f"{name}.estimate.tum", tum(trace.time_us, trace.pose))
-    known = np.isfinite(evaluation.truth[:, 0]) if evaluation is not None else np.zeros(1, dtype=np.bool_)
-    if evaluation is not None and known.any():
+    known = np.zeros(1, dtype=np.bool_) if evaluation is None else np.isfinite(evaluation.truth[:, 0])
+    if evaluation is None or not known.any():
+        (out / f"{name}.truth.tum").unlink(missing_ok=True)
+    else:
         write_atomically(out / f"{name}.truth.tum", tum(trace.time_us[known], evaluation.truth[known]))
     write_atomically(out / f"{name}.map.csv", map_csv(trace, identity))
     kept = out / f"{name}{SUFFIX}"
