@@ -55,6 +55,8 @@ extern "C" {
     REAL(range_scale_sd, 0.0, 0.0, 1.0, "all distances of a beacon err alike by this part of them (0: no)") \
     REAL(correlation_m, 0.0, 0.0, 100.0, \
          "a beacon's errors are alike until the robot has gone this far (0: no)") \
+    REAL(sensor_doubt, 0.0, 0.0, 10.0, \
+         "how doubtful its place, yaw and range scale are, in 7 cm, 2 deg, 5 %: states (0: exact)") \
     INTEGER(sighting_delay_us, 0, -1000000, 10000000, "a sighting stamped t shows odometry's t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
     /* map */ \

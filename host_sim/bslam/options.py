@@ -51,6 +51,7 @@ class RunOptions:
     kept_map: str | None = None  # file of a map to start in, at a place that nobody knows
     frozen: bool = False  # that map stays as it is
     recovery: str | None = None  # one of RECOVERIES; None: the usual one, see `recovery_of`
+    resume_sd: tuple[float, float] | None = None  # m, rad told after an interruption; None: by its length
     sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
     odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: as the presets say

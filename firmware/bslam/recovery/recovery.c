@@ -1,7 +1,6 @@
 #include "bslam/recovery/recovery.h"
 
 #include "base/bounds.h"
-#include "bslam/linalg/symmat.h"
 #include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
@@ -66,7 +65,7 @@ typedef struct view {
 
 static bslam_real_t heading_var(const bslam_ekf_t *ekf)
 {
-    return bslam_symmat_get(ekf->covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA);
+    return bslam_ekf_covariance(ekf, BSLAM_STATE_THETA, BSLAM_STATE_THETA);
 }
 
 /// Sighting `i` of a frame, to be remembered.
@@ -96,7 +95,7 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
     const int at = beacon->at + BSLAM_POINT_DIM;
     bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
-    bslam_real_t scale_var = is_sized ? bslam_symmat_get(ekf->covariance, at, at)
+    bslam_real_t scale_var = is_sized ? bslam_ekf_covariance(ekf, at, at)
                                       : bslam_unknown_scale_var(&slam->settings, sighting);
     if (beacon->known_scale > 0) {
         scale = beacon->known_scale;

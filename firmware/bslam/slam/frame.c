@@ -1,6 +1,5 @@
 #include "bslam/association/duplicates.h"
 #include "bslam/association/missed_beacons.h"
-#include "bslam/linalg/symmat.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "bslam/slam/slam_internal.h"
@@ -169,7 +168,7 @@ static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sigh
     const bslam_settings_t *settings = &slam->settings;
     return settings->association == BSLAM_ASSOCIATION_SVM && slam->measures_distance &&
            !sighting->has_range &&
-           (bslam_symmat_get(slam->ekf.covariance, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
+           (bslam_ekf_covariance(&slam->ekf, 2, 2) > DOUBTFUL_HEADING_RAD2 ||
             match->lead < settings->decision_delay_score) &&
            !bslam_is_placed(&slam->ekf, settings->decision_delay_us, -1, time_us);
 }

@@ -202,7 +202,7 @@ void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6])
     int k = 0;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j <= i; j++) {
-            lower[k] = bslam_symmat_get(robot.covariance, i, j);
+            lower[k] = robot.covariance[i][j];
             k++;
         }
     }

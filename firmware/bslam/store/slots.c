@@ -164,7 +164,7 @@ bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam, 
     slot_t slots[BSLAM_SLOTS];
     find_slots(flash, slots);
     bslam_status_t status = BSLAM_E_MAP;
-    // One that looks whole may be refused yet: for its covariance, or because it can no longer be read.
+    // One that looks whole may be refused yet: because it can no longer be read.
     for (int s = 0; s < BSLAM_SLOTS && status != BSLAM_OK; s++) {
         const bslam_map_source_t source = source_of(&slots[s]);
         if (slots[s].fault == BSLAM_MAP_FINE) {

@@ -6,8 +6,7 @@
 
 #include "bslam/store/map.h"
 
-/// A slot is whole if bslam_map_check says so: one that is refused for its covariance alone counts as whole
-/// here.
+/// A slot is whole if bslam_map_check says so.
 BSLAM_MUST_CHECK bslam_status_t bslam_slots_save(const bslam_flash_t *flash, const bslam_slam_t *slam,
                                                  bslam_map_fault_t *fault);
 

@@ -164,7 +164,7 @@ class _Run:
     ) -> None:
         self.slam, self.watcher = slam, watcher
         self.recorded = isinstance(slam, Recorder)
-        self.frames = frames
+        self.frames, self.resume_sd = frames, options.resume_sd
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
             self._give_map(log)
@@ -240,7 +240,7 @@ class _Run:
         """
         self._feed_frames(next_us - 1)
         position_sd_m = min(UNSEEN_SPEED_MPS * (next_us - last_us) * 1e-6, UNSEEN_POSITION_SD_MAX_M)
-        self.slam.resume_odometry(position_sd_m, UNSEEN_HEADING_SD_RAD)
+        self.slam.resume_odometry(*(self.resume_sd or (position_sd_m, UNSEEN_HEADING_SD_RAD)))
         self.refusals["interruption"] += 1
 
     def _frames_until(self, until_us: int | None) -> int:

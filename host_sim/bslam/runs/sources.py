@@ -106,9 +106,13 @@ class ScenarioSource(_Unshared):
     def name(self) -> str:
         return Path(self.scenario).stem
 
+    def world(self) -> Scenario:
+        """What is simulated."""
+        return load_scenario(self.scenario)
+
     def redrawn(self) -> Scenario:
-        """The scenario, with its wheels' noise drawn as is asked for."""
-        scenario = load_scenario(self.scenario)
+        """The same, with its wheels' noise drawn as is asked for."""
+        scenario = self.world()
         wheels = replace(scenario.wheels, draw=self.noise_draw or scenario.wheels.draw)
         return replace(scenario, wheels=wheels)
 
@@ -116,7 +120,7 @@ class ScenarioSource(_Unshared):
         return simulate(self.redrawn(), self.seed, self.sigma_mps, self.noise)
 
     def walls_m(self) -> NDArray[np.float64]:
-        scenario = load_scenario(self.scenario)
+        scenario = self.world()
         start = scenario.start
         ends_m = np.array([(*wall.start, *wall.end) for wall in scenario.arena.walls], dtype=np.float64)
         to_start = Rigid(start.heading_rad, start.x_m, start.y_m).inverse()

@@ -1,3 +1,4 @@
+#include "covariance.h"
 #include "known_map.h"
 #include "support.h"
 
@@ -59,9 +60,7 @@ static bslam_ekf_t three_beacons(const bslam_settings_t *settings)
         beacon->label = 10 + i;
         for (int k = 0; k < 2; k++) {
             ekf.mean[beacon->at + k] = real(places[i][k]);
-            for (int j = 0; j < ekf.dim; j++) {
-                bslam_symmat_set(ekf.covariance, beacon->at + k, j, j == beacon->at + k ? BSLAM_R(0.01) : 0);
-            }
+            covariance_forget(&ekf, beacon->at + k, 0.01);
         }
     }
     return ekf;
@@ -350,8 +349,7 @@ static void test_mahalanobis_prefers_the_uncertain_beacon_to_the_merely_near_one
     const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
     for (int k = 0; k < 2; k++) {
-        const int at = ekf.beacons[2].at + k;
-        bslam_symmat_set(ekf.covariance, at, at, 4);
+        covariance_forget(&ekf, ekf.beacons[2].at + k, 4);
     }
     // 0.4 m from beacon 0, which is known to 0.1 m, and 0.6 m from beacon 2, known to 2 m.
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1)};
@@ -378,10 +376,7 @@ static void test_mahalanobis_beacon_of_indefinite_covariance_is_passed_over(void
 {
     const bslam_settings_t settings = unit_settings();
     bslam_ekf_t ekf = three_beacons(&settings);
-    for (int k = 0; k < 2; k++) {
-        const int at = ekf.beacons[1].at + k;
-        bslam_symmat_set(ekf.covariance, at, at, -1);
-    }
+    covariance_break(&ekf, ekf.beacons[1].at, 2);
     const bslam_sighting_t seen[] = {unit_polar(1.5708, 3, -1)};
     const decision_t d = decide(bslam_associate_mahalanobis, &ekf, &settings, &on_axle, seen, 1);
     assert_true(d.records[0].match.beacon != 1);

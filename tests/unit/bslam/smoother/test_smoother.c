@@ -435,7 +435,7 @@ static void test_estimate_that_is_not_finite_is_not_taken(void **state)
     while (smoother.phase != BSLAM_SMOOTHER_FORTH) {
         drive_curve(1);
     }
-    smoother.run.covariance[0] = real(NAN);
+    smoother.run.factor.d[0] = real(NAN);
     while (smoother.insane == 0) {
         drive_curve(1);
         assert_true(bslam_ekf_is_sane(&slam.ekf));
