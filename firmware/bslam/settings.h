@@ -161,8 +161,9 @@ typedef struct bslam_settings {
 typedef enum bslam_preset {
     BSLAM_PRESET_REAL_WHEELS = 0,  ///< encoders, of which a wheel's true speed errs; the defaults
     BSLAM_PRESET_PAPER,            ///< the paper's speedometers: the reading errs, by 0.3 m/s at each step
-    BSLAM_PRESET_CAMERA,           ///< sightings of the vision library. By `association`: set that first
-    BSLAM_PRESET_BEARING_ONLY,     ///< sightings without distance. By `filter`: set that first
+    BSLAM_PRESET_COMMANDED,     ///< odometry of commands, unmeasured. By `association`, `filter`: set first
+    BSLAM_PRESET_CAMERA,        ///< sightings of the vision library. By `association`: set that first
+    BSLAM_PRESET_BEARING_ONLY,  ///< sightings without distance. By `filter`: set that first
     BSLAM_PRESET_COUNT
 } bslam_preset_t;
 

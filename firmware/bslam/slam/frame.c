@@ -24,9 +24,8 @@ static bslam_pose_t look_back(const bslam_slam_t *slam, int64_t back_us, bslam_v
     if (slam->settings.velocity_states != 0) {
         const bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
         const bslam_real_t back_s = (bslam_real_t)(int32_t)back_us * SECONDS_PER_US, square = back_s * back_s;
-        forward_var_m2 =
-            square * bslam_symmat_get(robot.covariance, BSLAM_STATE_FORWARD, BSLAM_STATE_FORWARD);
-        turn_var_rad2 = square * bslam_symmat_get(robot.covariance, BSLAM_STATE_TURN, BSLAM_STATE_TURN);
+        forward_var_m2 = square * robot.covariance[BSLAM_STATE_FORWARD][BSLAM_STATE_FORWARD];
+        turn_var_rad2 = square * robot.covariance[BSLAM_STATE_TURN][BSLAM_STATE_TURN];
     }
     const bslam_real_t way2_m2 = view.robot.x_m * view.robot.x_m + view.robot.y_m * view.robot.y_m;
     vantage->position_var_m2 = forward_var_m2 + way2_m2 * turn_var_rad2;

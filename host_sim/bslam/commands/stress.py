@@ -17,6 +17,7 @@ from bslam.commands.sweep import add_files_option, add_restart_option, finish, m
 from bslam.options import RunOptions
 from bslam.runs.batch import Job, make_jobs
 from bslam.runs.output import write_atomically
+from bslam.runs.sources import Says
 from bslam.runs.stress import ENCODERS_MPS, NOMINAL, ROWS, RowFigures, StressSource, row_figures
 from bslam.runs.sweep import SweepResult, code_digest
 from bslam.view.stress import Line, draw_stress
@@ -93,7 +94,7 @@ def jobs_of(arguments: argparse.Namespace) -> list[Job]:
         for seed in arguments.seeds:
             sources.append(StressSource(arguments.scenario, seed, sigma_mps, noise, row=name))
             told = {"sigma_mps": sigma_mps, "noise": noise, "resume_sd": ROWS[name].resume_sd}
-            options.append(run_options(arguments, has_looks=False, seed=seed, **told))
+            options.append(run_options(arguments, says=Says(), seed=seed, **told))
         sources[-1].world()  # what cannot be is said before anything is run
     jobs = make_jobs(sources, options, draw, arguments.pictures)
     return [replace(one, files=arguments.files) for one in jobs]

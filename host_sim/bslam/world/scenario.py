@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 
 from bslam.errors import BslamError
 from bslam.log import (
-    BEACON_ID_MAX,
     BEARING_SIGMA_RAD,
     GYRO_SIGMA_RADPS,
     RANGE_SIGMA_FLOOR_M,
@@ -29,6 +28,7 @@ from bslam.log import (
     WHEELBASE_M,
     read_truth,
 )
+from bslam.parsing.identities import BEACON_ID_MAX
 from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
@@ -450,7 +450,9 @@ def _read_recorded(
         raise BslamError(
             f"{where}: there is no file {file}; allowed: a truth.csv, from the scenario's folder"
         )
-    truth = read_truth(file)
+    truth = read_truth(file, [])
+    if not math.isfinite(sum(truth.theta_rad)):
+        raise BslamError(f"{where}: {file} has rows without theta_rad; allowed: a heading in each")
     rows = zip(
         truth.time_us.tolist(), truth.x_m.tolist(), truth.y_m.tolist(), truth.theta_rad.tolist(), strict=True
     )

@@ -185,7 +185,7 @@ def _describe_robot(scenario: Scenario) -> Robot:
         sensor_y_m=sensor.y_m,
         sensor_yaw_rad=sensor.yaw_rad,
         sighting_delay_us=sensor.delay_us,
-        **_gyro_noise(scenario),
+        gyro_sigma_radps=_gyro_sigma_radps(scenario),
         left_radius_m=None if encoders is None else encoders.left_radius_m,
         right_radius_m=None if encoders is None else encoders.right_radius_m,
         ticks_per_revolution=None if encoders is None else encoders.ticks_per_revolution,
@@ -193,10 +193,10 @@ def _describe_robot(scenario: Scenario) -> Robot:
     )
 
 
-def _gyro_noise(scenario: Scenario) -> dict[str, float]:
+def _gyro_sigma_radps(scenario: Scenario) -> float:
     """What the filter is told, which has no state for the bias: noise as bad after _BIAS_AS_NOISE_S."""
     gyro = scenario.gyro
     if gyro is None:
-        return {}
+        return float(Robot.gyro_sigma_radps)  # the default of what plays no part
     steps = _BIAS_AS_NOISE_S / (scenario.step_us * 1e-6)
-    return {"gyro_sigma_radps": math.hypot(gyro.sigma_radps, gyro.bias_sigma_radps * math.sqrt(steps))}
+    return math.hypot(gyro.sigma_radps, gyro.bias_sigma_radps * math.sqrt(steps))
