@@ -1,6 +1,6 @@
 # Hours of running: tests/soak/soak.c, in float and in double. The estimator alone.
 
-SOAK_SOURCES := $(LIBRARY_SOURCES_bslam) tests/soak/soak.c
+SOAK_SOURCES := $(LIBRARY_SOURCES_bslam) $(wildcard tests/soak/*.c)
 
 define soak_rules
 build/soak/$(1)/%.o: %.c mk/config.mk mk/soak.mk

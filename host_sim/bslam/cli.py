@@ -27,6 +27,7 @@ from bslam.commands import (
     report_page,
     run,
     scenario,
+    stress,
     sweep,
     tables,
 )
@@ -37,6 +38,7 @@ COMMANDS: dict[str, ModuleType] = {
     "replay": replay,
     "tables": tables,
     "sweep": sweep,
+    "stress": stress,
     "compare": compare,
     "live": live,
     "report": report_page,

@@ -4,6 +4,7 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
 #include "bslam/model/noise.h"
 #include "base/scalar.h"
@@ -46,8 +47,8 @@ static void append_values(bslam_ekf_t *ekf, new_values_t *values)
 
 /// The distance that a value's noise comes from may be too long by a scale: where that is larger, the point
 /// is nearer. The scale itself is the third value.
-static void add_scale(new_values_t *values, bslam_real_t scale_var, bslam_real_t range_m, bslam_real_t x_by_range,
-                      bslam_real_t y_by_range)
+static void add_scale(new_values_t *values, bslam_real_t scale_var, bslam_real_t range_m,
+                      bslam_real_t x_by_range, bslam_real_t y_by_range)
 {
     const bslam_real_t by_scale[BSLAM_SIZED_DIM] = {-range_m * x_by_range, -range_m * y_by_range, 1};
     add_noise(values, scale_var, by_scale, BSLAM_SIZED_DIM);
@@ -57,23 +58,26 @@ static void add_scale(new_values_t *values, bslam_real_t scale_var, bslam_real_t
 
 /// The sighted point; a sized one if its scale is to be a value. scale_var: of the scale that all its
 /// distances have.
-static void append_point(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
+static void append_point(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *told,
                          const bslam_sighting_t *sighting, bslam_real_t scale_var, bool is_sized)
 {
-    const bslam_pose_t pose = bslam_ekf_pose(ekf);
-    const bslam_sighted_point_t point =
-        bslam_locate_point(&pose, mount, sighting->range_m, sighting->bearing_rad);
-    const bslam_real_t range_var = bslam_scaled_range_variance_m2(settings, sighting, sighting->range_m,
-                                                                  is_sized ? 0 : scale_var);
-    const bslam_real_t by_range[BSLAM_POINT_DIM] = {point.x_by_range, point.y_by_range};
+    const bslam_pose_t pose = bslam_ekf_pose(ekf), mount = bslam_ekf_mount(ekf, told);
+    const bslam_real_t scale = bslam_ekf_range_scale(ekf), range_m = sighting->range_m / scale;
+    const bslam_sighted_point_t point = bslam_locate_point(&pose, &mount, range_m, sighting->bearing_rad);
+    const bslam_real_t range_var =
+        bslam_scaled_range_variance_m2(settings, sighting, sighting->range_m, is_sized ? 0 : scale_var);
+    const bslam_real_t by_range[BSLAM_POINT_DIM] = {point.x_by_range / scale, point.y_by_range / scale};
     const bslam_real_t by_bearing[BSLAM_POINT_DIM] = {point.x_by_bearing, point.y_by_bearing};
     new_values_t values = {.rows = {{.base = {1, 0, point.x_by_theta}}, {.base = {0, 1, point.y_by_theta}}},
                            .mean = {point.x_m, point.y_m},
                            .growth = {.count = BSLAM_POINT_DIM}};
+    for (int k = 0; k < BSLAM_POINT_DIM; k++) {
+        bslam_ekf_fill_sensor(ekf, &mount, by_bearing[k], -range_m * by_range[k], &values.rows[k]);
+    }
     add_noise(&values, range_var, by_range, BSLAM_POINT_DIM);
     add_noise(&values, bslam_bearing_variance_rad2(settings, sighting), by_bearing, BSLAM_POINT_DIM);
     if (is_sized) {
-        add_scale(&values, scale_var, sighting->range_m, point.x_by_range, point.y_by_range);
+        add_scale(&values, scale_var, range_m, point.x_by_range, point.y_by_range);
     }
     append_values(ekf, &values);
 }
@@ -84,18 +88,24 @@ static int room_of(const bslam_ekf_t *ekf)
     return 2 * (BSLAM_RAYS_MAX - ekf->ray_count) - ekf->sized_count;
 }
 
-static void append_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
+static void append_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *told,
                        const bslam_sighting_t *sighting)
 {
-    static const bslam_real_t OF_DIRECTION[BSLAM_RAY_DIM] = {0, 0, 1, 0}, OF_DISTANCE[BSLAM_RAY_DIM] = {0, 0, 0, 1};
-    const bslam_pose_t pose = bslam_ekf_pose(ekf);
-    const bslam_sensor_t sensor = bslam_sensor_at(&pose, mount);
+    static const bslam_real_t OF_DIRECTION[BSLAM_RAY_DIM] = {0, 0, 1, 0},
+                              OF_DISTANCE[BSLAM_RAY_DIM] = {0, 0, 0, 1};
+    const bslam_pose_t pose = bslam_ekf_pose(ekf), mount = bslam_ekf_mount(ekf, told);
+    const bslam_sensor_t sensor = bslam_sensor_at(&pose, &mount);
     const bslam_real_t direction_rad = bslam_angle_wrap(sensor.pose.theta_rad + sighting->bearing_rad);
     const bslam_real_t sd = settings->ray_inverse_distance_sd_per_m;
     new_values_t values = {
-        .rows = {{.base = {1, 0, sensor.x_by_theta}}, {.base = {0, 1, sensor.y_by_theta}}, {.base = {0, 0, 1}}},
+        .rows = {{.base = {1, 0, sensor.x_by_theta}},
+                 {.base = {0, 1, sensor.y_by_theta}},
+                 {.base = {0, 0, 1}}},
         .mean = {sensor.pose.x_m, sensor.pose.y_m, direction_rad, settings->ray_inverse_distance_per_m},
         .growth = {.count = BSLAM_RAY_DIM}};
+    for (int k = 0; k < BSLAM_RAY_DIM - 1; k++) {
+        bslam_ekf_fill_sensor(ekf, &mount, OF_DIRECTION[k], 0, &values.rows[k]);
+    }
     add_noise(&values, bslam_bearing_variance_rad2(settings, sighting), OF_DIRECTION, BSLAM_RAY_DIM);
     add_noise(&values, sd * sd, OF_DISTANCE, BSLAM_RAY_DIM);
     append_values(ekf, &values);
@@ -224,10 +234,11 @@ void bslam_ekf_remove_value(bslam_ekf_t *ekf, int at)
 
 void bslam_ekf_forget_map(bslam_ekf_t *ekf)
 {
-    bslam_factor_cut(&ekf->factor, ekf->base_dim - ekf->factor.tail_count);
-    memset(&ekf->mean[ekf->base_dim], 0, (size_t)(ekf->dim - ekf->base_dim) * sizeof ekf->mean[0]);
+    const int first = bslam_ekf_map_at(ekf);
+    bslam_factor_cut(&ekf->factor, first - ekf->factor.tail_count);
+    memset(&ekf->mean[first], 0, (size_t)(ekf->dim - first) * sizeof ekf->mean[0]);
     memset(ekf->beacons, 0, (size_t)ekf->beacon_count * sizeof ekf->beacons[0]);
-    ekf->dim = ekf->base_dim;
+    ekf->dim = first;
     ekf->beacon_count = 0;
     ekf->ray_count = 0;
     ekf->sized_count = 0;
@@ -349,21 +360,26 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
         .at = (uint16_t)at,
         .dim = BSLAM_RAY_DIM,
     };
+    for (int k = 0; k < BSLAM_POINT_DIM; k++) {
+        bslam_ekf_fill_sensor(ekf, mount, 0, -range_m * by_range[k], &place->rows[k]);
+    }
     return true;
 }
 
-bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *mount,
+bool bslam_ekf_measure_ray(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_pose_t *told,
                            const bslam_sighting_t *sighting, int index, bslam_real_t scale_var)
 {
     bslam_beacon_t *beacon = &ekf->beacons[index];
     const int at = beacon->at;
-    const bslam_real_t range_m = sighting->range_m;
+    const bslam_pose_t mount = bslam_ekf_mount(ekf, told);
+    const bslam_real_t sensor_scale = bslam_ekf_range_scale(ekf), range_m = sighting->range_m / sensor_scale;
     new_values_t values;
     bslam_real_t by_range[BSLAM_POINT_DIM];
-    if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, mount, range_m, at, &values, by_range)) {
+    if (beacon->kind != BSLAM_BEACON_RAY || !place_on_ray(ekf, &mount, range_m, at, &values, by_range)) {
         return false;
     }
-    add_noise(&values, bslam_scaled_range_variance_m2(settings, sighting, range_m, 0), by_range, BSLAM_POINT_DIM);
+    const bslam_real_t range_var = bslam_range_variance_m2(settings, sighting, sighting->range_m);
+    add_noise(&values, range_var / (sensor_scale * sensor_scale), by_range, BSLAM_POINT_DIM);
     add_scale(&values, scale_var, range_m, by_range[0], by_range[1]);
     replace_values(ekf, beacon, BSLAM_BEACON_SIZED, &values);
     ekf->ray_count--;

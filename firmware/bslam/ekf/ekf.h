@@ -1,13 +1,13 @@
 /// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its
 /// right-invariant form. MATH "The filter".
 ///
-/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 to 4 values each. The
-/// covariance is held in these coordinates in both forms; the invariant form transports it after each
-/// correction. It is held as a factor (linalg/factor.h), in the order omega, theta | beacons | v, x, y: then a
-/// motion, the transport and a new beacon keep that triangular.
+/// State: x, y, theta | v, omega or their scale factors | what the sensor is told wrong, both if switched on
+/// | beacons, 2 to 4 values each. The covariance is held in these coordinates in both forms; the invariant
+/// form transports it after each correction. It is held as a factor (linalg/factor.h), in the order omega,
+/// theta | sensor, beacons | v, x, y: then a motion, the transport and a new beacon keep that triangular.
 ///
-/// Cost in multiply-adds for n values: a motion n², for the noise of its turn. Each scalar of a sighting 10 n,
-/// and n² for its part in the factor, which waits until four scalars share one pass. The transport 2 n.
+/// Cost in multiply-adds for n values: a motion n², for the noise of its turn. Each scalar of a sighting 10
+/// n, and n² for its part in the factor, which waits until four scalars share one pass. The transport 2 n.
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
@@ -20,10 +20,13 @@
 
 /// The robot's own values: pose, and v, omega or their scale factors.
 #define BSLAM_ROBOT_DIM_MAX 5
+/// By what the sensor differs from what is told: place and yaw, in the told frame; all distances are too long
+/// by the scale.
+enum { BSLAM_SENSOR_X = 0, BSLAM_SENSOR_Y, BSLAM_SENSOR_YAW, BSLAM_SENSOR_SCALE, BSLAM_SENSOR_DIM };
 /// The largest state: room for 2 values more a ray, or 1 more for each of twice as many sized beacons.
-#define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
-/// And what a new beacon's values may take before those leave that they are made of.
-#define BSLAM_STATE_PADDED BSLAM_FACTOR_PADDED(BSLAM_STATE_MAX + 3)
+#define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
+/// And what comes before others leave: linalg/factor.h.
+#define BSLAM_STATE_PADDED BSLAM_FACTOR_PADDED(BSLAM_STATE_MAX + 7)
 /// Scalars that wait for a common pass through the factor.
 #define BSLAM_PENDING_MAX 4
 
@@ -74,25 +77,35 @@ typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
     bslam_factor_t factor;  ///< of the covariance, but for what waits
     int32_t dim;
-    int32_t base_dim;  ///< 3, or 5 with velocity or scale states
+    int32_t base_dim;    ///< 3, or 5 with velocity or scale states
+    int32_t sensor_dim;  ///< 0, or BSLAM_SENSOR_DIM behind those
     int32_t beacon_count, ray_count, sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
     // Scratch: holds nothing between calls.
     bslam_real_t d[BSLAM_FACTOR_PLACES_MAX];  ///< the factor's with what waits
-    bslam_real_t v[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX], lambda[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX];
+    bslam_real_t v[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX],
+        lambda[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX];
     bslam_real_t gain[BSLAM_PENDING_MAX];
     bslam_real_t correction[BSLAM_STATE_PADDED];
     int32_t pending_count;
     bool has_correction;
 } bslam_ekf_t;
 
-/// A sparse row: not zero only at x, y, theta and at `dim` neighbouring state values from `at` on, at >= 3.
+/// A sparse row: not zero only at x, y, theta, at the sensor's values, if there are any, and at `dim`
+/// neighbouring state values from `at` on, at >= 3.
 typedef struct bslam_row {
-    bslam_real_t base[3], other[BSLAM_RAY_DIM];
+    bslam_real_t base[3], other[BSLAM_RAY_DIM], sensor[BSLAM_SENSOR_DIM];
     uint16_t at;
     uint16_t dim;
+    uint16_t sensor_at, sensor_dim;
 } bslam_row_t;
+
+/// The first state value of the map.
+static inline int bslam_ekf_map_at(const bslam_ekf_t *ekf)
+{
+    return ekf->base_dim + ekf->sensor_dim;
+}
 
 /// Where state value i stands in the factor.
 static inline int bslam_ekf_place(const bslam_ekf_t *ekf, int i)

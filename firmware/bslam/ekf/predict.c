@@ -12,8 +12,8 @@
 /// What moves: the filter's robot, or a copy of it alone. The robot's values come first in the mean.
 typedef struct moving {
     bslam_real_t *mean;
-    bslam_ekf_t *ekf;      ///< NULL: the copy
-    bslam_robot_t *robot;  ///< NULL: the filter's
+    bslam_ekf_t *ekf;           ///< NULL: the copy
+    bslam_robot_t *robot;       ///< NULL: the filter's
     bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
     bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
     int base_dim;
@@ -78,8 +78,8 @@ static void move_robot(bslam_robot_t *robot, const bslam_transition_t *transitio
     bslam_real_t moved[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX] = {{0}};
     for (int j = 0; j < base; j++) {
         for (int i = 0; i < base; i++) {
-            moved[j][i] = i < POSE_DIM ? row_times(transition, i, base, robot->covariance[j])
-                                       : robot->covariance[j][i];
+            moved[j][i] =
+                i < POSE_DIM ? row_times(transition, i, base, robot->covariance[j]) : robot->covariance[j][i];
         }
     }
     for (int i = 0; i < base; i++) {

@@ -1,6 +1,7 @@
 // The state as it begins, and what is read of it.
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/scalar.h"
 
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
@@ -18,6 +19,7 @@ void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings)
         ekf->factor.d[bslam_ekf_place(ekf, BSLAM_STATE_FORWARD)] = forward_sd * forward_sd;
         ekf->factor.d[bslam_ekf_place(ekf, BSLAM_STATE_TURN)] = turn_sd * turn_sd;
     }
+    bslam_ekf_begin_sensor(ekf, settings);
 }
 
 /// A ray's values with an inverse distance that has a point.
@@ -72,9 +74,13 @@ bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index)
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf)
 {
     for (int i = 0; i < ekf->dim; i++) {
+        if (!bslam_is_number(ekf->mean[i])) {
+            return false;
+        }
+    }
+    for (int i = 0; i < bslam_factor_places(&ekf->factor); i++) {
         // Exactly zero is the pose before the first motion, and a ray's anchor taken from it.
-        if (!bslam_is_number(ekf->mean[i]) ||
-            !bslam_in_range(ekf->factor.d[bslam_ekf_place(ekf, i)], 0, BSLAM_R(1e30))) {
+        if (!bslam_in_range(ekf->factor.d[i], 0, BSLAM_R(1e30))) {
             return false;
         }
     }

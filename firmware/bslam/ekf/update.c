@@ -3,10 +3,15 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
+#include "bslam/linalg/four.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "base/scalar.h"
+
+/// A function whose callers name constants: each has a copy without tests of them.
+#define COPIED __attribute__((always_inline)) static inline
 
 // ---- rows of H --------------------------------------------------------------------------------------------
 
@@ -17,40 +22,116 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
     }
+    for (int k = 0; k < row->sensor_dim; k++) {
+        sum += row->sensor[k] * vector[row->sensor_at + k];
+    }
     return sum;
 }
 
-/// f += weight times row `place` of L, in the columns from `from` up to `to`, whose first one is f[0].
-static void add_row(const bslam_factor_t *factor, int place, bslam_real_t weight, int from, int to,
-                    bslam_real_t *f)
+/// What is made of rows of L: f = Lᵀ h in the columns from `from` up to `to`, of one h or two that look at
+/// the same places. `two` the compiler knows.
+typedef struct looks {
+    int from, to;
+    const bslam_row_t *a, *b;
+    bslam_real_t *f, *g;
+} looks_t;
+
+/// Adds row `place` of L, times `a` to f and times `b` to g.
+COPIED void add_row(const bslam_factor_t *factor, int place, bslam_real_t a, bslam_real_t b,
+                    const looks_t *looks, const bool two)
 {
-    const bslam_real_t *row = bslam_factor_row(factor, place);
-    const int end = place + 1 < to ? place + 1 : to;
-    for (int j = from; j < end; j++) {
-        f[j - from] += weight * row[4 * j];
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)looks->from;
+    const int end = place + 1 < looks->to ? place + 1 : looks->to;
+    bslam_real_t *f = looks->f, *g = looks->g;
+    for (int j = 0; j < end - looks->from; j++) {
+        f[j] += a * row[4 * j];
+        if (two) {
+            g[j] += b * row[4 * j];
+        }
+    }
+}
+
+/// The same of this row and the next one, by the two weights each.
+COPIED void add_two_rows(const bslam_factor_t *factor, int place, const bslam_real_t *a,
+                         const bslam_real_t *b, const looks_t *looks, const bool two)
+{
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)looks->from;
+    const bslam_real_t *next = bslam_factor_row(factor, place + 1) + 4 * (size_t)looks->from;
+    const bslam_real_t a0 = a[0], a1 = a[1], b0 = b[0], b1 = b[1];
+    bslam_real_t *f = looks->f, *g = looks->g;
+    const int end = (place + 1 < looks->to ? place + 1 : looks->to) - looks->from;
+    for (int j = 0; j < end; j++) {
+        f[j] += a0 * row[4 * j] + a1 * next[4 * j];
+        if (two) {
+            g[j] += b0 * row[4 * j] + b1 * next[4 * j];
+        }
+    }
+    const int own = place + 1 - looks->from;  // of the next row, which is 1 there
+    if (own >= 0 && place + 1 < looks->to) {
+        f[own] += a1;
+        if (two) {
+            g[own] += b1;
+        }
+    }
+}
+
+COPIED void look(const bslam_ekf_t *ekf, const looks_t *looks, const bool two)
+{
+    const bslam_factor_t *factor = &ekf->factor;
+    const bslam_row_t *a = looks->a, *b = looks->b;
+    // x, and y behind it
+    const bslam_real_t *tail = factor->tail + factor->tail_count - 2 + 4 * (size_t)looks->from;
+    for (int j = 0; j < looks->to - looks->from; j++) {
+        const bslam_real_t x = tail[4 * j], y = tail[4 * j + 1];
+        looks->f[j] = a->base[0] * x + a->base[1] * y;
+        if (two) {
+            looks->g[j] = b->base[0] * x + b->base[1] * y;
+        }
+    }
+    add_row(factor, bslam_ekf_place(ekf, BSLAM_STATE_THETA), a->base[2], b->base[2], looks, two);
+    for (int k = 0; k < a->sensor_dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, a->sensor_at + k), a->sensor[k], b->sensor[k], looks, two);
+    }
+    int k = 0;
+    for (; k + 1 < a->dim && a->at >= ekf->base_dim; k += 2) {
+        add_two_rows(factor, bslam_ekf_place(ekf, a->at + k), &a->other[k], &b->other[k], looks, two);
+    }
+    for (; k < a->dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, a->at + k), a->other[k], b->other[k], looks, two);
     }
 }
 
 void bslam_ekf_look(const bslam_ekf_t *ekf, const bslam_row_t *row, int from, int to, bslam_real_t *f)
 {
-    const bslam_factor_t *factor = &ekf->factor;
-    const bslam_real_t *tail = factor->tail + factor->tail_count - 2;  // x, and y behind it
-    for (int j = from; j < to; j++) {
-        f[j - from] = row->base[0] * tail[4 * j] + row->base[1] * tail[4 * j + 1];
-    }
-    add_row(factor, bslam_ekf_place(ekf, BSLAM_STATE_THETA), row->base[2], from, to, f);
-    for (int k = 0; k < row->dim; k++) {
-        add_row(factor, bslam_ekf_place(ekf, row->at + k), row->other[k], from, to, f);
-    }
+    const looks_t looks = {from, to, row, row, f, f};
+    look(ekf, &looks, false);
+}
+
+static void look_twice(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b, int from, int to,
+                       bslam_real_t *f, bslam_real_t *g)
+{
+    const looks_t looks = {from, to, a, b, f, g};
+    look(ekf, &looks, true);
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
+    row->sensor_dim = 0;
     row->at = (uint16_t)beacon->at;
     row->dim = (uint16_t)bslam_beacon_dim(beacon->kind);
     memcpy(row->base, by_pose, sizeof row->base);
     memcpy(row->other, by_beacon, sizeof row->other);
+}
+
+static void scale_row(bslam_row_t *row, bslam_real_t scale)
+{
+    for (int k = 0; scale != 1 && k < POSE_DIM; k++) {
+        row->base[k] *= scale;
+    }
+    for (int k = 0; scale != 1 && k < row->dim; k++) {
+        row->other[k] *= scale;
+    }
 }
 
 /// Of two rows a P bᵀ, a P aᵀ and b P bᵀ. From the covariance but for what waits.
@@ -67,8 +148,7 @@ static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bsl
     for (int from = 0; from < places; from += COLUMNS) {
         const int to = from + COLUMNS < places ? from + COLUMNS : places;
         bslam_real_t of_a[COLUMNS], of_b[COLUMNS];
-        bslam_ekf_look(ekf, a, from, to, of_a);
-        bslam_ekf_look(ekf, b, from, to, of_b);
+        look_twice(ekf, a, b, from, to, of_a, of_b);
         for (int j = 0; j < to - from; j++) {
             const bslam_real_t d = ekf->factor.d[from + j];
             sums.ab += d * of_a[j] * of_b[j];
@@ -143,12 +223,14 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
-                                    const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
+                                    const bslam_pose_t *told, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const bslam_pose_t mount = ekf->sensor_dim > 0 ? bslam_ekf_mount(ekf, told) : *told;
+    const bslam_real_t scale = bslam_ekf_range_scale(ekf);
     bslam_observation_t seen;
-    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
+    const bslam_status_t status = observe(ekf, beacon, &mount, &seen);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -160,14 +242,17 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    bslam_ekf_fill_sensor(ekf, &mount, -1, 0, &innovation->bearing_row);
     if (!sighting->has_range && settings->bearing_only_curvature_factor > 0) {
         innovation->bearing_var_rad2 += settings->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
     if (sighting->has_range) {
-        innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, seen.range_m);
+        innovation->range_m = sighting->range_m - scale * seen.range_m;
+        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, scale * seen.range_m);
         fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+        scale_row(&innovation->range_row, scale);
+        bslam_ekf_fill_sensor(ekf, &mount, 0, seen.range_m, &innovation->range_row);
     }
     return BSLAM_OK;
 }
@@ -212,12 +297,25 @@ static bslam_waiting_t waiting(bslam_ekf_t *ekf, int k)
     return (bslam_waiting_t){ekf->v[k], ekf->lambda[k], ekf->gain[k]};
 }
 
+/// The correction takes what is given by place, where the robot's values stand otherwise than in the state.
+static void take_change(bslam_ekf_t *ekf, bslam_real_t *change)
+{
+    const int tail = ekf->factor.tail_count;
+    for (int i = 0; i < ekf->base_dim; i++) {
+        const int place = bslam_ekf_place(ekf, i);
+        ekf->correction[i] += change[place];
+        change[place] = 0;
+    }
+    for (int at = 0; at < ekf->factor.body_count; at += 4) {
+        *(bslam_four_at_t *)(ekf->correction + at + tail) += bslam_four(change + at);
+    }
+}
+
 void bslam_ekf_settle(bslam_ekf_t *ekf)
 {
     if (ekf->pending_count == 0) {
         return;
     }
-    const int tail = ekf->factor.tail_count;
     bslam_waiting_t list[BSLAM_PENDING_MAX];
     for (int k = 0; k < ekf->pending_count; k++) {
         list[k] = waiting(ekf, k);
@@ -226,22 +324,16 @@ void bslam_ekf_settle(bslam_ekf_t *ekf)
     bslam_real_t *change = ekf->d;  // whose room is free now
     memset(change, 0, sizeof ekf->d);
     bslam_factor_settle(&ekf->factor, list, ekf->pending_count, change);
-    for (int i = 0; i < ekf->base_dim; i++) {
-        ekf->correction[i] += change[bslam_ekf_place(ekf, i)];
-    }
-    for (int i = ekf->base_dim; i < ekf->dim; i++) {
-        ekf->correction[i] += change[i - tail];
-    }
+    take_change(ekf, change);
     ekf->pending_count = 0;
 }
 
-/// f of a row, behind all that waits, into place `slot`. Returns what the correction so far says of the
+/// Brings f of a row, in place `slot`, behind all that waits. Returns what the correction so far says of the
 /// measurement.
 static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
 {
     const int places = bslam_factor_places(&ekf->factor);
     bslam_real_t foreseen = ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
-    bslam_ekf_look(ekf, row, 0, places, ekf->lambda[slot]);
     for (int k = 0; k < ekf->pending_count; k++) {
         const bslam_waiting_t before = waiting(ekf, k);
         foreseen += before.gain * bslam_factor_carry(&before, places, ekf->lambda[slot]);
@@ -249,14 +341,30 @@ static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
     return foreseen;
 }
 
-/// f D gᵀ of two slots: what is common to two rows' predictions.
+COPIED bslam_real_t total(bslam_four_t four)
+{
+    return (four[0] + four[1]) + (four[2] + four[3]);
+}
+
+/// The variance of what the row of a slot predicts.
+static bslam_real_t variance_of(const bslam_ekf_t *ekf, int slot)
+{
+    bslam_four_t sum = {0};
+    for (int at = 0; at < bslam_factor_places(&ekf->factor); at += 4) {
+        const bslam_four_t f = bslam_four(ekf->lambda[slot] + at);
+        sum += bslam_four(ekf->d + at) * (f * f);
+    }
+    return total(sum);
+}
+
+/// What two rows' predictions have in common.
 static bslam_real_t common(const bslam_ekf_t *ekf, int a, int b)
 {
-    bslam_real_t sum = 0;
-    for (int j = 0; j < bslam_factor_places(&ekf->factor); j++) {
-        sum += ekf->d[j] * (ekf->lambda[a][j] * ekf->lambda[b][j]);
+    bslam_four_t sum = {0};
+    for (int at = 0; at < bslam_factor_places(&ekf->factor); at += 4) {
+        sum += bslam_four(ekf->d + at) * (bslam_four(ekf->lambda[a] + at) * bslam_four(ekf->lambda[b] + at));
     }
-    return sum;
+    return total(sum);
 }
 
 static void make_room(bslam_ekf_t *ekf, int count)
@@ -273,11 +381,12 @@ static void make_room(bslam_ekf_t *ekf, int count)
 }
 
 /// Takes the measurement in the next slot.
-static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s, bslam_real_t variance)
+static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t variance)
 {
-    ekf->gain[ekf->pending_count] = innovation / s;
-    const bslam_waiting_t next = waiting(ekf, ekf->pending_count);
-    bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
+    const int slot = ekf->pending_count;
+    const bslam_waiting_t next = waiting(ekf, slot);
+    const bslam_real_t s = bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
+    ekf->gain[slot] = innovation / s;
     ekf->pending_count++;
     ekf->has_correction = true;
 }
@@ -287,8 +396,9 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
 {
     make_room(ekf, 1);
     const int slot = ekf->pending_count;
+    bslam_ekf_look(ekf, row, 0, bslam_factor_places(&ekf->factor), ekf->lambda[slot]);
     const bslam_real_t left = innovation - foresee(ekf, row, slot);
-    accept(ekf, left, common(ekf, slot, slot) + variance, variance);
+    accept(ekf, left, variance);
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
@@ -304,6 +414,18 @@ static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_
     return BSLAM_OK;
 }
 
+/// Both rows of a sighting, or the one that it has, into the next slots.
+static void look_sighting(bslam_ekf_t *ekf, const bslam_innovation_t *innovation)
+{
+    bslam_real_t *bearing = ekf->lambda[ekf->pending_count], *range = ekf->lambda[ekf->pending_count + 1];
+    const int places = bslam_factor_places(&ekf->factor);
+    if (innovation->has_range) {
+        look_twice(ekf, &innovation->bearing_row, &innovation->range_row, 0, places, bearing, range);
+    } else {
+        bslam_ekf_look(ekf, &innovation->bearing_row, 0, places, bearing);
+    }
+}
+
 bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                               const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
@@ -311,12 +433,13 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
     const int of_bearing = ekf->pending_count, of_range = of_bearing + 1;
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
+    look_sighting(ekf, innovation);
     const bslam_real_t bearing_left =
         innovation->bearing_rad - foresee(ekf, &innovation->bearing_row, of_bearing);
-    hph.yy = common(ekf, of_bearing, of_bearing);
+    hph.yy = variance_of(ekf, of_bearing);
     if (innovation->has_range) {
         range_left = innovation->range_m - foresee(ekf, &innovation->range_row, of_range);
-        hph.xx = common(ekf, of_range, of_range);
+        hph.xx = variance_of(ekf, of_range);
         hph.xy = common(ekf, of_range, of_bearing);
     }
     const bslam_sym2_t s = {.xx = innovation->has_range ? hph.xx + innovation->range_var_m2 : 1,
@@ -330,13 +453,13 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
         return status;
     }
     const bslam_real_t bearing_var = innovation->bearing_var_rad2 / fusion->weight;
-    accept(ekf, bearing_left, hph.yy + bearing_var, bearing_var);
+    accept(ekf, bearing_left, bearing_var);
     if (innovation->has_range) {  // conditional on the bearing
         const bslam_waiting_t bearing = waiting(ekf, of_bearing);
         const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
         range_left -= bearing.gain *
                       bslam_factor_carry(&bearing, bslam_factor_places(&ekf->factor), ekf->lambda[of_range]);
-        accept(ekf, range_left, common(ekf, of_range, of_range) + range_var, range_var);
+        accept(ekf, range_left, range_var);
     }
     return BSLAM_OK;
 }
@@ -376,7 +499,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     const bslam_turning_t turning = bslam_turning(turn_rad);
     move_position(ekf, BSLAM_STATE_X, &turning);
     move_angle(ekf, BSLAM_STATE_THETA);
-    for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
+    for (int i = BSLAM_STATE_FORWARD; i < bslam_ekf_map_at(ekf); i++) {
         move_value(ekf, i);
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
@@ -395,16 +518,30 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction: L's first columns. O(n).
+/// Four rows get so much of the heading's, which has `by_turn` of the turn rate's, if there is one.
+COPIED void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
+{
+    bslam_real_t *rows = bslam_factor_element(factor, at, 0);
+    *(bslam_four_at_t *)(rows + 4 * theta) += shift;
+    if (theta > 0) {
+        *(bslam_four_at_t *)rows += by_turn * shift;
+    }
+}
+
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions:
+/// L's first columns. O(n).
 static void transport_covariance(bslam_ekf_t *ekf)
 {
     bslam_factor_t *factor = &ekf->factor;
-    const int theta = bslam_ekf_place(ekf, BSLAM_STATE_THETA);
-    for (int i = 0; i < ekf->dim; i++) {
-        if (ekf->correction[i] != 0) {
-            bslam_factor_add_row(factor, bslam_ekf_place(ekf, i), theta, ekf->correction[i]);
-        }
+    const int tail = factor->tail_count, theta = bslam_ekf_place(ekf, BSLAM_STATE_THETA);
+    const bslam_real_t by_turn = theta > 0 ? *bslam_factor_element(factor, theta, 0) : 0;
+    memset(&ekf->correction[ekf->dim], 0, 3 * sizeof ekf->correction[0]);
+    for (int at = 0; at < factor->body_count; at += 4) {
+        shift_rows(factor, at, theta, by_turn, bslam_four(ekf->correction + at + tail));
     }
+    const bslam_real_t x = ekf->correction[BSLAM_STATE_X], y = ekf->correction[BSLAM_STATE_Y];
+    const bslam_four_t shift = tail == 2 ? (bslam_four_t){x, y, 0, 0} : (bslam_four_t){0, x, y, 0};
+    shift_rows(factor, bslam_factor_tail_at(factor), theta, by_turn, shift);
 }
 
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance)

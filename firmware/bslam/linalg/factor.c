@@ -10,15 +10,14 @@
 /// Variances below this are none: quotients by them would overflow.
 static const bslam_real_t VARIANCE_MIN = BSLAM_R(1e-30);
 
-static inline bslam_four_t load(const bslam_real_t *block, int j)
+COPIED bslam_four_t load(const bslam_real_t *block, int j)
 {
     return bslam_four(block + 4 * (size_t)j);
 }
 
-/// What four rows have of column j. (A function that is passed four numbers draws a note on how, from GCC.)
-static inline bslam_four_at_t *column(bslam_real_t *block, int j)
+COPIED void store(bslam_real_t *block, int j, bslam_four_t four)
 {
-    return (bslam_four_at_t *)(block + 4 * (size_t)j);
+    *(bslam_four_at_t *)(block + 4 * (size_t)j) = four;
 }
 
 bslam_real_t bslam_factor_get(const bslam_factor_t *factor, int i, int j)
@@ -88,46 +87,94 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by)
 /// A variance that becomes more than this many times larger leaves nothing to add to.
 static const bslam_real_t GROWTH_MAX = 4;
 
-/// What column j's own value takes of a sum; what its row has of w is p. The column becomes l + by (w - p l), or
-/// by w and what it is to *keep: the same, but where little is kept the first is a difference of large numbers.
-static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by, bslam_real_t *keep)
+/// What a column's own value takes of a sum; what its row has of w is p. *keep: of the column, 1 if that is
+/// added to. False: nothing.
+COPIED bool add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by,
+                       bslam_real_t *keep)
 {
-    const bslam_real_t sum = *d + *share * p * p;
-    *by = 0;
-    *keep = 1;
-    if (sum > VARIANCE_MIN && p != 0) {
-        const bslam_real_t left = *d / sum;
-        *keep = sum > GROWTH_MAX * *d ? left : 1;
-        *by = *share * p / sum;
-        *share *= left;
-        *d = sum;
+    const bslam_real_t scaled = *share * p, sum = *d + scaled * p;
+    if (!(sum > VARIANCE_MIN) || p == 0) {
+        return false;
+    }
+    const bslam_real_t inverse = 1 / sum, left = *d * inverse;
+    *keep = sum > GROWTH_MAX * *d ? left : 1;
+    *by = scaled * inverse;
+    *share *= left;
+    *d = sum;
+    return true;
+}
+
+/// A column of four rows, l, of which w had so much before it and has so much behind it.
+COPIED void add_to_column(bslam_real_t *l, bslam_real_t by, bslam_real_t keep, bslam_four_t before,
+                          bslam_four_t behind)
+{
+    const bslam_four_t old = bslam_four(l);
+    *(bslam_four_at_t *)l = keep < 1 ? keep * old + by * before : old + by * behind;
+}
+
+/// What goes through a factor: w and what columns have taken of it.
+typedef struct passing {
+    bslam_real_t *w, *by, *keep, *d;
+    bslam_real_t share;
+    int first;
+    int grown;  ///< behind the last column that keeps less than all: there the usual way is a difference of
+                ///< large numbers
+} passing_t;
+
+/// Four rows through the columns before theirs. Returns what is left of w.
+COPIED bslam_four_t pass_before(const passing_t *passing, bslam_real_t *block, int at)
+{
+    const bslam_real_t *w = passing->w, *by = passing->by;
+    bslam_four_t rest = bslam_four(w + at);
+    int j = passing->first;
+    for (; j < passing->grown && j < at; j++) {
+        const bslam_four_t before = rest;
+        rest -= w[j] * load(block, j);
+        add_to_column(block + 4 * j, by[j], passing->keep[j], before, rest);
+    }
+    for (; j < at; j++) {
+        const bslam_four_t l = load(block, j);
+        rest -= w[j] * l;
+        store(block, j, l + by[j] * rest);
+    }
+    return rest;
+}
+
+/// And through row `lane`'s own.
+COPIED void pass_own(passing_t *passing, bslam_real_t *block, int at, const int lane, bslam_four_t *rest)
+{
+    const int j = at + lane;
+    const bslam_real_t p = (*rest)[lane];
+    if (j < passing->first) {
+        return;
+    }
+    passing->w[j] = p;
+    passing->by[j] = 0;
+    passing->keep[j] = 1;
+    if (!add_to_own(&passing->d[j], p, &passing->share, &passing->by[j], &passing->keep[j])) {
+        *rest -= p * load(block, j);
+        return;
+    }
+    const bslam_four_t before = *rest;
+    *rest -= p * load(block, j);  // of its own row nothing is left
+    add_to_column(block + 4 * j, passing->by[j], passing->keep[j], before, *rest);
+    if (passing->keep[j] < 1) {
+        passing->grown = j + 1;
+        block[4 * j + lane] = 1;
     }
 }
 
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
                       bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
-    bslam_real_t *by = scratch[0], *keep = scratch[1];
-    if (!(share > 0)) {
-        return;
-    }
-    for (int at = first / 4 * 4; at < bslam_factor_places(factor); at += 4) {
+    passing_t passing = {w, scratch[0], scratch[1], factor->d, share, first, first};
+    for (int at = first / 4 * 4; share > 0 && at < bslam_factor_places(factor); at += 4) {
         bslam_real_t *block = block_of(factor, at);
-        bslam_four_t rest = bslam_four(w + at);
-        for (int j = first; j < at; j++) {
-            const bslam_four_t l = load(block, j), before = rest;
-            rest -= w[j] * l;
-            *column(block, j) = keep[j] < 1 ? keep[j] * l + by[j] * before : l + by[j] * rest;
-        }
-        for (int j = first > at ? first : at; j < at + 4; j++) {
-            const bslam_real_t p = rest[j - at];
-            add_to_own(&factor->d[j], p, &share, &by[j], &keep[j]);
-            const bslam_four_t l = load(block, j), before = rest;
-            rest -= p * l;  // of its own row nothing is left
-            *column(block, j) = keep[j] < 1 ? keep[j] * l + by[j] * before : l + by[j] * rest;
-            block[4 * j + j - at] = l[j - at];
-            w[j] = p;
-        }
+        bslam_four_t rest = pass_before(&passing, block, at);
+        pass_own(&passing, block, at, 0, &rest);
+        pass_own(&passing, block, at, 1, &rest);
+        pass_own(&passing, block, at, 2, &rest);
+        pass_own(&passing, block, at, 3, &rest);
     }
 }
 
@@ -196,11 +243,11 @@ void bslam_factor_remove(bslam_factor_t *factor, int first, int count, bslam_rea
         factor->d[i] = factor->d[i + count];
     }
     for (int j = first; j < left; j++) {
-        *column(factor->tail, j) = load(factor->tail, j + count);
+        store(factor->tail, j, load(factor->tail, j + count));
     }
     for (int i = left; i < bslam_factor_tail_at(factor); i++) {
         begin_row(factor, i, 0);
-        *column(factor->tail, i) = (bslam_four_t){0, 0, 0, 0};
+        store(factor->tail, i, (bslam_four_t){0, 0, 0, 0});
         factor->d[i] = 0;
     }
     move_tail(factor, left);
@@ -313,78 +360,109 @@ void bslam_factor_cut(bslam_factor_t *factor, int first)
 
 // ---- scalar measurements ----------------------------------------------------------------------------------
 
+/// Of four numbers, what those behind each sum up to, and `behind` with them.
+COPIED bslam_four_t sums_behind(bslam_four_t own, bslam_real_t behind)
+{
+    const bslam_real_t three = behind + own[3], two = three + own[2];
+    return (bslam_four_t){two + own[1], two, three, behind};
+}
+
 bslam_real_t bslam_factor_carry(const bslam_waiting_t *waiting, int places, bslam_real_t *f)
 {
     bslam_real_t sum = 0;
-    for (int j = places - 1; j >= 0; j--) {
-        const bslam_real_t before = f[j];
-        f[j] += waiting->lambda[j] * sum;
-        sum += waiting->v[j] * before;
+    for (int at = places - 4; at >= 0; at -= 4) {
+        const bslam_four_t before = bslam_four(f + at);
+        const bslam_four_t own = bslam_four(waiting->v + at) * before, behind = sums_behind(own, sum);
+        *(bslam_four_at_t *)(f + at) = before + bslam_four(waiting->lambda + at) * behind;
+        sum = behind[0] + own[0];
     }
     return sum;
 }
 
-void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance, bslam_real_t *d)
+bslam_real_t bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance,
+                                  bslam_real_t *d)
 {
-    bslam_real_t behind = variance, inverse = 1 / variance;
-    for (int j = places - 1; j >= 0; j--) {
-        const bslam_real_t f = waiting->lambda[j], v = d[j] * f, own = v * f, sum = behind + own;
-        const bslam_real_t sum_inverse = 1 / sum;
-        waiting->v[j] = v;
-        waiting->lambda[j] = -f * inverse;
+    bslam_real_t last = variance, last_inverse = 1 / variance;
+    for (int at = places - 4; at >= 0; at -= 4) {
+        const bslam_four_t f = bslam_four(waiting->lambda + at), before = bslam_four(d + at);
+        const bslam_four_t v = before * f, own = v * f, behind = sums_behind(own, last);
+        const bslam_four_t sum = behind + own, inverse = 1 / sum;
+        const bslam_four_t inverse_behind = {inverse[1], inverse[2], inverse[3], last_inverse};
         // A quotient near 1 is rounded to one side, a small difference is not.
-        d[j] = own < behind ? d[j] - v * (v * sum_inverse) : d[j] * (behind * sum_inverse);
-        behind = sum;
-        inverse = sum_inverse;
+        const bslam_four_t less = before - v * (v * inverse), part = before * (behind * inverse);
+        *(bslam_four_at_t *)(waiting->v + at) = v;
+        *(bslam_four_at_t *)(waiting->lambda + at) = -f * inverse_behind;
+        for (int k = 0; k < 4; k++) {
+            d[at + k] = own[k] < behind[k] ? less[k] : part[k];
+        }
+        last = sum[0];
+        last_inverse = inverse[0];
     }
+    return last;
 }
 
-/// Four rows through all columns of their block, from the last one on.
-COPIED void settle_rows(bslam_real_t *block, int columns, const bslam_waiting_t *waiting, const int count,
+/// Four rows through all columns of their block, from the last one on. The measurement that is taken last
+/// meets what those before it leave.
+COPIED void settle_rows(bslam_real_t *block, int columns, const bslam_waiting_t waiting[4], const int count,
                         bslam_real_t *change)
 {
-    bslam_four_t sums[4] = {{0}};
+    const bslam_real_t *v0 = waiting[0].v, *v1 = waiting[1].v, *v2 = waiting[2].v, *v3 = waiting[3].v;
+    const bslam_real_t *lambda0 = waiting[0].lambda, *lambda1 = waiting[1].lambda;
+    const bslam_real_t *lambda2 = waiting[2].lambda, *lambda3 = waiting[3].lambda;
+    bslam_four_t sum0 = {0}, sum1 = {0}, sum2 = {0}, sum3 = {0};
     for (int j = columns - 1; j >= 0; j--) {
-        bslam_four_t l = load(block, j);
-        for (int p = 0; p < count; p++) {
-            const bslam_four_t before = l;
-            l += waiting[p].lambda[j] * sums[p];
-            sums[p] += waiting[p].v[j] * before;
+        const bslam_four_t a = load(block, j), b = a + lambda0[j] * sum0;
+        sum0 += v0[j] * a;
+        if (count == 1) {
+            store(block, j, b);
+            continue;
         }
-        *column(block, j) = l;
+        const bslam_four_t c = b + lambda1[j] * sum1;
+        sum1 += v1[j] * b;
+        if (count == 2) {
+            store(block, j, c);
+            continue;
+        }
+        const bslam_four_t d = c + lambda2[j] * sum2;
+        sum2 += v2[j] * c;
+        store(block, j, count == 3 ? d : d + lambda3[j] * sum3);
+        sum3 += v3[j] * d;
     }
-    bslam_four_t all = bslam_four(change);
-    for (int p = 0; p < count; p++) {
-        all += waiting[p].gain * sums[p];
-    }
-    *(bslam_four_at_t *)change = all;
+    *(bslam_four_at_t *)change +=
+        waiting[0].gain * sum0 + waiting[1].gain * sum1 + waiting[2].gain * sum2 + waiting[3].gain * sum3;
 }
 
-COPIED void settle_all(bslam_factor_t *factor, const bslam_waiting_t *waiting, const int count,
+COPIED void settle_all(bslam_factor_t *factor, const bslam_waiting_t waiting[4], const int count,
                        bslam_real_t *change)
 {
-    for (int at = 0; at < bslam_factor_places(factor); at += 4) {
-        settle_rows(block_of(factor, at), at + 4, waiting, count, change + at);
+    const int body = factor->body_count;
+    for (int at = 0; at < body; at += 4) {
+        settle_rows(factor->body + bslam_factor_block_at(at), at + 4, waiting, count, change + at);
     }
+    const int at = BSLAM_FACTOR_PADDED(body);
+    settle_rows(factor->tail, at + 4, waiting, count, change + at);
 }
 
 void bslam_factor_settle(bslam_factor_t *factor, const bslam_waiting_t *waiting, int count,
                          bslam_real_t *change)
 {
+    bslam_waiting_t list[4];
+    for (int k = 0; k < 4; k++) {
+        list[k] = waiting[k < count ? k : 0];
+        list[k].gain = k < count ? list[k].gain : 0;
+    }
     switch (count) {
     case 1:
-        settle_all(factor, waiting, 1, change);
+        settle_all(factor, list, 1, change);
         break;
     case 2:
-        settle_all(factor, waiting, 2, change);
+        settle_all(factor, list, 2, change);
         break;
     case 3:
-        settle_all(factor, waiting, 3, change);
-        break;
-    case 4:
-        settle_all(factor, waiting, 4, change);
+        settle_all(factor, list, 3, change);
         break;
     default:
+        settle_all(factor, list, 4, change);
         break;
     }
 }

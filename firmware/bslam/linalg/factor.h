@@ -23,9 +23,9 @@ enum { BSLAM_FACTOR_TAIL_MAX = 3, BSLAM_FACTOR_GROWTH_MAX = 4 };
 
 /// n filled up to a multiple of four.
 #define BSLAM_FACTOR_PADDED(n) (((n) + 3) / 4 * 4)
-/// The largest body: two values of the robot, two a beacon, two more a ray; and room for three that come
-/// before those leave that they are made of.
-#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(2 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 3)
+/// The largest body: two values of the robot, four of the sensor, two a beacon, two more a ray; and room for
+/// seven that come before others leave: what a stored map hung on, or what a new value is made of.
+#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(6 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7)
 /// Places of the largest: the length of D, and of every vector that goes with it.
 #define BSLAM_FACTOR_PLACES_MAX (BSLAM_FACTOR_BODY_MAX + 4)
 
@@ -63,7 +63,8 @@ static inline const bslam_real_t *bslam_factor_row(const bslam_factor_t *factor,
 /// Element (i, j) of L, j <= i.
 static inline bslam_real_t *bslam_factor_element(bslam_factor_t *factor, int i, int j)
 {
-    bslam_real_t *rows = i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
+    bslam_real_t *rows =
+        i < factor->body_count ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail;
     return rows + 4 * (size_t)j + i % 4;
 }
 
@@ -123,8 +124,9 @@ typedef struct bslam_waiting {
 /// this one met. O(n).
 bslam_real_t bslam_factor_carry(const bslam_waiting_t *waiting, int places, bslam_real_t *f);
 
-/// Takes a measurement with this noise > 0 into D. O(n).
-void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance, bslam_real_t *d);
+/// Takes a measurement with this noise > 0 into D. Returns S, the variance of its innovation. O(n).
+bslam_real_t bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance,
+                                  bslam_real_t *d);
 
 /// Brings L up to date for `count` <= 4 measurements. change[places] += what they change of each value's
 /// mean. O(count n²).

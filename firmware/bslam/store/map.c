@@ -13,11 +13,13 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-/// What the values of a full map may hang on: two of the robot's, and the beacons'.
-enum { COLUMNS_MAX = 2 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
+/// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
+enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
 
 static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e30);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
+// A beacon may have moved away from where it began; no other value is as large.
+static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
@@ -64,11 +66,18 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
-    uint32_t column;  ///< of its first state value
+    uint32_t column;     ///< of its first state value
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } stored_beacon_t;
+
+static bslam_real_t move_value(bslam_codec_t *codec, bslam_real_t value)
+{
+    const bslam_real_t moved = bslam_codec_real(codec, value);
+    bslam_codec_require(codec, bslam_in_range(moved, -VALUE_MAX, VALUE_MAX), BSLAM_MAP_CONTENT);
+    return moved;
+}
 
 static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
@@ -81,8 +90,8 @@ static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
     beacon->sightings = bslam_codec_whole(codec, beacon->sightings, 4);
     record->scale = bslam_codec_real(codec, record->scale);
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
-    record->x_m = bslam_codec_real(codec, record->x_m);
-    record->y_m = bslam_codec_real(codec, record->y_m);
+    record->x_m = move_value(codec, record->x_m);
+    record->y_m = move_value(codec, record->y_m);
     bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     record->column = bslam_codec_whole(codec, record->column, 2);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
@@ -126,7 +135,7 @@ static void take_record(const target_t *target, const stored_beacon_t *record)
     beacon->known_scale = beacon->kind == BSLAM_BEACON_KNOWN ? record->scale : 0;
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
-    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->base_dim + (int32_t)record->column;
+    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_map_at(ekf) + (int32_t)record->column;
     if (bslam_slam_learns(target->slam)) {
         bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
         known->classifier =
@@ -201,7 +210,7 @@ static void read_factor(bslam_codec_t *codec, const header_t *header, const colu
                         bslam_ekf_t *ekf)
 {
     const uint32_t d_begins = codec->at;
-    const int first = ekf != NULL ? ekf->base_dim - ekf->factor.tail_count : 0;
+    const int first = ekf != NULL ? bslam_ekf_map_at(ekf) - ekf->factor.tail_count : 0;
     for (uint32_t c = 0; c < header->columns; c++) {
         const bslam_real_t d = bslam_codec_real(codec, 0);
         bslam_codec_require(codec, d >= 0, BSLAM_MAP_COVARIANCE);
@@ -227,7 +236,7 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 {
     for (int c = (int)header->columns - 1; c >= 0; c--) {
         if (!columns->are_values[c]) {
-            bslam_ekf_remove_value(ekf, ekf->base_dim + c);
+            bslam_ekf_remove_value(ekf, bslam_ekf_map_at(ekf) + c);
         }
     }
 }
@@ -236,16 +245,15 @@ static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_
 static void read_values(bslam_codec_t *codec, const header_t *header, const target_t *target,
                         const columns_t *columns)
 {
-    bslam_ekf_t *ekf =
-        target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
+    bslam_ekf_t *ekf = target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
     if (ekf != NULL) {
         bslam_factor_widen(&ekf->factor, (int)header->columns);
         ekf->dim += (int32_t)header->columns;
     }
     for (uint32_t c = 0; c < header->columns; c++) {
-        const bslam_real_t value = columns->are_values[c] ? bslam_codec_real(codec, 0) : 0;
+        const bslam_real_t value = columns->are_values[c] ? move_value(codec, 0) : 0;
         if (ekf != NULL) {
-            ekf->mean[ekf->base_dim + (int)c] = value;
+            ekf->mean[bslam_ekf_map_at(ekf) + (int)c] = value;
         }
     }
     read_factor(codec, header, columns, ekf);
@@ -286,9 +294,7 @@ static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beaco
 /// Of a beacon's first state value.
 static int column_of(const bslam_ekf_t *ekf, int index)
 {
-    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN
-               ? 0
-               : bslam_ekf_place(ekf, ekf->beacons[index].at);
+    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_place(ekf, ekf->beacons[index].at);
 }
 
 // ---- the whole --------------------------------------------------------------------------------------------
@@ -367,7 +373,8 @@ static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target)
     bslam_codec_require(codec, codec->at + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
     if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
-        target->slam->ekf.next_uid = header.next_uid;
+        uint32_t *next_uid = &target->slam->ekf.next_uid;
+        *next_uid = header.next_uid > *next_uid ? header.next_uid : *next_uid;
     }
 }
 

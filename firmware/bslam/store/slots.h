@@ -1,6 +1,6 @@
 /// A map in flash that survives a power cut at any moment: two slots, of which one always holds a whole map.
-/// A save erases the slot that is older or damaged, writes the map, reads it back, and only then the 16 bytes
-/// that make it the newer one. docs/MAP.md has the bytes.
+/// A save erases the slot that is older or damaged, writes the map, reads it back, and only then the piece
+/// that makes it the newer one. docs/MAP.md has the bytes.
 #ifndef BSLAM_STORE_SLOTS_H
 #define BSLAM_STORE_SLOTS_H
 

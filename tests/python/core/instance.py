@@ -9,14 +9,6 @@ from bslam.core import Slam
 from internals import inside, module_of
 
 
-def _places(slam: Slam) -> NDArray[np.int64]:
-    """(n,) where each value of the state stands in the factor: bslam_ekf_place."""
-    ekf = inside(slam).slam.ekf
-    tail, tail_at = ekf.factor.tail_count, -(-ekf.factor.body_count // 4) * 4
-    robot = [tail_at + tail - 2, tail_at + tail - 1, ekf.base_dim - tail - 1, tail_at, 0][: ekf.base_dim]
-    return np.array([*robot, *(np.arange(ekf.base_dim, ekf.dim) - tail)])
-
-
 def _array(slam: Slam, field: object) -> NDArray[np.float64]:
     """A member array of the instance, as a copy in double."""
     real = np.float64 if slam._raw.real == "double" else np.float32
@@ -34,16 +26,21 @@ def mean(slam: Slam) -> NDArray[np.float64]:
 
 
 def covariance(slam: Slam) -> NDArray[np.float64]:
-    """(n, n) its covariance, L D Lᵀ: bslam/linalg/factor.h."""
-    factor, places = inside(slam).slam.ekf.factor, _places(slam)
-    tail_at = -(-factor.body_count // 4) * 4
-    lower = np.zeros((tail_at + 4, tail_at + 4))
-    body, tail = _array(slam, factor.body), _array(slam, factor.tail)
-    for at in range(0, tail_at, 4):
-        begin = at * (at + 4) // 2
-        lower[at : at + 4, : at + 4] = body[begin : begin + 4 * (at + 4)].reshape(-1, 4).T
-    lower[tail_at:] = tail[: 4 * (tail_at + 4)].reshape(-1, 4).T
-    return ((lower * _array(slam, factor.d)[: tail_at + 4]) @ lower.T)[np.ix_(places, places)]
+    """(n, n) its covariance: L D Lᵀ of the factor (bslam/linalg/factor.h), in the state's order."""
+    ekf = inside(slam).slam.ekf
+    body, tail = int(ekf.factor.body_count), int(ekf.factor.tail_count)
+    places = -(-body // 4) * 4 + 4
+    flat = _array(slam, ekf.factor.body)
+    lower = np.zeros((places, places))
+    for at in range(0, places - 4, 4):
+        block = flat[at * (at + 4) // 2 :][: 4 * (at + 4)]
+        lower[at : at + 4, : at + 4] = block.reshape(-1, 4).T
+    lower[places - 4 :] = _array(slam, ekf.factor.tail)[: 4 * places].reshape(-1, 4).T
+    full = lower @ np.diag(_array(slam, ekf.factor.d)[:places]) @ lower.T
+    heading = int(ekf.base_dim) - tail - 1
+    robot = [places - 4 + tail - 2, places - 4 + tail - 1, heading, places - 4, 0][: int(ekf.base_dim)]
+    order = [*robot, *range(heading + 1, body)]
+    return full[np.ix_(order, order)]
 
 
 def beacons(slam: Slam) -> list[Any]:
@@ -69,10 +66,11 @@ def copy_of(slam: Slam) -> Slam:
 
 
 def state_without_counters(slam: Slam) -> bytes:
-    """Every byte of the instance but those that a refusal may change: the counters, and which sighting was
-    bad.
+    """Every byte of the instance but those that a refusal may change: the counters, which sighting was bad,
+    and stamps that were refused.
     """
-    return _blanked(slam, ("slam", "counters"), ("slam", "bad_sighting"), ("guard", "counters"))
+    changing = (("slam", name) for name in ("counters", "bad_sighting", "watch"))
+    return _blanked(slam, *changing, ("guard", "counters"))
 
 
 def state_without_addresses(slam: Slam) -> bytes:
