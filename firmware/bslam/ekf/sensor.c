@@ -15,7 +15,9 @@ void bslam_ekf_begin_sensor(bslam_ekf_t *ekf, const bslam_settings_t *settings)
     const int first = ekf->factor.body_count;
     bslam_factor_widen(&ekf->factor, BSLAM_SENSOR_DIM);
     for (int k = 0; k < BSLAM_SENSOR_DIM; k++) {
-        const bslam_real_t sd = settings->sensor_doubt * FIRST_SD[k];
+        // Distances that are too long and a way that is too short look the same: one scale can be a state.
+        const bool is_given = k == BSLAM_SENSOR_SCALE && settings->scale_states != 0;
+        const bslam_real_t sd = is_given ? 0 : settings->sensor_doubt * FIRST_SD[k];
         ekf->mean[ekf->base_dim + k] = k == BSLAM_SENSOR_SCALE ? 1 : 0;
         ekf->factor.d[first + k] = sd * sd;
     }
