@@ -111,7 +111,12 @@ static void look_twice(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam
                        bslam_real_t *f, bslam_real_t *g)
 {
     const looks_t looks = {from, to, a, b, f, g};
-    look(ekf, &looks, true);
+    if (a->at == b->at && a->dim == b->dim && a->sensor_dim == b->sensor_dim) {
+        look(ekf, &looks, true);
+    } else {
+        bslam_ekf_look(ekf, a, from, to, f);
+        bslam_ekf_look(ekf, b, from, to, g);
+    }
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
