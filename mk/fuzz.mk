@@ -68,4 +68,4 @@ adversary: build/adversary ## odd but legal settings and calls, a world behind t
 	@for profile in 0 1 2; do $< $$profile 0 $(ADVERSARY_SEEDS) $(ADVERSARY_STEPS) || exit 1; done
 
 adversary-short:
-	@$(MAKE) --no-print-directory adversary ADVERSARY_SEEDS=10
+	@$(MAKE) --no-print-directory adversary ADVERSARY_SEEDS=5
