@@ -354,7 +354,7 @@ typedef struct bslam_map_sink {
 } bslam_map_sink_t;
 
 /// Writes the confirmed beacons, their covariance and their classifiers. sink NULL: only counts. *bytes is
-/// how many there are. BSLAM_E_MAP: the sink failed. O(n² + samples), twice.
+/// how many there are. BSLAM_E_MAP: the sink failed, or a number is beyond 1e12. O(n² + samples), twice.
 BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
 
 /// Takes a stored map in place of the robot's own; the robot does not know where it is in it (bslam_set_pose,

@@ -16,7 +16,7 @@ enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 /// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
 enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
 
-static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e30);
+static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e12);  // so that what it is made of can be written again
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon may have moved away from where it began; no other value is as large.
 static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
@@ -277,9 +277,12 @@ static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf, const hea
     }
     for (int i = 0; i < (int)header->columns; i++) {
         const bslam_real_t *row = bslam_factor_row(factor, i);
+        bslam_real_t variance = 0;
         for (int j = 0; columns->are_values[i] && j < i; j++) {
-            (void)bslam_codec_real(codec, row[4 * j]);
+            const bslam_real_t value = bslam_codec_real(codec, row[4 * j]);
+            variance += (float)factor->d[j] * value * value;
         }
+        bslam_codec_require(codec, bslam_in_range(variance, 0, VARIANCE_MAX), BSLAM_MAP_COVARIANCE);
     }
 }
 
