@@ -17,6 +17,7 @@ Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 _FRAMES_MAX: Final = 4000  # more tell nothing new, and take time
+_SIGHTINGS_MAX: Final = 10_000
 _BEACONS_MAX: Final = 120  # so many, those seen most, make a map
 _SIGHTINGS_MIN: Final = 4  # of a beacon
 _LEAST_SD: Final = (1e-4, 1e-3)  # rad, m: a sensor without noise may be told
@@ -95,13 +96,14 @@ class Drive:
         return bool(np.isfinite(self.seen.range_m).all())
 
     def thinned(self) -> Drive:
-        """With at most so many frames, evenly in time, and so many beacons."""
+        """With at most about so many frames, evenly in time, sightings and beacons."""
         seen = self.seen
         often = np.argsort(-np.bincount(seen.label), kind="stable")[:_BEACONS_MAX]
         rows = np.flatnonzero(np.isin(seen.label, often))
-        slot = np.floor((seen.time_s[rows] - seen.time_s[0]) / np.ptp(seen.time_s) * _FRAMES_MAX)
         times_s, first, frame = np.unique(seen.time_s[rows], return_index=True, return_inverse=True)
-        if len(times_s) > _FRAMES_MAX:
+        most = min(_FRAMES_MAX, len(times_s) * _SIGHTINGS_MAX // len(rows))
+        slot = np.floor((seen.time_s[rows] - seen.time_s[0]) / np.ptp(seen.time_s) * most)
+        if len(times_s) > most:
             rows = rows[np.append(True, np.diff(slot[first]) > 0.0)[frame]]
         names, label = np.unique(seen.label[rows], return_inverse=True)
         kept = Seen(*(column[rows] for column in vars(seen).values()))

@@ -5,6 +5,7 @@ A sighting that contradicts its own beacon, and fits another one, moves nothing:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Final
 
@@ -42,9 +43,9 @@ class _Filter:
     """State x: pose, beacons' places; a beacon not seen yet has no part in it."""
 
     def __init__(self, problem: Problem, parameters: Floats) -> None:
-        seen, self.problem = problem.drive.seen, problem
+        seen, self.robot = problem.drive.seen, problem.drive.robot
         self.label = seen.label.tolist()
-        self.measured = np.column_stack([seen.bearing_rad + parameters[YAW], seen.range_m])
+        self.measured = np.column_stack([seen.bearing_rad + parameters[YAW], seen.range_m]).tolist()
         self.noise = (_SD_FACTOR * seen.sd) ** 2
         size = 3 + 2 * len(problem.drive.names)
         self.x, self.covariance = np.zeros(size), np.zeros((size, size))
@@ -92,28 +93,37 @@ class _Filter:
     def _seen(self, row: int, label: int) -> tuple[Floats, Floats, Floats]:
         """Innovation, its covariance, and the covariance of all else with it."""
         innovation, jacobian = self._innovation(row, label)
-        places = [0, 1, 2, 3 + 2 * label, 4 + 2 * label]
-        gain = self.covariance[:, places] @ jacobian.T
-        return innovation, jacobian @ gain[places] + np.diag(self.noise[row]), gain
+        own = slice(3 + 2 * label, 5 + 2 * label)
+        gain = self.covariance[:, :3] @ jacobian[:, :3].T + self.covariance[:, own] @ jacobian[:, 3:].T
+        spread = jacobian[:, :3] @ gain[:3] + jacobian[:, 3:] @ gain[own]
+        return innovation, spread + np.diag(self.noise[row]), gain
 
     def _innovation(self, row: int, label: int) -> tuple[Floats, Floats]:
         """With its Jacobian by pose and beacon, (2, 5)."""
-        offset, by_heading = (one[0] for one in self.problem.mounts(self.x[None, :3]))
-        way = self.x[3 + 2 * label : 5 + 2 * label] - self.x[:2] - offset
-        distance = np.hypot(*way) + 1e-9
-        along, across = way / distance, np.array([-way[1], way[0]]) / distance**2
-        bearing_rad, range_m = self.measured[row].tolist()
-        turned = bearing_rad - np.arctan2(way[1], way[0]) + self.x[2]
-        innovation = np.array([np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi, range_m - distance])
-        by_pose = [[*-across, -across @ by_heading - 1.0, *across], [*-along, -along @ by_heading, *along]]
-        return innovation, np.array(by_pose)
+        (bearing_rad, range_m), heading = self.measured[row], float(self.x[2])
+        offset_x, offset_y = self._offset()
+        dx = float(self.x[3 + 2 * label] - self.x[0]) - offset_x
+        dy = float(self.x[4 + 2 * label] - self.x[1]) - offset_y
+        distance = math.hypot(dx, dy) + 1e-9
+        c, s = dx / distance, dy / distance
+        across_x, across_y = -s / distance, c / distance
+        by_heading = -(s * offset_y + c * offset_x) / distance - 1.0, c * offset_y - s * offset_x
+        turned = math.remainder(bearing_rad - math.atan2(dy, dx) + heading, math.tau)
+        rows = [[-across_x, -across_y, by_heading[0], across_x, across_y], [-c, -s, by_heading[1], c, s]]
+        return np.array([turned, range_m - distance]), np.array(rows)
+
+    def _offset(self) -> tuple[float, float]:
+        """From the robot's middle to the sensor, in the map."""
+        c, s, robot = math.cos(self.x[2]), math.sin(self.x[2]), self.robot
+        return c * robot.sensor_x_m - s * robot.sensor_y_m, s * robot.sensor_x_m + c * robot.sensor_y_m
 
     def _add(self, row: int, label: int) -> None:
-        offset, by_heading = (one[0] for one in self.problem.mounts(self.x[None, :3]))
+        offset = np.array(self._offset())
         bearing_rad, range_m = self.measured[row]
         along = np.array([np.cos(self.x[2] + bearing_rad), np.sin(self.x[2] + bearing_rad)])
         across = range_m * np.array([-along[1], along[0]])
-        by_pose = np.column_stack([np.eye(2), by_heading + across])
+        by_heading = np.array([-offset[1], offset[0]]) + across
+        by_pose = np.column_stack([np.eye(2), by_heading])
         by_noise = np.column_stack([across, along])
         own, pose = slice(3 + 2 * label, 5 + 2 * label), self.covariance[:3, :3]
         self.x[own] = self.x[:2] + offset + range_m * along

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from bslam.log import ODOMETRY_COLUMNS, Log
-from bslam.logcheck.drive import Drive, Factors
+from bslam.logcheck.drive import Drive, Factors, Floats
 from bslam.logcheck.finding import Curve, Finding, Picture
 from bslam.logcheck.flow import Flow
 from bslam.logcheck.reference import Fitted
@@ -31,15 +31,16 @@ def is_gross(factor: float) -> bool:
 
 
 def unit_slip(log: Log, drive: Drive, flow: Flow) -> tuple[Factors, Finding] | None:
-    """The slip of units that explains the flow; None if it needs none. Several show one after the other."""
-    kind, what, columns, factors = min(_slips(log), key=lambda slip: _distance(slip[3], flow))
-    as_told = _distance(Factors(), flow)
+    """The slip of units that explains most of the flow; None if it needs none. Others may show after it."""
+    kind, what, columns, factors = min(_slips(log), key=lambda slip: _misfits(slip[3], flow).sum())
+    before, after = _misfits(Factors(), flow), _misfits(factors, flow)
+    is_mended = before.sum() - after.sum() > _GROSS and after[before != after].max() < _SAME
     sure = f"sightings show {flow.way:.4g} of odometry's way and {flow.turn:.4g} of its turn"
-    if log.odometry.kind == "velocity" and _speed(drive) > _FASTEST_MPS and as_told < _GROSS:
+    if not is_mended and log.odometry.kind == "velocity" and _speed(drive) > _FASTEST_MPS:
         what, columns = "v_mps and range_m are in millimetres", "v_mps and range_m"
         kind, factors = "units", Factors(way=1e-3, range=1e-3)
         sure += f"; as told it drives {_speed(drive):.0f} m/s"
-    elif as_told < _GROSS or _distance(factors, flow) > _SAME:
+    elif not is_mended:
         return None
     factor = next(one for one in vars(factors).values() if one != 1.0)
     return factors, Finding(kind, what, sure, f"multiply {columns} by {factor:.6g}", {"factor": factor})
@@ -62,12 +63,12 @@ def _slips(log: Log) -> Iterator[Slip]:
         yield "stamps", "odometry.csv: time_us is in milliseconds", "time_us", Factors(1e3, 1e3)
 
 
-def _distance(factors: Factors, flow: Flow) -> float:
-    """How far the flow is, as a logarithm, from what these factors would mend."""
+def _misfits(factors: Factors, flow: Flow) -> Floats:
+    """How far way and turn of the flow are, as logarithms, from what these factors would mend."""
     turns = sorted(abs(one) for one in (flow.turn, flow.turn_most) if math.isfinite(one) and one)
     turn = min(max(factors.turn, turns[0]), turns[-1]) / factors.turn if turns else 1.0
     way = abs(flow.way) * factors.range / factors.way if math.isfinite(flow.way) and flow.way else 1.0
-    return max(abs(math.log(turn)), abs(math.log(way)))
+    return np.abs(np.log([way, turn]))
 
 
 def _speed(drive: Drive) -> float:
