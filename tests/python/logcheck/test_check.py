@@ -1,0 +1,214 @@
+"""A log is tested before it is believed: what is planted is named, with what mends it, and nothing else."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bslam.log import first_steps
+from bslam.logcheck.check import check_log
+from bslam.world.simulate import load_scenario, simulate
+from logcheck.drives import exchanged, made_up, with_odometry, with_robot, with_sightings
+
+
+def found(log):
+    report = check_log(log)
+    return [one for one in report.findings if not one.is_note], report
+
+
+def the_one(log):
+    """The only finding."""
+    findings, _ = found(log)
+    assert len(findings) == 1, [one.what for one in findings]
+    return findings[0]
+
+
+@pytest.mark.parametrize("kind", ["wheels", "ticks", "velocity"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_check_a_good_log_finds_nothing(kind, seed):
+    findings, report = found(made_up(seed, kind=kind))
+    assert findings == []
+    assert report.untested == []
+    assert report.estimates["turn"]["value"] == pytest.approx(1.0, abs=0.03)
+    assert report.estimates["way"]["value"] == pytest.approx(1.0, abs=0.02)
+    half_a_row_s = 0.02  # within a row of odometry its noise hides the delay
+    assert report.estimates["delay"]["value"] == pytest.approx(0.0, abs=1.5 * half_a_row_s)
+
+
+@pytest.mark.parametrize(("sigma_mps", "steps"), [(0.05, 2000), (0.3, 2000)])
+def test_check_a_simulated_log_finds_nothing(sigma_mps, steps):
+    log = simulate(load_scenario("paper_room"), 11, sigma_mps, None)
+    assert found(first_steps(log, steps))[0] == []
+
+
+def mirrored(log):
+    return with_sightings(log, bearing_rad=-log.sightings.bearing_rad)
+
+
+def swapped(log):
+    return with_odometry(log, a=log.odometry.b, b=log.odometry.a)
+
+
+def test_check_mirrored_bearings_are_told_from_swapped_wheels_by_the_map():
+    one = the_one(mirrored(made_up()))
+    assert one.kind == "mirrored bearings"
+    assert one.mend == "multiply bearing_rad of sightings.csv by -1"
+    assert one.picture is not None
+    one = the_one(swapped(made_up()))
+    assert one.kind == "swapped wheels"
+    assert one.mend == "exchange the columns left_m and right_m"
+
+
+def test_check_mirrored_bearings_without_any_truth_names_both():
+    one = the_one(replace(mirrored(made_up()), beacons=None))
+    assert "bearings are mirrored, or left and right wheel are swapped" in one.what
+    assert "multiply bearing_rad" in one.mend and "exchange the columns" in one.mend
+
+
+def test_check_a_mirrored_map_is_not_blamed_on_the_robot():
+    log = made_up()
+    one = the_one(replace(log, beacons=replace(log.beacons, y_m=-log.beacons.y_m)))
+    assert one.kind == "mirrored bearings" and one.what.startswith("beacons.csv is mirrored")
+
+
+@pytest.mark.parametrize(("name", "factor"), [("millimetres", 1e3), ("centimetres", 1e2)])
+def test_check_a_wrong_unit_is_named_with_whose_it_is(name, factor):
+    log = made_up()
+    ranges = with_sightings(log, range_m=factor * log.sightings.range_m)
+    assert the_one(ranges).what == f"sightings.csv: range_m is in {name}"
+    both = with_odometry(ranges, a=factor * log.odometry.a, b=factor * log.odometry.b)
+    assert the_one(both).what.endswith(f"left_m and right_m and range_m are in {name}")
+    odometry = with_odometry(log, a=factor * log.odometry.a, b=factor * log.odometry.b)
+    assert the_one(odometry).what == f"odometry: left_m and right_m are in {name}"
+    beacons = replace(log.beacons, x_m=factor * log.beacons.x_m, y_m=factor * log.beacons.y_m)
+    one = the_one(replace(log, beacons=beacons))
+    assert (one.kind, one.mend.split(",")[0]) == (
+        "units",
+        f"multiply x_m and y_m of beacons.csv by {1 / factor:.4g}",
+    )
+
+
+def test_check_units_of_speeds_are_told_apart():
+    log = made_up(kind="velocity")
+    both = with_odometry(log, a=1e3 * log.odometry.a, b=np.degrees(log.odometry.b))
+    assert {(one.kind, one.mend) for one in found(both)[0]} == {
+        ("units", "multiply v_mps by 0.001"),
+        ("degrees", "multiply omega_radps by 0.0174533"),
+    }
+
+
+def test_check_directions_in_degrees_are_named():
+    log = made_up()
+    one = the_one(with_sightings(log, bearing_rad=np.degrees(log.sightings.bearing_rad)))
+    assert one.kind == "degrees" and "pi/180" in one.mend
+
+
+@pytest.mark.parametrize("delay_s", [0.12, 0.4, -0.2])
+def test_check_a_delay_is_named_with_the_setting_that_mends_it(delay_s):
+    log = made_up()
+    late_us = log.sightings.time_us + round(1e6 * delay_s)
+    one = the_one(with_sightings(log, time_us=late_us))
+    assert one.kind == "delay"
+    setting, value_us = one.mend.split("=")
+    assert setting == "--set sighting_delay_us"
+    assert int(value_us) == pytest.approx(1e6 * delay_s, abs=15_000)
+    if delay_s > 0.0:
+        told = with_robot(with_sightings(log, time_us=late_us), sighting_delay_us=int(value_us))
+        assert found(told)[0] == []
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_check_the_scale_of_the_way_is_named(factor):
+    log = made_up()
+    one = the_one(
+        with_robot(
+            with_odometry(log, a=factor * log.odometry.a, b=factor * log.odometry.b),
+            wheelbase_m=factor * log.robot.wheelbase_m,
+        )
+    )
+    assert one.mend.startswith("--set forward_scale=")
+    assert float(one.mend.split("=")[1]) == pytest.approx(1.0 / factor, rel=0.02)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_check_the_scale_of_the_turn_is_named(factor):
+    log = made_up()
+    one = the_one(with_robot(log, wheelbase_m=log.robot.wheelbase_m / factor))
+    assert one.mend.startswith("--set turn_scale=")
+    assert float(one.mend.split("=")[1]) == pytest.approx(1.0 / factor, rel=0.02)
+
+
+def test_check_one_wheel_of_another_size_is_named():
+    log = made_up(kind="ticks")
+    kinds = [one.what for one in found(with_robot(log, left_radius_m=1.08 * log.robot.left_radius_m))[0]]
+    assert any("left wheel goes" in what and "too far" in what for what in kinds)
+
+
+def test_check_ranges_off_by_a_tenth_are_told_from_a_long_way_by_the_beacons():
+    log = made_up()
+    one = the_one(with_sightings(log, range_m=1.1 * log.sightings.range_m))
+    assert one.what.startswith("beacons.csv is 0.9")
+
+
+def test_check_noise_told_too_small_is_named_and_too_large_noted():
+    log = made_up()
+    kinds = {"bearing_sigma_rad": 0.02, "range_sigma_fraction": 0.02, "range_sigma_floor_m": 0.02}
+    small = with_robot(log, **{key: value / 3.0 for key, value in kinds.items()})
+    findings = found(small)[0]
+    assert [one.kind for one in findings] == ["noise", "noise"]
+    for one in findings:
+        assert one.figures["single"] == pytest.approx(3.0, rel=0.15)
+    findings, report = found(with_robot(log, **{key: 6.0 * value for key, value in kinds.items()}))
+    assert findings == []
+    assert [one.kind for one in report.findings] == ["noise", "noise"]
+
+
+@pytest.mark.parametrize(("first_s", "last_s"), [(20.0, 45.0), (35.0, 60.0)])
+def test_check_labels_exchanged_for_a_while_are_named_with_when(first_s, last_s):
+    one = the_one(exchanged(made_up(), 1, 7, first_s, last_s))
+    assert one.kind == "identities"
+    assert sorted(one.figures["labels"]) == [1, 7]
+    row_s = 0.04  # times are from the first row of odometry
+    assert first_s - row_s <= one.figures["from_s"] < one.figures["until_s"] <= last_s
+    assert one.figures["until_s"] - one.figures["from_s"] > 0.6 * (last_s - first_s)
+
+
+def test_check_labels_exchanged_against_the_map_are_named():
+    one = the_one(exchanged(made_up(), 2, 5, 0.0, 1e6))
+    assert one.kind == "identities" and one.figures["labels"] == [2, 5] and "beacons.csv" in one.mend
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0])
+def test_check_missing_identities_are_counted(share):
+    log = made_up()
+    ids = log.sightings.beacon_id
+    blank = np.random.default_rng(0).random(len(ids)) < share
+    findings, report = found(with_sightings(log, beacon_id=np.where(blank, -1, ids)))
+    assert [one.what for one in findings] == [
+        f"{blank.sum()} of {len(ids)} sightings have no identity",
+    ]
+    assert len(report.untested) == (share == 1.0)
+
+
+def test_check_sightings_of_another_time_are_named():
+    log = made_up()
+    one = the_one(with_sightings(log, time_us=log.sightings.time_us + 10**9))
+    assert one.kind == "stamps" and "before or after odometry" in one.what
+
+
+def test_check_by_directions_alone_tests_signs_and_says_what_it_does_not():
+    log = mirrored(made_up())
+    blind = with_sightings(log, range_m=np.full(len(log.sightings.range_m), math.nan))
+    findings, report = found(blind)
+    assert [one.kind for one in findings] == ["mirrored bearings"]
+    assert any("no sighting has a distance" in one for one in report.untested)
+
+
+def test_check_a_robot_at_rest_or_on_a_straight_says_what_it_cannot_test():
+    log = made_up()
+    still = np.zeros(len(log.odometry.a))
+    findings, report = found(with_odometry(log, a=still, b=still))
+    assert findings == [] and len(report.untested) == 1
+    straight = found(with_odometry(log, a=log.odometry.a, b=log.odometry.a))[1]
+    assert any("hardly turns" in one for one in straight.untested)
