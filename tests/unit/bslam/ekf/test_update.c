@@ -326,7 +326,7 @@ static void test_distance2_is_the_textbooks(void **state)
     }
 }
 
-static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **state)
+static void test_row_covariances_of_any_two_sightings_is_the_textbooks(void **state)
 {
     const bslam_settings_t settings = params_of(0, true);
     unit_random_t random = {20};
@@ -341,10 +341,14 @@ static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **sta
             const dense_t rows = twin_rows(&ekf, &mount, i), others = twin_rows(&ekf, &mount, j);
             const dense_t columns = dense_transposed(&others);
             const dense_t p = dense_product(&rows, &twin.covariance), all = dense_product(&p, &columns);
-            assert_near(bslam_ekf_row_covariance(&ekf, &a.range_row, &b.bearing_row), all.at[0][1],
-                        TOLERANCE);
-            assert_near(bslam_ekf_row_covariance(&ekf, &a.bearing_row, &b.bearing_row), all.at[1][1],
-                        TOLERANCE);
+            const bslam_row_t of[] = {b.range_row, b.bearing_row, a.bearing_row};
+            bslam_real_t covariances[COUNT_OF(of)];
+            bslam_ekf_row_covariances(&ekf, &a.range_row, of, COUNT_OF(of), covariances);
+            assert_near(covariances[0], all.at[0][0], TOLERANCE);
+            assert_near(covariances[1], all.at[0][1], TOLERANCE);
+            bslam_ekf_row_covariances(&ekf, &a.bearing_row, of, COUNT_OF(of), covariances);
+            assert_near(covariances[0], all.at[1][0], TOLERANCE);
+            assert_near(covariances[1], all.at[1][1], TOLERANCE);
         }
     }
 }
@@ -797,7 +801,7 @@ int main(void)
         cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
-        cmocka_unit_test(test_row_covariance_of_any_two_sightings_is_the_textbooks),
+        cmocka_unit_test(test_row_covariances_of_any_two_sightings_is_the_textbooks),
         cmocka_unit_test(test_fuse_distance2_is_conditional_on_what_was_fused_before),
         cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),
