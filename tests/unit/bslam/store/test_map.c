@@ -434,16 +434,34 @@ static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
 
 static void test_map_load_of_a_variance_that_is_too_large_is_refused(void **state)
 {
-    put_float(d_at(1), 1e12f);  // as much as a number may be
-    seal();
-    load(BSLAM_MAP_LIVING);
-    put_float(l_at(2, 1), 1e9f);  // 1e30
+    put_float(d_at(1), 1e10f);
+    put_float(l_at(2, 1), 9);  // 8.1e11, and 1e12 is allowed
     seal();
     load(BSLAM_MAP_LIVING);
     assert_true(bslam_ekf_is_sane(&other.ekf));
-    put_float(l_at(2, 1), 1.1e9f);
+    put_float(l_at(2, 1), 11);
     seal();
     assert_refused(BSLAM_MAP_COVARIANCE);
+    put_float(l_at(2, 1), 0);
+    put_float(d_at(1), 1.1e12f);
+    seal();
+    assert_refused(BSLAM_MAP_COVARIANCE);
+}
+
+/// What a column that leaves had is the others' then: much of it, where they had hardly any.
+static void test_map_load_of_a_factor_with_large_numbers_can_be_saved(void **state)
+{
+    put_float(d_at(0), 1e10f);
+    put_float(d_at(1), 1e-24f);
+    put_float(l_at(1, 0), 1e-9f);
+    put_float(l_at(2, 0), 7);
+    seal();
+    load(BSLAM_MAP_LIVING);
+    covariance_assert_sound(&other.ekf.factor);
+    assert_near(bslam_ekf_covariance(&other.ekf, other.ekf.base_dim + 1, other.ekf.base_dim + 1), 49e10,
+                49e4);
+    size = kept_write(&other, bytes);
+    load(BSLAM_MAP_LIVING);
 }
 
 /// Whatever L is, with D >= 0 it is a covariance.
@@ -793,6 +811,7 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_with_a_negative_that_is_no_sample_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_of_a_variance_that_is_too_large_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_of_a_factor_with_large_numbers_can_be_saved, setup),
         cmocka_unit_test_setup(test_map_load_of_any_factor_gives_a_covariance, setup),
         cmocka_unit_test_setup(test_map_load_beside_beacons_that_are_not_saved_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_with_and_without_velocity_states_is_exact, setup),
