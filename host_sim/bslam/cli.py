@@ -15,6 +15,7 @@ from types import ModuleType
 
 from bslam.commands import (
     calibrate,
+    check,
     compare,
     console,
     export,
@@ -36,6 +37,7 @@ from bslam.errors import BslamError
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
     "replay": replay,
+    "check": check,
     "tables": tables,
     "sweep": sweep,
     "stress": stress,

@@ -29,8 +29,7 @@ static bool fill(const bslam_factor_t *factor)
     double sd[PLACES];
     size = 0;
     for (int n = 0; n < factor->body_count + factor->tail_count; n++) {
-        const int i =
-            n < factor->body_count ? n : bslam_factor_tail_at(factor) + n - factor->body_count;
+        const int i = n < factor->body_count ? n : bslam_factor_tail_at(factor) + n - factor->body_count;
         const double variance = covariance(factor, i, i);
         if (!(factor->d[i] >= 0) || !isfinite(variance)) {
             return false;

@@ -1,10 +1,11 @@
-// Hours of a life (world.h): lives it, feeds the filter, and compares it with the truth at each step. One line
-// a seed:
+// Hours of a life (world.h): lives it, feeds the filter, and compares it with the truth at each step. One
+// line a seed:
 //
 //     seed,hours,nees,nees_last_hour,nees_beacon,error_m,error_max_m,least_eigenvalue,repairs
 //
-// The filter has the library's own settings, and the noise that the room is made with. For a consistent filter
-// NEES of the pose is 3 in the mean, and that of a beacon's direction and inverse distance from the robot 2.
+// The filter has the library's own settings, and the noise that the room is made with. For a consistent
+// filter NEES of the pose is 3 in the mean, and that of a beacon's direction and inverse distance from the
+// robot 2.
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -76,9 +77,9 @@ static double judge_pose(const world_t *world, const world_t *start, double *err
     const double dy = world->y_m - start->y_m;
     const double sine = sin(start->theta_rad);
     const double cosine = cos(start->theta_rad);
-    const double e[3] = {
-        (double)pose.x_m - (cosine * dx + sine * dy), (double)pose.y_m - (cosine * dy - sine * dx),
-        remainder((double)pose.theta_rad - (world->theta_rad - start->theta_rad), 2 * PI)};
+    const double e[3] = {(double)pose.x_m - (cosine * dx + sine * dy),
+                         (double)pose.y_m - (cosine * dy - sine * dx),
+                         remainder((double)pose.theta_rad - (world->theta_rad - start->theta_rad), 2 * PI)};
     double lower[3][3];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j <= i; j++) {
@@ -144,7 +145,8 @@ static double judge_beacon(const world_t *world, int32_t label)
     const sight_t sight = sight_of(ekf, &ekf->beacons[index]);
     double bearing_rad, range_m, lower[3][3] = {{0}};
     see_truly(world, label, &bearing_rad, &range_m);
-    const double e[2] = {remainder(sight.bearing_rad - bearing_rad, 2 * PI), sight.inverse_per_m - 1 / range_m};
+    const double e[2] = {remainder(sight.bearing_rad - bearing_rad, 2 * PI),
+                         sight.inverse_per_m - 1 / range_m};
     for (int i = 0; i < sight.count; i++) {
         for (int j = 0; j < sight.count; j++) {
             const double p = definite_covariance(ekf, sight.values[i], sight.values[j]);
@@ -257,8 +259,7 @@ int main(int argc, char **argv)
     for (long seed = first; seed < first + seeds; seed++) {
         const long steps = minutes * (STEPS_AN_HOUR / 60);
         begin(life, (int32_t)filter_kind);
-        const outcome_t outcome =
-            soak(life, (uint64_t)seed, steps, standstill_s * (STEPS_AN_HOUR / 3600));
+        const outcome_t outcome = soak(life, (uint64_t)seed, steps, standstill_s * (STEPS_AN_HOUR / 3600));
         print_outcome(&outcome, (uint64_t)seed, steps);
     }
     return 0;

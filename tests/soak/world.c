@@ -101,18 +101,18 @@ static void shuttle(world_t *world)
 }
 
 static const life_t lives[] = {
-    {"drive", drive, ALL, .has_range = true, .has_speedometers = true},
-    {"rest", rest, ALL, .has_range = true},
-    {"park", park, ALL, .has_range = true},
-    {"spin", spin, ALL, .has_range = true},
-    {"shuttle", shuttle, ALL, .has_range = true},
-    {"one_beacon", drive, 1u << 1, .has_range = true},
-    {"doubt", drive, ALL, .has_range = true, .doubt_s = 60},
-    {"directions", drive, ALL},
-    {"rest_directions", rest, ALL},
-    {"park_directions", park, ALL},
-    {"spin_directions", spin, ALL},
-    {"doubt_directions", drive, ALL, .doubt_s = 300},
+    {"drive", drive, .in_view = ALL, .has_range = true, .has_speedometers = true},
+    {"rest", rest, .in_view = ALL, .has_range = true},
+    {"park", park, .in_view = ALL, .has_range = true},
+    {"spin", spin, .in_view = ALL, .has_range = true},
+    {"shuttle", shuttle, .in_view = ALL, .has_range = true},
+    {"one_beacon", drive, .in_view = 1u << 1, .has_range = true},
+    {"doubt", drive, .in_view = ALL, .has_range = true, .doubt_s = 60},
+    {"directions", drive, .in_view = ALL},
+    {"rest_directions", rest, .in_view = ALL},
+    {"park_directions", park, .in_view = ALL},
+    {"spin_directions", spin, .in_view = ALL},
+    {"doubt_directions", drive, .in_view = ALL, .doubt_s = 300},
 };
 
 const life_t *find_life(const char *name)
@@ -201,8 +201,7 @@ int look(world_t *world, bslam_sighting_t seen[BEACONS])
 bslam_settings_t settings_of(const life_t *life)
 {
     bslam_settings_t settings;
-    bslam_settings_preset(&settings,
-                          life->has_speedometers ? BSLAM_PRESET_PAPER : BSLAM_PRESET_REAL_WHEELS);
+    bslam_settings_preset(&settings, life->has_speedometers ? BSLAM_PRESET_PAPER : BSLAM_PRESET_REAL_WHEELS);
     settings.wheelbase_m = measured(WHEELBASE_M);
     const double wheel_sd_mps = life->has_speedometers ? SPEEDOMETER_SD_MPS : ENCODER_SD_MPS;
     settings.left_speed_sd_mps = settings.right_speed_sd_mps = measured(wheel_sd_mps);

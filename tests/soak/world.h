@@ -1,6 +1,6 @@
 /// A room, as the paper's without its middle wall, a robot that leads one of several lives in it, and what
-/// its sensors say. All of it in double, whatever the filter's scalar; what is measured is rounded to float32:
-/// the float build and its double twin get the same numbers.
+/// its sensors say. All of it in double, whatever the filter's scalar; what is measured is rounded to
+/// float32: the float build and its double twin get the same numbers.
 #ifndef SOAK_WORLD_H
 #define SOAK_WORLD_H
 

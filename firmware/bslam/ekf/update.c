@@ -153,7 +153,8 @@ static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bsl
     for (int from = 0; from < places; from += COLUMNS) {
         const int to = from + COLUMNS < places ? from + COLUMNS : places;
         bslam_real_t of_a[COLUMNS], of_b[COLUMNS];
-        look_twice(ekf, a, b, from, to, of_a, of_b);
+        bslam_ekf_look(ekf, a, from, to, of_a);
+        bslam_ekf_look(ekf, b, from, to, of_b);
         for (int j = 0; j < to - from; j++) {
             const bslam_real_t d = ekf->factor.d[from + j];
             sums.ab += d * of_a[j] * of_b[j];

@@ -83,12 +83,14 @@ static uint32_t add_word(uint32_t sum, uint32_t word)
     return (sum ^ word) * UINT32_C(16777619);  // FNV-1a
 }
 
-/// Of a number 32 bits: in double those that differ from one measurement to the next.
 static uint32_t add_number(uint32_t sum, bslam_real_t number)
 {
-    uint32_t word;
-    memcpy(&word, &number, sizeof word);
-    return add_word(sum, word);
+    uint32_t words[sizeof number / sizeof(uint32_t)];
+    memcpy(words, &number, sizeof words);
+    for (size_t w = 0; w < sizeof words / sizeof words[0]; w++) {
+        sum = add_word(sum, words[w]);
+    }
+    return sum;
 }
 
 /// What tells a frame from others; 0: none does, it is empty.
@@ -102,9 +104,13 @@ static uint32_t sum_of(int64_t time_us, const bslam_sighting_t *sightings, int c
     return count > 0 ? sum : 0;
 }
 
-static bool was_taken(const bslam_slam_t *slam, uint32_t sum)
+/// What is newer than all frames was not.
+static bool was_taken(const bslam_slam_t *slam, int64_t behind_us, uint32_t sum)
 {
     bool found = false;
+    if (slam->elapsed_us - behind_us > slam->moment_us) {
+        return found;
+    }
     for (int f = 0; f < BSLAM_HISTORY_MAX; f++) {
         found = found || (sum != 0 && slam->frames[f] == sum);
     }
@@ -141,5 +147,6 @@ bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const
     }
     *behind_us = bslam_slam_behind_us(slam, time_us - slam->settings.sighting_delay_us);
     const bool in_reach = *behind_us >= -slam->settings.ahead_max_us && is_remembered(slam, *behind_us);
-    return in_reach && !was_taken(slam, sum_of(time_us, sightings, count)) ? BSLAM_OK : BSLAM_E_TIME;
+    return in_reach && !was_taken(slam, *behind_us, sum_of(time_us, sightings, count)) ? BSLAM_OK
+                                                                                       : BSLAM_E_TIME;
 }

@@ -30,7 +30,7 @@ _COLUMNS = (
 )
 HEADINGS = [heading for heading, _ in _COLUMNS]
 _MOST_ROWS = 40
-_MOST_REMARKS = 20
+_MOST_NOTES = 20
 
 
 def finish(
@@ -49,19 +49,24 @@ def finish(
     for outcome in result.outcomes:
         if outcome.crash is not None:
             print(f"{outcome.name} failed:\n{outcome.crash}", file=sys.stderr)
-    remarks = [f"{one['name']}: {text}" for one in entries for text in one.get("notes", ())]
-    for text in remarks[:_MOST_REMARKS]:
-        print(text, file=sys.stderr)
-    if len(remarks) > _MOST_REMARKS:
-        print(f"{len(remarks) - _MOST_REMARKS} more notes in summary.json", file=sys.stderr)
-    problems = [f"{one['name']}: {text}" for one in entries for text in one.get("problems", ())]
-    for text in problems:
-        print(text, file=sys.stderr)
+    fit = _say_remarks(entries)
     if result.interrupted:
         print("stopped: what was finished is kept", file=sys.stderr)
     if result.bad_input is not None:
         raise BslamError(result.bad_input)
-    return 0 if result.ok and not problems else 1
+    return 0 if result.ok and fit else 1
+
+
+def _say_remarks(entries: Sequence[dict[str, Any]]) -> bool:
+    """What is to be said of each run; whether none has a problem."""
+    notes, problems = (
+        [f"{one['name']}: {text}" for one in entries for text in one.get(key, ())]
+        for key in ("notes", "problems")
+    )
+    more = [f"{len(notes) - _MOST_NOTES} more notes in summary.json"] if len(notes) > _MOST_NOTES else []
+    for text in [*notes[:_MOST_NOTES], *more, *problems]:
+        print(text, file=sys.stderr)
+    return not problems
 
 
 def _say_each(what: str, words: Sequence[str]) -> None:

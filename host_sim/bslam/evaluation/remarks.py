@@ -23,7 +23,7 @@ def notes_on(log: Log, trace: Trace, options: RunOptions) -> list[str]:
     """What was left out, refused or taken for granted."""
     notes = list(log.notes)
     if options.sensor == "recorded":
-        notes += _of_odometry(log, options) + _of_identities(log, options) + _of_beacons(log)
+        notes += _of_odometry(log, options) + _of_identities(log, options) + _of_truth(log) + _of_beacons(log)
     refused = sum(trace.refusals.values())
     if refused:
         by_status = ", ".join(f"{name} {count}" for name, count in sorted(trace.refusals.items()))
@@ -71,11 +71,25 @@ def _of_odometry(log: Log, options: RunOptions) -> list[str]:
 
 
 def _of_identities(log: Log, options: RunOptions) -> list[str]:
-    if has_identities(log) or len(log.sightings.time_us) == 0:
+    nameless = int((log.sightings.beacon_id[log.sightings.mappable] < 0).sum())
+    if nameless <= _MANY * len(log.sightings.time_us):
         return []
+    if has_identities(log):
+        unused = f"{nameless} of {len(log.sightings.time_us)} sightings have no identity, and are not used"
+        return [f"{unused} by --association known"] if options.association == "known" else []
     if options.association == "known":
         return ["no sighting has an identity: --association mahalanobis, joint or nearest needs none"]
     return [f"no sighting has an identity: --association {options.association} tells whose each is"]
+
+
+def _of_truth(log: Log) -> list[str]:
+    if log.truth is None:
+        return []
+    drive_us, true_us = log.odometry.time_us[[0, -1]], log.truth.time_us[[0, -1]]
+    if true_us[0] <= drive_us[1] and drive_us[0] <= true_us[1]:
+        return []
+    spans = [f"{one[0] * 1e-6:.3f} to {one[1] * 1e-6:.3f} s" for one in (true_us, drive_us)]
+    return [f"the truth, {spans[0]}, is of another time than odometry, {spans[1]}"]
 
 
 def _of_beacons(log: Log) -> list[str]:

@@ -150,7 +150,7 @@ def beacons_to_hold(log: Log, options: RunOptions) -> int:
     if is_known:  # and for competitors of one label
         room = true_beacons + (true_beacons - 1) // SIZE_CLASSES[0]
     elif given or len(sighted):
-        room = max(2 * true_beacons, FALSE_BEACONS_ROOM)
+        room = max(true_beacons + true_beacons // 2, FALSE_BEACONS_ROOM)
     else:
         room = most
     return max(true_beacons, min(room, most))

@@ -112,6 +112,15 @@ def test_a_truth_without_headings_is_as_good_for_positions(replay, drive):
     assert np.isfinite(np.loadtxt(replay.out / "circle.truth.tum")).all()
 
 
+def test_a_truth_of_another_time_is_said_to_be(replay, drive):
+    later = replace(drive, truth=replace(drive.truth, time_us=drive.truth.time_us + 60_000_000))
+    entry, text = replay(later)
+    assert "position_error_m" not in entry
+    assert (
+        "circle: the truth, 60.000 to 72.000 s, is of another time than odometry, 0.040 to 12.000 s\n" in text
+    )
+
+
 def test_a_map_without_truth_has_an_error(replay, drive):
     moved = elsewhere(drive, Rigid(2.0, 30.0, -7.0))
     whole, _ = replay(moved)
@@ -155,6 +164,15 @@ def test_known_association_without_identities_has_used_nothing_and_says_so(repla
     assert entry["problems"][0].startswith(
         "most of the log was not used: 0 of 601 inputs refused, 903 of 903"
     )
+
+
+def test_sightings_without_identity_beside_others_are_said_not_to_be_used(replay, drive):
+    some = drive.sightings.beacon_id.copy()
+    some[drive.sightings.beacon_id == 5] = -1
+    partial = replace(drive, sightings=replace(drive.sightings, beacon_id=some))
+    _, text = replay(partial)
+    assert "circle: 301 of 903 sightings have no identity, and are not used by --association known\n" in text
+    assert "no identity" not in replay(partial, "--association", "mahalanobis")[1]
 
 
 def test_identities_that_are_words_come_out_as_they_went_in(replay, drive):
