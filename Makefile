@@ -89,9 +89,9 @@ PYTEST_HALF := tests/python/runs tests/python/target tests/python/tools
 
 .PHONY: test pytest pytest-half pytest-rest
 test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak, firmware in QEMU, pytest
-	@$(MAKE) --no-print-directory --keep-going --jobs=2 pytest lint unit replay soak-short check-sizes \
-	    || { echo "make test: FAILED, see above" >&2; exit 1; }
-	@echo "make test: all passed (lint, C unit tests, fuzz inputs, a short soak, firmware and its sizes, pytest)"
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 pytest lint unit replay soak-short adversary-short \
+	    check-sizes || { echo "make test: FAILED, see above" >&2; exit 1; }
+	@echo "make test: all passed (lint, C unit tests, fuzz inputs, short lives, firmware and its sizes, pytest)"
 
 pytest: pytest-half pytest-rest ## the Python tests only
 

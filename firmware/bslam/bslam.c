@@ -191,10 +191,13 @@ bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t position_sd_m, bslam_r
         return status;
     }
     check_members(instance);
+    status = bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad);
 #if BSLAM_RECOVERY
-    bslam_recovery_restart(&instance->recovery);
+    if (status == BSLAM_OK) {
+        bslam_recovery_restart(&instance->recovery);
+    }
 #endif
-    return ended(robot, bslam_slam_resume_odometry(&instance->slam, position_sd_m, heading_sd_rad));
+    return ended(robot, status);
 #else
     (void)robot;
     (void)position_sd_m;

@@ -335,8 +335,8 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_CLASSIFIERS,  ///< classifiers, samples or negatives beyond what this build holds
     BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
     BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range: a place beyond 20 km
-    BSLAM_MAP_COVARIANCE,  ///< a D below 0 in its factor, or a variance beyond 1e12
-    BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, or reads otherwise than before; the sink fails
+    BSLAM_MAP_COVARIANCE,   ///< a D below 0 in its factor, or a variance beyond 1e12
+    BSLAM_MAP_UNREADABLE,   ///< the source cannot be read, or reads otherwise than before; the sink fails
     BSLAM_MAP_FAULT_COUNT
 } bslam_map_fault_t;
 
@@ -354,7 +354,7 @@ typedef struct bslam_map_sink {
 } bslam_map_sink_t;
 
 /// Writes the confirmed beacons, their covariance and their classifiers. sink NULL: only counts. *bytes is
-/// how many there are. BSLAM_E_MAP: the sink failed. O(n² + samples), twice.
+/// how many there are. BSLAM_E_MAP: the sink failed, or a number is beyond 1e12. O(n² + samples), twice.
 BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
 
 /// Takes a stored map in place of the robot's own; the robot does not know where it is in it (bslam_set_pose,

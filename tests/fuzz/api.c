@@ -19,8 +19,8 @@ static bslam_slam_t *slam_of(bslam_t *one)
     return &bslam_instance(one)->slam;
 }
 
-/// What a refused call may have touched: counters, the sighting at fault, after a jump the tick reference. And
-/// the seal over all of them.
+/// What a refused call may have touched: counters, the sighting at fault, after a jump the tick reference.
+/// And the seal over all of them.
 static void require_unchanged(bslam_status_t status)
 {
     bslam_slam_t *was = slam_of(&before);
@@ -227,5 +227,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
         fuzz_require_sound(slam_of(&robot));
     }
+    (void)fuzz_require_kept(slam_of(&robot));
     return 0;
 }

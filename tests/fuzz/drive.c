@@ -240,5 +240,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         happen(&input, &world);
         fuzz_require_sound(&robot.slam);
     }
+    (void)fuzz_require_kept(&robot.slam);
     return 0;
 }

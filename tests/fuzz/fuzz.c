@@ -3,8 +3,18 @@
 
 #include <string.h>
 
-#include "base/trig.h"
 #include "base/scalar.h"
+#include "base/trig.h"
+#include "bslam/store/map.h"
+
+#include "definite.h"
+#include "map_memory.h"
+
+enum { BLOB_MAX = 1 << 18 };
+
+/// What double leaves of an eigenvalue that is 0; and what float does, where values are taken out, of a
+/// variance.
+static const double EIGENVALUE_ROUNDING = 1e-9, VARIANCE_ROUNDING = 1e-4;
 
 static void require_finite(const bslam_ekf_t *ekf)
 {
@@ -36,14 +46,14 @@ static void require_factor(const bslam_factor_t *factor)
 static void require_counts(const bslam_ekf_t *ekf)
 {
     bool is_taken[BSLAM_STATE_MAX] = {false};
-    int32_t dim = ekf->base_dim;
+    int32_t dim = bslam_ekf_map_at(ekf);
     int32_t rays = 0;
     fuzz_require(ekf->beacon_count >= 0 && ekf->beacon_count <= BSLAM_BEACONS_MAX);
     for (int b = 0; b < ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &ekf->beacons[b];
         fuzz_require(beacon->uid < ekf->next_uid && (b == 0 || beacon->uid > ekf->beacons[b - 1].uid));
         for (int at = beacon->at; at < beacon->at + bslam_beacon_dim(beacon->kind); at++) {
-            fuzz_require(at >= ekf->base_dim && at < ekf->dim && !is_taken[at]);
+            fuzz_require(at >= bslam_ekf_map_at(ekf) && at < ekf->dim && !is_taken[at]);
             is_taken[at] = true;
             dim++;
         }
@@ -70,6 +80,79 @@ void fuzz_require_sound(const bslam_slam_t *slam)
     const bslam_slam_counters_t *counters = &slam->counters;
     fuzz_require(counters->matched + counters->added + counters->rejected + counters->deferred ==
                  counters->sightings);
+}
+
+// ---- keeping ----------------------------------------------------------------------------------------------
+
+/// Larger than a map may have: as an element of L or D, or as a variance.
+static bool has_large_number(const bslam_ekf_t *ekf)
+{
+    const bslam_factor_t *factor = &ekf->factor;
+    double largest = 0;
+    for (int i = 0; i < factor->body_count; i++) {
+        largest = fmax(largest, (double)bslam_factor_get(factor, i, i));
+        for (int j = 0; j < i; j++) {
+            largest = fmax(largest, fabs((double)bslam_factor_row(factor, i)[4 * j]));
+        }
+    }
+    return largest > 0.999e12;
+}
+
+/// The map's bytes; 0 of them where a number is too large to be kept.
+static uint32_t save(const bslam_slam_t *slam, uint8_t bytes[BLOB_MAX])
+{
+    map_memory_t memory = {bytes, BLOB_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    const bslam_status_t status = bslam_map_write(slam, &sink, &fault);
+    fuzz_require(status == BSLAM_OK || has_large_number(&slam->ekf));
+    return status == BSLAM_OK ? memory.count : 0;
+}
+
+static void load(bslam_slam_t *slam, const uint8_t *bytes, uint32_t size)
+{
+    const bslam_map_source_t source = map_from_memory(bytes, size);
+    bslam_map_fault_t fault;
+    fuzz_require(bslam_map_check(&source) == BSLAM_MAP_FINE);
+    fuzz_require(bslam_map_load(slam, &source, BSLAM_MAP_LIVING, &fault) == BSLAM_OK);
+}
+
+/// Of each beacon that both have, what is known of its values.
+static void require_same_beacons(const bslam_ekf_t *a, const bslam_ekf_t *b)
+{
+    for (int i = 0, k = 0; k < b->beacon_count; k++) {
+        while (a->beacons[i].uid != b->beacons[k].uid) {
+            i++;
+        }
+        for (int v = 0; v < bslam_beacon_dim(b->beacons[k].kind); v++) {
+            const int of_a = a->beacons[i].at + v, of_b = b->beacons[k].at + v;
+            const double was = definite_covariance(a, of_a, of_a), is = definite_covariance(b, of_b, of_b);
+            fuzz_require((float)a->mean[of_a] == (float)b->mean[of_b]);
+            fuzz_require(fabs(is - was) <= VARIANCE_ROUNDING * was + 1e-30);
+        }
+    }
+}
+
+bool fuzz_require_kept(const bslam_slam_t *slam)
+{
+    static bslam_slam_t other;
+    static uint8_t bytes[BLOB_MAX], again[BLOB_MAX];
+    fuzz_require(definite_least_eigenvalue(&slam->ekf.factor) >= -EIGENVALUE_ROUNDING);
+    memcpy(&other, slam, sizeof other);
+    other.appearance = NULL;
+    other.smoother = NULL;
+    const uint32_t size = save(&other, bytes);
+    if (size == 0) {
+        return false;
+    }
+    load(&other, bytes, size);
+    require_same_beacons(&slam->ekf, &other.ekf);
+    const uint32_t left = save(&other, bytes);  // what its values hung on is gone now
+    if (left > 0) {
+        load(&other, bytes, left);
+        fuzz_require(save(&other, again) == left && memcmp(bytes, again, left) == 0);
+    }
+    return left > 0;
 }
 
 // ---- a map ------------------------------------------------------------------------------------------------

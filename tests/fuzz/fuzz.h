@@ -52,6 +52,11 @@ int64_t fuzz_time(fuzz_input_t *input, int64_t now_us);
 /// accounts can be read.
 void fuzz_require_sound(const bslam_slam_t *slam);
 
+/// Holds too, and takes longer: no eigenvalue of the correlations is negative, in double. The map can be
+/// kept: what is saved loads, says the same of the beacons, and is saved as the same bytes from then on.
+/// False: it has a number beyond those of a map, and was refused.
+bool fuzz_require_kept(const bslam_slam_t *slam);
+
 /// A pipeline that has a map of three beacons, one of them in direction only, and, where looks are given,
 /// machines that know them. Always the same.
 void fuzz_make_map(bslam_slam_t *slam, bslam_appearance_t *appearance);

@@ -94,8 +94,8 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
     const int at = beacon->at + BSLAM_POINT_DIM;
     bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
-    bslam_real_t scale_var = is_sized ? bslam_ekf_covariance(ekf, at, at)
-                                      : bslam_unknown_scale_var(&slam->settings, sighting);
+    bslam_real_t scale_var =
+        is_sized ? bslam_ekf_covariance(ekf, at, at) : bslam_unknown_scale_var(&slam->settings, sighting);
     if (beacon->known_scale > 0) {
         scale = beacon->known_scale;
         scale_var = 0;

@@ -289,9 +289,12 @@ static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf, const hea
     }
     for (int i = 0; i < (int)header->columns; i++) {
         const bslam_real_t *row = bslam_factor_row(factor, i);
+        bslam_real_t variance = columns->are_values[i] ? (float)factor->d[i] : 0;
         for (int j = 0; columns->are_values[i] && j < i; j++) {
-            (void)move_factor(codec, row[4 * j]);
+            const bslam_real_t value = move_factor(codec, row[4 * j]);
+            variance += (float)factor->d[j] * value * value;
         }
+        bslam_codec_require(codec, bslam_in_range(variance, 0, VARIANCE_MAX), BSLAM_MAP_COVARIANCE);
     }
 }
 

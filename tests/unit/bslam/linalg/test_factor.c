@@ -575,8 +575,7 @@ static void test_measure_never_takes_more_than_there_is(void **state)
             bslam_factor_measure(&waiting[0], bslam_factor_places(&factor), variance, factor.d);
             bslam_factor_settle(&factor, waiting, 1, change);
             covariance_assert_sound(&factor);
-            assert_true((double)bslam_factor_get(&factor, place(0), place(0)) <=
-                        before * (1 + TOLERANCE));
+            assert_true((double)bslam_factor_get(&factor, place(0), place(0)) <= before * (1 + TOLERANCE));
         }
     }
 }
@@ -634,8 +633,8 @@ static void test_any_row_of_operations_is_that_of_the_dense_matrix(void **state)
     }
 }
 
-/// Numbers from a hundred millionth to a hundred million, without any order: no D below 0, and none that is no
-/// number.
+/// Numbers from a hundred millionth to a hundred million, without any order: no D below 0, and none that is
+/// no number.
 static void test_absurd_numbers_leave_a_covariance(void **state)
 {
     unit_random_t random = {18};

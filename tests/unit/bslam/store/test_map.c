@@ -439,6 +439,7 @@ static void test_map_load_of_a_variance_that_is_too_large_is_refused(void **stat
     seal();
     load(BSLAM_MAP_LIVING);
     assert_true(bslam_ekf_is_sane(&other.ekf));
+    assert_int_equal(kept_write(&other, bytes), size);
     put_float(l_at(2, 1), 11);
     seal();
     assert_refused(BSLAM_MAP_COVARIANCE);
@@ -462,6 +463,22 @@ static void test_map_load_of_a_factor_with_large_numbers_can_be_saved(void **sta
                 49e4);
     size = kept_write(&other, bytes);
     load(BSLAM_MAP_LIVING);
+}
+
+/// What would not be loaded is not saved, so that the map saved before is kept.
+static void test_map_write_of_a_variance_that_is_too_large_is_refused(void **state)
+{
+    static const double factors[][2] = {{1e6, 1001}, {1.1e12, 0}, {1e-30, 1.1e18}};
+    for (int k = 0; k < COUNT_OF(factors); k++) {
+        map_memory_t memory = {bytes, sizeof bytes, 0};
+        const bslam_map_sink_t sink = map_to_memory(&memory);
+        bslam_map_fault_t fault;
+        kept_make(&slam, &appearance, 4);
+        slam.ekf.factor.d[1] = real(factors[k][0]);
+        *bslam_factor_element(&slam.ekf.factor, 2, 1) = real(factors[k][1]);
+        assert_int_equal(bslam_map_write(&slam, &sink, &fault), BSLAM_E_MAP);
+        assert_int_equal(fault, k < 2 ? BSLAM_MAP_COVARIANCE : BSLAM_MAP_NOT_FINITE);
+    }
 }
 
 /// Whatever L is, with D >= 0 it is a covariance.
@@ -812,6 +829,7 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_of_a_variance_that_is_too_large_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_of_a_factor_with_large_numbers_can_be_saved, setup),
+        cmocka_unit_test_setup(test_map_write_of_a_variance_that_is_too_large_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_of_any_factor_gives_a_covariance, setup),
         cmocka_unit_test_setup(test_map_load_beside_beacons_that_are_not_saved_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_with_and_without_velocity_states_is_exact, setup),
