@@ -172,7 +172,8 @@ COPIED void pass_own(passing_t *passing, bslam_real_t *block, int at, const int 
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
                       bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
-    passing_t passing = {w, scratch[0], scratch[1], factor->d, share, first, first, bslam_factor_places(factor)};
+    passing_t passing = {w,     scratch[0], scratch[1], factor->d,
+                         share, first,      first,      bslam_factor_places(factor)};
     for (int at = first / 4 * 4; share > 0 && at < bslam_factor_places(factor); at += 4) {
         bslam_real_t *block = block_of(factor, at);
         bslam_four_t rest = pass_before(&passing, block, at);
