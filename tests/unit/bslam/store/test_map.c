@@ -133,7 +133,7 @@ static void assert_same_map(const bslam_ekf_t *saved, const bslam_ekf_t *loaded)
     int from[DENSE_MAX], to[DENSE_MAX];
     const int count = saved_values(saved, from);
     assert_int_equal(saved_values(loaded, to), count);
-    assert_int_equal(loaded->dim, loaded->base_dim + count);
+    assert_int_equal(loaded->dim, bslam_ekf_map_at(loaded) + count);
     const dense_t was = covariance_of(saved), is = covariance_of(loaded);
     for (int i = 0; i < count; i++) {
         assert_true((float)loaded->mean[to[i]] == (float)saved->mean[from[i]]);
@@ -145,7 +145,7 @@ static void assert_same_map(const bslam_ekf_t *saved, const bslam_ekf_t *loaded)
             const double apart_now = is.at[to[i]][to[i]] - 2 * is.at[to[i]][to[j]] + is.at[to[j]][to[j]];
             assert_near(apart_now, apart, 1e-4 * apart + 1e-10 * (var + other_var));
         }
-        for (int k = 0; k < loaded->base_dim; k++) {
+        for (int k = 0; k < bslam_ekf_map_at(loaded); k++) {
             assert_true(is.at[to[i]][k] == 0);
         }
     }
@@ -572,12 +572,14 @@ static void test_map_load_beside_beacons_that_are_not_saved_is_exact(void **stat
 }
 
 /// Robots may have further states before the beacons, of which the other one knows nothing.
-static void test_map_load_with_and_without_velocity_states_is_exact(void **state)
+static void test_map_load_with_and_without_further_states_is_exact(void **state)
 {
-    for (int kind = 0; kind < 4; kind++) {
+    for (int kind = 0; kind < 16; kind++) {
         bslam_settings_t saver = plain_map_settings(), loader = saver;
         saver.velocity_states = kind % 2;
-        loader.velocity_states = kind / 2;
+        loader.velocity_states = kind / 2 % 2;
+        saver.sensor_doubt = kind / 4 % 2 != 0 ? 1 : 0;
+        loader.sensor_doubt = kind / 8 != 0 ? 1 : 0;
         begin_plain(&saver, &loader);
         for (int step = 0; step < 60; step++) {
             const bslam_sighting_t seen = on_ring(step % 5, step % 3 != 0);
@@ -832,7 +834,7 @@ int main(void)
         cmocka_unit_test_setup(test_map_write_of_a_variance_that_is_too_large_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_of_any_factor_gives_a_covariance, setup),
         cmocka_unit_test_setup(test_map_load_beside_beacons_that_are_not_saved_is_exact, setup),
-        cmocka_unit_test_setup(test_map_load_with_and_without_velocity_states_is_exact, setup),
+        cmocka_unit_test_setup(test_map_load_with_and_without_further_states_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_after_rays_settled_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_of_a_doubt_of_30_m_keeps_the_centimetres, setup),
         cmocka_unit_test_setup(test_map_load_of_a_covariance_without_an_inverse_is_exact, setup),
