@@ -207,6 +207,26 @@ static void test_fuse_sized_beacons_among_rays_is_the_batch_update(void **state)
     }
 }
 
+static void test_fuse_with_sensor_states_is_the_batch_update(void **state)
+{
+    unit_random_t random = {23};
+    for (int kind = 0; kind < 8; kind++) {
+        bslam_settings_t settings = params_of(kind % 2, kind / 2 % 2 != 0);
+        settings.sensor_doubt = 1;
+        settings.range_scale_sd = kind / 4 != 0 ? BSLAM_R(0.1) : 0;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
+        int known;
+        assert_int_equal(ekf.sensor_dim, BSLAM_SENSOR_DIM);
+        assert_int_equal(bslam_ekf_add_known(&ekf, ekf.mean[0] + 3, ekf.mean[1] - 2, &known), BSLAM_OK);
+        for (int frame = 0; frame < 5; frame++) {
+            const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, false),
+                                    random_plan(&random, known, true), random_plan(&random, 3, true),
+                                    random_plan(&random, 4, false)};
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
+        }
+    }
+}
+
 static void test_fuse_frames_in_a_row_are_the_textbooks(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
@@ -328,7 +348,8 @@ static void test_distance2_is_the_textbooks(void **state)
 
 static void test_row_covariances_of_any_two_sightings_is_the_textbooks(void **state)
 {
-    const bslam_settings_t settings = params_of(0, true);
+    bslam_settings_t settings = params_of(0, true);
+    settings.sensor_doubt = 1;
     unit_random_t random = {20};
     const bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t twin = twin_of(&ekf);
@@ -794,6 +815,7 @@ int main(void)
         cmocka_unit_test(test_fuse_invariant_with_velocity_states_is_the_batch_update),
         cmocka_unit_test(test_fuse_distance_of_a_ray_is_the_batch_update),
         cmocka_unit_test(test_fuse_sized_beacons_among_rays_is_the_batch_update),
+        cmocka_unit_test(test_fuse_with_sensor_states_is_the_batch_update),
         cmocka_unit_test(test_fuse_frames_in_a_row_are_the_textbooks),
         cmocka_unit_test(test_fuse_order_within_a_frame_does_not_matter),
         cmocka_unit_test(test_fuse_known_beacon_corrects_the_robot_and_stays),
