@@ -1,7 +1,7 @@
 # Every entry point. `make help` lists the targets from their `##` comments. Recipes of more than a few lines
 # live in mk/: config.mk (flags), unit.mk (C tests), firmware.mk (the library for a core), images.mk (images
 # for boards, sizes), rtos.mk (the robot on FreeRTOS), lint.mk (style), bench.mk (instruction counts), docs.mk
-# (generated documents), fuzz.mk, mcdc.mk and soak.mk (longer proofs).
+# (generated documents), fuzz.mk, mcdc.mk, soak.mk and mutants.mk (longer proofs).
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -21,6 +21,7 @@ include mk/docs.mk
 include mk/fuzz.mk
 include mk/mcdc.mk
 include mk/soak.mk
+include mk/mutants.mk
 
 .PHONY: help
 help: ## list the targets
@@ -88,9 +89,9 @@ PYTEST_HALF := tests/python/runs tests/python/target tests/python/tools
 
 .PHONY: test pytest pytest-half pytest-rest
 test: setup ## lint, C unit tests (float, double; sanitizers), fuzz inputs, soak, firmware in QEMU, pytest
-	@$(MAKE) --no-print-directory --keep-going --jobs=2 pytest lint unit replay soak-short check-sizes \
-	    || { echo "make test: FAILED, see above" >&2; exit 1; }
-	@echo "make test: all passed (lint, C unit tests, fuzz inputs, a short soak, firmware and its sizes, pytest)"
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 pytest lint unit replay soak-short adversary-short \
+	    check-sizes || { echo "make test: FAILED, see above" >&2; exit 1; }
+	@echo "make test: all passed (lint, C unit tests, fuzz inputs, short lives, firmware and its sizes, pytest)"
 
 pytest: pytest-half pytest-rest ## the Python tests only
 

@@ -3,10 +3,10 @@
 # kept in tests/fuzz/corpus/<target>.bin, compiled with the compiler of the other tests.
 
 FUZZ_TARGETS := link map model image api drive session
-FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c
+FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c tests/soak/definite.c
 FUZZ_ROBOT := $(ROBOT_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_ROBOT) $(FUZZ_HELPERS)
-FUZZ_DEFINES := -Itests/fuzz -Itests/unit -DBSLAM_CONFIG_HEADER='"sizes.h"' -DROBOT_VISION=1 \
+FUZZ_DEFINES := -Itests/fuzz -Itests/unit -Itests/soak -DBSLAM_CONFIG_HEADER='"sizes.h"' -DROBOT_VISION=1 \
     -DBSLAM_APPEARANCE=1 -DBSLAM_SMOOTHER=1 -DBSLAM_GUARD=2 -DSESSION_MAP_BYTES=4096
 FUZZ_FLAGS := $(C_STANDARD) $(C_INCLUDES) $(FUZZ_DEFINES) $(SANITIZE) -g -MMD -MP
 
@@ -53,3 +53,19 @@ fuzz-programs:
 
 fuzz: fuzz-programs ## make inputs up for every target until the goals are met, on top of out/fuzz (20 min)
 	@$(PYTHON) -m tools.proofs.fuzz $(FUZZ)
+
+# By seeds in place of inputs, with the library's own sizes, for hundreds of calls: tests/fuzz/adversary.c.
+ADVERSARY_SOURCES := $(addprefix tests/fuzz/,adversary.c fuzz.c input.c) tests/soak/definite.c
+ADVERSARY_SEEDS := 3000
+ADVERSARY_STEPS := 400
+
+build/adversary: $(ADVERSARY_SOURCES) tests/fuzz/fuzz.h build/unit/float/libbslam.a
+	@$(UNIT_COMPILE_float) $(UNIT_WARNINGS) -Itests/fuzz -Itests/unit -Itests/soak $(ADVERSARY_SOURCES) \
+	    build/unit/float/libbslam.a -lm -o $@
+
+.PHONY: adversary adversary-short
+adversary: build/adversary ## odd but legal settings and calls, a world behind them: 3 x 3000 seeds (10 min)
+	@for profile in 0 1 2; do $< $$profile 0 $(ADVERSARY_SEEDS) $(ADVERSARY_STEPS) || exit 1; done
+
+adversary-short:
+	@$(MAKE) --no-print-directory adversary ADVERSARY_SEEDS=5

@@ -23,6 +23,12 @@ UNIT_FLAGS_float := -DBSLAM_REAL_DOUBLE=0 $(UNIT_SWITCHES)
 UNIT_FLAGS_double := -DBSLAM_REAL_DOUBLE=1 $(UNIT_SWITCHES)
 UNIT_CORE_WARNINGS_float := $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 UNIT_CORE_WARNINGS_double := $(C_WARNINGS)
+UNIT_SANITIZE_float := $(SANITIZE)
+UNIT_SANITIZE_double := $(SANITIZE)
+
+# The float build as fast as it goes, for programs that run the tests often: mk/mutants.mk.
+UNIT_FLAGS_plain := $(UNIT_FLAGS_float)
+UNIT_CORE_WARNINGS_plain := $(UNIT_CORE_WARNINGS_float)
 
 .PHONY: unit
 unit: $(UNIT_REALS:%=unit-%) ## the C unit tests, in float and in double, under ASan and UBSan
@@ -31,7 +37,8 @@ unit: $(UNIT_REALS:%=unit-%) ## the C unit tests, in float and in double, under 
 # The rules for one scalar type: $(1) is float or double.
 define unit_rules
 UNIT_DIR_$(1) := build/unit/$(1)
-UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(SANITIZE) -MMD -MP
+UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(UNIT_SANITIZE_$(1)) \
+    -MMD -MP
 
 UNIT_CORE_$(1) := $$(CORE_SOURCES:%.c=build/unit/$(1)/%.o)
 UNIT_ARCHIVES_$(1) := $$(LIBRARIES:%=build/unit/$(1)/lib%.a)
@@ -66,7 +73,7 @@ $$(UNIT_ARCHIVES_$(1)): build/unit/$(1)/lib%.a: $$(UNIT_CORE_$(1))
 $$(UNIT_PROGRAMS_$(1)): build/unit/$(1)/bin/%: build/unit/$(1)/tests/unit/%.o build/unit/$(1)/helpers.a \
     $$(UNIT_ARCHIVES_$(1)) build/unit/$(1)/librobot.a
 	@mkdir -p $$(@D)
-	@$$(CC) $$(SANITIZE) $$< build/unit/$(1)/helpers.a \
+	@$$(CC) $$(UNIT_SANITIZE_$(1)) $$< build/unit/$(1)/helpers.a \
 	    $$(patsubst %,build/unit/$(1)/lib%.a,$$(call unit_library,$$(firstword $$(subst /, ,$$*)))) \
 	    $$(CMOCKA_LIBS) -lm -o $$@
 
@@ -79,7 +86,7 @@ $$(UNIT_PROGRAMS_$(1):%=%.run): %.run: %
 -include $$(UNIT_CORE_$(1):.o=.d) $$(UNIT_ROBOT_$(1):.o=.d) $$(UNIT_HELPERS:%.c=build/unit/$(1)/%.d)
 -include $$(UNIT_SOURCES:%.c=build/unit/$(1)/%.d)
 endef
-$(foreach real,$(UNIT_REALS),$(eval $(call unit_rules,$(real))))
+$(foreach real,$(UNIT_REALS) plain,$(eval $(call unit_rules,$(real))))
 
 # Asked when a test is compiled, not when make starts: `make setup` may have installed CMocka in between.
 CMOCKA_CFLAGS = $(shell pkg-config --cflags cmocka)

@@ -92,7 +92,7 @@ static bool state_is(const bslam_ekf_t *ekf, const float *mean, const float *low
         }
         for (int j = 0; j <= i; j++) {
             const float expected = lower[i * (i + 1) / 2 + j];
-            if (!is_near(bslam_symmat_get(ekf->covariance, i, j), expected, scale * deviation(lower, j))) {
+            if (!is_near(bslam_ekf_covariance(ekf, i, j), expected, scale * deviation(lower, j))) {
                 return false;
             }
         }

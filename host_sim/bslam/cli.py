@@ -28,6 +28,7 @@ from bslam.commands import (
     report_page,
     run,
     scenario,
+    stress,
     sweep,
     tables,
 )
@@ -39,6 +40,7 @@ COMMANDS: dict[str, ModuleType] = {
     "check": check,
     "tables": tables,
     "sweep": sweep,
+    "stress": stress,
     "compare": compare,
     "live": live,
     "report": report_page,

@@ -233,7 +233,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fuzz_input_t input = {data, size};
     world_t world;
-    fuzz_begin();
     const unsigned choice = fuzz_u8(&input);
     prepare(&robot, &world, choice & 7u);
     world.has_recovery = (choice & 8u) == 0;
@@ -241,5 +240,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         happen(&input, &world);
         fuzz_require_sound(&robot.slam);
     }
+    (void)fuzz_require_kept(&robot.slam);
     return 0;
 }

@@ -3,79 +3,60 @@
 
 #include <string.h>
 
-#include "base/trig.h"
 #include "base/scalar.h"
+#include "base/trig.h"
+#include "bslam/store/map.h"
 
-/// The covariance is rounded: a number of it may be wrong by so much of the largest variance that the input
-/// has made so far, from which it came down. Below the other its square is 0 in float.
-static const double ROUNDING = 1e-6;
-static const double COVARIANCE_MIN = 1e-19;
-static double largest_variance;
-/// Where the filter stood when it was last looked at.
-static int64_t filter_us;
+#include "definite.h"
+#include "map_memory.h"
 
-void fuzz_begin(void)
-{
-    largest_variance = 0;
-    filter_us = 0;
-}
+enum { BLOB_MAX = 1 << 18 };
 
-/// The variance of the speeds that the last call's prediction made, which a sighting of the same call may
-/// have taken away again: no look between calls has seen it.
-static void count_walk(const bslam_slam_t *slam)
-{
-    const int64_t now_us = slam->odometry.time_us - slam->history.filter.behind_us;
-    const double gone_s = 1e-6 * (double)(now_us - filter_us);
-    const double walk = fmax((double)slam->settings.velocity_walk_mps_sqrt_s,
-                             (double)slam->settings.turn_rate_walk_radps_sqrt_s);
-    if (slam->ekf.base_dim > BSLAM_STATE_FORWARD && gone_s > 0) {
-        largest_variance = fmax(largest_variance, walk * walk * gone_s);
-    }
-    filter_us = now_us;
-}
+/// What double leaves of an eigenvalue that is 0; and what float does, where values are taken out, of a
+/// variance.
+static const double EIGENVALUE_ROUNDING = 1e-9, VARIANCE_ROUNDING = 1e-4;
 
 static void require_finite(const bslam_ekf_t *ekf)
 {
     for (int i = 0; i < ekf->dim; i++) {
         fuzz_require(isfinite((double)ekf->mean[i]));
         for (int j = 0; j <= i; j++) {
-            fuzz_require(isfinite((double)bslam_symmat_get(ekf->covariance, i, j)));
+            fuzz_require(isfinite((double)bslam_ekf_covariance(ekf, i, j)));
         }
     }
     const double theta_rad = (double)ekf->mean[BSLAM_STATE_THETA];
     fuzz_require(theta_rad >= -(double)BSLAM_PI && theta_rad <= (double)BSLAM_PI);
 }
 
-static bool is_positive(const bslam_ekf_t *ekf)
+/// D is not negative, and L the triangle that it should be: then their product is a covariance.
+static void require_factor(const bslam_factor_t *factor)
 {
-    const double slack = COVARIANCE_MIN + ROUNDING * largest_variance;
-    for (int i = 0; i < ekf->dim; i++) {
-        const double own = (double)bslam_symmat_get(ekf->covariance, i, i);
-        for (int j = 0; j < i; j++) {
-            const double other = (double)bslam_symmat_get(ekf->covariance, j, j);
-            const double both = fabs((double)bslam_symmat_get(ekf->covariance, i, j)) - slack;
-            if (both > 0 && both * both > 1.01 * (own + slack) * (other + slack)) {
-                return false;
-            }
+    const int places = bslam_factor_places(factor), tail_at = bslam_factor_tail_at(factor);
+    for (int i = 0; i < places; i++) {
+        const bool is_value = i < factor->body_count || (i >= tail_at && i < tail_at + factor->tail_count);
+        const bslam_real_t *row =
+            (i < tail_at ? factor->body + bslam_factor_block_at(i / 4 * 4) : factor->tail) + i % 4;
+        fuzz_require(factor->d[i] >= 0 && isfinite((double)factor->d[i]) && (is_value || factor->d[i] == 0));
+        for (int j = is_value ? i : 0; j < i / 4 * 4 + 4; j++) {
+            fuzz_require(row[4 * j] == (j == i && is_value ? 1 : 0));
         }
-        if (own < 0) {
-            return false;
-        }
-        largest_variance = fmax(largest_variance, own);
     }
-    return true;
 }
 
 static void require_counts(const bslam_ekf_t *ekf)
 {
-    int32_t dim = ekf->base_dim;
+    bool is_taken[BSLAM_STATE_MAX] = {false};
+    int32_t dim = bslam_ekf_map_at(ekf);
     int32_t rays = 0;
     fuzz_require(ekf->beacon_count >= 0 && ekf->beacon_count <= BSLAM_BEACONS_MAX);
     for (int b = 0; b < ekf->beacon_count; b++) {
         const bslam_beacon_t *beacon = &ekf->beacons[b];
-        fuzz_require(beacon->kind == BSLAM_BEACON_KNOWN || beacon->at == dim);
         fuzz_require(beacon->uid < ekf->next_uid && (b == 0 || beacon->uid > ekf->beacons[b - 1].uid));
-        dim += bslam_beacon_dim(beacon->kind);
+        for (int at = beacon->at; at < beacon->at + bslam_beacon_dim(beacon->kind); at++) {
+            fuzz_require(at >= bslam_ekf_map_at(ekf) && at < ekf->dim && !is_taken[at]);
+            is_taken[at] = true;
+            dim++;
+        }
         rays += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     }
     fuzz_require(dim == ekf->dim && dim <= BSLAM_STATE_MAX);
@@ -86,8 +67,7 @@ void fuzz_require_sound(const bslam_slam_t *slam)
 {
     require_counts(&slam->ekf);
     require_finite(&slam->ekf);
-    count_walk(slam);
-    fuzz_require(is_positive(&slam->ekf) || slam->counters.insane > 0);
+    require_factor(&slam->ekf.factor);
     const bslam_pose_t pose = bslam_slam_pose(slam);
     fuzz_require(isfinite((double)pose.x_m) && isfinite((double)pose.y_m) &&
                  isfinite((double)pose.theta_rad));
@@ -102,11 +82,77 @@ void fuzz_require_sound(const bslam_slam_t *slam)
                  counters->sightings);
 }
 
-void fuzz_clear_unused(bslam_slam_t *slam)
+// ---- keeping ----------------------------------------------------------------------------------------------
+
+/// Larger than a map may have: as an element of L or D, or as a variance.
+static bool has_large_number(const bslam_ekf_t *ekf)
 {
-    bslam_real_t *m = slam->ekf.covariance;
-    const size_t used = bslam_symmat_row(slam->ekf.dim);
-    memset(m + used, 0, (BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - used) * sizeof *m);
+    const bslam_factor_t *factor = &ekf->factor;
+    double largest = 0;
+    for (int i = 0; i < factor->body_count; i++) {
+        largest = fmax(largest, (double)bslam_factor_get(factor, i, i));
+        for (int j = 0; j < i; j++) {
+            largest = fmax(largest, fabs((double)bslam_factor_row(factor, i)[4 * j]));
+        }
+    }
+    return largest > 0.999e12;
+}
+
+/// The map's bytes; 0 of them where a number is too large to be kept.
+static uint32_t save(const bslam_slam_t *slam, uint8_t bytes[BLOB_MAX])
+{
+    map_memory_t memory = {bytes, BLOB_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    const bslam_status_t status = bslam_map_write(slam, &sink, &fault);
+    fuzz_require(status == BSLAM_OK || has_large_number(&slam->ekf));
+    return status == BSLAM_OK ? memory.count : 0;
+}
+
+static void load(bslam_slam_t *slam, const uint8_t *bytes, uint32_t size)
+{
+    const bslam_map_source_t source = map_from_memory(bytes, size);
+    bslam_map_fault_t fault;
+    fuzz_require(bslam_map_check(&source) == BSLAM_MAP_FINE);
+    fuzz_require(bslam_map_load(slam, &source, BSLAM_MAP_LIVING, &fault) == BSLAM_OK);
+}
+
+/// Of each beacon that both have, what is known of its values.
+static void require_same_beacons(const bslam_ekf_t *a, const bslam_ekf_t *b)
+{
+    for (int i = 0, k = 0; k < b->beacon_count; k++) {
+        while (a->beacons[i].uid != b->beacons[k].uid) {
+            i++;
+        }
+        for (int v = 0; v < bslam_beacon_dim(b->beacons[k].kind); v++) {
+            const int of_a = a->beacons[i].at + v, of_b = b->beacons[k].at + v;
+            const double was = definite_covariance(a, of_a, of_a), is = definite_covariance(b, of_b, of_b);
+            fuzz_require((float)a->mean[of_a] == (float)b->mean[of_b]);
+            fuzz_require(fabs(is - was) <= VARIANCE_ROUNDING * was + 1e-30);
+        }
+    }
+}
+
+bool fuzz_require_kept(const bslam_slam_t *slam)
+{
+    static bslam_slam_t other;
+    static uint8_t bytes[BLOB_MAX], again[BLOB_MAX];
+    fuzz_require(definite_least_eigenvalue(&slam->ekf.factor) >= -EIGENVALUE_ROUNDING);
+    memcpy(&other, slam, sizeof other);
+    other.appearance = NULL;
+    other.smoother = NULL;
+    const uint32_t size = save(&other, bytes);
+    if (size == 0) {
+        return false;
+    }
+    load(&other, bytes, size);
+    require_same_beacons(&slam->ekf, &other.ekf);
+    const uint32_t left = save(&other, bytes);  // what its values hung on is gone now
+    if (left > 0) {
+        load(&other, bytes, left);
+        fuzz_require(save(&other, again) == left && memcmp(bytes, again, left) == 0);
+    }
+    return left > 0;
 }
 
 // ---- a map ------------------------------------------------------------------------------------------------

@@ -47,17 +47,15 @@ bslam_odometry_reading_t fuzz_reading(fuzz_input_t *input, int64_t now_us);
 /// A moment near now_us or, if the input says so, any.
 int64_t fuzz_time(fuzz_input_t *input, int64_t now_us);
 
-/// Before the first pipeline of an input.
-void fuzz_begin(void);
-
 /// Holds of every pipeline after every call: all of state and covariance is finite, angles are within
-/// (-pi, pi], no variance is negative and no correlation beyond 1 (but for the rounding of a float32 filter,
-/// which is of the size of its largest variance), or else the pipeline has counted it (`insane`); counts and
-/// places of beacons fit each other; pose, map and accounts can be read.
+/// (-pi, pi], the factor is that of a covariance; counts and places of beacons fit each other; pose, map and
+/// accounts can be read.
 void fuzz_require_sound(const bslam_slam_t *slam);
 
-/// Behind the rows in use the covariance's memory holds nothing: makes zeros of it.
-void fuzz_clear_unused(bslam_slam_t *slam);
+/// Holds too, and takes longer: no eigenvalue of the correlations is negative, in double. The map can be
+/// kept: what is saved loads, says the same of the beacons, and is saved as the same bytes from then on.
+/// False: it has a number beyond those of a map, and was refused.
+bool fuzz_require_kept(const bslam_slam_t *slam);
 
 /// A pipeline that has a map of three beacons, one of them in direction only, and, where looks are given,
 /// machines that know them. Always the same.

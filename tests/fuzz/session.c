@@ -325,7 +325,6 @@ static void talk(fuzz_input_t *input)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fuzz_input_t input = {data, size};
-    fuzz_begin();
     const unsigned choice = fuzz_u8(&input);
     memset(&answers, 0, sizeof answers);
     clock_us = 0;

@@ -1,195 +1,40 @@
-// Hours in a room, as the paper's without its middle wall: drives, measures, feeds the filter, and compares
-// it with the truth at each step. One line a seed:
+// Hours of a life (world.h): lives it, feeds the filter, and compares it with the truth at each step. One
+// line a seed:
 //
-//     seed,hours,nees,nees_last_hour,error_m,repairs
+//     seed,hours,nees,nees_last_hour,nees_beacon,error_m,error_max_m,least_eigenvalue,repairs
 //
-// The filter has the library's own parameters, and the noise that the room is made with. The world is
-// computed in double whatever the filter's scalar, and what the sensors say is rounded to float32: the float
-// build and its double twin get the same numbers.
+// The filter has the library's own settings, and the noise that the room is made with. For a consistent
+// filter NEES of the pose is 3 in the mean, and that of a beacon's direction and inverse distance from the
+// robot 2.
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-#include "bslam/bslam.h"
+#include "bslam/internal.h"
 
-#define PI 3.14159265358979323846
-#define STEP_S 0.04
-#define STEP_US 40000
-#define STEPS_AN_HOUR 90000
+#include "definite.h"
+#include "world.h"
+
 /// Not judged: the pose of the start is exact, and its covariance has no inverse.
 #define STEPS_AT_START 250
+/// What takes long to look at is looked at so often.
+#define STEPS_A_LOOK 25
+/// How doubtful odometry is resumed in turn, and what of that is true.
+static const double told_m[] = {30, 0.5, 2}, told_rad[] = {3.2, 0.3, 0.1}, carried[] = {0, 1, 0.5};
 
-// The room, the robot and its sensors: host_sim/bslam/scenarios/paper_room.toml.
-enum { BEACONS = 6 };
-static const double beacons[BEACONS][2] = {{1.5, 0}, {4, 0}, {8.5, 0}, {2.5, 8}, {7, 8}, {9.5, 8}};
-static const double WHEELBASE_M = 0.4;
-static const double WHEEL_SD_MPS = 0.3;
-static const double BEARING_SD_RAD = 0.013575;
-static const double RANGE_SD_FRACTION = 0.02;
-static const double RANGE_SCALE_M = 110.9;
-static const double SPEED_MPS = 0.4;
-static const double ACCELERATION_MPS2 = 0.5;
-static const double TURN_RATE_RADPS = 1.0;
-static const double TURN_ACCELERATION_RADPS2 = 3.0;
-static const double HEADING_GAIN_PER_S = 1.4;
-static const double TURN_NOISE_RADPS = 0.43;
-static const double TURN_NOISE_TIME_S = 1.4;
-static const double TURN_ON_SPOT_RAD = 1.1;
+/// What came of one seed: sums, but for the last two.
+typedef struct outcome {
+    double nees, nees_last, nees_beacon, error_m, error_max_m, least_eigenvalue;
+    long beacon_looks;
+} outcome_t;
 
-// ---- chance -----------------------------------------------------------------------------------------------
+static bslam_t robot;
 
-typedef struct chance {
-    uint64_t state;
-} chance_t;
-
-/// splitmix64: seeds in a row give streams that have nothing in common.
-static double uniform(chance_t *chance)
+static const bslam_ekf_t *filter(void)
 {
-    chance->state += UINT64_C(0x9e3779b97f4a7c15);
-    uint64_t z = chance->state;
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    z ^= z >> 31;
-    return ((double)(z >> 11) + 0.5) / 9007199254740992.0;
-}
-
-static double normal(chance_t *chance)
-{
-    const double radius = sqrt(-2 * log(uniform(chance)));
-    return radius * cos(2 * PI * uniform(chance));
-}
-
-// ---- the world --------------------------------------------------------------------------------------------
-
-typedef struct world {
-    chance_t chance;
-    double x_m, y_m, theta_rad;
-    double v_mps, omega_radps;
-    double unsteady_radps;  ///< of its steering
-    double goal_x_m, goal_y_m;
-} world_t;
-
-static double within(double value, double most)
-{
-    return fmax(-most, fmin(most, value));
-}
-
-static void next_goal(world_t *world)
-{
-    world->goal_x_m = 1 + 9 * uniform(&world->chance);
-    world->goal_y_m = 1 + 6 * uniform(&world->chance);
-}
-
-static world_t begin(uint64_t seed)
-{
-    world_t world = {.chance = {seed * UINT64_C(1000003)}, .x_m = 1.5, .y_m = 2.5};
-    next_goal(&world);
-    return world;
-}
-
-/// A step towards the goal, along an arc.
-static void drive(world_t *world)
-{
-    const double dx = world->goal_x_m - world->x_m;
-    const double dy = world->goal_y_m - world->y_m;
-    if (hypot(dx, dy) < 0.4) {
-        next_goal(world);
-    }
-    const double off_rad = remainder(atan2(dy, dx) - world->theta_rad, 2 * PI);
-    const double keep = exp(-STEP_S / TURN_NOISE_TIME_S);
-    world->unsteady_radps =
-        keep * world->unsteady_radps + TURN_NOISE_RADPS * sqrt(1 - keep * keep) * normal(&world->chance);
-    const double turn = within(HEADING_GAIN_PER_S * off_rad, TURN_RATE_RADPS) + world->unsteady_radps;
-    const double speed = fabs(off_rad) > TURN_ON_SPOT_RAD ? 0 : SPEED_MPS;
-    world->omega_radps += within(turn - world->omega_radps, TURN_ACCELERATION_RADPS2 * STEP_S);
-    world->v_mps += within(speed - world->v_mps, ACCELERATION_MPS2 * STEP_S);
-    const double middle_rad = world->theta_rad + world->omega_radps * STEP_S / 2;
-    world->x_m += world->v_mps * STEP_S * cos(middle_rad);
-    world->y_m += world->v_mps * STEP_S * sin(middle_rad);
-    world->theta_rad = remainder(world->theta_rad + world->omega_radps * STEP_S, 2 * PI);
-}
-
-static bslam_real_t measured(double value)
-{
-    return (bslam_real_t)(float)value;
-}
-
-static bslam_odometry_reading_t read_wheels(world_t *world, int64_t time_us)
-{
-    const double left_mps = world->v_mps - world->omega_radps * WHEELBASE_M / 2;
-    const double right_mps = world->v_mps + world->omega_radps * WHEELBASE_M / 2;
-    bslam_odometry_reading_t reading = {.time_us = time_us, .source = BSLAM_ODOMETRY_WHEELS};
-    reading.left_m = measured((left_mps + WHEEL_SD_MPS * normal(&world->chance)) * STEP_S);
-    reading.right_m = measured((right_mps + WHEEL_SD_MPS * normal(&world->chance)) * STEP_S);
-    return reading;
-}
-
-/// Beacons in the half in front of the robot.
-static int look(world_t *world, bslam_sighting_t seen[BEACONS])
-{
-    int count = 0;
-    for (int i = 0; i < BEACONS; i++) {
-        const double dx = beacons[i][0] - world->x_m;
-        const double dy = beacons[i][1] - world->y_m;
-        const double range_m = hypot(dx, dy);
-        const double bearing_rad = remainder(atan2(dy, dx) - world->theta_rad, 2 * PI);
-        if (fabs(bearing_rad) <= PI / 2) {
-            const double range_sd_m = hypot(RANGE_SD_FRACTION * range_m, range_m * range_m / RANGE_SCALE_M);
-            seen[count++] = (bslam_sighting_t){
-                .bearing_rad = measured(bearing_rad + BEARING_SD_RAD * normal(&world->chance)),
-                .range_m = measured(range_m + range_sd_m * normal(&world->chance)),
-                .has_range = true,
-                .label = i};
-        }
-    }
-    return count;
-}
-
-// ---- the filter against the truth -------------------------------------------------------------------------
-
-static bslam_settings_t filter_params(void)
-{
-    bslam_settings_t settings;
-    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
-    settings.wheelbase_m = measured(WHEELBASE_M);
-    settings.left_speed_sd_mps = measured(WHEEL_SD_MPS);
-    settings.right_speed_sd_mps = measured(WHEEL_SD_MPS);
-    settings.bearing_sd_rad = measured(BEARING_SD_RAD);
-    settings.range_sd_floor_m = 0;
-    settings.range_sd_fraction = measured(RANGE_SD_FRACTION);
-    settings.range_sd_per_m = measured(1 / RANGE_SCALE_M);
-    return settings;
-}
-
-/// eᵀ P⁻¹ e of the pose, by Cholesky's factor of P in double.
-static double nees_of(const bslam_t *slam, const double e[3])
-{
-    bslam_real_t lower[6];
-    bslam_pose_covariance(slam, lower);
-    const double l00 = sqrt((double)lower[0]);
-    const double l10 = (double)lower[1] / l00;
-    const double l11 = sqrt((double)lower[2] - l10 * l10);
-    const double l20 = (double)lower[3] / l00;
-    const double l21 = ((double)lower[4] - l20 * l10) / l11;
-    const double l22 = sqrt((double)lower[5] - l20 * l20 - l21 * l21);
-    const double w0 = e[0] / l00;
-    const double w1 = (e[1] - l10 * w0) / l11;
-    const double w2 = (e[2] - l20 * w0 - l21 * w1) / l22;
-    return w0 * w0 + w1 * w1 + w2 * w2;
-}
-
-/// The filter's error in the frame of the start, where the map's is.
-static void error_of(const bslam_t *slam, const world_t *world, const world_t *start, double e[3])
-{
-    const bslam_pose_t pose = bslam_pose(slam);
-    const double dx = world->x_m - start->x_m;
-    const double dy = world->y_m - start->y_m;
-    const double sine = sin(start->theta_rad);
-    const double cosine = cos(start->theta_rad);
-    e[0] = (double)pose.x_m - (cosine * dx + sine * dy);
-    e[1] = (double)pose.y_m - (cosine * dy - sine * dx);
-    e[2] = remainder((double)pose.theta_rad - (world->theta_rad - start->theta_rad), 2 * PI);
+    return &bslam_const_instance(&robot)->slam.ekf;
 }
 
 static void require(bool condition, const char *what)
@@ -200,59 +45,222 @@ static void require(bool condition, const char *what)
     }
 }
 
-/// It may stand for a while before it drives off.
-static void soak(uint64_t seed, long steps, long standing)
+// ---- the filter against the truth -------------------------------------------------------------------------
+
+/// eᵀ P⁻¹ e, by Cholesky's factor of P, of which `lower` has the rows.
+static double nees_of(int n, double lower[3][3], const double *e)
 {
-    static bslam_t slam;
-    const bslam_settings_t settings = filter_params();
-    int bad_id;
-    require(bslam_init(&slam, &settings, &bad_id) == BSLAM_OK, "a parameter is refused");
-    world_t world = begin(seed);
-    world_t start = world;
-    double nees = 0;
-    double nees_last = 0;
-    double error_m = 0;
+    double sum = 0, w[3];
+    for (int i = 0; i < n; i++) {
+        w[i] = e[i];
+        for (int j = 0; j <= i; j++) {
+            for (int k = 0; k < j; k++) {
+                lower[i][j] -= lower[i][k] * lower[j][k];
+            }
+            if (j < i) {
+                lower[i][j] /= lower[j][j];
+                w[i] -= lower[i][j] * w[j];
+            }
+        }
+        lower[i][i] = sqrt(lower[i][i]);
+        w[i] /= lower[i][i];
+        sum += w[i] * w[i];
+    }
+    return sum;
+}
+
+/// Of the pose in the frame of the start, where the map's is.
+static double judge_pose(const world_t *world, const world_t *start, double *error_m)
+{
+    const bslam_pose_t pose = bslam_pose(&robot);
+    const double dx = world->x_m - start->x_m;
+    const double dy = world->y_m - start->y_m;
+    const double sine = sin(start->theta_rad);
+    const double cosine = cos(start->theta_rad);
+    const double e[3] = {(double)pose.x_m - (cosine * dx + sine * dy),
+                         (double)pose.y_m - (cosine * dy - sine * dx),
+                         remainder((double)pose.theta_rad - (world->theta_rad - start->theta_rad), 2 * PI)};
+    double lower[3][3];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j <= i; j++) {
+            lower[i][j] = definite_covariance(filter(), i, j);
+        }
+    }
+    *error_m = hypot(e[0], e[1]);
+    return nees_of(3, lower, e);
+}
+
+/// A beacon from the robot: its direction and its inverse distance, which a ray has before its distance is
+/// known, and how they go with the robot's pose and the beacon's own values.
+typedef struct sight {
+    double bearing_rad, inverse_per_m;
+    int count, values[3 + BSLAM_RAY_DIM];
+    double by[2][3 + BSLAM_RAY_DIM];
+} sight_t;
+
+/// From q, a vector to it of length inverse/inverse_per_m, and their derivatives.
+static sight_t sight_along(const bslam_ekf_t *ekf, int at, int dim, const double q[2], double inverse,
+                           double by_q[2][3 + BSLAM_RAY_DIM], int of_inverse)
+{
+    const double length = hypot(q[0], q[1]);
+    sight_t sight = {.bearing_rad = atan2(q[1], q[0]) - (double)ekf->mean[BSLAM_STATE_THETA],
+                     .inverse_per_m = inverse / length,
+                     .count = 3 + dim};
+    for (int k = 0; k < sight.count; k++) {
+        sight.values[k] = k < 3 ? k : at + k - 3;
+        sight.by[0][k] = (q[0] * by_q[1][k] - q[1] * by_q[0][k]) / length / length;
+        sight.by[1][k] = (k == of_inverse ? 1 / length : 0) -
+                         inverse * (q[0] * by_q[0][k] + q[1] * by_q[1][k]) / pow(length, 3);
+    }
+    sight.by[0][BSLAM_STATE_THETA] -= 1;
+    return sight;
+}
+
+static sight_t sight_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon)
+{
+    const int at = beacon->at;
+    const bool is_ray = beacon->kind == BSLAM_BEACON_RAY;
+    const double dx = (double)ekf->mean[at] - (double)ekf->mean[BSLAM_STATE_X];
+    const double dy = (double)ekf->mean[at + 1] - (double)ekf->mean[BSLAM_STATE_Y];
+    const double rho = is_ray ? (double)ekf->mean[at + 3] : 1;
+    const double direction = is_ray ? (double)ekf->mean[at + 2] : 0;
+    const double ux = is_ray ? cos(direction) : 0, uy = is_ray ? sin(direction) : 0;
+    const double q[2] = {rho * dx + ux, rho * dy + uy};
+    double by_q[2][3 + BSLAM_RAY_DIM] = {{-rho, 0, 0, rho, 0, -uy, dx}, {0, -rho, 0, 0, rho, ux, dy}};
+    return sight_along(ekf, at, bslam_beacon_dim(beacon->kind), q, rho, by_q, is_ray ? 6 : -1);
+}
+
+/// Of a beacon as it is from the robot, whatever is known of where both are on the whole. Negative: the map
+/// has none of this label.
+static double judge_beacon(const world_t *world, int32_t label)
+{
+    const bslam_ekf_t *ekf = filter();
+    int index = 0;
+    while (index < ekf->beacon_count && ekf->beacons[index].label != label) {
+        index++;
+    }
+    if (index == ekf->beacon_count) {
+        return -1;
+    }
+    const sight_t sight = sight_of(ekf, &ekf->beacons[index]);
+    double bearing_rad, range_m, lower[3][3] = {{0}};
+    see_truly(world, label, &bearing_rad, &range_m);
+    const double e[2] = {remainder(sight.bearing_rad - bearing_rad, 2 * PI),
+                         sight.inverse_per_m - 1 / range_m};
+    for (int i = 0; i < sight.count; i++) {
+        for (int j = 0; j < sight.count; j++) {
+            const double p = definite_covariance(ekf, sight.values[i], sight.values[j]);
+            lower[0][0] += sight.by[0][i] * p * sight.by[0][j];
+            lower[1][0] += sight.by[1][i] * p * sight.by[0][j];
+            lower[1][1] += sight.by[1][i] * p * sight.by[1][j];
+        }
+    }
+    return nees_of(2, lower, e);
+}
+
+static void judge(outcome_t *outcome, const world_t *world, const world_t *start, bool in_last_hour)
+{
+    double error_m;
+    const double nees = judge_pose(world, start, &error_m);
+    require(isfinite(nees), "the state is not finite, or its covariance not positive");
+    outcome->nees += nees;
+    outcome->nees_last += in_last_hour ? nees : 0;
+    outcome->error_m += error_m;
+    outcome->error_max_m = fmax(outcome->error_max_m, error_m);
+}
+
+static void look_closer(outcome_t *outcome, const world_t *world, const bslam_sighting_t *seen, int count)
+{
+    const double least = definite_least_eigenvalue(&filter()->factor);
+    require(isfinite(least), "the covariance is none");
+    outcome->least_eigenvalue = fmin(outcome->least_eigenvalue, least);
+    const double nees = count > 0 ? judge_beacon(world, seen[0].label) : -1;
+    outcome->nees_beacon += nees >= 0 ? nees : 0;
+    outcome->beacon_looks += nees >= 0 ? 1 : 0;
+}
+
+// ---- a life -----------------------------------------------------------------------------------------------
+
+/// Odometry stops, somebody carries the robot, and odometry goes on.
+static void interrupt(world_t *world, long times)
+{
+    const int turn = (int)(times % 3);
+    carry(world, carried[turn] * told_m[turn], carried[turn] * told_rad[turn]);
+    require(bslam_resume_odometry(&robot, (bslam_real_t)told_m[turn], (bslam_real_t)told_rad[turn]) ==
+                BSLAM_OK,
+            "a resumption is refused");
+}
+
+static void begin(const life_t *life, int32_t filter_kind)
+{
+    bslam_settings_t settings = settings_of(life);
+    int bad_setting;
+    settings.filter = filter_kind;
+    if (!life->has_range) {
+        bslam_settings_preset(&settings, BSLAM_PRESET_BEARING_ONLY);
+    }
+    require(bslam_init(&robot, &settings, &bad_setting) == BSLAM_OK, "a setting is refused");
+}
+
+/// It may stand for a while before it moves.
+static outcome_t soak(const life_t *life, uint64_t seed, long steps, long standing)
+{
+    world_t world = begin_life(life, seed), start = world;
+    outcome_t outcome = {.least_eigenvalue = 1};
+    const long doubt = life->doubt_s * (STEPS_AN_HOUR / 3600);
     for (long step = 1; step <= steps; step++) {
         if (step > standing) {
-            drive(&world);
+            live(&world);
         }
         if (step == 1) {
             start = world;  // odometry begins with the first reading: the map has the frame of that moment
         }
+        if (doubt > 0 && step % doubt == 0) {
+            interrupt(&world, step / doubt);
+        }
         const bslam_odometry_reading_t reading = read_wheels(&world, step * (int64_t)STEP_US);
         bslam_sighting_t seen[BEACONS];
         const int count = look(&world, seen);
-        require(bslam_odometry(&slam, &reading) == BSLAM_OK, "a reading is refused");
-        require(bslam_sightings(&slam, reading.time_us, seen, count) == BSLAM_OK, "a frame is refused");
-        if (step <= STEPS_AT_START) {
-            continue;
+        require(bslam_odometry(&robot, &reading) == BSLAM_OK, "a reading is refused");
+        require(bslam_sightings(&robot, reading.time_us, seen, count) == BSLAM_OK, "a frame is refused");
+        if (step > STEPS_AT_START) {
+            judge(&outcome, &world, &start, step > steps - STEPS_AN_HOUR);
         }
-        double e[3];
-        error_of(&slam, &world, &start, e);
-        const double now = nees_of(&slam, e);
-        require(isfinite(now), "the state is not finite, or its covariance not positive");
-        nees += now;
-        nees_last += step > steps - STEPS_AN_HOUR ? now : 0;
-        error_m += hypot(e[0], e[1]);
+        if (step % STEPS_A_LOOK == 0) {
+            look_closer(&outcome, &world, seen, count);
+        }
     }
-    const double all = (double)(steps - STEPS_AT_START);
-    const double last = fmin(all, STEPS_AN_HOUR);
-    (void)printf("%llu,%.3f,%.6f,%.6f,%.6f,%u\n", (unsigned long long)seed, (double)steps / STEPS_AN_HOUR,
-                 nees / all, nees_last / last, error_m / all, (unsigned)bslam_counters(&slam).slam.insane);
+    return outcome;
+}
+
+static void print_outcome(const outcome_t *outcome, uint64_t seed, long steps)
+{
+    const double all = (double)(steps - STEPS_AT_START), last = fmin(all, STEPS_AN_HOUR);
+    (void)printf("%llu,%.3f,%.6f,%.6f,%.6f,%.6f,%.6f,%.3g,%u\n", (unsigned long long)seed,
+                 (double)steps / STEPS_AN_HOUR, outcome->nees / all, outcome->nees_last / last,
+                 outcome->nees_beacon / (double)outcome->beacon_looks, outcome->error_m / all,
+                 outcome->error_max_m, outcome->least_eigenvalue,
+                 (unsigned)bslam_counters(&robot).slam.insane);
     (void)fflush(stdout);
 }
 
 int main(int argc, char **argv)
 {
-    static const char usage[] = "usage: soak FIRST_SEED SEEDS MINUTES STANDSTILL_S";
-    require(argc == 5, usage);
-    const long first = strtol(argv[1], NULL, 10);
-    const long seeds = strtol(argv[2], NULL, 10);
-    const long minutes = strtol(argv[3], NULL, 10);
-    const long standstill_s = strtol(argv[4], NULL, 10);
+    static const char usage[] = "usage: soak LIFE FILTER FIRST_SEED SEEDS MINUTES STANDSTILL_S";
+    require(argc == 7, usage);
+    const life_t *life = find_life(argv[1]);
+    require(life != NULL, "no such life");
+    const long filter_kind = strtol(argv[2], NULL, 10);
+    const long first = strtol(argv[3], NULL, 10);
+    const long seeds = strtol(argv[4], NULL, 10);
+    const long minutes = strtol(argv[5], NULL, 10);
+    const long standstill_s = strtol(argv[6], NULL, 10);
     require(first >= 0 && seeds > 0 && minutes > 0 && standstill_s >= 0, usage);
     for (long seed = first; seed < first + seeds; seed++) {
-        soak((uint64_t)seed, minutes * (STEPS_AN_HOUR / 60), standstill_s * (STEPS_AN_HOUR / 3600));
+        const long steps = minutes * (STEPS_AN_HOUR / 60);
+        begin(life, (int32_t)filter_kind);
+        const outcome_t outcome = soak(life, (uint64_t)seed, steps, standstill_s * (STEPS_AN_HOUR / 3600));
+        print_outcome(&outcome, (uint64_t)seed, steps);
     }
     return 0;
 }

@@ -123,6 +123,44 @@ dense_t dense_inverse(const dense_t *a)
     return inverse;
 }
 
+/// Turns rows and columns i and j so that element (i, j) becomes 0.
+static void rotate(dense_t *a, int i, int j)
+{
+    if (a->at[i][j] == 0) {
+        return;
+    }
+    const double half = (a->at[j][j] - a->at[i][i]) / (2 * a->at[i][j]);
+    const double t = (half < 0 ? -1 : 1) / (fabs(half) + sqrt(half * half + 1));
+    const double c = 1 / sqrt(t * t + 1), s = t * c;
+    for (int k = 0; k < a->rows; k++) {
+        const double row[2] = {a->at[i][k], a->at[j][k]};
+        a->at[i][k] = c * row[0] - s * row[1];
+        a->at[j][k] = s * row[0] + c * row[1];
+    }
+    for (int k = 0; k < a->rows; k++) {
+        const double column[2] = {a->at[k][i], a->at[k][j]};
+        a->at[k][i] = c * column[0] - s * column[1];
+        a->at[k][j] = s * column[0] + c * column[1];
+    }
+}
+
+double dense_least_eigenvalue(const dense_t *a)
+{
+    dense_t rest = *a;
+    for (int sweep = 0; sweep < 12; sweep++) {  // each leaves about the square of what is off the diagonal
+        for (int i = 0; i < a->rows; i++) {
+            for (int j = i + 1; j < a->rows; j++) {
+                rotate(&rest, i, j);
+            }
+        }
+    }
+    double least = rest.at[0][0];
+    for (int i = 1; i < a->rows; i++) {
+        least = fmin(least, rest.at[i][i]);
+    }
+    return least;
+}
+
 dense_t dense_without(const dense_t *a, int first, int count)
 {
     const bool is_vector = a->columns == 1;

@@ -24,6 +24,9 @@ dense_t dense_sandwich(const dense_t *a, const dense_t *p);
 /// a⁻¹ by Gauss and Jordan with pivoting. Fails the test if there is none.
 dense_t dense_inverse(const dense_t *a);
 
+/// The least eigenvalue of a symmetric matrix, by Jacobi's rotations.
+double dense_least_eigenvalue(const dense_t *a);
+
 /// Without rows and columns first to first + count - 1 (a column vector: without the rows).
 dense_t dense_without(const dense_t *a, int first, int count);
 

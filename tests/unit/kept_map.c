@@ -56,14 +56,6 @@ void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects)
         assert_int_equal(bslam_slam_sightings(slam, now_us, seen, objects + 1), BSLAM_OK);
     }
     assert_int_equal(slam->ekf.beacon_count, objects + 1);
-    kept_clear_unused(slam);
-}
-
-void kept_clear_unused(bslam_slam_t *slam)
-{
-    const size_t used = bslam_symmat_row(slam->ekf.dim);
-    memset(slam->ekf.covariance + used, 0,
-           sizeof slam->ekf.covariance - used * sizeof slam->ekf.covariance[0]);
 }
 
 uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX])

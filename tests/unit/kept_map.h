@@ -21,9 +21,6 @@ void kept_make(bslam_slam_t *slam, bslam_appearance_t *appearance, int objects);
 /// The same settings and appearance, and no map yet.
 void kept_empty(bslam_slam_t *slam, bslam_appearance_t *appearance);
 
-/// Behind the rows in use the covariance's memory holds nothing; zeros here, as a load leaves them.
-void kept_clear_unused(bslam_slam_t *slam);
-
 /// The map as bytes; how many.
 uint32_t kept_write(const bslam_slam_t *slam, uint8_t bytes[KEPT_BYTES_MAX]);
 

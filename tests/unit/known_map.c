@@ -1,5 +1,6 @@
 #include "known_map.h"
 
+#include "covariance.h"
 #include "support.h"
 
 static const bslam_pose_t on_axle = {0, 0, 0};
@@ -15,9 +16,7 @@ bslam_ekf_t unit_map_of(const bslam_settings_t *settings, const double (*places)
         const int at = ekf.beacons[index].at;
         for (int k = 0; k < 2; k++) {
             ekf.mean[at + k] = real(places[i][k]);
-            for (int j = 0; j < ekf.dim; j++) {
-                bslam_symmat_set(ekf.covariance, at + k, j, j == at + k ? BSLAM_R(0.01) : 0);
-            }
+            covariance_forget(&ekf, at + k, 0.01);
         }
     }
     return ekf;

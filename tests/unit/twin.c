@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "covariance.h"
+
 // ---- a random filter --------------------------------------------------------------------------------------
 
 /// B Bᵀ + 0.3 I, scaled to the standard deviations: well conditioned, and everything is correlated.
@@ -14,15 +16,17 @@ static void randomise_covariance(bslam_ekf_t *ekf, unit_random_t *random, const 
             b[i][k] = unit_random(random, -1, 1);
         }
     }
+    dense_t p = dense_zero(n, n);
     for (int i = 0; i < n; i++) {
-        for (int j = 0; j <= i; j++) {
+        for (int j = 0; j < n; j++) {
             double sum = i == j ? 0.3 * n : 0;
             for (int k = 0; k < n; k++) {
                 sum += b[i][k] * b[j][k];
             }
-            bslam_symmat_set(ekf->covariance, i, j, real(sum * sd[i] * sd[j] / n));
+            p.at[i][j] = sum * sd[i] * sd[j] / n;
         }
     }
+    covariance_set(ekf, &p);
 }
 
 /// Puts a beacon 2 to 8 m away from (x, y), in any direction.
@@ -92,7 +96,7 @@ twin_t twin_of(const bslam_ekf_t *ekf)
     for (int i = 0; i < ekf->dim; i++) {
         twin.mean.at[i][0] = (double)ekf->mean[i];
         for (int j = 0; j < ekf->dim; j++) {
-            twin.covariance.at[i][j] = (double)bslam_symmat_get(ekf->covariance, i, j);
+            twin.covariance.at[i][j] = (double)bslam_ekf_covariance(ekf, i, j);
         }
     }
     return twin;

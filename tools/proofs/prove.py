@@ -77,15 +77,31 @@ def tool(name: str) -> list[str]:
 
 def own_proofs(quick: bool) -> list[Proof]:
     """Of the core alone."""
-    slots, guard = "build/unit/float/bin/store/test_slots", "build/unit/float/bin/store/test_guard"
+    slots, guard = (f"build/unit/float/bin/bslam/store/test_{name}" for name in ("slots", "guard"))
     soaks = ("build/soak/float/soak", "build/soak/double/soak")
     cuts = ("power cuts at every byte, at every pair", "0 mixed", r"power cuts: (.*)")
     flips = ("bit flips of the guarded state", "found, or without effect", r"bit flips: (.*)")
     soak = ("6 h x 20 seeds, float beside double", "NEES 2.4-3.7, 0, 10 %", r"soak: .* seeds: (.*)")
+    lives = ("of every kind of life", "no eigenvalue < 0, NEES, error", r"lives: .* seeds: (.*)")
+    adversary = ("odd but legal settings and calls", "all holds", r"adversary: (.*)")
+    mutants = ("mutants of the estimator killed", "92 %, store and link 100", r"mutants: (\d.*)")
     mcdc = ("MC/DC of the libraries", "95 %", r"mcdc: (\d.*?),")
     fuzz = ("fuzzing: executions, crashes", "2e8, 1e6 each, 0", r"fuzz: (.*)")
     depth = MappingProxyType({}) if quick else THOROUGH
     less_soak = ["--minutes", "30", "--seeds", "4", "--nees", "1.1", "5.8"] if quick else []
+    hours, days, sample = (1, 1, 14) if quick else (10, 30, 500)
+    each = [*tool("soak"), "--seeds", "1", "--minutes", str(60 * hours), "--lives"]
+    month = [
+        *tool("soak"),
+        "--seeds",
+        "1",
+        "--minutes",
+        str(1440 * days),
+        "--filters",
+        "invariant",
+        "--lives",
+    ]
+    make = ["make", "--no-print-directory"]
     # The ledger tells of executions elsewhere, too: of each target some are made here.
     how_long = ["--seconds", "60"] if quick else ["--each", "30"]
     fuzzing = [*tool("fuzz"), "--jobs", str(CORES), *how_long]
@@ -93,6 +109,17 @@ def own_proofs(quick: bool) -> list[Proof]:
         Proof("cuts", *cuts, [slots], 1, (slots,), depth),
         Proof("flips", *flips, [guard], 0.1, (guard,), depth),
         Proof("soak", *soak, [*tool("soak"), *less_soak], 0.2 if quick else 4, soaks),
+        Proof("lives", f"{hours} h {lives[0]}", *lives[1:], each, 2.5 * hours, soaks),
+        Proof(
+            "rest",
+            f"{days} days at rest, and parked",
+            *lives[1:],
+            [*month, "rest", "park"],
+            1.3 * days,
+            soaks,
+        ),
+        Proof("adversary", *adversary, [*make, f"adversary{'-short' * quick}"], 0.3 if quick else 15),
+        Proof("mutants", *mutants, [*make, "mutants", f"MUTANTS=--sample {sample}"], sample / 25),
         Proof("mcdc", *mcdc, tool("mcdc"), 2, ("mcdc-programs",)),
         Proof("fuzz", *fuzz, fuzzing, 1 if quick else 12, ("fuzz-programs",), alone=True),
     ]

@@ -30,14 +30,14 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *setting
     if (dx * dx + dy * dy > apart_m * apart_m) {
         return false;
     }
-    const bslam_real_t *p = ekf->covariance;
     const bslam_real_t floor_m2 = settings->duplicate_sd_m * settings->duplicate_sd_m;
-    const bslam_real_t xx = floor_m2 + bslam_symmat_get(p, at, at) + bslam_symmat_get(p, bt, bt) -
-                            2 * bslam_symmat_get(p, at, bt);
-    const bslam_real_t yy = floor_m2 + bslam_symmat_get(p, at + 1, at + 1) +
-                            bslam_symmat_get(p, bt + 1, bt + 1) - 2 * bslam_symmat_get(p, at + 1, bt + 1);
-    const bslam_real_t xy = bslam_symmat_get(p, at + 1, at) + bslam_symmat_get(p, bt + 1, bt) -
-                            bslam_symmat_get(p, at + 1, bt) - bslam_symmat_get(p, bt + 1, at);
+    const bslam_real_t xx = floor_m2 + bslam_ekf_covariance(ekf, at, at) + bslam_ekf_covariance(ekf, bt, bt) -
+                            2 * bslam_ekf_covariance(ekf, at, bt);
+    const bslam_real_t yy = floor_m2 + bslam_ekf_covariance(ekf, at + 1, at + 1) +
+                            bslam_ekf_covariance(ekf, bt + 1, bt + 1) -
+                            2 * bslam_ekf_covariance(ekf, at + 1, bt + 1);
+    const bslam_real_t xy = bslam_ekf_covariance(ekf, at + 1, at) + bslam_ekf_covariance(ekf, bt + 1, bt) -
+                            bslam_ekf_covariance(ekf, at + 1, bt) - bslam_ekf_covariance(ekf, bt + 1, at);
     const bslam_real_t det = xx * yy - xy * xy;
     return dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx <= settings->duplicate_d2 * det;
 }

@@ -1,7 +1,6 @@
 #include "bslam/association/missed_beacons.h"
 
 #include "bslam/association/viewpoint.h"
-#include "bslam/linalg/symmat.h"
 #include "base/scalar.h"
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
@@ -37,7 +36,7 @@ static bool is_expected(const bslam_appearance_t *appearance, const bslam_ekf_t 
     const bslam_real_t off_m = bslam_abs(viewpoint->range_m - seen_m);
     return off_m <= SAME_PLACE * seen_m && viewpoint->bearing_rad < INSIDE * appearance->left_rad &&
            viewpoint->bearing_rad > INSIDE * appearance->right_rad &&
-           bslam_symmat_get(ekf->covariance, 2, 2) <= HEADING_VAR_MAX_RAD2 && viewpoint->is_sure;
+           bslam_ekf_covariance(ekf, 2, 2) <= HEADING_VAR_MAX_RAD2 && viewpoint->is_sure;
 }
 
 int bslam_missed_beacons_find(bslam_appearance_t *appearance, const bslam_ekf_t *ekf,

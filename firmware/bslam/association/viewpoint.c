@@ -1,6 +1,5 @@
 #include "bslam/association/viewpoint.h"
 
-#include "bslam/linalg/symmat.h"
 #include "base/trig.h"
 #include "base/scalar.h"
 
@@ -24,12 +23,11 @@ bslam_viewpoint_t bslam_viewpoint_of(const bslam_ekf_t *ekf, int index)
     const bslam_real_t dx_m = ekf->mean[at] - robot.x_m;
     const bslam_real_t dy_m = ekf->mean[at + 1] - robot.y_m;
     const bslam_real_t direction_rad = bslam_atan2(dy_m, dx_m);
-    const bslam_real_t *p = ekf->covariance;
     bslam_viewpoint_t viewpoint;
     viewpoint.range_m = bslam_sqrt(dx_m * dx_m + dy_m * dy_m);
     viewpoint.bearing_rad = bslam_angle_wrap(direction_rad - robot.theta_rad);
     viewpoint.sector = bslam_viewpoint_sector(direction_rad);
     const bslam_real_t sd_m = POSITION_SD_MAX * viewpoint.range_m;
-    viewpoint.is_sure = bslam_symmat_get(p, 0, 0) + bslam_symmat_get(p, 1, 1) <= sd_m * sd_m;
+    viewpoint.is_sure = bslam_ekf_covariance(ekf, 0, 0) + bslam_ekf_covariance(ekf, 1, 1) <= sd_m * sd_m;
     return viewpoint;
 }

@@ -1,28 +1,33 @@
 /// The extended Kalman filter over robot and map: paper equations (1)-(11) and the augment step, and its
 /// right-invariant form. MATH "The filter".
 ///
-/// State: x, y, theta | v, omega or their scale factors, if switched on | beacons, 2 to 4 values each. The
-/// covariance is held in these coordinates in both forms; the invariant form transports it after each
-/// correction.
+/// State: x, y, theta | v, omega or their scale factors | what the sensor is told wrong, both if switched on
+/// | beacons, 2 to 4 values each. The covariance is held in these coordinates in both forms; the invariant
+/// form transports it after each correction. It is held as a factor (linalg/factor.h), in the order omega,
+/// theta | sensor, beacons | v, x, y: then a motion, the transport and a new beacon keep that triangular.
 ///
-/// Cost in multiply-adds for n values: prediction O(n). Each scalar of a sighting 7 n, and n²/2 for its
-/// down-date, which waits until four scalars share one pass over the triangle.
+/// Cost in multiply-adds for n values: a motion n², for the noise of its turn. Each scalar of a sighting 10
+/// n, and n² for its part in the factor, which waits until four scalars share one pass. The transport 2 n.
 #ifndef BSLAM_EKF_EKF_H
 #define BSLAM_EKF_EKF_H
 
 #include "bslam/bslam.h"
 #include "base/status.h"
 #include "base/types.h"
+#include "bslam/linalg/factor.h"
 #include "bslam/linalg/smallmat.h"
-#include "bslam/linalg/symmat.h"
 #include "bslam/model/observation.h"
 
 /// The robot's own values: pose, and v, omega or their scale factors.
 #define BSLAM_ROBOT_DIM_MAX 5
+/// By what the sensor differs from what is told: place and yaw, in the told frame; all distances are too long
+/// by the scale.
+enum { BSLAM_SENSOR_X = 0, BSLAM_SENSOR_Y, BSLAM_SENSOR_YAW, BSLAM_SENSOR_SCALE, BSLAM_SENSOR_DIM };
 /// The largest state: room for 2 values more a ray, or 1 more for each of twice as many sized beacons.
-#define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
-#define BSLAM_STATE_PADDED BSLAM_SYMMAT_PADDED(BSLAM_STATE_MAX)
-/// Scalars whose down-date waits for a common pass.
+#define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
+/// And what comes before others leave: linalg/factor.h.
+#define BSLAM_STATE_PADDED BSLAM_FACTOR_PADDED(BSLAM_STATE_MAX + 7)
+/// Scalars that wait for a common pass through the factor.
 #define BSLAM_PENDING_MAX 4
 
 /// Where the robot's values stand in the state.
@@ -70,18 +75,55 @@ typedef struct bslam_beacon {
 
 typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
-    bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX)];
+    bslam_factor_t factor;  ///< of the covariance, but for what waits
     int32_t dim;
-    int32_t base_dim;  ///< 3, or 5 with velocity or scale states
+    int32_t base_dim;    ///< 3, or 5 with velocity or scale states
+    int32_t sensor_dim;  ///< 0, or BSLAM_SENSOR_DIM behind those
     int32_t beacon_count, ray_count, sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
     // Scratch: holds nothing between calls.
-    bslam_real_t pending[BSLAM_PENDING_MAX][BSLAM_STATE_PADDED];
-    bslam_real_t pending_scale[BSLAM_PENDING_MAX], correction[BSLAM_STATE_PADDED];
+    bslam_real_t d[BSLAM_FACTOR_PLACES_MAX];  ///< the factor's with what waits
+    bslam_real_t v[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX],
+        lambda[BSLAM_PENDING_MAX][BSLAM_FACTOR_PLACES_MAX];
+    bslam_real_t gain[BSLAM_PENDING_MAX];
+    bslam_real_t correction[BSLAM_STATE_PADDED];
     int32_t pending_count;
     bool has_correction;
 } bslam_ekf_t;
+
+/// A sparse row: not zero only at x, y, theta, at the sensor's values, if there are any, and at `dim`
+/// neighbouring state values from `at` on, at >= 3.
+typedef struct bslam_row {
+    bslam_real_t base[3], other[BSLAM_RAY_DIM], sensor[BSLAM_SENSOR_DIM];
+    uint16_t at;
+    uint16_t dim;
+    uint16_t sensor_at, sensor_dim;
+} bslam_row_t;
+
+/// The first state value of the map.
+static inline int bslam_ekf_map_at(const bslam_ekf_t *ekf)
+{
+    return ekf->base_dim + ekf->sensor_dim;
+}
+
+/// Where state value i stands in the factor.
+static inline int bslam_ekf_place(const bslam_ekf_t *ekf, int i)
+{
+    const int tail = ekf->factor.tail_count, tail_at = bslam_factor_tail_at(&ekf->factor);
+    if (i >= ekf->base_dim) {
+        return i - tail;
+    }
+    return i == BSLAM_STATE_THETA  ? ekf->base_dim - tail - 1
+           : i == BSLAM_STATE_TURN ? 0
+                                   : tail_at + (i == BSLAM_STATE_FORWARD ? 0 : tail - 2 + i);
+}
+
+/// The covariance of state values i and j. O(n).
+static inline bslam_real_t bslam_ekf_covariance(const bslam_ekf_t *ekf, int i, int j)
+{
+    return bslam_factor_get(&ekf->factor, bslam_ekf_place(ekf, i), bslam_ekf_place(ekf, j));
+}
 
 /// Robot at the origin, which it knows exactly; no beacons.
 void bslam_ekf_init(bslam_ekf_t *ekf, const bslam_settings_t *settings);
@@ -101,11 +143,11 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
 /// The robot's own part of a state, which goes through odometry alone as it does with the map.
 typedef struct bslam_robot {
     bslam_real_t mean[BSLAM_ROBOT_DIM_MAX];
-    bslam_real_t covariance[BSLAM_SYMMAT_LENGTH(BSLAM_ROBOT_DIM_MAX)];
+    bslam_real_t covariance[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX];
     int32_t dim;
 } bslam_robot_t;
 
-/// The robot as the filter has it.
+/// The robot as the filter has it. O(n).
 bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf);
 
 /// What bslam_ekf_predict does to the robot. O(1).
@@ -244,11 +286,17 @@ bool bslam_ekf_give_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var);
 /// A sized beacon is something else than was thought: its scale is 1 again, to this variance and more_var >
 /// 0. Means stay; what hung on the scale becomes as doubtful as if more_var had been there from the start. No
 /// correction may be under way. O(n²).
-void bslam_ekf_renew_scale(bslam_ekf_t *ekf, const bslam_settings_t *settings, int index,
-                           bslam_real_t scale_var, bslam_real_t more_var);
+void bslam_ekf_renew_scale(bslam_ekf_t *ekf, int index, bslam_real_t scale_var, bslam_real_t more_var);
+
+/// A point becomes another one, made of the state by these rows. Its values stand behind all others then, and
+/// its mean is as it was. O(n²).
+void bslam_ekf_replace_point(bslam_ekf_t *ekf, int index, const bslam_row_t rows[BSLAM_POINT_DIM]);
 
 /// Takes a beacon out of the state; those behind it move up one place. O(n²).
 void bslam_ekf_remove(bslam_ekf_t *ekf, int index);
+
+/// Takes a value that is no beacon's out of the state. O(n²).
+void bslam_ekf_remove_value(bslam_ekf_t *ekf, int at);
 
 /// Takes all beacons out. The robot stays as it is. O(n).
 void bslam_ekf_forget_map(bslam_ekf_t *ekf);
@@ -278,7 +326,7 @@ void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *
 /// Covariance of a beacon's position in the map; zero for a known one.
 bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index);
 
-/// Whether all means and variances are finite, and no variance is negative. O(n).
+/// Whether all means are finite, and so is D, which is not negative. O(n).
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf);
 
 #endif

@@ -9,14 +9,25 @@
 #include "bslam/model/pose.h"
 #include "base/scalar.h"
 
-/// A state that moves: that of the filter, or the robot's own part of it. The robot's values come first.
+/// What moves: the filter's robot, or a copy of it alone. The robot's values come first in the mean.
 typedef struct moving {
     bslam_real_t *mean;
-    bslam_real_t *covariance;
+    bslam_ekf_t *ekf;           ///< NULL: the copy
+    bslam_robot_t *robot;       ///< NULL: the filter's
     bslam_real_t *correction;   ///< that waits about the mean, and moves with it; NULL: none
     bslam_transition_t *noted;  ///< where to say how; NULL: nowhere
-    int base_dim, dim;
+    int base_dim;
 } moving_t;
+
+static moving_t moving_ekf(bslam_ekf_t *ekf)
+{
+    return (moving_t){.mean = ekf->mean, .ekf = ekf, .base_dim = ekf->base_dim};
+}
+
+static moving_t moving_robot(bslam_robot_t *robot)
+{
+    return (moving_t){.mean = robot->mean, .robot = robot, .base_dim = robot->dim};
+}
 
 /// Fills in the derivatives by pose, and by the two further states, which move the pose by forward_rate and
 /// turn_rate times their own change.
@@ -60,86 +71,112 @@ static void move_correction(const moving_t *state, const bslam_transition_t *tra
     memcpy(state->correction, moved, sizeof moved);
 }
 
-/// The robot's block of F P Fᵀ where it has nothing but its pose: theta moves x and y.
-static void move_pose_block(bslam_real_t *p, bslam_real_t x_theta, bslam_real_t y_theta)
+/// P <- F P Fᵀ of the copy.
+static void move_robot(bslam_robot_t *robot, const bslam_transition_t *transition)
 {
-    bslam_real_t *y_row = p + bslam_symmat_row(1), *theta_row = p + bslam_symmat_row(2);
-    const bslam_real_t x_before = theta_row[0], y_before = theta_row[1];
-    theta_row[0] += x_theta * theta_row[2];
-    theta_row[1] += y_theta * theta_row[2];
-    p[0] += x_theta * (x_before + theta_row[0]);
-    y_row[0] += x_theta * y_before + y_theta * theta_row[0];
-    y_row[1] += y_theta * (y_before + theta_row[1]);
-}
-
-/// The same with two further values.
-static void move_robot_block(bslam_real_t *p, int base, const bslam_transition_t *transition)
-{
-    bslam_real_t moved[POSE_DIM][BSLAM_ROBOT_DIM_MAX] = {{0}};
+    const int base = robot->dim;
+    bslam_real_t moved[BSLAM_ROBOT_DIM_MAX][BSLAM_ROBOT_DIM_MAX] = {{0}};
     for (int j = 0; j < base; j++) {
-        bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
         for (int i = 0; i < base; i++) {
-            column[i] = bslam_symmat_get(p, i, j);
-        }
-        for (int i = 0; i < POSE_DIM; i++) {
-            moved[i][j] = row_times(transition, i, base, column);
+            moved[j][i] =
+                i < POSE_DIM ? row_times(transition, i, base, robot->covariance[j]) : robot->covariance[j][i];
         }
     }
-    for (int i = 0; i < POSE_DIM; i++) {
-        for (int j = 0; j <= i; j++) {
-            bslam_symmat_set(p, i, j, row_times(transition, j, base, moved[i]));
+    for (int i = 0; i < base; i++) {
+        bslam_real_t column[BSLAM_ROBOT_DIM_MAX] = {0};
+        for (int j = 0; j < base; j++) {
+            column[j] = moved[j][i];
         }
-        for (int j = POSE_DIM; j < base; j++) {
-            bslam_symmat_set(p, i, j, moved[i][j]);
+        for (int j = 0; j < base; j++) {
+            robot->covariance[i][j] = j < POSE_DIM ? row_times(transition, j, base, column) : column[j];
         }
     }
 }
 
-/// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows. Touches those rows only: O(n).
+/// The filter's: each row takes of those before it in the factor. O(n).
+static void move_factor(bslam_ekf_t *ekf, const bslam_transition_t *transition)
+{
+    bslam_factor_t *factor = &ekf->factor;
+    const int theta = bslam_ekf_place(ekf, BSLAM_STATE_THETA);
+    const bool extended = ekf->base_dim > POSE_DIM;
+    for (int i = BSLAM_STATE_X; i <= BSLAM_STATE_Y; i++) {
+        const bslam_real_t *by = transition->by[i];
+        const int place = bslam_ekf_place(ekf, i);
+        bslam_factor_add_row(factor, place, theta, by[BSLAM_STATE_THETA]);
+        if (extended) {
+            bslam_factor_add_row(factor, place, bslam_ekf_place(ekf, BSLAM_STATE_TURN), by[BSLAM_STATE_TURN]);
+            bslam_factor_add_row(factor, place, bslam_ekf_place(ekf, BSLAM_STATE_FORWARD),
+                                 by[BSLAM_STATE_FORWARD]);
+        }
+    }
+    if (extended) {
+        bslam_factor_add_row(factor, theta, bslam_ekf_place(ekf, BSLAM_STATE_TURN),
+                             transition->by[BSLAM_STATE_THETA][BSLAM_STATE_TURN]);
+    }
+}
+
+/// P <- [F 0; 0 I] P [F 0; 0 I]ᵀ, where F replaces the pose rows.
 static void move_covariance(const moving_t *state, const bslam_transition_t *transition)
 {
-    const int base = state->base_dim;
     if (state->correction != NULL) {
         move_correction(state, transition);
     }
     if (state->noted != NULL) {
         *state->noted = *transition;
     }
-    if (base == POSE_DIM) {
-        move_pose_block(state->covariance, transition->by[0][BSLAM_STATE_THETA],
-                        transition->by[1][BSLAM_STATE_THETA]);
+    if (state->ekf != NULL) {
+        move_factor(state->ekf, transition);
     } else {
-        move_robot_block(state->covariance, base, transition);
-    }
-    const bslam_transition_t f = *transition;
-    const bool extended = base > POSE_DIM;
-    bslam_real_t *row = state->covariance + bslam_symmat_row(base);
-    for (int i = base; i < state->dim; i++) {
-        row[0] += f.by[0][2] * row[2];
-        row[1] += f.by[1][2] * row[2];
-        if (extended) {
-            row[0] += f.by[0][3] * row[3] + f.by[0][4] * row[4];
-            row[1] += f.by[1][3] * row[3] + f.by[1][4] * row[4];
-            row[2] += f.by[2][4] * row[4];
-        }
-        row += bslam_symmat_filled(i);
+        move_robot(state->robot, transition);
     }
 }
 
-/// Adds the noise of the increment, mapped into the pose: Q of equation (5).
+/// P += variance by byᵀ, of the robot's values. No down-date may wait. O(n²) where the heading has a part in
+/// it, else O(n).
+static void add_noise(const moving_t *state, bslam_real_t variance, const bslam_real_t *by)
+{
+    if (state->ekf == NULL) {
+        for (int i = 0; i < state->base_dim; i++) {
+            for (int j = 0; j < state->base_dim; j++) {
+                state->robot->covariance[i][j] += variance * by[i] * by[j];
+            }
+        }
+        return;
+    }
+    bslam_ekf_t *ekf = state->ekf;
+    const int places = bslam_factor_places(&ekf->factor);
+    bslam_real_t *w = ekf->v[0];
+    int first = places;
+    memset(w, 0, (size_t)places * sizeof w[0]);
+    for (int i = 0; i < state->base_dim; i++) {
+        const int place = bslam_ekf_place(ekf, i);
+        w[place] = by[i];
+        first = by[i] != 0 && place < first ? place : first;
+    }
+    bslam_factor_add(&ekf->factor, first, variance, w, ekf->lambda);
+}
+
+/// One value of the robot's becomes more doubtful.
+static void add_doubt(const moving_t *state, int at, bslam_real_t variance)
+{
+    bslam_real_t by[BSLAM_ROBOT_DIM_MAX] = {0};
+    by[at] = 1;
+    add_noise(state, variance, by);
+}
+
+/// Adds the noise of the increment, mapped into the pose: Q of equation (5), as that of the turn, with what
+/// of the forward motion goes with it, and the rest of this one.
 static void add_motion_noise(const moving_t *state, const bslam_motion_jacobian_t *jacobian,
                              const bslam_motion_t *motion)
 {
-    const bslam_real_t by_forward[POSE_DIM] = {jacobian->x_forward, jacobian->y_forward, 0};
-    const bslam_real_t by_turn[POSE_DIM] = {jacobian->x_turn, jacobian->y_turn, 1};
-    for (int i = 0; i < POSE_DIM; i++) {
-        for (int j = 0; j <= i; j++) {
-            const bslam_real_t cross = by_forward[i] * by_turn[j] + by_turn[i] * by_forward[j];
-            state->covariance[bslam_symmat_at(i, j)] +=
-                motion->forward_var_m2 * by_forward[i] * by_forward[j] +
-                motion->turn_var_rad2 * by_turn[i] * by_turn[j] + motion->forward_turn_cov_mrad * cross;
-        }
-    }
+    const bslam_real_t turn_var = motion->turn_var_rad2, common = motion->forward_turn_cov_mrad;
+    const bslam_real_t share = turn_var > 0 ? common / turn_var : 0;
+    const bslam_real_t rest = motion->forward_var_m2 - share * common;
+    const bslam_real_t by_turn[BSLAM_ROBOT_DIM_MAX] = {jacobian->x_turn + share * jacobian->x_forward,
+                                                       jacobian->y_turn + share * jacobian->y_forward, 1};
+    const bslam_real_t by_forward[BSLAM_ROBOT_DIM_MAX] = {jacobian->x_forward, jacobian->y_forward};
+    add_noise(state, turn_var, by_turn);
+    add_noise(state, rest > 0 ? rest : 0, by_forward);
 }
 
 /// One of the two further states forgets at `keep` a step and walks with variance `walk_var`.
@@ -150,12 +187,15 @@ static void walk_state(const moving_t *state, int at, bslam_real_t keep, bslam_r
         if (state->correction != NULL) {
             state->correction[at] *= keep;
         }
-        for (int i = 0; i < state->dim; i++) {
-            state->covariance[bslam_symmat_at(i, at)] *= keep;
+        if (state->ekf != NULL) {
+            bslam_factor_scale(&state->ekf->factor, bslam_ekf_place(state->ekf, at), keep);
         }
-        state->covariance[bslam_symmat_at(at, at)] *= keep;
+        for (int i = 0; state->robot != NULL && i < state->base_dim; i++) {
+            state->robot->covariance[i][at] *= keep;
+            state->robot->covariance[at][i] *= keep;
+        }
     }
-    state->covariance[bslam_symmat_at(at, at)] += walk_var;
+    add_doubt(state, at, walk_var);
 }
 
 static void step_pose(const moving_t *state, const bslam_settings_t *settings, bslam_real_t forward_m,
@@ -264,33 +304,31 @@ static void measure_speeds(bslam_ekf_t *ekf, const speeds_t *speeds)
     }
 }
 
-/// One of the two into the robot's covariance and its correction.
+/// One of the two into the copy's covariance and its correction.
 static void apply_speed(bslam_robot_t *robot, const bslam_real_t by[2], bslam_real_t innovation,
                         bslam_real_t *correction)
 {
-    bslam_real_t *p = robot->covariance;
     bslam_real_t column[BSLAM_ROBOT_DIM_MAX];
     for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
-        column[i] = by[0] * bslam_symmat_get(p, i, BSLAM_STATE_FORWARD) +
-                    by[1] * bslam_symmat_get(p, i, BSLAM_STATE_TURN);
+        const bslam_real_t *row = robot->covariance[i];
+        column[i] = by[0] * row[BSLAM_STATE_FORWARD] + by[1] * row[BSLAM_STATE_TURN];
     }
     const bslam_real_t s = by[0] * column[BSLAM_STATE_FORWARD] + by[1] * column[BSLAM_STATE_TURN] + 1;
     const bslam_real_t left =
         innovation - by[0] * correction[BSLAM_STATE_FORWARD] - by[1] * correction[BSLAM_STATE_TURN];
     for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
         const bslam_real_t gain = column[i] / s;
-        bslam_real_t *row = p + bslam_symmat_row(i);
         correction[i] += gain * left;
-        for (int j = 0; j <= i; j++) {
-            row[j] -= gain * column[j];
+        for (int j = 0; j < BSLAM_ROBOT_DIM_MAX; j++) {
+            robot->covariance[i][j] -= gain * column[j];
         }
     }
 }
 
 /// measure_speeds without a map. The transport of the invariant form is what a motion by the correction does
 /// to the covariance.
-static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state,
-                                  const bslam_settings_t *settings, const speeds_t *speeds)
+static void measure_robots_speeds(bslam_robot_t *robot, const bslam_settings_t *settings,
+                                  const speeds_t *speeds)
 {
     bslam_real_t correction[BSLAM_ROBOT_DIM_MAX] = {0};
     for (int k = 0; k < 2; k++) {
@@ -303,7 +341,7 @@ static void measure_robots_speeds(bslam_robot_t *robot, const moving_t *state,
                                                .y_theta = correction[BSLAM_STATE_X]};
         bslam_transition_t transition;
         fill_transition(&shift, 0, 0, &transition);
-        move_covariance(state, &transition);
+        move_robot(robot, &transition);
     }
     for (int i = 0; i < BSLAM_ROBOT_DIM_MAX; i++) {
         robot->mean[i] += correction[i];
@@ -343,7 +381,7 @@ static bool drive(const moving_t *state, const bslam_settings_t *settings, const
 void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
                        bslam_motion_t *moved)
 {
-    const moving_t state = {ekf->mean, ekf->covariance, NULL, NULL, ekf->base_dim, ekf->dim};
+    const moving_t state = moving_ekf(ekf);
     speeds_t speeds;
     if (drive(&state, settings, motion, moved, &speeds)) {
         measure_speeds(ekf, &speeds);
@@ -377,14 +415,12 @@ static void drive_about(const moving_t *state, const bslam_settings_t *settings,
 }
 
 /// The travel is as doubtful as it misses the next point, times `share`, both axes.
-static void doubt_travel(bslam_ekf_t *ekf, const bslam_real_t *next, bslam_real_t share)
+static void doubt_travel(const moving_t *state, const bslam_real_t *next, bslam_real_t share)
 {
-    const bslam_real_t x_m = share * (ekf->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
-    const bslam_real_t y_m = share * (ekf->mean[BSLAM_STATE_Y] - next[BSLAM_STATE_Y]);
-    for (int i = BSLAM_STATE_X; i <= BSLAM_STATE_Y; i++) {
-        const bslam_real_t variance = bslam_symmat_get(ekf->covariance, i, i);
-        bslam_symmat_set(ekf->covariance, i, i, variance + x_m * x_m + y_m * y_m);
-    }
+    const bslam_real_t x_m = share * (state->mean[BSLAM_STATE_X] - next[BSLAM_STATE_X]);
+    const bslam_real_t y_m = share * (state->mean[BSLAM_STATE_Y] - next[BSLAM_STATE_Y]);
+    add_doubt(state, BSLAM_STATE_X, x_m * x_m + y_m * y_m);
+    add_doubt(state, BSLAM_STATE_Y, x_m * x_m + y_m * y_m);
 }
 
 void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings, const bslam_motion_t *motion,
@@ -392,7 +428,9 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                              bslam_transition_t *transition)
 {
     bslam_ekf_settle(ekf);
-    const moving_t state = {ekf->mean, ekf->covariance, ekf->correction, transition, ekf->base_dim, ekf->dim};
+    moving_t state = moving_ekf(ekf);
+    state.correction = ekf->correction;
+    state.noted = transition;
     ekf->mean[BSLAM_STATE_THETA] += bend->turned_rad;
     if (settings->velocity_states == 0) {
         bslam_motion_t moved = *motion;
@@ -402,7 +440,7 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings,
         drive_about(&state, settings, motion->dt_s, bend->stretch, next);
     }
     ekf->mean[BSLAM_STATE_THETA] -= bend->turned_rad;
-    doubt_travel(ekf, next, bend->doubt_of_miss);
+    doubt_travel(&state, next, bend->doubt_of_miss);
     for (int i = 0; i < ekf->base_dim; i++) {
         const bslam_real_t left = ekf->mean[i] - next[i];
         ekf->correction[i] += i == BSLAM_STATE_THETA ? bslam_angle_wrap(left) : left;
@@ -423,18 +461,21 @@ bslam_robot_t bslam_ekf_robot(const bslam_ekf_t *ekf)
 {
     bslam_robot_t robot = {.dim = ekf->base_dim};
     memcpy(robot.mean, ekf->mean, (size_t)robot.dim * sizeof robot.mean[0]);
-    const size_t length = (size_t)BSLAM_SYMMAT_LENGTH(robot.dim);
-    memcpy(robot.covariance, ekf->covariance, length * sizeof robot.covariance[0]);
+    for (int i = 0; i < robot.dim; i++) {
+        for (int j = 0; j <= i; j++) {
+            robot.covariance[i][j] = robot.covariance[j][i] = bslam_ekf_covariance(ekf, i, j);
+        }
+    }
     return robot;
 }
 
 void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings, const bslam_motion_t *motion,
                          bslam_motion_t *moved)
 {
-    const moving_t state = {robot->mean, robot->covariance, NULL, NULL, robot->dim, robot->dim};
+    const moving_t state = moving_robot(robot);
     speeds_t speeds;
     if (drive(&state, settings, motion, moved, &speeds)) {
-        measure_robots_speeds(robot, &state, settings, &speeds);
+        measure_robots_speeds(robot, settings, &speeds);
         note_velocity(robot->mean, moved);
     }
 }
@@ -444,19 +485,17 @@ void bslam_robot_predict(bslam_robot_t *robot, const bslam_settings_t *settings,
 /// Adds to a variance, but not beyond `most`.
 static void add_variance(bslam_ekf_t *ekf, int at, bslam_real_t addition, bslam_real_t most)
 {
-    bslam_real_t *variance = &ekf->covariance[bslam_symmat_at(at, at)];
-    const bslam_real_t room = most > *variance ? most - *variance : 0;
-    *variance += addition < room ? addition : room;
+    const moving_t state = moving_ekf(ekf);
+    const bslam_real_t variance = bslam_ekf_covariance(ekf, at, at);
+    const bslam_real_t room = most > variance ? most - variance : 0;
+    add_doubt(&state, at, addition < room ? addition : room);
 }
 
 /// A state value that nothing is known of but its prior.
-static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t sd)
+static void forget_state(bslam_ekf_t *ekf, int at, bslam_real_t mean, bslam_real_t variance)
 {
-    ekf->mean[at] = 0;
-    for (int i = 0; i < ekf->dim; i++) {
-        bslam_symmat_set(ekf->covariance, i, at, 0);
-    }
-    bslam_symmat_set(ekf->covariance, at, at, sd * sd);
+    ekf->mean[at] = mean;
+    bslam_factor_forget(&ekf->factor, bslam_ekf_place(ekf, at), variance, ekf->v[0], ekf->lambda);
 }
 
 void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_real_t position_var_m2,
@@ -466,18 +505,15 @@ void bslam_ekf_resume(bslam_ekf_t *ekf, const bslam_settings_t *settings, bslam_
     add_variance(ekf, BSLAM_STATE_Y, position_var_m2, BSLAM_R(900.0));
     add_variance(ekf, BSLAM_STATE_THETA, heading_var_rad2, BSLAM_R(10.24));
     if (settings->velocity_states != 0) {
-        forget_state(ekf, BSLAM_STATE_FORWARD, settings->velocity_sd_mps);
-        forget_state(ekf, BSLAM_STATE_TURN, settings->turn_rate_sd_radps);
+        forget_state(ekf, BSLAM_STATE_FORWARD, 0, settings->velocity_sd_mps * settings->velocity_sd_mps);
+        forget_state(ekf, BSLAM_STATE_TURN, 0, settings->turn_rate_sd_radps * settings->turn_rate_sd_radps);
     }
 }
 
 void bslam_ekf_set_pose(bslam_ekf_t *ekf, const bslam_pose_t *pose, bslam_real_t position_var_m2,
                         bslam_real_t heading_var_rad2)
 {
-    forget_state(ekf, BSLAM_STATE_X, bslam_sqrt(position_var_m2));
-    forget_state(ekf, BSLAM_STATE_Y, bslam_sqrt(position_var_m2));
-    forget_state(ekf, BSLAM_STATE_THETA, bslam_sqrt(heading_var_rad2));
-    ekf->mean[BSLAM_STATE_X] = pose->x_m;
-    ekf->mean[BSLAM_STATE_Y] = pose->y_m;
-    ekf->mean[BSLAM_STATE_THETA] = bslam_angle_wrap(pose->theta_rad);
+    forget_state(ekf, BSLAM_STATE_X, pose->x_m, position_var_m2);
+    forget_state(ekf, BSLAM_STATE_Y, pose->y_m, position_var_m2);
+    forget_state(ekf, BSLAM_STATE_THETA, bslam_angle_wrap(pose->theta_rad), heading_var_rad2);
 }

@@ -3,13 +3,15 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
+#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
+#include "bslam/linalg/four.h"
 #include "bslam/model/noise.h"
 #include "bslam/model/pose.h"
 #include "base/scalar.h"
 
-/// Sixteen roundings of one: what the sums of an update may be off by, as part of their largest term.
-static const bslam_real_t ROUNDINGS = 8 * BSLAM_REAL_EPSILON;
+/// A function whose callers name constants: each has a copy without tests of them.
+#define COPIED __attribute__((always_inline)) static inline
 
 // ---- rows of H --------------------------------------------------------------------------------------------
 
@@ -17,108 +19,148 @@ bslam_real_t bslam_ekf_dot(const bslam_row_t *row, const bslam_real_t *vector)
 {
     bslam_real_t sum = row->base[0] * vector[0] + row->base[1] * vector[1] + row->base[2] * vector[2];
     const bslam_real_t *others = vector + row->at;
-    if (row->dim == 2) {  // a beacon that is a point
-        return sum + row->other[0] * others[0] + row->other[1] * others[1];
-    }
     for (int k = 0; k < row->dim; k++) {
         sum += row->other[k] * others[k];
+    }
+    for (int k = 0; k < row->sensor_dim; k++) {
+        sum += row->sensor[k] * vector[row->sensor_at + k];
     }
     return sum;
 }
 
-/// Adds to P rowᵀ what the waiting down-dates make of it. Returns by how much less row P rowᵀ is for it.
-static bslam_real_t add_pending(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+/// What is made of rows of L: f = Lᵀ h in the columns from `from` up to `to`, of one h or two that look at
+/// the same places. `two` the compiler knows.
+typedef struct looks {
+    int from, to;
+    const bslam_row_t *a, *b;
+    bslam_real_t *f, *g;
+} looks_t;
+
+/// Adds row `place` of L, times `a` to f and times `b` to g.
+COPIED void add_row(const bslam_factor_t *factor, int place, bslam_real_t a, bslam_real_t b,
+                    const looks_t *looks, const bool two)
 {
-    bslam_real_t less = 0;
-    for (int p = 0; p < ekf->pending_count; p++) {
-        const bslam_real_t *column = ekf->pending[p];
-        const bslam_real_t by_row = bslam_ekf_dot(row, column);
-        const bslam_real_t factor = ekf->pending_scale[p] * by_row;
-        bslam_ekf_add_scaled(out, factor, column, ekf->dim);
-        less -= factor * by_row;
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)looks->from;
+    const int end = place + 1 < looks->to ? place + 1 : looks->to;
+    bslam_real_t *f = looks->f, *g = looks->g;
+    for (int j = 0; j < end - looks->from; j++) {
+        f[j] += a * row[4 * j];
+        if (two) {
+            g[j] += b * row[4 * j];
+        }
     }
-    return less;
 }
 
-bslam_real_t bslam_ekf_project(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t *out)
+/// The same of this row and the next one, by the two weights each.
+COPIED void add_two_rows(const bslam_factor_t *factor, int place, const bslam_real_t *a,
+                         const bslam_real_t *b, const looks_t *looks, const bool two)
 {
-    bslam_symmat_times(ekf->covariance, ekf->dim, row, out);
-    return add_pending(ekf, row, out);
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)looks->from;
+    const bslam_real_t *next = bslam_factor_row(factor, place + 1) + 4 * (size_t)looks->from;
+    const bslam_real_t a0 = a[0], a1 = a[1], b0 = b[0], b1 = b[1];
+    bslam_real_t *f = looks->f, *g = looks->g;
+    const int end = (place + 1 < looks->to ? place + 1 : looks->to) - looks->from;
+    for (int j = 0; j < end; j++) {
+        f[j] += a0 * row[4 * j] + a1 * next[4 * j];
+        if (two) {
+            g[j] += b0 * row[4 * j] + b1 * next[4 * j];
+        }
+    }
+    const int own = place + 1 - looks->from;  // of the next row, which is 1 there
+    if (own >= 0 && place + 1 < looks->to) {
+        f[own] += a1;
+        if (two) {
+            g[own] += b1;
+        }
+    }
 }
 
-/// P times the rows of a sighting's bearing (y) and, if it has one, range (x). Returns by how much less their
-/// variances are for what waits.
-static bslam_sym2_t project_sighting(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
-                                     bslam_real_t *by_bearing, bslam_real_t *by_range)
+COPIED void look(const bslam_ekf_t *ekf, const looks_t *looks, const bool two)
 {
-    bslam_sym2_t less = {0, 0, 0};
-    if (!innovation->has_range) {
-        less.yy = bslam_ekf_project(ekf, &innovation->bearing_row, by_bearing);
-        return less;
+    const bslam_factor_t *factor = &ekf->factor;
+    const bslam_row_t *a = looks->a, *b = looks->b;
+    // x, and y behind it
+    const bslam_real_t *tail = factor->tail + factor->tail_count - 2 + 4 * (size_t)looks->from;
+    for (int j = 0; j < looks->to - looks->from; j++) {
+        const bslam_real_t x = tail[4 * j], y = tail[4 * j + 1];
+        looks->f[j] = a->base[0] * x + a->base[1] * y;
+        if (two) {
+            looks->g[j] = b->base[0] * x + b->base[1] * y;
+        }
     }
-    bslam_symmat_times_two(ekf->covariance, ekf->dim, &innovation->bearing_row, &innovation->range_row,
-                           by_bearing, by_range);
-    less.yy = add_pending(ekf, &innovation->bearing_row, by_bearing);
-    less.xx = add_pending(ekf, &innovation->range_row, by_range);
-    return less;
+    add_row(factor, bslam_ekf_place(ekf, BSLAM_STATE_THETA), a->base[2], b->base[2], looks, two);
+    for (int k = 0; k < a->sensor_dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, a->sensor_at + k), a->sensor[k], b->sensor[k], looks, two);
+    }
+    int k = 0;
+    for (; k + 1 < a->dim && a->at >= ekf->base_dim; k += 2) {
+        add_two_rows(factor, bslam_ekf_place(ekf, a->at + k), &a->other[k], &b->other[k], looks, two);
+    }
+    for (; k < a->dim; k++) {
+        add_row(factor, bslam_ekf_place(ekf, a->at + k), a->other[k], b->other[k], looks, two);
+    }
+}
+
+void bslam_ekf_look(const bslam_ekf_t *ekf, const bslam_row_t *row, int from, int to, bslam_real_t *f)
+{
+    const looks_t looks = {from, to, row, row, f, f};
+    look(ekf, &looks, false);
+}
+
+static void look_twice(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b, int from, int to,
+                       bslam_real_t *f, bslam_real_t *g)
+{
+    const looks_t looks = {from, to, a, b, f, g};
+    if (a->at == b->at && a->dim == b->dim && a->sensor_dim == b->sensor_dim) {
+        look(ekf, &looks, true);
+    } else {
+        bslam_ekf_look(ekf, a, from, to, f);
+        bslam_ekf_look(ekf, b, from, to, g);
+    }
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
                      const bslam_real_t *by_beacon, bslam_row_t *row)
 {
+    row->sensor_dim = 0;
     row->at = (uint16_t)beacon->at;
     row->dim = (uint16_t)bslam_beacon_dim(beacon->kind);
     memcpy(row->base, by_pose, sizeof row->base);
     memcpy(row->other, by_beacon, sizeof row->other);
 }
 
-enum { SEEN_DIM_MAX = POSE_DIM + BSLAM_RAY_DIM };
-
-/// Covariance of the i-th value that row a looks at with all that row b does: the robot's pose and a beacon
-/// each.
-static void fill_line(const bslam_ekf_t *ekf, const bslam_row_t *a, int i, const bslam_row_t *b,
-                      bslam_real_t line[SEEN_DIM_MAX])
+static void scale_row(bslam_row_t *row, bslam_real_t scale)
 {
-    const int at = i < POSE_DIM ? i : a->at + i - POSE_DIM;
-    for (int j = 0; j < POSE_DIM; j++) {
-        line[j] = bslam_symmat_get(ekf->covariance, at, j);
+    for (int k = 0; scale != 1 && k < POSE_DIM; k++) {
+        row->base[k] *= scale;
     }
-    for (int j = 0; j < b->dim; j++) {
-        line[POSE_DIM + j] = bslam_symmat_get(ekf->covariance, b->at + j, at);
+    for (int k = 0; scale != 1 && k < row->dim; k++) {
+        row->other[k] *= scale;
     }
 }
 
-/// row · line.
-static bslam_real_t weigh(const bslam_row_t *row, const bslam_real_t *line)
-{
-    bslam_real_t sum = 0;
-    for (int k = 0; k < POSE_DIM; k++) {
-        sum += line[k] * row->base[k];
-    }
-    for (int k = 0; k < row->dim; k++) {
-        sum += line[POSE_DIM + k] * row->other[k];
-    }
-    return sum;
-}
-
-/// Of two rows a P bᵀ; and a P aᵀ and b P bᵀ, if they look at the same beacon. From the covariance as it is
-/// stored.
+/// Of two rows a P bᵀ, a P aᵀ and b P bᵀ. From the covariance but for what waits.
 typedef struct forms {
     bslam_real_t ab, aa, bb;
 } forms_t;
 
+enum { COLUMNS = 16 };  // at once, so that no row of L need be kept
+
 static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
 {
+    const int places = bslam_factor_places(&ekf->factor);
     forms_t sums = {0, 0, 0};
-    bslam_real_t line[SEEN_DIM_MAX] = {0};
-    for (int i = 0; i < POSE_DIM + a->dim; i++) {
-        fill_line(ekf, a, i, b, line);
-        const bslam_real_t of_a = i < POSE_DIM ? a->base[i] : a->other[i - POSE_DIM];
-        const bslam_real_t of_b = i < POSE_DIM ? b->base[i] : b->other[i - POSE_DIM];
-        const bslam_real_t by_b = weigh(b, line);
-        sums.ab += of_a * by_b;
-        sums.aa += of_a * weigh(a, line);
-        sums.bb += of_b * by_b;
+    for (int from = 0; from < places; from += COLUMNS) {
+        const int to = from + COLUMNS < places ? from + COLUMNS : places;
+        bslam_real_t of_a[COLUMNS], of_b[COLUMNS];
+        bslam_ekf_look(ekf, a, from, to, of_a);
+        bslam_ekf_look(ekf, b, from, to, of_b);
+        for (int j = 0; j < to - from; j++) {
+            const bslam_real_t d = ekf->factor.d[from + j];
+            sums.ab += d * of_a[j] * of_b[j];
+            sums.aa += d * of_a[j] * of_a[j];
+            sums.bb += d * of_b[j] * of_b[j];
+        }
     }
     return sums;
 }
@@ -187,12 +229,14 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
 }
 
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
-                                    const bslam_pose_t *mount, const bslam_sighting_t *sighting, int index,
+                                    const bslam_pose_t *told, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const bslam_pose_t mount = ekf->sensor_dim > 0 ? bslam_ekf_mount(ekf, told) : *told;
+    const bslam_real_t scale = bslam_ekf_range_scale(ekf);
     bslam_observation_t seen;
-    const bslam_status_t status = observe(ekf, beacon, mount, &seen);
+    const bslam_status_t status = observe(ekf, beacon, &mount, &seen);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -204,14 +248,17 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
     fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
+    bslam_ekf_fill_sensor(ekf, &mount, -1, 0, &innovation->bearing_row);
     if (!sighting->has_range && settings->bearing_only_curvature_factor > 0) {
         innovation->bearing_var_rad2 += settings->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
     if (sighting->has_range) {
-        innovation->range_m = sighting->range_m - seen.range_m;
-        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, seen.range_m);
+        innovation->range_m = sighting->range_m - scale * seen.range_m;
+        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, scale * seen.range_m);
         fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
+        scale_row(&innovation->range_row, scale);
+        bslam_ekf_fill_sensor(ekf, &mount, 0, seen.range_m, &innovation->range_row);
     }
     return BSLAM_OK;
 }
@@ -251,97 +298,113 @@ bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t 
 
 // ---- gain and down-date -----------------------------------------------------------------------------------
 
-/// The first `count` waiting down-dates as terms of a pass; places without one add nothing.
-static void fill_terms(const bslam_ekf_t *ekf, bslam_symmat_term_t *terms, int count)
+static bslam_waiting_t waiting(bslam_ekf_t *ekf, int k)
 {
-    for (int p = 0; p < count; p++) {
-        const bool waits = p < ekf->pending_count;
-        terms[p].row_factors = ekf->pending[waits ? p : 0];
-        terms[p].columns = ekf->pending[waits ? p : 0];
-        terms[p].scale = waits ? ekf->pending_scale[p] : 0;
+    return (bslam_waiting_t){ekf->v[k], ekf->lambda[k], ekf->gain[k]};
+}
+
+/// The correction takes what is given by place, where the robot's values stand otherwise than in the state.
+static void take_change(bslam_ekf_t *ekf, bslam_real_t *change)
+{
+    const int tail = ekf->factor.tail_count;
+    for (int i = 0; i < ekf->base_dim; i++) {
+        const int place = bslam_ekf_place(ekf, i);
+        ekf->correction[i] += change[place];
+        change[place] = 0;
+    }
+    for (int at = 0; at < ekf->factor.body_count; at += 4) {
+        *(bslam_four_at_t *)(ekf->correction + at + tail) += bslam_four(change + at);
     }
 }
 
 void bslam_ekf_settle(bslam_ekf_t *ekf)
 {
-    if (ekf->pending_count > 0) {
-        bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-        fill_terms(ekf, terms, BSLAM_PENDING_MAX);
-        bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, ekf->pending_count);
-        ekf->pending_count = 0;
+    if (ekf->pending_count == 0) {
+        return;
     }
+    bslam_waiting_t list[BSLAM_PENDING_MAX];
+    for (int k = 0; k < ekf->pending_count; k++) {
+        list[k] = waiting(ekf, k);
+    }
+    memcpy(ekf->factor.d, ekf->d, sizeof ekf->d);
+    bslam_real_t *change = ekf->d;  // whose room is free now
+    memset(change, 0, sizeof ekf->d);
+    bslam_factor_settle(&ekf->factor, list, ekf->pending_count, change);
+    take_change(ekf, change);
+    ekf->pending_count = 0;
 }
 
-/// What the correction so far says of a measurement.
-static bslam_real_t foreseen(const bslam_ekf_t *ekf, const bslam_row_t *row)
+/// Brings f of a row, in place `slot`, behind all that waits. Returns what the correction so far says of the
+/// measurement.
+static bslam_real_t foresee(bslam_ekf_t *ekf, const bslam_row_t *row, int slot)
 {
-    return ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
+    const int places = bslam_factor_places(&ekf->factor);
+    bslam_real_t foreseen = ekf->has_correction ? bslam_ekf_dot(row, ekf->correction) : 0;
+    for (int k = 0; k < ekf->pending_count; k++) {
+        const bslam_waiting_t before = waiting(ekf, k);
+        foreseen += before.gain * bslam_factor_carry(&before, places, ekf->lambda[slot]);
+    }
+    return foreseen;
 }
 
-/// How far a scalar measurement moves the mean and the covariance along its column P hᵀ.
-typedef struct gain {
-    bslam_real_t step;   ///< innovation / S
-    bslam_real_t scale;  ///< -1 / S
-} gain_t;
-
-static gain_t gain_of(bslam_real_t innovation, bslam_real_t s)
+COPIED bslam_real_t total(bslam_four_t four)
 {
-    return (gain_t){innovation / s, -1 / s};
+    return (four[0] + four[1]) + (four[2] + four[3]);
 }
 
-static void begin_correction(bslam_ekf_t *ekf)
+/// The variance of what the row of a slot predicts.
+static bslam_real_t variance_of(const bslam_ekf_t *ekf, int slot)
 {
+    bslam_four_t sum = {0};
+    for (int at = 0; at < bslam_factor_places(&ekf->factor); at += 4) {
+        const bslam_four_t f = bslam_four(ekf->lambda[slot] + at);
+        sum += bslam_four(ekf->d + at) * (f * f);
+    }
+    return total(sum);
+}
+
+/// What two rows' predictions have in common.
+static bslam_real_t common(const bslam_ekf_t *ekf, int a, int b)
+{
+    bslam_four_t sum = {0};
+    for (int at = 0; at < bslam_factor_places(&ekf->factor); at += 4) {
+        sum += bslam_four(ekf->d + at) * (bslam_four(ekf->lambda[a] + at) * bslam_four(ekf->lambda[b] + at));
+    }
+    return total(sum);
+}
+
+static void make_room(bslam_ekf_t *ekf, int count)
+{
+    if (ekf->pending_count + count > BSLAM_PENDING_MAX) {
+        bslam_ekf_settle(ekf);
+    }
+    if (ekf->pending_count == 0) {
+        memcpy(ekf->d, ekf->factor.d, sizeof ekf->d);
+    }
     if (!ekf->has_correction) {
         memset(ekf->correction, 0, sizeof ekf->correction);
-        ekf->has_correction = true;
     }
 }
 
-/// Takes the column in the next free pending slot into the correction and the pending down-dates.
-static void accept_column(bslam_ekf_t *ekf, gain_t gain)
+/// Takes the measurement in the next slot.
+static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t variance)
 {
-    begin_correction(ekf);
-    bslam_ekf_add_scaled(ekf->correction, gain.step, ekf->pending[ekf->pending_count], ekf->dim);
-    ekf->pending_scale[ekf->pending_count] = gain.scale;
+    const int slot = ekf->pending_count;
+    const bslam_waiting_t next = waiting(ekf, slot);
+    const bslam_real_t s = bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
+    ekf->gain[slot] = innovation / s;
     ekf->pending_count++;
-}
-
-/// The range's column becomes conditional on the bearing, and both go into the correction.
-static void take_columns(bslam_real_t *restrict correction, const bslam_real_t *restrict by_bearing,
-                         bslam_real_t *restrict by_range, int n, const gain_t gains[2], bslam_real_t share)
-{
-    const bslam_real_t by = gains[0].step, to = gains[1].step;
-    for (int i = 0; i < n; i += 4) {
-        const bslam_four_t bearing = bslam_four(by_bearing + i);
-        const bslam_four_t own = bslam_four(by_range + i) - share * bearing;
-        *(bslam_four_at_t *)(by_range + i) = own;
-        *(bslam_four_at_t *)(correction + i) = bslam_four(correction + i) + by * bearing + to * own;
-    }
-}
-
-/// The same for the columns of a bearing and a range in the next two slots, the range's conditional on the
-/// bearing.
-static void accept_two(bslam_ekf_t *ekf, gain_t bearing, gain_t range, bslam_real_t share)
-{
-    const int at = ekf->pending_count;
-    begin_correction(ekf);
-    const gain_t gains[2] = {bearing, range};
-    take_columns(ekf->correction, ekf->pending[at], ekf->pending[at + 1], ekf->dim, gains, share);
-    ekf->pending_scale[at] = bearing.scale;
-    ekf->pending_scale[at + 1] = range.scale;
-    ekf->pending_count += 2;
+    ekf->has_correction = true;
 }
 
 void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t innovation,
                             bslam_real_t variance)
 {
-    if (ekf->pending_count == BSLAM_PENDING_MAX) {
-        bslam_ekf_settle(ekf);
-    }
-    bslam_real_t *column = ekf->pending[ekf->pending_count];
-    (void)bslam_ekf_project(ekf, row, column);
-    const bslam_real_t left = innovation - foreseen(ekf, row);
-    accept_column(ekf, gain_of(left, bslam_ekf_dot(row, column) + variance));
+    make_room(ekf, 1);
+    const int slot = ekf->pending_count;
+    bslam_ekf_look(ekf, row, 0, bslam_factor_places(&ekf->factor), ekf->lambda[slot]);
+    const bslam_real_t left = innovation - foresee(ekf, row, slot);
+    accept(ekf, left, variance);
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
@@ -357,63 +420,53 @@ static bslam_status_t judge(const bslam_settings_t *settings, bslam_real_t gate_
     return BSLAM_OK;
 }
 
-/// A measurement's variance, and at least what h P hᵀ is rounded by: a sighting surer than that would leave
-/// no positive definite covariance. The doubt that a robot shares with a beacon cancels out, but not its
-/// rounding. So `before`, which is h P hᵀ without what waits, and the robot's own part of it. MATH "Update".
-static bslam_real_t noise_of(const bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real_t variance,
-                             bslam_real_t before)
+/// Both rows of a sighting, or the one that it has, into the next slots.
+static void look_sighting(bslam_ekf_t *ekf, const bslam_innovation_t *innovation)
 {
-    bslam_real_t terms = before;
-    for (int k = 0; k < POSE_DIM; k++) {
-        terms += row->base[k] * row->base[k] * ekf->covariance[5 * k];  // the first rows lie four apart
+    bslam_real_t *bearing = ekf->lambda[ekf->pending_count], *range = ekf->lambda[ekf->pending_count + 1];
+    const int places = bslam_factor_places(&ekf->factor);
+    if (innovation->has_range) {
+        look_twice(ekf, &innovation->bearing_row, &innovation->range_row, 0, places, bearing, range);
+    } else {
+        bslam_ekf_look(ekf, &innovation->bearing_row, 0, places, bearing);
     }
-    const bslam_real_t rounding = ROUNDINGS * terms;
-    return variance > rounding ? variance : rounding;
 }
 
 bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                               const bslam_innovation_t *innovation, bslam_fusion_t *fusion)
 {
-    if (ekf->pending_count + 2 > BSLAM_PENDING_MAX) {
-        bslam_ekf_settle(ekf);
-    }
-    const bslam_row_t *bearing_row = &innovation->bearing_row;
-    bslam_real_t *bearing_column = ekf->pending[ekf->pending_count];
-    bslam_real_t *range_column = ekf->pending[ekf->pending_count + 1];
+    make_room(ekf, 2);
+    const int of_bearing = ekf->pending_count, of_range = of_bearing + 1;
     bslam_sym2_t hph = {0, 0, 0};
     bslam_real_t range_left = 0;
-    const bslam_real_t bearing_left = innovation->bearing_rad - foreseen(ekf, bearing_row);
-    const bslam_sym2_t less = project_sighting(ekf, innovation, bearing_column, range_column);
-    hph.yy = bslam_ekf_dot(bearing_row, bearing_column);
+    look_sighting(ekf, innovation);
+    const bslam_real_t bearing_left =
+        innovation->bearing_rad - foresee(ekf, &innovation->bearing_row, of_bearing);
+    hph.yy = variance_of(ekf, of_bearing);
     if (innovation->has_range) {
-        range_left = innovation->range_m - foreseen(ekf, &innovation->range_row);
-        hph.xx = bslam_ekf_dot(&innovation->range_row, range_column);
-        hph.xy = bslam_ekf_dot(&innovation->range_row, bearing_column);
+        range_left = innovation->range_m - foresee(ekf, &innovation->range_row, of_range);
+        hph.xx = variance_of(ekf, of_range);
+        hph.xy = common(ekf, of_range, of_bearing);
     }
     const bslam_sym2_t s = {.xx = innovation->has_range ? hph.xx + innovation->range_var_m2 : 1,
                             .xy = hph.xy,
                             .yy = hph.yy + innovation->bearing_var_rad2};
     bslam_status_t status = bslam_sym2_mahalanobis(&s, range_left, bearing_left, &fusion->distance2);
-    if (status != BSLAM_OK) {
-        return status;
+    if (status == BSLAM_OK) {
+        status = judge(settings, innovation->gate_d2, fusion);
     }
-    status = judge(settings, innovation->gate_d2, fusion);
     if (status != BSLAM_OK) {
         return status;
     }
     const bslam_real_t bearing_var = innovation->bearing_var_rad2 / fusion->weight;
-    const bslam_real_t bearing_s = hph.yy + noise_of(ekf, bearing_row, bearing_var, hph.yy + less.yy);
-    const gain_t bearing = gain_of(bearing_left, bearing_s);
-    if (!innovation->has_range) {
-        accept_column(ekf, bearing);
-        return BSLAM_OK;
+    accept(ekf, bearing_left, bearing_var);
+    if (innovation->has_range) {  // conditional on the bearing
+        const bslam_waiting_t bearing = waiting(ekf, of_bearing);
+        const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
+        range_left -= bearing.gain *
+                      bslam_factor_carry(&bearing, bslam_factor_places(&ekf->factor), ekf->lambda[of_range]);
+        accept(ekf, range_left, range_var);
     }
-    // The range's variance and innovation, conditional on the bearing.
-    const bslam_real_t share = hph.xy / bearing_s;
-    const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
-    const bslam_real_t range_s =
-        hph.xx - share * hph.xy + noise_of(ekf, &innovation->range_row, range_var, hph.xx + less.xx);
-    accept_two(ekf, bearing, gain_of(range_left - share * bearing_left, range_s), share);
     return BSLAM_OK;
 }
 
@@ -452,7 +505,7 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     const bslam_turning_t turning = bslam_turning(turn_rad);
     move_position(ekf, BSLAM_STATE_X, &turning);
     move_angle(ekf, BSLAM_STATE_THETA);
-    for (int i = BSLAM_STATE_FORWARD; i < ekf->base_dim; i++) {
+    for (int i = BSLAM_STATE_FORWARD; i < bslam_ekf_map_at(ekf); i++) {
         move_value(ekf, i);
     }
     for (int b = 0; b < ekf->beacon_count; b++) {
@@ -471,27 +524,30 @@ static void move_mean(bslam_ekf_t *ekf, bslam_real_t turn_rad)
     }
 }
 
-/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, in the pass over the triangle that the pending down-dates need:
-/// A P Aᵀ = P + shift mirrorᵀ + mirror shiftᵀ with mirror = P e_theta + shift P_theta,theta / 2.
+/// Four rows get so much of the heading's, which has `by_turn` of the turn rate's, if there is one.
+COPIED void shift_rows(bslam_factor_t *factor, int at, int theta, bslam_real_t by_turn, bslam_four_t shift)
+{
+    bslam_real_t *rows = bslam_factor_element(factor, at, 0);
+    *(bslam_four_at_t *)(rows + 4 * theta) += shift;
+    if (theta > 0) {
+        *(bslam_four_at_t *)rows += by_turn * shift;
+    }
+}
+
+/// P <- A P Aᵀ with A = I + shift e_thetaᵀ, where the shift stands in the correction, 0 but for positions:
+/// L's first columns. O(n).
 static void transport_covariance(bslam_ekf_t *ekf)
 {
-    static const bslam_row_t theta_row = {.base = {0, 0, 1}};
-    const bslam_real_t *shift = ekf->correction;
-    bslam_real_t *mirror = ekf->pending[BSLAM_PENDING_MAX - 1];
-    if (ekf->pending_count > BSLAM_PENDING_MAX - 2) {
-        bslam_ekf_settle(ekf);
+    bslam_factor_t *factor = &ekf->factor;
+    const int tail = factor->tail_count, theta = bslam_ekf_place(ekf, BSLAM_STATE_THETA);
+    const bslam_real_t by_turn = theta > 0 ? *bslam_factor_element(factor, theta, 0) : 0;
+    memset(&ekf->correction[ekf->dim], 0, 3 * sizeof ekf->correction[0]);
+    for (int at = 0; at < factor->body_count; at += 4) {
+        shift_rows(factor, at, theta, by_turn, bslam_four(ekf->correction + at + tail));
     }
-    bslam_symmat_column(ekf->covariance, ekf->dim, BSLAM_STATE_THETA, mirror);
-    add_pending(ekf, &theta_row, mirror);
-    const bslam_real_t half_variance = mirror[BSLAM_STATE_THETA] / 2;
-    bslam_ekf_add_scaled(mirror, half_variance, shift, ekf->dim);
-    bslam_symmat_term_t terms[BSLAM_PENDING_MAX];
-    const int behind = ekf->pending_count > 0 ? 2 : 0;
-    fill_terms(ekf, terms, BSLAM_PENDING_MAX);
-    terms[behind] = (bslam_symmat_term_t){.row_factors = shift, .scale = 1, .columns = mirror};
-    terms[behind + 1] = (bslam_symmat_term_t){.row_factors = mirror, .scale = 1, .columns = shift};
-    bslam_symmat_add_rank4(ekf->covariance, ekf->dim, terms, behind + 2);
-    ekf->pending_count = 0;
+    const bslam_real_t x = ekf->correction[BSLAM_STATE_X], y = ekf->correction[BSLAM_STATE_Y];
+    const bslam_four_t shift = tail == 2 ? (bslam_four_t){x, y, 0, 0} : (bslam_four_t){0, x, y, 0};
+    shift_rows(factor, bslam_factor_tail_at(factor), theta, by_turn, shift);
 }
 
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance)
@@ -506,11 +562,10 @@ void bslam_ekf_correct(bslam_ekf_t *ekf, const bslam_settings_t *settings)
         return;
     }
     const bool invariant = settings->filter != BSLAM_FILTER_STANDARD;
+    bslam_ekf_settle(ekf);
     move_mean(ekf, invariant ? ekf->correction[BSLAM_STATE_THETA] : 0);
     if (invariant) {
         transport_covariance(ekf);
-    } else {
-        bslam_ekf_settle(ekf);
     }
     ekf->has_correction = false;
 }

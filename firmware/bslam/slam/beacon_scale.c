@@ -70,7 +70,7 @@ bool bslam_slam_vote_distance(bslam_slam_t *slam, const bslam_pose_t *mount, int
         return false;
     }
     const bslam_real_t variance = scale_variance(slam, sighting);
-    bslam_ekf_renew_scale(&slam->ekf, &slam->settings, index, variance, CONFUSED_VAR);
+    bslam_ekf_renew_scale(&slam->ekf, index, variance, CONFUSED_VAR);
     return true;
 }
 
@@ -92,7 +92,7 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
         beacon->beacon_class = sighting->beacon_class;
         beacon->class_lead = 1;
         if (variance > 0) {
-            bslam_ekf_renew_scale(&slam->ekf, &slam->settings, index, variance, CONFUSED_VAR);
+            bslam_ekf_renew_scale(&slam->ekf, index, variance, CONFUSED_VAR);
         }
     }
 }

@@ -23,13 +23,13 @@ __attribute__((noinline)) static uint64_t add_words(uint64_t hash, const void *f
 
 static uint64_t add_state(uint64_t hash, const bslam_ekf_t *ekf)
 {
+    const bslam_factor_t *factor = &ekf->factor;
     hash = add_word(hash, (uint32_t)ekf->dim);
     hash = add_words(hash, ekf->mean, (size_t)ekf->dim * sizeof ekf->mean[0]);
-    for (int i = 0; i < ekf->dim; i++) {
-        const bslam_real_t *row = &ekf->covariance[bslam_symmat_row(i)];
-        hash = add_words(hash, row, (size_t)(i + 1) * sizeof row[0]);
-    }
-    return hash;
+    const size_t tail_at = (size_t)bslam_factor_tail_at(factor), places = tail_at + 4;
+    hash = add_words(hash, factor->d, places * sizeof factor->d[0]);
+    hash = add_words(hash, factor->tail, 4 * places * sizeof factor->tail[0]);
+    return add_words(hash, factor->body, bslam_factor_block_at((int)tail_at) * sizeof factor->body[0]);
 }
 
 static uint64_t add_classifiers(uint64_t hash, const bslam_learner_t *learner)

@@ -1,4 +1,6 @@
 // What is known from before the first node, linear about other points. MATH "The smoother".
+#include <string.h>
+
 #include "base/logarithm.h"
 #include "base/trig.h"
 #include "bslam/smoother/smoother_internal.h"
@@ -42,53 +44,43 @@ static void turn_and_stretch(const similarity_t *g, const bslam_real_t p[2], bsl
     m[1] = p[1] + g->im * dx + g->re * dy;
 }
 
-/// The new pair's covariance with value j.
-static void new_pair(const bslam_real_t *covariance, int at, int j, const similarity_t *g, bslam_real_t m[2])
+/// Two of `length` values leave their place for the end.
+static void move_to_end(bslam_real_t *values, int at, int length)
 {
-    const bslam_real_t p[2] = {bslam_symmat_get(covariance, BSLAM_STATE_X, j),
-                               bslam_symmat_get(covariance, BSLAM_STATE_Y, j)};
-    m[0] = bslam_symmat_get(covariance, at, j);
-    m[1] = bslam_symmat_get(covariance, at + 1, j);
-    turn_and_stretch(g, p, m);
+    const bslam_real_t first = values[at], second = values[at + 1];
+    memmove(&values[at], &values[at + 2], (size_t)(length - at - 2) * sizeof values[0]);
+    values[length - 2] = first;
+    values[length - 1] = second;
 }
 
-/// The covariance, where the values at `at` and behind are p + g (they - p) from now on.
-static void transport_covariance(bslam_real_t *covariance, int dim, int at, const similarity_t *g)
+/// A point becomes p + g (it - p), with p the robot's place. Its values stand behind all others then.
+static void transport(bslam_smoother_t *smoother, int beacon, const similarity_t *g)
 {
-    bslam_real_t own[2][2];  // of the new pair, by the old one
-    new_pair(covariance, at, at, g, own[0]);
-    new_pair(covariance, at, at + 1, g, own[1]);
-    for (int j = 0; j < dim; j++) {
-        if (j != at && j != at + 1) {
-            bslam_real_t m[2];
-            new_pair(covariance, at, j, g, m);
-            bslam_symmat_set(covariance, at, j, m[0]);
-            bslam_symmat_set(covariance, at + 1, j, m[1]);
-        }
-    }
-    for (int k = 0; k < 2; k++) {
-        const bslam_real_t p[2] = {bslam_symmat_get(covariance, at + k, BSLAM_STATE_X),
-                                   bslam_symmat_get(covariance, at + k, BSLAM_STATE_Y)};
-        bslam_real_t m[2] = {own[0][k], own[1][k]};
-        turn_and_stretch(g, p, m);
-        own[0][k] = m[0];
-        own[1][k] = m[1];
-    }
-    bslam_symmat_set(covariance, at, at, own[0][0]);
-    bslam_symmat_set(covariance, at + 1, at, (own[1][0] + own[0][1]) / 2);
-    bslam_symmat_set(covariance, at + 1, at + 1, own[1][1]);
+    bslam_ekf_t *base = &smoother->base;
+    const int at = base->beacons[beacon].at;
+    const bslam_row_t rows[BSLAM_POINT_DIM] = {
+        {.base = {1 - g->re, g->im}, .other = {g->re, -g->im}, .at = (uint16_t)at, .dim = BSLAM_POINT_DIM},
+        {.base = {-g->im, 1 - g->re}, .other = {g->im, g->re}, .at = (uint16_t)at, .dim = BSLAM_POINT_DIM},
+    };
+    bslam_ekf_replace_point(base, beacon, rows);
+    move_to_end(base->correction, at, base->dim);
+    move_to_end(smoother->place, at, base->dim);
+    move_to_end(smoother->place_moved, at, base->dim);
 }
 
 static bool is_seen(const bslam_ekf_t *base, int at)
 {
-    return bslam_symmat_get(base->covariance, at, at) + bslam_symmat_get(base->covariance, at + 1, at + 1) <
+    return bslam_ekf_covariance(base, at, at) + bslam_ekf_covariance(base, at + 1, at + 1) <
            UNSEEN_VARIANCE_M2;
 }
 
-/// A point's correction and covariance about `place`. False, and nothing done, where that has no use.
-static bool transport_point(bslam_ekf_t *base, int at, const bslam_real_t place[2])
+/// A point's correction and covariance about where it is linearised. False, and nothing done, where that has
+/// no use.
+static bool transport_point(bslam_smoother_t *smoother, int beacon)
 {
-    const bslam_real_t *p = &base->mean[BSLAM_STATE_X];
+    bslam_ekf_t *base = &smoother->base;
+    const int at = base->beacons[beacon].at;
+    const bslam_real_t *p = &base->mean[BSLAM_STATE_X], *place = &smoother->place[at];
     const bslam_real_t from[2] = {base->mean[at] - p[0], base->mean[at + 1] - p[1]};
     const bslam_real_t to[2] = {place[0] - p[0], place[1] - p[1]};
     similarity_t g;
@@ -98,7 +90,7 @@ static bool transport_point(bslam_ekf_t *base, int at, const bslam_real_t place[
     turn_and_stretch(&g, &base->correction[BSLAM_STATE_X], &base->correction[at]);
     base->correction[at] -= to[0] * g.log_re - to[1] * g.log_im;
     base->correction[at + 1] -= to[0] * g.log_im + to[1] * g.log_re;
-    transport_covariance(base->covariance, base->dim, at, &g);
+    transport(smoother, beacon, &g);
     return true;
 }
 
@@ -107,13 +99,13 @@ void bslam_smoother_linearise_base(bslam_smoother_t *smoother)
     bslam_ekf_t *base = &smoother->base;
     for (int b = 0; b < base->beacon_count; b++) {
         const bslam_beacon_t *beacon = &base->beacons[b];
-        const bslam_real_t *place = &smoother->place[beacon->at];
         const int dim = bslam_beacon_dim(beacon->kind);
-        const bool is_moved = beacon->kind == BSLAM_BEACON_POINT && transport_point(base, beacon->at, place);
+        const bool is_moved = beacon->kind == BSLAM_BEACON_POINT && transport_point(smoother, b);
         for (int k = 0; k < dim; k++) {
+            const bslam_real_t place = smoother->place[beacon->at + k];
             bslam_real_t *value = &base->mean[beacon->at + k];
-            base->correction[beacon->at + k] += is_moved ? 0 : *value - place[k];
-            *value = place[k];
+            base->correction[beacon->at + k] += is_moved ? 0 : *value - place;
+            *value = place;
         }
     }
 }

@@ -190,6 +190,7 @@ static void give_map(bslam_ekf_t *ekf)
         ekf->mean[i] = 0;
         ekf->correction[i] = 0;
     }
+    bslam_factor_cut(&ekf->factor, ekf->base_dim - ekf->factor.tail_count);
     ekf->dim = ekf->base_dim;
     ekf->ray_count = 0;
     ekf->sized_count = 0;
@@ -207,15 +208,25 @@ static void begin_up(bslam_smoother_t *smoother)
     smoother->top = smoother->node_count;
 }
 
+/// Where value i of a robot without a map stands in its factor, in their order there.
+static int place_of(const bslam_factor_t *factor, int i)
+{
+    return i < factor->body_count ? i : bslam_factor_tail_at(factor) + i - factor->body_count;
+}
+
 static void note_mark(const bslam_ekf_t *run, bslam_smoother_mark_t *mark)
 {
+    const bslam_factor_t *factor = &run->factor;
     int k = 0;
+    memcpy(mark->correction, run->correction, (size_t)run->base_dim * sizeof mark->correction[0]);
     for (int i = 0; i < run->base_dim; i++) {
-        mark->correction[i] = run->correction[i];
-        for (int j = 0; j <= i; j++) {
-            mark->covariance[k] = bslam_symmat_get(run->covariance, i, j);
+        const int place = place_of(factor, i);
+        for (int j = 0; j < i; j++) {
+            mark->factor[k] = bslam_factor_row(factor, place)[4 * place_of(factor, j)];
             k++;
         }
+        mark->factor[k] = factor->d[place];
+        k++;
     }
 }
 
@@ -223,24 +234,28 @@ static void note_mark(const bslam_ekf_t *run, bslam_smoother_mark_t *mark)
 static void restore_mark(bslam_smoother_t *smoother, const bslam_smoother_mark_t *mark, int first)
 {
     bslam_ekf_t *run = &smoother->run;
+    bslam_factor_t *factor = &run->factor;
     const bslam_real_t *mean = first > 0 ? bslam_smoother_node(smoother, first - 1)->at : smoother->base.mean;
     int k = 0;
+    memcpy(run->mean, mean, (size_t)run->base_dim * sizeof run->mean[0]);
+    memcpy(run->correction, mark->correction, (size_t)run->base_dim * sizeof run->correction[0]);
     for (int i = 0; i < run->base_dim; i++) {
-        run->mean[i] = mean[i];
-        run->correction[i] = mark->correction[i];
-        for (int j = 0; j <= i; j++) {
-            bslam_symmat_set(run->covariance, i, j, mark->covariance[k]);
+        const int place = place_of(factor, i);
+        for (int j = 0; j < i; j++) {
+            *bslam_factor_element(factor, place, place_of(factor, j)) = mark->factor[k];
             k++;
         }
+        factor->d[place] = mark->factor[k];
+        k++;
     }
 }
 
 /// Lower triangle L with L Lᵀ = m + DOUBT_MIN I, n x n, from the symmetric matrix m.
-static void factor(const bslam_real_t *m, int n, bslam_real_t l[ROBOT][ROBOT])
+static void factor(bslam_real_t m[ROBOT][ROBOT], int n, bslam_real_t l[ROBOT][ROBOT])
 {
     for (int i = 0; i < n; i++) {
         for (int j = 0; j <= i; j++) {
-            bslam_real_t sum = bslam_symmat_get(m, i, j) + (i == j ? DOUBT_MIN : 0);
+            bslam_real_t sum = m[i][j] + (i == j ? DOUBT_MIN : 0);
             for (int k = 0; k < j; k++) {
                 sum -= l[i][k] * l[j][k];
             }
@@ -271,16 +286,16 @@ static void solve(bslam_real_t l[ROBOT][ROBOT], int n, bslam_real_t x[ROBOT])
 }
 
 /// Row i of P Fᵀ.
-static void cross_row(const bslam_real_t *p, int i, int n, const bslam_transition_t *f,
+static void cross_row(bslam_real_t p[ROBOT][ROBOT], int i, int n, const bslam_transition_t *f,
                       bslam_real_t row[ROBOT])
 {
     for (int j = 0; j < n; j++) {
         row[j] = 0;
         for (int k = 0; j < 3 && k < n; k++) {
-            row[j] += bslam_symmat_get(p, i, k) * f->by[j][k] * (k < 3 ? 1 : f->keep[k - 3]);
+            row[j] += p[i][k] * f->by[j][k] * (k < 3 ? 1 : f->keep[k - 3]);
         }
         if (j >= 3) {
-            row[j] = bslam_symmat_get(p, i, j) * f->keep[j - 3];
+            row[j] = p[i][j] * f->keep[j - 3];
         }
     }
 }
@@ -290,7 +305,7 @@ static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *nex
                     bslam_smoother_step_t *step)
 {
     bslam_ekf_t *run = &smoother->run;
-    const bslam_robot_t here = bslam_ekf_robot(run);
+    bslam_robot_t here = bslam_ekf_robot(run);
     const int n = run->base_dim;
     bslam_transition_t transition;
     bslam_real_t l[ROBOT][ROBOT];
@@ -298,7 +313,8 @@ static void step_on(bslam_smoother_t *smoother, const bslam_smoother_node_t *nex
     const bslam_bend_t bend = bslam_smoother_bend(next);
     bslam_ekf_predict_about(run, &smoother->model, &next->motion, &bend, next->at, &transition);
     memcpy(step->next, run->correction, (size_t)n * sizeof step->next[0]);
-    factor(run->covariance, n, l);
+    bslam_robot_t there = bslam_ekf_robot(run);
+    factor(there.covariance, n, l);
     for (int i = 0; i < n; i++) {
         cross_row(here.covariance, i, n, &transition, step->gain[i]);
         solve(l, n, step->gain[i]);

@@ -307,7 +307,10 @@ static void take_over(bslam_smoother_t *smoother, const bslam_settings_t *settin
 {
     const bslam_ekf_t *run = &smoother->run;
     memcpy(ekf->mean, run->mean, sizeof ekf->mean);
-    memcpy(ekf->covariance, run->covariance, sizeof ekf->covariance);
+    ekf->factor = run->factor;
+    for (int b = 0; b < ekf->beacon_count; b++) {
+        ekf->beacons[b].at = run->beacons[b].at;
+    }
     if (smoother->from_middle.dt_s > 0) {
         bslam_motion_t moved;
         bslam_ekf_predict(ekf, settings, &smoother->from_middle, &moved);

@@ -77,7 +77,7 @@ typedef struct bslam_smoother_step {
 /// The robot on the pass up, where a part begins.
 typedef struct bslam_smoother_mark {
     bslam_real_t correction[BSLAM_ROBOT_DIM_MAX];
-    bslam_real_t covariance[BSLAM_ROBOT_DIM_MAX * (BSLAM_ROBOT_DIM_MAX + 1) / 2];
+    bslam_real_t factor[BSLAM_ROBOT_DIM_MAX * (BSLAM_ROBOT_DIM_MAX + 1) / 2];  ///< rows of L, each with its D
 } bslam_smoother_mark_t;
 
 typedef enum bslam_smoother_phase {

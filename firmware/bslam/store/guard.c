@@ -28,13 +28,15 @@ static size_t bounded(int32_t count, int32_t most)
 static uint32_t checksum_of(const bslam_slam_t *slam)
 {
     const bslam_ekf_t *ekf = &slam->ekf;
-    const size_t rows = bslam_symmat_row((int)bounded(ekf->dim, BSLAM_STATE_MAX));
+    const bslam_factor_t *factor = &ekf->factor;
+    const int body = (int)BSLAM_FACTOR_PADDED(bounded(factor->body_count, BSLAM_FACTOR_BODY_MAX));
     const size_t counts = offsetof(bslam_ekf_t, beacons) - offsetof(bslam_ekf_t, dim);
     const size_t flags = sizeof *ekf - offsetof(bslam_ekf_t, pending_count);
     const size_t rest = offsetof(bslam_slam_t, accounts) - offsetof(bslam_slam_t, odometry);
     uint32_t sum = bslam_guard_sum(START, &slam->settings, sizeof slam->settings);
     sum = bslam_guard_sum(sum, ekf->mean, sizeof ekf->mean);
-    sum = bslam_guard_sum(sum, ekf->covariance, rows * sizeof ekf->covariance[0]);
+    sum = bslam_guard_sum(sum, factor, offsetof(bslam_factor_t, body));
+    sum = bslam_guard_sum(sum, factor->body, bslam_factor_block_at(body) * sizeof factor->body[0]);
     sum = bslam_guard_sum(sum, &ekf->dim, counts);
     sum = bslam_guard_sum(sum, ekf->beacons,
                           bounded(ekf->beacon_count, BSLAM_BEACONS_MAX) * sizeof ekf->beacons[0]);

@@ -13,12 +13,13 @@
 
 enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 
-// Rounding may leave a covariance short of positive semidefinite by a part of its variances. One that lacks
-// no more than this is taken with its variances larger by as much.
-static const bslam_real_t SHORTFALL_MAX = BSLAM_R(1e-3);
-// By pairs the same, as a squared correlation; a little more, so that rounding refuses nothing that goes.
-static const bslam_real_t CORRELATION2_MAX = BSLAM_R(1.0021);
+/// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
+enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
+
+static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e12);  // so that what it is made of can be written again
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
+// A beacon may have moved away from where it began; no other value is as large.
+static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
@@ -27,7 +28,8 @@ static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 typedef struct header {
     uint32_t length;
     uint32_t beacons;
-    uint32_t values;
+    uint32_t values;   ///< state values of the beacons
+    uint32_t columns;  ///< of the factor: those, and what else they hang on
     uint32_t classifiers;
     uint32_t next_uid;
 } header_t;
@@ -47,9 +49,11 @@ static void move_header(bslam_codec_t *codec, header_t *header)
     header->classifiers = bslam_codec_whole(codec, header->classifiers, 2);
     const uint32_t features = bslam_codec_whole(codec, BSLAM_SAMPLE_FEATURES, 2);
     header->next_uid = bslam_codec_whole(codec, header->next_uid, 4);
-    const uint32_t reserved = bslam_codec_whole(codec, 0, 4);
+    header->columns = bslam_codec_whole(codec, header->columns, 2);
+    const uint32_t reserved = bslam_codec_whole(codec, 0, 2);
     bslam_codec_require(codec, header->beacons <= BSLAM_BEACONS_MAX, BSLAM_MAP_BEACONS);
-    bslam_codec_require(codec, header->values <= BSLAM_STATE_MAX - BSLAM_ROBOT_DIM_MAX, BSLAM_MAP_BEACONS);
+    bslam_codec_require(codec, header->values <= header->columns, BSLAM_MAP_CONTENT);
+    bslam_codec_require(codec, header->columns <= COLUMNS_MAX, BSLAM_MAP_BEACONS);
     bslam_codec_require(codec, header->classifiers <= BSLAM_LEARNER_SLOTS, BSLAM_MAP_CLASSIFIERS);
     bslam_codec_require(codec, features == BSLAM_SAMPLE_FEATURES, BSLAM_MAP_CLASSIFIERS);
     bslam_codec_require(codec, reserved == 0, BSLAM_MAP_CONTENT);
@@ -62,10 +66,18 @@ static void move_header(bslam_codec_t *codec, header_t *header)
 typedef struct stored_beacon {
     bslam_beacon_t beacon;
     uint32_t classifier;
+    uint32_t column;     ///< of its first state value
     bslam_real_t scale;  ///< 0: nobody knows
     bslam_real_t x_m, y_m;
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } stored_beacon_t;
+
+static bslam_real_t move_value(bslam_codec_t *codec, bslam_real_t value)
+{
+    const bslam_real_t moved = bslam_codec_real(codec, value);
+    bslam_codec_require(codec, bslam_in_range(moved, -VALUE_MAX, VALUE_MAX), BSLAM_MAP_CONTENT);
+    return moved;
+}
 
 static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
@@ -78,9 +90,10 @@ static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
     beacon->sightings = bslam_codec_whole(codec, beacon->sightings, 4);
     record->scale = bslam_codec_real(codec, record->scale);
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
-    record->x_m = bslam_codec_real(codec, record->x_m);
-    record->y_m = bslam_codec_real(codec, record->y_m);
+    record->x_m = move_value(codec, record->x_m);
+    record->y_m = move_value(codec, record->y_m);
     bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
+    record->column = bslam_codec_whole(codec, record->column, 2);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, kind <= BSLAM_BEACON_SIZED, BSLAM_MAP_CONTENT);
     beacon->label = label == UINT32_MAX ? BSLAM_LABEL_NONE : (int32_t)label;
@@ -91,21 +104,12 @@ static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 typedef struct target {
     bslam_slam_t *slam;
     bslam_map_mode_t mode;
-    bslam_real_t raise;  ///< of variances, as a part of them
 } target_t;
 
-/// Where a covariance can be factored, to see that it is one.
-typedef struct room {
-    bslam_real_t *factor;
-    size_t length;
-    bslam_real_t raise;  ///< as the target would
-} room_t;
-
-/// Of a covariance of so many values.
-static bool has_room(const room_t *room, uint32_t values)
-{
-    return bslam_symmat_row((int)values) <= room->length;
-}
+/// Which columns are a beacon's state values.
+typedef struct columns {
+    bool are_values[COLUMNS_MAX];
+} columns_t;
 
 /// A frozen map has no use for a beacon whose distance is not known.
 static bool is_taken(const target_t *target, const bslam_beacon_t *beacon)
@@ -131,8 +135,7 @@ static void take_record(const target_t *target, const stored_beacon_t *record)
     beacon->known_scale = beacon->kind == BSLAM_BEACON_KNOWN ? record->scale : 0;
     ekf->ray_count += beacon->kind == BSLAM_BEACON_RAY ? 1 : 0;
     ekf->sized_count += beacon->kind == BSLAM_BEACON_SIZED ? 1 : 0;
-    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : ekf->dim;
-    ekf->dim += bslam_beacon_dim(beacon->kind);
+    beacon->at = beacon->kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_map_at(ekf) + (int32_t)record->column;
     if (bslam_slam_learns(target->slam)) {
         bslam_beacon_appearance_t *known = &target->slam->appearance->of[index];
         known->classifier =
@@ -141,7 +144,23 @@ static void take_record(const target_t *target, const stored_beacon_t *record)
     }
 }
 
-static void read_beacons(bslam_codec_t *codec, const header_t *header, const target_t *target)
+/// A beacon's columns are its own, and there.
+static void take_columns(bslam_codec_t *codec, const header_t *header, const stored_beacon_t *record,
+                         columns_t *columns)
+{
+    const uint32_t count = (uint32_t)bslam_beacon_dim(record->beacon.kind);
+    for (uint32_t k = 0; k < count; k++) {
+        const uint32_t column = record->column + k;
+        const bool is_there = column < header->columns && !columns->are_values[column];
+        bslam_codec_require(codec, is_there, BSLAM_MAP_CONTENT);
+        if (is_there) {
+            columns->are_values[column] = true;
+        }
+    }
+}
+
+static void read_beacons(bslam_codec_t *codec, const header_t *header, const target_t *target,
+                         columns_t *columns)
 {
     uint32_t values = 0;
     uint32_t further = 0;  // beyond two a beacon
@@ -159,6 +178,7 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
             codec, record.classifier == BSLAM_MAP_NO_CLASSIFIER || record.classifier < header->classifiers,
             BSLAM_MAP_CONTENT);
         bslam_codec_require(codec, values <= header->values, BSLAM_MAP_CONTENT);
+        take_columns(codec, header, &record, columns);
         bslam_codec_require(codec, further <= 2 * BSLAM_RAYS_MAX, BSLAM_MAP_BEACONS);
         least_uid = uid + 1;
         if (codec->fault == BSLAM_MAP_FINE && is_taken(target, &record.beacon)) {
@@ -170,11 +190,11 @@ static void read_beacons(bslam_codec_t *codec, const header_t *header, const tar
 
 // ---- mean and covariance ----------------------------------------------------------------------------------
 
-/// A value of the covariance, read out of turn: the diagonal.
-static bslam_real_t variance_at(bslam_codec_t *codec, uint32_t covariance_at, uint32_t i)
+/// A number of the factor's D, read out of turn.
+static bslam_real_t d_at(bslam_codec_t *codec, uint32_t d_begins, uint32_t column)
 {
     uint8_t bytes[4] = {0};
-    const uint32_t at = covariance_at + REAL_BYTES * (i * (i + 1) / 2 + i);
+    const uint32_t at = d_begins + REAL_BYTES * column;
     if (codec->source->size < at + REAL_BYTES) {
         return 0;
     }
@@ -184,103 +204,85 @@ static bslam_real_t variance_at(bslam_codec_t *codec, uint32_t covariance_at, ui
                                               (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24);
 }
 
-/// Without room for more: no variance is negative, no two values are correlated beyond 1.
-static void check_pairs(bslam_codec_t *codec, uint32_t values)
+/// D, and of each value its row of L: whatever they are, their product is a covariance, if none of its
+/// variances is too large. ekf: where it goes, or NULL.
+static void read_factor(bslam_codec_t *codec, const header_t *header, const columns_t *columns,
+                        bslam_ekf_t *ekf)
 {
-    const uint32_t covariance_at = codec->at;
-    for (uint32_t i = 0; i < values && codec->fault == BSLAM_MAP_FINE; i++) {
-        const bslam_real_t own = variance_at(codec, covariance_at, i);
-        for (uint32_t j = 0; j <= i; j++) {
+    const uint32_t d_begins = codec->at;
+    const int first = ekf != NULL ? bslam_ekf_map_at(ekf) - ekf->factor.tail_count : 0;
+    for (uint32_t c = 0; c < header->columns; c++) {
+        const bslam_real_t d = bslam_codec_real(codec, 0);
+        bslam_codec_require(codec, d >= 0, BSLAM_MAP_COVARIANCE);
+        if (ekf != NULL) {
+            ekf->factor.d[first + (int)c] = d;
+        }
+    }
+    for (uint32_t i = 0; i < header->columns && codec->fault == BSLAM_MAP_FINE; i++) {
+        bslam_real_t variance = 0;
+        for (uint32_t j = 0; columns->are_values[i] && j < i; j++) {
             const bslam_real_t value = bslam_codec_real(codec, 0);
-            const bslam_real_t other = j == i ? 1 : variance_at(codec, covariance_at, j);
-            const bool fits = j == i ? value >= 0 : value * value <= CORRELATION2_MAX * own * other;
-            bslam_codec_require(codec, fits, BSLAM_MAP_COVARIANCE);
+            variance += d_at(codec, d_begins, j) * value * value;
+            if (ekf != NULL) {
+                *bslam_factor_element(&ekf->factor, first + (int)i, first + (int)j) = value;
+            }
         }
+        bslam_codec_require(codec, bslam_in_range(variance, 0, VARIANCE_MAX), BSLAM_MAP_COVARIANCE);
     }
 }
 
-/// All values together: that the covariance is positive semidefinite.
-static void check_whole(bslam_codec_t *codec, uint32_t values, const room_t *room)
+/// What the values hang on that is no beacon's leaves.
+static void drop_others(bslam_ekf_t *ekf, const header_t *header, const columns_t *columns)
 {
-    for (int i = 0; i < (int)values && codec->fault == BSLAM_MAP_FINE; i++) {
-        for (int j = 0; j <= i; j++) {
-            bslam_symmat_set(room->factor, i, j, bslam_codec_real(codec, 0));
-        }
-        bslam_codec_require(codec, bslam_symmat_factor_row(room->factor, i, room->raise),
-                            BSLAM_MAP_COVARIANCE);
-    }
-}
-
-static void take_covariance(bslam_codec_t *codec, uint32_t values, const target_t *target)
-{
-    bslam_ekf_t *ekf = &target->slam->ekf;
-    const int base = ekf->base_dim;
-    for (int i = base; i < base + (int)values; i++) {
-        for (int k = 0; k < base; k++) {
-            bslam_symmat_set(ekf->covariance, i, k, 0);
-        }
-        for (int j = base; j <= i; j++) {
-            const bslam_real_t value = bslam_codec_real(codec, 0);
-            bslam_symmat_set(ekf->covariance, i, j, j == i ? value + target->raise * value : value);
+    for (int c = (int)header->columns - 1; c >= 0; c--) {
+        if (!columns->are_values[c]) {
+            bslam_ekf_remove_value(ekf, bslam_ekf_map_at(ekf) + c);
         }
     }
 }
 
-/// The state values of the beacons, and the lower triangle of their covariance, row by row.
+/// The state values of the beacons, by column, and their covariance.
 static void read_values(bslam_codec_t *codec, const header_t *header, const target_t *target,
-                        const room_t *room)
+                        const columns_t *columns)
 {
-    const bool is_taken = target != NULL && target->mode == BSLAM_MAP_LIVING;
-    for (uint32_t i = 0; i < header->values; i++) {
-        const bslam_real_t value = bslam_codec_real(codec, 0);
-        if (is_taken) {
-            target->slam->ekf.mean[target->slam->ekf.base_dim + (int)i] = value;
+    bslam_ekf_t *ekf = target != NULL && target->mode == BSLAM_MAP_LIVING ? &target->slam->ekf : NULL;
+    if (ekf != NULL) {
+        bslam_factor_widen(&ekf->factor, (int)header->columns);
+        ekf->dim += (int32_t)header->columns;
+    }
+    for (uint32_t c = 0; c < header->columns; c++) {
+        const bslam_real_t value = columns->are_values[c] ? move_value(codec, 0) : 0;
+        if (ekf != NULL) {
+            ekf->mean[bslam_ekf_map_at(ekf) + (int)c] = value;
         }
     }
-    if (is_taken) {
-        take_covariance(codec, header->values, target);
-    } else if (room != NULL && has_room(room, header->values)) {
-        check_whole(codec, header->values, room);
-    } else {
-        check_pairs(codec, header->values);
+    read_factor(codec, header, columns, ekf);
+    if (ekf != NULL) {
+        drop_others(ekf, header, columns);
     }
 }
 
-/// Saved values in their order: the next state value after `place` of a saved beacon.
-typedef struct saved_value {
-    int beacon, value;
-} saved_value_t;
-
-/// Moves on to the next saved state value; false: there is none.
-static bool next_value(const bslam_ekf_t *ekf, saved_value_t *place)
+static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf, const header_t *header,
+                         const columns_t *columns)
 {
-    place->value++;
-    while (place->beacon < ekf->beacon_count &&
-           (!bslam_map_saves(ekf, place->beacon) ||
-            place->value >= bslam_beacon_dim(ekf->beacons[place->beacon].kind))) {
-        place->beacon++;
-        place->value = 0;
+    const bslam_factor_t *factor = &ekf->factor;
+    const int tail = factor->tail_count;
+    for (int c = 0; c < (int)header->columns; c++) {
+        if (columns->are_values[c]) {
+            (void)bslam_codec_real(codec, ekf->mean[c + tail]);
+        }
     }
-    return place->beacon < ekf->beacon_count;
-}
-
-static int state_at(const bslam_ekf_t *ekf, const saved_value_t *place)
-{
-    return ekf->beacons[place->beacon].at + place->value;
-}
-
-static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf)
-{
-    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
-        (void)bslam_codec_real(codec, ekf->mean[state_at(ekf, &i)]);
+    for (int c = 0; c < (int)header->columns; c++) {
+        (void)bslam_codec_real(codec, factor->d[c]);
     }
-    for (saved_value_t i = {0, -1}; next_value(ekf, &i);) {
-        saved_value_t j = {0, -1};
-        do {
-            (void)next_value(ekf, &j);
-            (void)bslam_codec_real(codec,
-                                   bslam_symmat_get(ekf->covariance, state_at(ekf, &i), state_at(ekf, &j)));
-        } while (i.beacon != j.beacon || i.value != j.value);
+    for (int i = 0; i < (int)header->columns; i++) {
+        const bslam_real_t *row = bslam_factor_row(factor, i);
+        bslam_real_t variance = 0;
+        for (int j = 0; columns->are_values[i] && j < i; j++) {
+            const bslam_real_t value = bslam_codec_real(codec, row[4 * j]);
+            variance += (float)factor->d[j] * value * value;
+        }
+        bslam_codec_require(codec, bslam_in_range(variance, 0, VARIANCE_MAX), BSLAM_MAP_COVARIANCE);
     }
 }
 
@@ -292,17 +294,27 @@ static bslam_real_t scale_of(const bslam_ekf_t *ekf, const bslam_beacon_t *beaco
     return bslam_in_range(scale, 0, SCALE_MAX) ? scale : 0;
 }
 
+/// Of a beacon's first state value.
+static int column_of(const bslam_ekf_t *ekf, int index)
+{
+    return ekf->beacons[index].kind == BSLAM_BEACON_KNOWN ? 0 : bslam_ekf_place(ekf, ekf->beacons[index].at);
+}
+
 // ---- the whole --------------------------------------------------------------------------------------------
 
 static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t length)
 {
     const bslam_ekf_t *ekf = &slam->ekf;
-    header_t header = {.length = length, .next_uid = ekf->next_uid};
+    header_t header = {
+        .length = length, .columns = (uint32_t)ekf->factor.body_count, .next_uid = ekf->next_uid};
+    columns_t columns = {{0}};
     for (int b = 0; b < ekf->beacon_count; b++) {
-        if (bslam_map_saves(ekf, b)) {
-            header.beacons++;
-            header.values += (uint32_t)bslam_beacon_dim(ekf->beacons[b].kind);
+        const int count = bslam_beacon_dim(ekf->beacons[b].kind);
+        for (int k = 0; bslam_map_saves(ekf, b) && k < count; k++) {
+            columns.are_values[column_of(ekf, b) + k] = true;
         }
+        header.beacons += bslam_map_saves(ekf, b) ? 1u : 0u;
+        header.values += bslam_map_saves(ekf, b) ? (uint32_t)count : 0u;
     }
     for (int32_t slot = 0; bslam_slam_learns(slam) && slot < BSLAM_LEARNER_SLOTS; slot++) {
         header.classifiers += bslam_map_owns(slam, slot) ? 1u : 0u;
@@ -312,6 +324,7 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
         if (bslam_map_saves(ekf, b)) {
             stored_beacon_t record = {.beacon = ekf->beacons[b], .classifier = BSLAM_MAP_NO_CLASSIFIER};
             record.scale = scale_of(ekf, &ekf->beacons[b]);
+            record.column = (uint32_t)column_of(ekf, b);
             if (bslam_slam_learns(slam)) {
                 const bslam_beacon_appearance_t *known = &slam->appearance->of[b];
                 record.classifier = bslam_map_classifier_number(slam, known->classifier);
@@ -321,7 +334,7 @@ static void write_all(bslam_codec_t *codec, const bslam_slam_t *slam, uint32_t l
             move_record(codec, &record);
         }
     }
-    write_values(codec, ekf);
+    write_values(codec, ekf, &header, &columns);
     for (int32_t slot = 0; bslam_slam_learns(slam) && slot < BSLAM_LEARNER_SLOTS; slot++) {
         if (bslam_map_owns(slam, slot)) {
             bslam_map_write_classifier(codec, slam, slot);
@@ -348,22 +361,23 @@ bslam_status_t bslam_map_write(const bslam_slam_t *slam, const bslam_map_sink_t 
 
 /// All of a blob whose CRC was `crc` when its frame was checked. Flash that is worn, or a line, may read
 /// otherwise now: nothing of this reading is to be believed before its own CRC is the same.
-static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target, const room_t *room)
+static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target)
 {
     header_t header = {0};
+    columns_t columns = {{0}};
     move_header(codec, &header);
-    read_beacons(codec, &header, target);
+    read_beacons(codec, &header, target, &columns);
     if (codec->fault != BSLAM_MAP_FINE) {
         return;  // counts are not to be believed
     }
-    read_values(codec, &header, target, room);
+    read_values(codec, &header, target, &columns);
     const bool learns = target != NULL && bslam_slam_learns(target->slam);
     bslam_map_read_classifiers(codec, header.classifiers, learns ? &target->slam->appearance->learner : NULL);
     bslam_codec_require(codec, codec->at + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
-    bslam_codec_require(codec, room == NULL || has_room(room, header.values), BSLAM_MAP_NO_ROOM);
     if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
-        target->slam->ekf.next_uid = header.next_uid;
+        uint32_t *next_uid = &target->slam->ekf.next_uid;
+        *next_uid = header.next_uid > *next_uid ? header.next_uid : *next_uid;
     }
 }
 
@@ -395,44 +409,36 @@ static bslam_map_fault_t check_frame(const bslam_map_source_t *source, uint32_t 
     return codec.fault;
 }
 
-static bslam_map_fault_t check(const bslam_map_source_t *source, const room_t *room, uint32_t *crc)
+static bslam_map_fault_t check(const bslam_map_source_t *source, uint32_t *crc)
 {
     const bslam_map_fault_t fault = check_frame(source, crc);
     if (fault != BSLAM_MAP_FINE) {
         return fault;
     }
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, *crc, NULL, room);
+    read_all(&codec, *crc, NULL);
     return codec.fault;
 }
 
 bslam_map_fault_t bslam_map_check(const bslam_map_source_t *source)
 {
     uint32_t crc;
-    return check(source, NULL, &crc);
+    return check(source, &crc);
 }
 
 bslam_status_t bslam_map_load(bslam_slam_t *slam, const bslam_map_source_t *source, bslam_map_mode_t mode,
                               bslam_map_fault_t *fault)
 {
-    // Behind the rows of its own covariance the pipeline's memory holds nothing.
-    const size_t own = bslam_symmat_row(slam->ekf.dim);
-    room_t room = {slam->ekf.covariance + own, BSLAM_SYMMAT_LENGTH(BSLAM_STATE_MAX) - own, 0};
     uint32_t crc;
-    *fault = check(source, &room, &crc);
-    if (*fault == BSLAM_MAP_COVARIANCE) {
-        room.raise = SHORTFALL_MAX;
-        *fault = check(source, &room, &crc);
-    }
-    memset(room.factor, 0, room.length * sizeof *room.factor);
+    *fault = check(source, &crc);
     if (*fault != BSLAM_MAP_FINE) {
         return BSLAM_E_MAP;
     }
     bslam_slam_forget_map(slam);
     slam->is_frozen = mode == BSLAM_MAP_FROZEN;
-    const target_t target = {slam, mode, room.raise};
+    const target_t target = {slam, mode};
     bslam_codec_t codec = {.source = source, .crc = BSLAM_CRC32_START};
-    read_all(&codec, crc, &target, NULL);
+    read_all(&codec, crc, &target);
     *fault = codec.fault;
     if (*fault != BSLAM_MAP_FINE) {
         bslam_slam_forget_map(slam);

@@ -207,7 +207,7 @@ static void test_refused_calls_change_no_bit(void **state)
     assert_int_equal(bslam_sightings(&robot, now_us + 1, seen, 2), BSLAM_E_NOT_FINITE);
     assert_int_equal(bslam_health(&robot).bad_sighting, 1);
     assert_int_equal(bslam_sightings(&robot, now_us + 1, seen, BSLAM_SIGHTINGS_MAX + 1), BSLAM_E_COUNT);
-    assert_int_equal(bslam_sightings(&robot, now_us, seen, 1), BSLAM_E_TIME);
+    assert_int_equal(bslam_sightings(&robot, -1, seen, 1), BSLAM_E_TIME);
     assert_int_equal(bslam_resume_odometry(&robot, real(NAN), 0), BSLAM_E_RANGE);
     const bslam_pose_t pose = {real(NAN), 0, 0};
     assert_int_equal(bslam_set_pose(&robot, &pose, 0, 0), BSLAM_E_NOT_FINITE);
@@ -393,8 +393,22 @@ static void test_restart_of_what_holds_no_state_is_refused(void **state)
     mark();
     assert_int_equal(bslam_restart(&robot, 0, 0), BSLAM_E_STATE);
     assert_int_equal(bslam_restart(&robot, real(0.1), real(0.1)), BSLAM_E_STATE);
+}
+
+static void test_restart_in_a_doubt_that_is_refused_changes_nothing(void **state)
+{
+    settings.recovery = 1;
     start_guarded();
+    bslam_freeze_map(&robot, true);
+    while (bslam_health(&robot).state != BSLAM_RECOVERY_DOUBTING) {
+        stand_at(-2, 2, 1.5, 1);
+    }
+    const uint64_t before = fingerprint();
     assert_int_equal(bslam_restart(&robot, real(31), 0), BSLAM_E_RANGE);
+    assert_int_equal(bslam_health(&robot).state, BSLAM_RECOVERY_DOUBTING);
+    assert_true(fingerprint() == before);
+    assert_int_equal(bslam_restart(&robot, real(30), 0), BSLAM_OK);
+    assert_int_equal(bslam_health(&robot).state, BSLAM_RECOVERY_FOLLOWING);
 }
 
 // ---- keeping the map --------------------------------------------------------------------------------------
@@ -513,6 +527,7 @@ int main(void)
         cmocka_unit_test_setup(test_restart_goes_back_to_the_copy, setup),
         cmocka_unit_test_setup(test_restart_goes_on_with_memory_that_is_whole, setup),
         cmocka_unit_test_setup(test_restart_of_what_holds_no_state_is_refused, setup),
+        cmocka_unit_test_setup(test_restart_in_a_doubt_that_is_refused_changes_nothing, setup),
 
         cmocka_unit_test_setup(test_map_that_was_saved_is_loaded, setup),
         cmocka_unit_test_setup(test_map_in_flash_is_loaded, setup),

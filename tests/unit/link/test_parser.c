@@ -81,12 +81,14 @@ static void test_link_push_values_come_back(void **state)
     bslam_link_put_u16(&writer, 0xfffe);
     bslam_link_put_u32(&writer, 0xfffefdfc);
     bslam_link_put_i32(&writer, INT32_MIN);
+    bslam_link_put_i32(&writer, -12345678);
     bslam_link_put_real(&writer, real(-0.15625));
     assert_int_equal(push_all(bytes, bslam_link_end(&writer)), 1);
     bslam_link_reader_t reader = bslam_link_payload(&parser);
     assert_int_equal(bslam_link_get_u16(&reader), 0xfffe);
     assert_int_equal(bslam_link_get_u32(&reader), 0xfffefdfc);
     assert_int_equal(bslam_link_get_i32(&reader), INT32_MIN);
+    assert_int_equal(bslam_link_get_i32(&reader), -12345678);
     assert_true(bslam_link_get_real(&reader) == real(-0.15625));
     assert_true(bslam_link_is_read(&reader));
 }

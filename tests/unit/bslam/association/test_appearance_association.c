@@ -1,3 +1,4 @@
+#include "covariance.h"
 #include "known_map.h"
 #include "support.h"
 
@@ -717,7 +718,7 @@ static void test_conditional_on_a_match_the_others_are_surer(void **state)
     const bslam_settings_t settings = svm_params();
     static const double places[2][2] = {{4, 0}, {0, 4}};
     bslam_ekf_t ekf = unit_map_of(&settings, places, 2);
-    bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
+    covariance_forget(&ekf, BSLAM_STATE_THETA, 0.01);
     const bslam_sighting_t seen[] = {unit_polar(0.1, 4, -1), unit_polar(1.570796 + 0.1, 4, -1)};
     bslam_innovation_t innovations[2];
     for (int i = 0; i < 2; i++) {

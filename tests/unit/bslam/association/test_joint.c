@@ -1,3 +1,4 @@
+#include "covariance.h"
 #include "known_map.h"
 #include "support.h"
 
@@ -24,7 +25,7 @@ static bslam_settings_t joint_params(void)
 static bslam_ekf_t map_of(const bslam_settings_t *settings, const double (*places)[2], int count)
 {
     bslam_ekf_t ekf = unit_map_of(settings, places, count);
-    bslam_symmat_set(ekf.covariance, BSLAM_STATE_THETA, BSLAM_STATE_THETA, BSLAM_R(0.01));
+    covariance_forget(&ekf, BSLAM_STATE_THETA, 0.01);
     return ekf;
 }
 
@@ -164,10 +165,7 @@ static void test_joint_beacon_of_indefinite_covariance_is_passed_over(void **sta
     const bslam_settings_t settings = joint_params();
     const double places[2][2] = {{4, 0}, {0, 4}};
     bslam_ekf_t ekf = map_of(&settings, places, 2);
-    for (int k = 0; k < 2; k++) {
-        const int at = ekf.beacons[0].at + k;
-        bslam_symmat_set(ekf.covariance, at, at, -1);
-    }
+    covariance_break(&ekf, ekf.beacons[0].at, 2);
     const bslam_sighting_t seen[] = {unit_polar(0, 4, -1), unit_polar(1.5708, 4, -1)};
     const bslam_sighting_frame_t frame = {&ekf, &settings, NULL, &on_axle, seen, 2, 0};
     bslam_record_t records[2];

@@ -1,3 +1,4 @@
+#include "covariance.h"
 #include "support.h"
 #include "twin.h"
 #include "plain_settings.h"
@@ -325,6 +326,29 @@ static void test_distance2_is_the_textbooks(void **state)
     }
 }
 
+static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **state)
+{
+    const bslam_settings_t settings = params_of(0, true);
+    unit_random_t random = {20};
+    const bslam_ekf_t ekf = random_filter(&settings, &random);
+    const twin_t twin = twin_of(&ekf);
+    for (int i = 0; i < 5; i++) {
+        for (int j = 0; j < 5; j++) {
+            const plan_t plans[] = {random_plan(&random, i, true), random_plan(&random, j, true)};
+            const bslam_sighting_t seen[] = {sighting_of(&ekf, &plans[0]), sighting_of(&ekf, &plans[1])};
+            const bslam_innovation_t a = innovation_of(&ekf, &settings, i, &seen[0]);
+            const bslam_innovation_t b = innovation_of(&ekf, &settings, j, &seen[1]);
+            const dense_t rows = twin_rows(&ekf, &mount, i), others = twin_rows(&ekf, &mount, j);
+            const dense_t columns = dense_transposed(&others);
+            const dense_t p = dense_product(&rows, &twin.covariance), all = dense_product(&p, &columns);
+            assert_near(bslam_ekf_row_covariance(&ekf, &a.range_row, &b.bearing_row), all.at[0][1],
+                        TOLERANCE);
+            assert_near(bslam_ekf_row_covariance(&ekf, &a.bearing_row, &b.bearing_row), all.at[1][1],
+                        TOLERANCE);
+        }
+    }
+}
+
 static void test_fuse_distance2_is_conditional_on_what_was_fused_before(void **state)
 {
     const bslam_settings_t settings = params_of(0, false);
@@ -388,7 +412,7 @@ static void test_fuse_just_inside_and_outside_the_gate(void **state)
     assert_true(fusion.weight == 0 && fusion.distance2 == distance2);
     bslam_ekf_correct(&copy, &settings);
     assert_memory_equal(copy.mean, ekf.mean, sizeof ekf.mean);
-    assert_memory_equal(copy.covariance, ekf.covariance, sizeof ekf.covariance);
+    assert_memory_equal(&copy.factor, &ekf.factor, sizeof ekf.factor);
 }
 
 static void test_fuse_gated_sighting_between_others_has_no_effect(void **state)
@@ -490,9 +514,7 @@ static double bend_by_hessian(const bslam_ekf_t *ekf, int beacon)
 
 static void forget_heading(bslam_ekf_t *ekf)
 {
-    for (int i = 0; i < ekf->dim; i++) {
-        bslam_symmat_set(ekf->covariance, i, BSLAM_STATE_THETA, 0);
-    }
+    covariance_forget(ekf, BSLAM_STATE_THETA, 0);
 }
 
 static void test_innovation_of_a_points_direction_grows_by_the_bend_of_its_model(void **state)
@@ -596,9 +618,7 @@ static void test_innovation_of_a_distance_to_a_ray_at_infinity_is_singular(void 
 static bslam_ekf_t broken_filter(const bslam_settings_t *settings, unit_random_t *random)
 {
     bslam_ekf_t ekf = random_filter(settings, random);
-    for (int i = 0; i < ekf.dim; i++) {
-        bslam_symmat_set(ekf.covariance, i, i, -1);
-    }
+    covariance_break(&ekf, 0, ekf.dim);
     return ekf;
 }
 
@@ -618,7 +638,7 @@ static void test_fuse_and_distance2_of_an_indefinite_state_are_singular(void **s
         assert_int_equal(bslam_ekf_fuse(&ekf, &settings, &innovation, &fusion), BSLAM_E_SINGULAR);
         bslam_ekf_correct(&ekf, &settings);
         assert_memory_equal(ekf.mean, before.mean, sizeof before.mean);
-        assert_memory_equal(ekf.covariance, before.covariance, sizeof before.covariance);
+        assert_memory_equal(&ekf.factor, &before.factor, sizeof before.factor);
     }
 }
 
@@ -630,9 +650,9 @@ static double largest_correlation(const bslam_ekf_t *ekf)
     double largest = 0;
     for (int i = 0; i < ekf->dim; i++) {
         for (int j = 0; j < i; j++) {
-            const double pii = (double)bslam_symmat_get(ekf->covariance, i, i);
-            const double pjj = (double)bslam_symmat_get(ekf->covariance, j, j);
-            const double pij = (double)bslam_symmat_get(ekf->covariance, i, j);
+            const double pii = (double)bslam_ekf_covariance(ekf, i, i);
+            const double pjj = (double)bslam_ekf_covariance(ekf, j, j);
+            const double pij = (double)bslam_ekf_covariance(ekf, i, j);
             const double correlation = pii > 0 && pjj > 0 ? fabs(pij) / sqrt(pii * pjj) : INFINITY;
             largest = fmax(largest, correlation);
         }
@@ -704,11 +724,11 @@ static double largest_excess(const bslam_ekf_t *ekf, const bslam_ekf_t *before)
     double largest = 0;
     for (int i = 0; i < ekf->dim; i++) {
         for (int j = 0; j < i; j++) {
-            const double pii = (double)bslam_symmat_get(ekf->covariance, i, i);
-            const double pjj = (double)bslam_symmat_get(ekf->covariance, j, j);
-            const double excess = fabs((double)bslam_symmat_get(ekf->covariance, i, j)) - sqrt(pii * pjj);
-            const double was_ii = (double)bslam_symmat_get(before->covariance, i, i);
-            const double was_jj = (double)bslam_symmat_get(before->covariance, j, j);
+            const double pii = (double)bslam_ekf_covariance(ekf, i, i);
+            const double pjj = (double)bslam_ekf_covariance(ekf, j, j);
+            const double excess = fabs((double)bslam_ekf_covariance(ekf, i, j)) - sqrt(pii * pjj);
+            const double was_ii = (double)bslam_ekf_covariance(before, i, i);
+            const double was_jj = (double)bslam_ekf_covariance(before, j, j);
             largest = fmax(largest, excess / sqrt(was_ii * was_jj));
         }
     }
@@ -777,6 +797,7 @@ int main(void)
         cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
+        cmocka_unit_test(test_row_covariance_of_any_two_sightings_is_the_textbooks),
         cmocka_unit_test(test_fuse_distance2_is_conditional_on_what_was_fused_before),
         cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),

@@ -1,3 +1,4 @@
+#include "covariance.h"
 #include "known_map.h"
 #include "support.h"
 
@@ -90,7 +91,7 @@ static void test_recovery_of_a_robot_that_stays_changes_nothing(void **state)
         assert_int_equal(bslam_slam_sightings(&slam, now_us, seen, BEACONS), BSLAM_OK);
     }
     assert_memory_equal(alone.ekf.mean, slam.ekf.mean, sizeof slam.ekf.mean);
-    assert_memory_equal(alone.ekf.covariance, slam.ekf.covariance, sizeof slam.ekf.covariance);
+    assert_memory_equal(&alone.ekf.factor, &slam.ekf.factor, sizeof slam.ekf.factor);
     assert_int_equal(recovery.counters.withheld, 0);
 }
 
@@ -126,9 +127,7 @@ static void test_recovery_goes_by_the_beacons_own_scales(void **state)
         assert_int_equal(slam.ekf.beacons[b].kind, BSLAM_BEACON_SIZED);
         const int at = slam.ekf.beacons[b].at + BSLAM_POINT_DIM;
         slam.ekf.mean[at] = BSLAM_R(1.2);
-        for (int i = 0; i < slam.ekf.dim; i++) {
-            bslam_symmat_set(slam.ekf.covariance, at, i, i == at ? BSLAM_R(1e-4) : 0);
-        }
+        covariance_forget(&slam.ekf, at, 1e-4);
     }
     stretch = 1.2;
     look_on(10, 1, 2, 2.5, BEACONS);
@@ -291,7 +290,7 @@ static void test_recovery_withholds_a_frame_as_if_nothing_was_seen(void **state)
         assert_int_equal(bslam_slam_odometry(&unseeing, &still), BSLAM_OK);
         assert_int_equal(bslam_slam_sightings(&unseeing, now_us, NULL, 0), BSLAM_OK);
         assert_memory_equal(unseeing.ekf.mean, slam.ekf.mean, sizeof slam.ekf.mean);
-        assert_memory_equal(unseeing.ekf.covariance, slam.ekf.covariance, sizeof slam.ekf.covariance);
+        assert_memory_equal(&unseeing.ekf.factor, &slam.ekf.factor, sizeof slam.ekf.factor);
     }
     assert_int_equal(recovery.counters.withheld, 24);
     assert_int_equal(slam.ekf.beacon_count, BEACONS - 1);
@@ -366,9 +365,7 @@ static void test_recovery_of_beacons_that_look_alike_one_without_a_distance_is_p
     assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
     setup(NULL);
     go_by_looks();
-    for (int k = 0; k < 2; k++) {
-        bslam_symmat_set(slam.ekf.covariance, other->at + k, other->at + k, -1);
-    }
+    covariance_break(&slam.ekf, other->at, 2);
     assert_int_equal(contradicting(beacons[0][0], beacons[0][1]), 0);
 }
 

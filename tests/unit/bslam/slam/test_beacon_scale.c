@@ -66,7 +66,7 @@ static double scale(void)
 
 static double variance(int value)
 {
-    return (double)bslam_symmat_get(slam.ekf.covariance, beacon()->at + value, beacon()->at + value);
+    return (double)bslam_ekf_covariance(&slam.ekf, beacon()->at + value, beacon()->at + value);
 }
 
 static void test_distance_of_something_else_is_not_used(void **state)
@@ -228,7 +228,7 @@ static void test_ray_that_is_seen_with_a_distance_is_sized_from_then_on(void **s
     const double along = variance(0), common = 0.05 * 2;
     assert_near(along, 0.05 * 0.05 + common * common, 1e-5);
     assert_near(variance(2), 0.0025, 1e-6);
-    assert_near(bslam_symmat_get(slam.ekf.covariance, beacon()->at, beacon()->at + 2), -0.0025 * 2, 1e-6);
+    assert_near(bslam_ekf_covariance(&slam.ekf, beacon()->at, beacon()->at + 2), -0.0025 * 2, 1e-6);
 }
 
 static void test_ray_that_a_distance_from_elsewhere_is_taken_for_stays(void **state)

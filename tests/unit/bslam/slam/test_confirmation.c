@@ -85,7 +85,7 @@ static void test_until_a_beacon_is_believed_its_sightings_move_nothing(void **st
         assert_true(account.has_beacon);
         assert_int_equal(account.beacon_uid, uid);
         assert_memory_equal(slam.ekf.mean, unmoved.mean, sizeof unmoved.mean);
-        assert_memory_equal(slam.ekf.covariance, unmoved.covariance, sizeof unmoved.covariance);
+        assert_memory_equal(&slam.ekf.factor, &unmoved.factor, sizeof unmoved.factor);
         assert_int_equal(is_confirmed(0), i == 2);
     }
     assert_int_equal(slam.counters.deferred, 3);

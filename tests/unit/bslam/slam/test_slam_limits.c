@@ -75,9 +75,9 @@ static void see(drive_t *drive)
 /// The correlation of two state values; an exactly known value has none, and 1 with itself.
 static double correlation(const bslam_ekf_t *ekf, int i, int j)
 {
-    const double scale = sqrt((double)bslam_symmat_get(ekf->covariance, i, i)) *
-                         sqrt((double)bslam_symmat_get(ekf->covariance, j, j));
-    return scale > 0 ? (double)bslam_symmat_get(ekf->covariance, i, j) / scale : i == j;
+    const double scale =
+        sqrt((double)bslam_ekf_covariance(ekf, i, i)) * sqrt((double)bslam_ekf_covariance(ekf, j, j));
+    return scale > 0 ? (double)bslam_ekf_covariance(ekf, i, j) / scale : i == j;
 }
 
 /// True if every eigenvalue of the correlation matrix is above minus a few roundings: Cholesky in double,

@@ -56,7 +56,7 @@ static void assert_state(const bslam_ekf_t *ekf, const double *mean, const doubl
         for (int j = 0; j <= i; j++) {
             const double scale = deviation(lower, i) * deviation(lower, j);
             const double expected = lower[i * (i + 1) / 2 + j];
-            assert_near((double)bslam_symmat_get(ekf->covariance, i, j) / scale, expected / scale, TOLERANCE);
+            assert_near((double)bslam_ekf_covariance(ekf, i, j) / scale, expected / scale, TOLERANCE);
         }
     }
 }

@@ -37,10 +37,9 @@ static void assert_about(double x_m, double y_m, double correction_x_m, double c
     assert_true(base->mean[at] == real(x_m) && base->mean[at + 1] == real(y_m));
     assert_near((double)base->correction[at], correction_x_m, tolerance);
     assert_near((double)base->correction[at + 1], correction_y_m, tolerance);
-    assert_near((double)bslam_symmat_get(base->covariance, at, at), variance_m2, tolerance * variance_m2);
-    assert_near((double)bslam_symmat_get(base->covariance, at + 1, at + 1), variance_m2,
-                tolerance * variance_m2);
-    assert_near((double)bslam_symmat_get(base->covariance, at + 1, at), 0, tolerance * variance_m2);
+    assert_near((double)bslam_ekf_covariance(base, at, at), variance_m2, tolerance * variance_m2);
+    assert_near((double)bslam_ekf_covariance(base, at + 1, at + 1), variance_m2, tolerance * variance_m2);
+    assert_near((double)bslam_ekf_covariance(base, at + 1, at), 0, tolerance * variance_m2);
 }
 
 static void test_place_is_stretched_and_turned_by_the_logarithm(void **state)
