@@ -56,7 +56,11 @@ def check_log(log: Log) -> Report:
     solution = solve(log, drive, flow)
     findings += sign_findings(log, signed, shown, solution.references)
     findings += [*verdict.delay(solution, drive, flow), *verdict.scales(solution, drive, flow)]
-    findings += [*verdict.mount(solution, drive), *verdict.noise(solution), *verdict.identities(solution)]
+    findings += [
+        *verdict.mount(solution, drive),
+        *verdict.noise(solution),
+        *verdict.identities(solution, log),
+    ]
     names = ("way", "turn", "bend", "yaw", "delay")
     return Report(log.name, findings, untested, {name: vars(getattr(solution, name)) for name in names})
 

@@ -211,47 +211,43 @@ def _histogram(one: Noise) -> Picture:
     return Picture("error over told noise", "density", curves)
 
 
-def identities(solution: Solution) -> Iterator[Finding]:
+def identities(solution: Solution, log: Log) -> Iterator[Finding]:
     """Beacons named for each other, in a part of the log or against beacons.csv."""
     found = exchanges(solution.problem, solution.state)
     for pair in dict.fromkeys(frozenset((one.named, one.shown)) for one in found):
-        yield _exchange([one for one in found if {one.named, one.shown} == pair], solution)
+        yield _exchange([one for one in found if {one.named, one.shown} == pair], solution, log)
     for fitted in solution.references:
-        for a, b in fitted.exchanged():
+        for a, b in (map(log.identity, pair) for pair in fitted.exchanged()):
             what = f"beacons {a} and {b} are exchanged between sightings.csv and {fitted.what}"
             sure, mend = (
-                "each stands where the other is told; the others fit",
+                "each stands where the other is told; others fit",
                 f"exchange {a} and {b} in {fitted.what}",
             )
             yield Finding("identities", what, sure, mend, {"labels": [a, b]}, _map_picture(fitted))
 
 
-def _exchange(ways: list[Exchange], solution: Solution) -> Finding:
-    one, time_s = ways[0], solution.problem.drive.seen.time_s
-    start_s, end_s = (
-        float(of(time_s[np.concatenate([way.hits for way in ways])])) for of in (np.min, np.max)
-    )
+def _exchange(both: list[Exchange], solution: Solution, log: Log) -> Finding:
+    """Of one pair: each for the other, or one for the other alone."""
+    one, time_s = both[0], solution.problem.drive.seen.time_s
+    hits_s = time_s[np.concatenate([each.hits for each in both])]
     own_m, other_m = (
-        float(np.median(np.concatenate([getattr(way, name)[np.isin(way.rows, way.hits)] for way in ways])))
-        for name in ("own_m", "other_m")
+        float(np.median(np.concatenate([off[np.isin(each.rows, each.hits)] for each, off in pairs])))
+        for pairs in ([(each, each.own_m) for each in both], [(each, each.other_m) for each in both])
     )
-    count, of = sum(len(way.hits) for way in ways), sum(way.inside for way in ways)
-    are = (
-        f"{one.named} and {one.shown} are exchanged"
-        if len(ways) > 1
-        else f"{one.shown} are named {one.named}"
-    )
+    count, of = sum(len(each.hits) for each in both), sum(each.inside for each in both)
+    a, b = log.identity(one.named), log.identity(one.shown)
+    are = f"{a} and {b} are exchanged" if len(both) > 1 else f"{b} are named {a}"
     curves = [
-        Curve(f"named {one.named}, from {label}", time_s[one.rows], off_m)
-        for label, off_m in ((one.named, one.own_m), (one.shown, one.other_m))
+        Curve(f"named {a}, from where {label} is", time_s[one.rows], off_m)
+        for label, off_m in ((a, one.own_m), (b, one.other_m))
     ]
     return Finding(
         "identities",
-        f"sightings of beacons {are} from {start_s:.1f} to {end_s:.1f} s after the first row of odometry",
+        f"sightings of beacons {are} from {hits_s.min():.1f} to {hits_s.max():.1f} s of odometry",
         f"{count} of {of} are off by {own_m:.2f} m as they are named, by {other_m:.2f} m if exchanged",
         "exchange these beacon_id in sightings.csv",
-        {"labels": [one.named, one.shown], "from_s": start_s, "until_s": end_s, "sightings": count},
-        Picture("time, s", "distance from where the beacon is, m", curves),
+        {"labels": [a, b], "from_s": hits_s.min(), "until_s": hits_s.max(), "sightings": count},
+        Picture("time, s", "distance, m", curves),
     )
 
 
