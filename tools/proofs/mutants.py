@@ -7,7 +7,7 @@ Examples:
 
 `make mutants` builds what this needs and says how C is compiled. A mutant is compiled without sanitizers and
 linked before the library. First the tests of its layer run, then all others. It is *killed* if one fails or
-takes 20 s of the processor's time. It is the *same* if its object has the original's bytes, or if
+takes 5 s of the processor's time. It is the *same* if its object has the original's bytes, or if
 tests/unit/mutants.toml tells why nothing can show it. The sample goes by a hash of the mutant's text, so it
 stays when sources change elsewhere. What came of each is kept in out/mutants; it is asked again if its file
 changes, a survivor if anything does. Exit status 0: the goals are reached; 1: not; 2: not built, or a verdict
@@ -38,7 +38,7 @@ LAYERS = {
     "smoother": "bslam/smoother", "store": "bslam/store", "link": "link",
 }  # fmt: skip
 GOALS = dict.fromkeys(LAYERS, 0.92) | {"store": 1.0, "link": 1.0}
-SEED, CPU_S = "mutants", 20
+SEED, CPU_S = "mutants", 5
 KINDS = ("killed", "survived", "same", "does not compile", "unknown")
 
 # --- Mutants ------------------------------------------------------------------------------------------------
