@@ -23,7 +23,7 @@ C_STANDARD := -std=c11 -ffp-contract=off
 C_INCLUDES := -Ifirmware
 
 C_WARNINGS := -Wall -Wextra -Werror -Wconversion -Wfloat-conversion -Wshadow -Wvla -Wundef \
-    -Wstrict-prototypes -Wmissing-prototypes -Wcast-align -Wwrite-strings
+    -Wstrict-prototypes -Wmissing-prototypes -Wcast-align -Wwrite-strings -Wno-psabi
 
 # In the float build a double is a mistake: it costs a library call on a Cortex-M4F.
 C_WARNINGS_FLOAT := -Wdouble-promotion -Wunsuffixed-float-constants

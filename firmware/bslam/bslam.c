@@ -14,6 +14,9 @@ _Static_assert(sizeof(bslam_ekf_t) <= BSLAM_SIZE_EKF, "size.h: filter");
 _Static_assert(sizeof(bslam_slam_t) <= BSLAM_SIZE_PIPELINE, "size.h: pipeline");
 _Static_assert(sizeof(bslam_instance_t) <= sizeof(bslam_t), "size.h: the sum");
 
+/// Sixteen turns, as much as one interval of odometry may have.
+static const bslam_real_t HEADING_MAX_RAD = BSLAM_R(100.0);
+
 // ---- the guard: a step begins with a look at the memory and ends with a seal on it ------------------------
 
 #if BSLAM_GUARD
@@ -332,12 +335,22 @@ void bslam_freeze_map(bslam_t *robot, bool is_frozen)
     }
 }
 
+/// What is no number is called that, and not far.
+static bool is_far(bslam_real_t value, bslam_real_t most)
+{
+    return bslam_is_number(value) && !bslam_in_range(value, -most, most);
+}
+
 static bslam_status_t set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bslam_real_t position_sd_m,
                                bslam_real_t heading_sd_rad)
 {
     if (pose == NULL) {
         bslam_slam_lose_pose(slam);
         return BSLAM_OK;
+    }
+    if (is_far(pose->x_m, BSLAM_POSE_MAX_M) || is_far(pose->y_m, BSLAM_POSE_MAX_M) ||
+        is_far(pose->theta_rad, HEADING_MAX_RAD)) {
+        return BSLAM_E_RANGE;
     }
     return bslam_slam_set_pose(slam, pose, position_sd_m, heading_sd_rad);
 }

@@ -8,15 +8,16 @@
 ///     bslam_sightings(&robot, time_us, seen, count);            // each image
 ///     bslam_pose(&robot);
 ///
-/// Odometry and sightings come in the order of time; sightings may be late by BSLAM_HISTORY_MAX readings. The
-/// filter stands at the moment that the last frame shows. Odometry since then waits, and the pose of now is
-/// the filter's, carried on through it. So nothing is approximated for a late frame.
+/// Odometry comes in the order of time; frames of one camera or several may be late by BSLAM_HISTORY_MAX
+/// readings. The filter stands at the moment that the newest frame shows. Odometry since then waits, and the
+/// pose of now is the filter's, carried on through it. So nothing is approximated for a late frame; for one
+/// that is older than a frame before it, the noise of the way between counts as its own.
 ///
 /// The map's frame is the robot's pose at the start: x forward, y left, SI units, angles in (-pi, pi].
 ///
 /// Every instance is its caller's; there is no heap, no global state, no output. One instance must not be
 /// entered twice at a time, and must not be moved or copied. On any status but BSLAM_OK it is as it was, to
-/// the bit, but for its counters and its health.
+/// the bit, but for its counters, its health, and what it holds against refused stamps and tick counts.
 ///
 /// Costs are in the number n of state values: 5 for the robot, 2 a beacon, up to 2 more a ray.
 #ifndef BSLAM_H
@@ -71,8 +72,8 @@ BSLAM_MUST_CHECK bslam_status_t bslam_restart(bslam_t *robot, bslam_real_t posit
 
 typedef enum bslam_odometry_source {
     BSLAM_ODOMETRY_WHEELS = 0,  ///< left_m, right_m: travel of each wheel since the reading before
-    BSLAM_ODOMETRY_TICKS,       ///< left_ticks, right_ticks: the counters, which roll over at counter_bits
-    BSLAM_ODOMETRY_VELOCITY     ///< v_mps, omega_radps: held over the interval that ends at time_us
+    BSLAM_ODOMETRY_TICKS,    ///< left_ticks, right_ticks: the counters, which roll over as the settings say
+    BSLAM_ODOMETRY_VELOCITY  ///< v_mps, omega_radps: held over the interval that ends at time_us
 } bslam_odometry_source_t;
 
 /// One reading. Only the source's own fields are read.
@@ -90,27 +91,33 @@ typedef struct bslam_odometry_reading {
     bslam_real_t gyro_sd_radps;  ///< noise of this one; 0: the setting gyro_sd_radps
 } bslam_odometry_reading_t;
 
-/// One odometry reading, which waits until a frame shows a later moment. BSLAM_E_TIME: the time is negative,
-/// does not advance, or jumps by more than 4 s. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a counter beyond
-/// counter_bits, a gyro turn beyond 100 rad, or an unknown source. BSLAM_E_JUMP: a wheel faster than
-/// speed_max_mps; the next tick reading is the new reference. BSLAM_E_SINGULAR: velocity states without
-/// noise. O(1); where no more may wait one prediction, O(n).
+/// One odometry reading, which waits until a frame shows a later moment. O(1); where no more may wait one
+/// prediction, O(n). BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a count that the counters do not have, a gyro turn
+/// beyond 100 rad, or an unknown source. BSLAM_E_SINGULAR: velocity states without noise.
+///
+/// BSLAM_E_TIME: the time is negative, does not advance, or jumps by more than 4 s. Where readings follow one
+/// another for 1 s elsewhere in time, the clock began again: counted, goes on as after bslam_resume_odometry,
+/// as doubtful as a gap of that length.
+///
+/// BSLAM_E_JUMP: a wheel faster than speed_max_mps. The next count that goes with those before tells all the
+/// way. A third that goes with the odd one says that the counters began anew there: the time before is a gap.
 BSLAM_MUST_CHECK bslam_status_t bslam_odometry(bslam_t *robot, const bslam_odometry_reading_t *reading);
 
 /// After an interruption of odometry, at a standstill: an encoder reset, a pause of more than 4 s, a robot
-/// that was pushed. The next reading starts the clock and the tick reference anew, at any time stamp. The
-/// pose becomes as doubtful as the robot may have moved unseen. BSLAM_E_RANGE: position_sd_m outside 0 to 30
-/// or heading_sd_rad outside 0 to 3.2 (NaN is).
+/// that was pushed. The next reading starts the clock and the tick reference anew, at any time stamp; give no
+/// frame of before. The pose becomes as doubtful as the robot may have moved unseen. BSLAM_E_RANGE:
+/// position_sd_m outside 0 to 30 or heading_sd_rad outside 0 to 3.2 (NaN is).
 BSLAM_MUST_CHECK bslam_status_t bslam_resume_odometry(bslam_t *robot, bslam_real_t position_sd_m,
                                                       bslam_real_t heading_sd_rad);
 
 /// What one image shows (bslam_sighting_t: base/types.h), stamped time_us. Associates, fuses, adds beacons
-/// and removes them; bslam_results tells what became of each. An empty frame is fine. O(count n²), after a
-/// prediction for each reading that waited. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: not
-/// after the last frame, older than where the filter stands, or newer than the odometry by more than
-/// ahead_max_us. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a distance or its noise outside 1 mm to 10 km, a
-/// direction beyond +-2 pi or its noise outside 1e-5 to pi, a label below -1. bslam_health says which
-/// sighting.
+/// and removes them; bslam_results tells what became of each. An empty frame is fine, several of one moment
+/// are, and any order. Of sightings with one label the best is used. O(count n²), after a prediction for each
+/// reading that waited. BSLAM_E_COUNT: more than BSLAM_SIGHTINGS_MAX. BSLAM_E_TIME: older than
+/// BSLAM_HISTORY_MAX readings, newer than odometry by more than ahead_max_us, or one of the last
+/// BSLAM_HISTORY_MAX frames again. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: a distance or its noise outside 1 mm to
+/// 10 km, a direction beyond +-2 pi or its noise outside 1e-5 to pi, a label below -1. bslam_health says
+/// which sighting.
 BSLAM_MUST_CHECK bslam_status_t bslam_sightings(bslam_t *robot, int64_t time_us,
                                                 const bslam_sighting_t *sightings, int count);
 
@@ -166,7 +173,7 @@ typedef enum bslam_reason {
     BSLAM_REASON_AMBIGUOUS,    ///< not near enough to a beacon to match nor far enough to be new, or delayed
     BSLAM_REASON_APPEARANCE,   ///< too far from any beacon to match, but it looks like one that may be here
     BSLAM_REASON_GATE,         ///< its innovation is outside the gate
-    BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room
+    BSLAM_REASON_MAP_FULL,     ///< it is new, and there is no room: see BSLAM_PLACE_MAX_M, too
     BSLAM_REASON_SINGULAR,     ///< the beacon stands at the sensor, or S is not positive definite
     BSLAM_REASON_FROZEN,       ///< it is new, and the map is frozen
     BSLAM_REASON_LOST,         ///< it contradicts the robot's pose, or the pose is unknown
@@ -193,6 +200,7 @@ typedef struct bslam_slam_counters {
     uint32_t odometry;          ///< readings taken
     uint32_t odometry_refused;  ///< readings refused, any status
     uint32_t jumps;             ///< of these, BSLAM_E_JUMP
+    uint32_t clock_restarts;    ///< times that the clock began again without bslam_resume_odometry
     uint32_t frames;            ///< frames taken
     uint32_t frames_refused;    ///< frames refused, any status
     uint32_t sightings;         ///< in the frames taken
@@ -268,7 +276,7 @@ typedef enum bslam_beacon_kind {
 
 /// A beacon (the field's landmark) as the map has it since the last frame.
 typedef struct bslam_beacon_view {
-    uint32_t uid;  ///< its number: none is ever used twice
+    uint32_t uid;  ///< its number: none is used twice. After 2^32 - 1 of them the map is full
     int32_t label;
     bslam_beacon_kind_t kind;
     bool confirmed;
@@ -284,8 +292,13 @@ typedef struct bslam_beacon_view {
 /// Beacon 0 <= index < bslam_health().beacons. BSLAM_E_NO_BEACON otherwise.
 BSLAM_MUST_CHECK bslam_status_t bslam_beacon(const bslam_t *robot, int index, bslam_beacon_view_t *view);
 
+/// From the origin in x and in y: a pose that is set, and a beacon. Float32 rounds to 0.06 mm at 1 km, a
+/// sixteenth of the least noise of a distance, and to 1 mm at 10 km. Give far places from one near by.
+#define BSLAM_POSE_MAX_M BSLAM_R(1000.0)
+#define BSLAM_PLACE_MAX_M BSLAM_R(10000.0)
+
 /// Gives a beacon with a known place, which never changes: localisation in a known map. BSLAM_E_NOT_FINITE,
-/// BSLAM_E_RANGE (a label below 0), BSLAM_E_DUPLICATE, BSLAM_E_MAP_FULL.
+/// BSLAM_E_RANGE (a label below 0, beyond BSLAM_PLACE_MAX_M), BSLAM_E_DUPLICATE, BSLAM_E_MAP_FULL.
 BSLAM_MUST_CHECK bslam_status_t bslam_add_known_beacon(bslam_t *robot, int32_t label, bslam_real_t x_m,
                                                        bslam_real_t y_m);
 
@@ -302,8 +315,8 @@ void bslam_freeze_map(bslam_t *robot, bool is_frozen);
 /// Puts the robot somewhere in the map, as of the last frame, this doubtful: at a charging station, say.
 /// Odometry that waits is gone through from there. pose NULL: nobody knows where the robot is. Its pose then
 /// goes on by odometry alone, sightings are accounted for as "lost", and the map stays as it is, until it is
-/// put somewhere or, with the setting `recovery`, finds itself. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE:
-/// position_sd_m outside 0 to 30 or heading_sd_rad outside 0 to 3.2.
+/// put somewhere or, with the setting `recovery`, finds itself. BSLAM_E_NOT_FINITE. BSLAM_E_RANGE: beyond
+/// BSLAM_POSE_MAX_M or 100 rad, position_sd_m outside 0 to 30 or heading_sd_rad outside 0 to 3.2.
 BSLAM_MUST_CHECK bslam_status_t bslam_set_pose(bslam_t *robot, const bslam_pose_t *pose,
                                                bslam_real_t position_sd_m, bslam_real_t heading_sd_rad);
 
@@ -321,9 +334,9 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_BEACONS,      ///< more beacons, or rays, than this build holds
     BSLAM_MAP_CLASSIFIERS,  ///< classifiers, samples or negatives beyond what this build holds
     BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
-    BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range
-    BSLAM_MAP_COVARIANCE,  ///< a negative variance, a correlation beyond 1, values that cannot be so together
-    BSLAM_MAP_UNREADABLE,  ///< the source cannot be read, or reads otherwise than before; the sink fails
+    BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range: a place beyond 20 km
+    BSLAM_MAP_COVARIANCE,   ///< a D below 0 in its factor, or a variance beyond 1e30
+    BSLAM_MAP_UNREADABLE,   ///< the source cannot be read, or reads otherwise than before; the sink fails
     BSLAM_MAP_FAULT_COUNT
 } bslam_map_fault_t;
 
@@ -345,25 +358,27 @@ typedef struct bslam_map_sink {
 BSLAM_MUST_CHECK bslam_status_t bslam_save_map(bslam_t *robot, const bslam_map_sink_t *sink, uint32_t *bytes);
 
 /// Takes a stored map in place of the robot's own; the robot does not know where it is in it (bslam_set_pose,
-/// or the setting `recovery`). Settings, clock and counters stay. The same bytes load into builds of other
-/// sizes where there is room. BSLAM_E_MAP with *fault: refused, and nothing has changed; but if a source that
-/// was whole when it was checked reads otherwise later, there is no map. O(n³ / 6 + samples).
+/// or the setting `recovery`). Settings, clock and counters stay, and no uid that the robot or the map had
+/// is given again. The same bytes load into builds of other sizes where there is room. BSLAM_E_MAP with
+/// *fault: refused, and nothing has changed; but if a source that was whole when it was checked reads
+/// otherwise later, there is no map. O(n³ / 6 + samples).
 BSLAM_MUST_CHECK bslam_status_t bslam_load_map(bslam_t *robot, const bslam_map_source_t *source,
                                                bslam_map_fault_t *fault);
 
-/// Bytes that the flash takes at once, at places that are multiples of it, are a divisor of this.
-#define BSLAM_FLASH_PIECE 16
+/// Written at once, at a multiple of it, from memory aligned to 8, and once between two erases: flash takes
+/// that whose word is any divisor of it, 1 to 64 bytes.
+#define BSLAM_FLASH_PIECE 64
 /// Areas of a bslam_flash_t.
 #define BSLAM_SLOTS 2
 
-/// What a board gives to keep a map over a power cut: two areas, each erased as a whole (bytes become 0xff),
-/// of which one always holds a whole map. False: it failed.
+/// What a board gives to keep a map over a power cut: two areas, each erased as a whole (to 0xff, or 0), of
+/// which one always holds a whole map. False: it failed.
 typedef struct bslam_flash {
     bool (*erase)(void *context, int slot);
     bool (*write)(void *context, int slot, uint32_t at, const void *bytes, uint32_t count);
     bool (*read)(void *context, int slot, uint32_t at, void *bytes, uint32_t count);
     void *context;
-    uint32_t slot_bytes;  ///< of each area: a map takes BSLAM_FLASH_PIECE more than bslam_save_map counts
+    uint32_t slot_bytes;  ///< of each area: a map takes a piece, and what bslam_save_map counts in whole ones
 } bslam_flash_t;
 
 /// Saves the map in the slot that is older or damaged, and reads it back. BSLAM_E_MAP with *fault: the flash

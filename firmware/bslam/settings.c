@@ -90,6 +90,39 @@ static void set_paper(bslam_settings_t *settings)
     settings->right_speed_sd_mps = BSLAM_R(0.3);
 }
 
+/// A command leads the motion, and is not the driven speed: the scales are estimated, and the error grows
+/// with travel and turn. Where wheels slip unmeasured, a gate would reject sightings for good; Huber weights
+/// let the estimate come back. Sightings err by about .02 rad and .02 m + .035 r, but alike for many frames:
+/// that counts as more noise for consistency, as less for association.
+static void set_commanded(bslam_settings_t *settings)
+{
+    settings->scale_states = 1;
+    settings->scale_sd = BSLAM_R(0.3);
+    settings->scale_walk_sqrt_s = BSLAM_R(0.001);
+    settings->left_speed_sd_mps = 0;
+    settings->right_speed_sd_mps = 0;
+    settings->forward_sd_per_sqrt_m = BSLAM_R(0.05);
+    settings->turn_sd_per_sqrt_m = BSLAM_R(0.05);
+    settings->turn_sd_per_sqrt_rad = BSLAM_R(0.25);
+    settings->bearing_sd_rad = settings->filter == BSLAM_FILTER_SMOOTHER ? BSLAM_R(0.1) : BSLAM_R(0.05);
+    settings->range_sd_floor_m = BSLAM_R(0.06);
+    settings->range_sd_fraction = BSLAM_R(0.18);
+    settings->range_sd_per_m = 0;
+    settings->sighting_delay_us = 175000;
+    settings->gate_d2 = 0;
+    settings->huber_d = BSLAM_R(0.5);
+    if (settings->association != BSLAM_ASSOCIATION_KNOWN) {
+        settings->scale_sd = BSLAM_R(0.08);
+        settings->turn_sd_per_sqrt_rad = BSLAM_R(0.1);
+        settings->bearing_sd_rad = BSLAM_R(0.03);
+        settings->range_sd_fraction = BSLAM_R(0.06);
+        settings->huber_d = 1;
+        settings->match_d2 = 12;
+        settings->new_d2 = 100;
+        settings->confirm_window_us = 3000000;
+    }
+}
+
 /// What is partly hidden is measured as if it were whole: a few sightings in a hundred err by many times what
 /// they say. Distances are so doubtful that position alone fits too much: appearance counts twice, new
 /// beacons are expected less, and the viewpoint tells nothing.
@@ -126,15 +159,19 @@ static void set_bearing_only(bslam_settings_t *settings)
 void bslam_settings_preset(bslam_settings_t *settings, bslam_preset_t preset)
 {
     static void (*const sets[BSLAM_PRESET_COUNT])(bslam_settings_t *) = {
-        [BSLAM_PRESET_REAL_WHEELS] = set_defaults,
-        [BSLAM_PRESET_PAPER] = set_paper,
-        [BSLAM_PRESET_CAMERA] = set_camera,
+        [BSLAM_PRESET_REAL_WHEELS] = set_defaults,      [BSLAM_PRESET_PAPER] = set_paper,
+        [BSLAM_PRESET_COMMANDED] = set_commanded,       [BSLAM_PRESET_CAMERA] = set_camera,
         [BSLAM_PRESET_BEARING_ONLY] = set_bearing_only,
     };
     sets[preset < BSLAM_PRESET_COUNT ? preset : BSLAM_PRESET_REAL_WHEELS](settings);
 }
 
 // ---- checking ---------------------------------------------------------------------------------------------
+
+/// A millimetre's, as the least noise that a sighting may bring; less, as the sum of squares is rounded.
+static const bslam_real_t RANGE_VARIANCE_MIN_M2 = BSLAM_R(0.99e-6);
+/// Of fewer counts none tells forward from back.
+enum { COUNTER_MODULUS_MIN = 3 };
 
 static bool is_allowed(const bslam_settings_t *settings, int id)
 {
@@ -156,7 +193,7 @@ int bslam_settings_at(size_t offset)
 }
 
 /// The field that contradicts velocity states; negative: none does.
-static int contradiction(const bslam_settings_t *settings)
+static int velocity_contradiction(const bslam_settings_t *settings)
 {
     const size_t scale = offsetof(bslam_settings_t, scale_states);
     const size_t left = offsetof(bslam_settings_t, left_speed_sd_mps);
@@ -166,6 +203,26 @@ static int contradiction(const bslam_settings_t *settings)
            : !(settings->left_speed_sd_mps > 0)  ? bslam_settings_at(left)
            : !(settings->right_speed_sd_mps > 0) ? bslam_settings_at(right)
                                                  : -1;
+}
+
+/// Variance of a distance of 1 m.
+static bslam_real_t range_variance_at_1_m(const bslam_settings_t *settings)
+{
+    return settings->range_sd_floor_m * settings->range_sd_floor_m +
+           settings->range_sd_fraction * settings->range_sd_fraction +
+           settings->range_sd_per_m * settings->range_sd_per_m;
+}
+
+/// A field within its range that cannot be beside the others; negative: there is none.
+static int contradiction(const bslam_settings_t *settings)
+{
+    if (range_variance_at_1_m(settings) < RANGE_VARIANCE_MIN_M2) {
+        return bslam_settings_at(offsetof(bslam_settings_t, range_sd_floor_m));
+    }
+    if (settings->counter_modulus != 0 && settings->counter_modulus < COUNTER_MODULUS_MIN) {
+        return bslam_settings_at(offsetof(bslam_settings_t, counter_modulus));
+    }
+    return velocity_contradiction(settings);
 }
 
 bslam_status_t bslam_settings_check(const bslam_settings_t *settings, int *bad_id)

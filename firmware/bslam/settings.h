@@ -28,6 +28,7 @@ extern "C" {
     REAL(right_radius_m, 0.05, 1e-4, 10.0, "radius of the right wheel") \
     INTEGER(ticks_per_revolution, 1024, 1, 10000000, "encoder ticks in a turn of the wheel") \
     INTEGER(counter_bits, 16, 2, 32, "width of the tick counters, which roll over") \
+    INTEGER(counter_modulus, 0, 0, 16000000, "the count in place of which they are 0 (0: 2^counter_bits)") \
     REAL(mount_x_m, 0.0, -100.0, 100.0, "sensor on the robot, forward of the wheel axle") \
     REAL(mount_y_m, 0.0, -100.0, 100.0, "sensor on the robot, to the left") \
     REAL(mount_yaw_rad, 0.0, -3.2, 3.2, "sensor on the robot, turned to the left") \
@@ -55,8 +56,6 @@ extern "C" {
     REAL(range_scale_sd, 0.0, 0.0, 1.0, "all distances of a beacon err alike by this part of them (0: no)") \
     REAL(correlation_m, 0.0, 0.0, 100.0, \
          "a beacon's errors are alike until the robot has gone this far (0: no)") \
-    REAL(sensor_doubt, 0.0, 0.0, 10.0, \
-         "how doubtful its place, yaw, range scale and delay are, of 7 cm, 2 deg, 5 %, 0.1 s (0: exact)") \
     INTEGER(sighting_delay_us, 0, -1000000, 10000000, "a sighting stamped t shows odometry's t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
     /* map */ \
@@ -96,6 +95,8 @@ extern "C" {
     REAL(forward_sd_per_sqrt_s, 0.0, 0.0, 10.0, \
          "noise of forward motion that grows with the time of moving") \
     REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, "noise of the heading that grows with the time of moving") \
+    REAL(sensor_doubt, 0.0, 0.0, 10.0, \
+         "sensor's place, yaw, range scale are states, as doubtful as this times 7 cm, 2 deg, 5 % (0: exact)") \
     INTEGER(history_steps, 1024, 1, 1024, "readings that wait for a late sighting, to BSLAM_HISTORY_MAX") \
     REAL(bearing_only_variance_factor, 3.0, 1.0, 1000.0, \
          "bearing-only: the direction's variance times this") \
@@ -160,8 +161,9 @@ typedef struct bslam_settings {
 typedef enum bslam_preset {
     BSLAM_PRESET_REAL_WHEELS = 0,  ///< encoders, of which a wheel's true speed errs; the defaults
     BSLAM_PRESET_PAPER,            ///< the paper's speedometers: the reading errs, by 0.3 m/s at each step
-    BSLAM_PRESET_CAMERA,           ///< sightings of the vision library. By `association`: set that first
-    BSLAM_PRESET_BEARING_ONLY,     ///< sightings without distance. By `filter`: set that first
+    BSLAM_PRESET_COMMANDED,     ///< odometry of commands, unmeasured. By `association`, `filter`: set first
+    BSLAM_PRESET_CAMERA,        ///< sightings of the vision library. By `association`: set that first
+    BSLAM_PRESET_BEARING_ONLY,  ///< sightings without distance. By `filter`: set that first
     BSLAM_PRESET_COUNT
 } bslam_preset_t;
 

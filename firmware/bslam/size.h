@@ -12,22 +12,22 @@
 #define BSLAM_SIZE_POINTER ((int)sizeof(void *))
 #define BSLAM_SIZE_ENUM ((int)sizeof(bslam_status_t))
 
-/// State values: 5 for the robot, 5 for its sensor, 2 a beacon, and room for 2 more a ray and 7 in passing;
+/// State values: 5 for the robot, 4 for its sensor, 2 a beacon, and room for 2 more a ray and 7 in passing;
 /// filled up to a multiple of four.
-#define BSLAM_SIZE_STATE ((10 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)
+#define BSLAM_SIZE_STATE ((9 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)
 /// A filter: means; triangle and tail of the factor, measurements that wait; beacons.
-#define BSLAM_SIZE_BODY ((7 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)
+#define BSLAM_SIZE_BODY ((6 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7 + 3) / 4 * 4)
 #define BSLAM_SIZE_EKF \
     (BSLAM_SIZE_REAL * (BSLAM_SIZE_STATE * 2 + (BSLAM_SIZE_BODY + 4) * 14 + \
-                        BSLAM_SIZE_BODY * (BSLAM_SIZE_BODY + 4) / 2 + 6) + \
+                        BSLAM_SIZE_BODY * (BSLAM_SIZE_BODY + 4) / 2 + 4) + \
      BSLAM_BEACONS_MAX * (56 + 4 * BSLAM_SIZE_REAL) + 48)
 /// The values of the settings.
-#define BSLAM_SIZE_SETTINGS (83 * BSLAM_SIZE_REAL + 80 + 2 * BSLAM_SIZE_POINTER)
+#define BSLAM_SIZE_SETTINGS (83 * BSLAM_SIZE_REAL + 88 + 2 * BSLAM_SIZE_POINTER)
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
-     BSLAM_SIGHTINGS_MAX * (24 + 5 * BSLAM_SIZE_ENUM + 39 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + \
-     4 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 152)
+     BSLAM_SIGHTINGS_MAX * (24 + 5 * BSLAM_SIZE_ENUM + 37 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + \
+     4 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 208 + 4 * BSLAM_HISTORY_MAX)
 
 #define BSLAM_SIZE_RECOVERY \
     (BSLAM_RECOVERY * ((BSLAM_SIZE_REAL + BSLAM_SIZE_POINTER > 8 ? 496 : 416) + 124 * BSLAM_SIZE_REAL))

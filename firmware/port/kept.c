@@ -15,7 +15,7 @@ typedef struct head {
     uint32_t crc;  ///< over sequence, count and the bytes
 } head_t;
 
-_Static_assert(sizeof(head_t) == BSLAM_FLASH_PIECE, "a head is one piece");
+_Static_assert(sizeof(head_t) <= BSLAM_FLASH_PIECE, "a head is one piece");
 
 /// Bytes of the piece that begins at `at`.
 static uint32_t piece_at(uint32_t at, uint32_t count)
@@ -63,17 +63,21 @@ static int find_newest(const bslam_flash_t *flash, uint32_t count, uint32_t *seq
     return newest;
 }
 
+static bool write_piece(const bslam_flash_t *flash, int slot, uint32_t at, const void *bytes, uint32_t count)
+{
+    _Alignas(8) uint8_t piece[BSLAM_FLASH_PIECE];
+    memset(piece, 0xff, sizeof piece);
+    memcpy(piece, bytes, count);
+    return flash->write(flash->context, slot, at, piece, sizeof piece);
+}
+
 static bool write_bytes(const bslam_flash_t *flash, int slot, const uint8_t *bytes, uint32_t count)
 {
-    for (uint32_t at = 0; at < count; at += BSLAM_FLASH_PIECE) {
-        uint8_t piece[BSLAM_FLASH_PIECE];
-        memset(piece, 0xff, sizeof piece);
-        memcpy(piece, bytes + at, piece_at(at, count));
-        if (!flash->write(flash->context, slot, BSLAM_FLASH_PIECE + at, piece, sizeof piece)) {
-            return false;
-        }
+    bool done = true;
+    for (uint32_t at = 0; at < count && done; at += BSLAM_FLASH_PIECE) {
+        done = write_piece(flash, slot, BSLAM_FLASH_PIECE + at, bytes + at, piece_at(at, count));
     }
-    return true;
+    return done;
 }
 
 bool kept_save(const bslam_flash_t *flash, const uint8_t *bytes, uint32_t count)
@@ -84,8 +88,7 @@ bool kept_save(const bslam_flash_t *flash, const uint8_t *bytes, uint32_t count)
     head.crc = ~bslam_crc32_add(crc_of_head(&head), bytes, count);
     head_t written;
     return count + 2 * BSLAM_FLASH_PIECE <= flash->slot_bytes && flash->erase(flash->context, slot) &&
-           write_bytes(flash, slot, bytes, count) &&
-           flash->write(flash->context, slot, 0, &head, sizeof head) &&
+           write_bytes(flash, slot, bytes, count) && write_piece(flash, slot, 0, &head, sizeof head) &&
            read_head(flash, slot, count, &written) && memcmp(&written, &head, sizeof head) == 0;
 }
 

@@ -28,13 +28,14 @@ void gyro_wait_start(gyro_wait_t *wait, camera_input_t *input)
     wait->is_waiting = false;
 }
 
-/// How far a wheel went: its counter rolls over at counter_bits.
+/// How far a wheel went: its counter rolls over at counter_modulus, or 2^counter_bits.
 static bslam_real_t travel_m(const bslam_settings_t *settings, uint32_t before, uint32_t after,
                              bslam_real_t radius_m)
 {
-    const uint32_t unused_bits = 32u - (uint32_t)settings->counter_bits;
-    const int32_t scaled = (int32_t)((after - before) << unused_bits);
-    const bslam_real_t ticks = (bslam_real_t)(scaled / (int32_t)(1u << unused_bits));
+    const uint32_t by_bits = settings->counter_bits < 32 ? 1u << settings->counter_bits : 0;
+    const uint32_t modulus = settings->counter_modulus > 0 ? (uint32_t)settings->counter_modulus : by_bits;
+    const uint32_t up = after - before + (after < before ? modulus : 0), down = modulus - up;
+    const bslam_real_t ticks = up < down ? (bslam_real_t)up : -(bslam_real_t)down;
     return ticks * (TURN_RAD / (bslam_real_t)settings->ticks_per_revolution) * radius_m;
 }
 

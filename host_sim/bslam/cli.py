@@ -15,6 +15,7 @@ from types import ModuleType
 
 from bslam.commands import (
     calibrate,
+    check,
     compare,
     console,
     export,
@@ -27,6 +28,7 @@ from bslam.commands import (
     report_page,
     run,
     scenario,
+    stress,
     sweep,
     tables,
 )
@@ -35,8 +37,10 @@ from bslam.errors import BslamError
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
     "replay": replay,
+    "check": check,
     "tables": tables,
     "sweep": sweep,
+    "stress": stress,
     "compare": compare,
     "live": live,
     "report": report_page,

@@ -7,6 +7,7 @@ REP-103 (x forward, y left, counter-clockwise positive).
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 from bslam.parsing.csvtable import Column, Table, is_count, read_table
+from bslam.parsing.identities import BEACON_ID, IDENTITY, read_identities
 from bslam.parsing.settings import (
     FIELD_OF_VIEW,
     Rule,
@@ -49,8 +51,6 @@ SIGNATURES = "signatures.npy"
 SEEDS = "seeds.npy"
 """The file that holds signatures of things that are no beacon."""
 SEEDS_MAX = 128
-BEACON_ID_MAX = 2**31 - 1
-"""Labels are 32-bit numbers in the core."""
 TICK_KEYS = ("left_radius_m", "right_radius_m", "ticks_per_revolution", "counter_bits")
 
 
@@ -102,12 +102,12 @@ class Sightings:
 
 @dataclass(frozen=True)
 class Truth:
-    """True poses. Frame: the start pose (simulation, csv folders) or the data set's own frame."""
+    """True poses. Frame: the start pose's (simulation), or one of its own, the room's say."""
 
     time_us: NDArray[np.int64]  # (k,)
     x_m: NDArray[np.float64]  # (k,)
     y_m: NDArray[np.float64]  # (k,)
-    theta_rad: NDArray[np.float64]  # (k,)
+    theta_rad: NDArray[np.float64]  # (k,) NaN: nobody knows the heading
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,12 @@ SENSOR_YAW_RAD = number(-3.2, 3.2)
 SIGHTING_DELAY_US = integer(0, 10_000_000)
 CORRELATION_M = number(0.0, 100.0)
 SCALE_SD = number(0.0, 1.0)
+CORE_SETTINGS = Rule(
+    "a table of the core's settings, each a number",
+    dict,
+    lambda table: all(isinstance(one, (int, float)) and math.isfinite(one) for one in table.values()),
+    lambda table: tuple(table.items()),
+)
 
 
 @dataclass(frozen=True)
@@ -147,6 +153,7 @@ class Robot:
     The four keys of the encoders must be there in a log with tick odometry. `wheel_noise` says what the sigma
     of the wheels' speed is of: the reading of a wheel that moves as told, or the motion of one that jitters.
     A sensor without noise may be described so: the filter is told a little (`options.core_params`).
+    `settings`, the table [settings] of robot.toml, holds what the other keys cannot say.
     """
 
     wheelbase_m: float = setting(WHEELBASE_M)
@@ -169,6 +176,7 @@ class Robot:
     counter_bits: int | None = setting(integer(2, 32), None)
     wheel_noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
     gyro_sigma_radps: float = setting(GYRO_SIGMA_RADPS, 0.02)  # each reading, independent
+    settings: tuple[tuple[str, int | float], ...] = setting(CORE_SETTINGS, ())  # of the core, as is
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,12 @@ class Log:
     seeds: NDArray[np.float32] | None = (
         None  # (k, SIGNATURE_SIZE) signatures of what is no beacon, for machines
     )
-    collection: str = ""  # the published data set it is from, "mrclam" say; none for folders and simulations
+    words: tuple[str, ...] = ()  # what a beacon_id stands for where identities are words
+    notes: tuple[str, ...] = ()  # what was left out when it was read, and why
+
+    def identity(self, number: int) -> str:
+        """The identity as the log has it; none: empty."""
+        return "" if number < 0 else self.words[number] if number < len(self.words) else str(number)
 
 
 def read_folder(path: str | Path) -> Log:
@@ -199,15 +212,21 @@ def read_folder(path: str | Path) -> Log:
         raise BslamError(
             f"{folder}: no such folder; a log is a folder with odometry.csv, sightings.csv, robot.toml"
         )
-    robot = _read_robot(folder / "robot.toml")
+    robot, notes = _read_robot(folder / "robot.toml"), list[str]()
+    odometry = _read_odometry(folder, robot, notes)
+    seen, signature = _sightings_table(folder, notes)
+    placed = _beacons_table(folder, notes)
+    identities = read_identities(seen, placed)
     return Log(
         name=folder.resolve().name,
-        odometry=_read_odometry(folder, robot),
-        sightings=_read_sightings(folder),
-        truth=_read_truth(folder),
-        beacons=_read_beacons(folder),
+        odometry=odometry,
+        sightings=_sightings(seen, identities.numbers(seen), signature),
+        truth=_read_truth(folder, notes),
+        beacons=None if placed is None else _beacons(placed, identities.numbers(placed)),
         robot=robot,
         seeds=_read_seeds(folder / SEEDS),
+        words=identities.words,
+        notes=tuple(notes),
     )
 
 
@@ -231,9 +250,9 @@ def write_folder(log: Log, path: str | Path) -> None:
             b_name: _texts(odometry.b, number),
             **gyro,
         },
-        "sightings": _sightings_texts(sightings),
-        "truth": None if log.truth is None else _texts_by_field(log.truth),
-        "beacons": None if log.beacons is None else _texts_by_field(log.beacons),
+        "sightings": _sightings_texts(log),
+        "truth": None if log.truth is None else _truth_texts(log.truth),
+        "beacons": None if log.beacons is None else _beacons_texts(log, log.beacons),
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -268,6 +287,11 @@ def first_steps(log: Log, steps: int) -> Log:
     return replace(log, odometry=odometry, sightings=replace(log.sightings, **cut))
 
 
+def has_identities(log: Log) -> bool:
+    """Whether somebody says of at least one sighting whose it is."""
+    return bool((log.sightings.beacon_id >= 0).any())
+
+
 def wrap_rad(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same angles in (-pi, pi]; those already there are kept to the last bit."""
     outside = (angle_rad <= -math.pi) | (angle_rad > math.pi)
@@ -285,18 +309,25 @@ def _texts_or_empty(values: NDArray[np.float64]) -> list[str]:
     return ["" if math.isnan(one) else repr(one) for one in values.tolist()]
 
 
-def _texts_by_field(table: Truth | Beacons) -> dict[str, list[str]]:
-    columns = {field.name: getattr(table, field.name) for field in fields(table)}
-    return {
-        name: _texts(values, int if values.dtype == np.int64 else float) for name, values in columns.items()
-    }
+def _truth_texts(truth: Truth) -> dict[str, list[str]]:
+    columns = {"time_us": _texts(truth.time_us, int), "x_m": _texts(truth.x_m, float)}
+    columns["y_m"] = _texts(truth.y_m, float)
+    if not np.isnan(truth.theta_rad).all():
+        columns["theta_rad"] = _texts_or_empty(truth.theta_rad)
+    return columns
 
 
-def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
+def _beacons_texts(log: Log, beacons: Beacons) -> dict[str, list[str]]:
+    columns = {BEACON_ID: [log.identity(one) for one in beacons.beacon_id.tolist()]}
+    return columns | {"x_m": _texts(beacons.x_m, float), "y_m": _texts(beacons.y_m, float)}
+
+
+def _sightings_texts(log: Log) -> dict[str, list[str]]:
     """Columns of sightings.csv; range_m, mappable and the noise only where they say something."""
+    sightings = log.sightings
     columns = {
         "time_us": _texts(sightings.time_us, int),
-        "beacon_id": ["" if one < 0 else str(one) for one in sightings.beacon_id.tolist()],
+        BEACON_ID: [log.identity(one) for one in sightings.beacon_id.tolist()],
         "bearing_rad": _texts(sightings.bearing_rad, float),
     }
     if not np.isnan(sightings.range_m).all():
@@ -312,13 +343,18 @@ def _sightings_texts(sightings: Sightings) -> dict[str, list[str]]:
 
 
 def _write_csv(path: Path, columns: dict[str, list[str]]) -> None:
-    lines = [",".join(columns), *map(",".join, zip(*columns.values(), strict=True))]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
 
 
 def robot_text(robot: Robot) -> str:
     """The text of a robot.toml."""
-    return "".join(f"{key} = {value!r}\n" for key, value in asdict(robot).items() if value is not None)
+    keys = {key: value for key, value in asdict(robot).items() if key != "settings" and value is not None}
+    lines = [f"{key} = {value!r}\n" for key, value in keys.items()]
+    more = [f"{key} = {value!r}\n" for key, value in robot.settings]
+    return "".join([*lines, "\n[settings]\n", *more] if more else lines)
 
 
 # --- reading ------------------------------------------------------------------------------------------------
@@ -327,6 +363,7 @@ def robot_text(robot: Robot) -> str:
 _FARTHEST = 1e6
 _LARGEST_FEATURE = 1e12  # as the core has it
 
+_NO_RANGE_ALONE = "a sighting of range alone cannot be used"
 _COUNT = Column("an integer from 0", is_count)
 _NUMBER = Column("a number from -1e6 to 1e6", lambda values: np.abs(values) <= _FARTHEST)
 _COLUMNS = {
@@ -339,12 +376,12 @@ _COLUMNS = {
     "omega_radps": _NUMBER,
     GYRO: Column("a number from -1000 to 1000, or empty", lambda v: np.abs(v) <= 1000.0, empty=math.nan),
     GYRO_SD: Column("0 or a number from 1e-6 to 100", lambda v: (v == 0.0) | ((v >= 1e-6) & (v <= 100.0))),
-    "beacon_id": Column(
-        f"an integer from 0 to {BEACON_ID_MAX}, or empty in sightings",
-        lambda values: is_count(values) & (values <= BEACON_ID_MAX),
-        empty=-1.0,
+    BEACON_ID: IDENTITY,
+    "bearing_rad": Column(
+        f"radians from -2 pi to 2 pi; {_NO_RANGE_ALONE}",
+        lambda values: np.abs(values) <= 2.0 * math.pi,
+        why=_NO_RANGE_ALONE,
     ),
-    "bearing_rad": Column("radians from -2 pi to 2 pi", lambda values: np.abs(values) <= 2.0 * math.pi),
     "range_m": Column(
         "a number above 0, at most 1e6, or empty", lambda v: (v > 0) & (v <= _FARTHEST), empty=math.nan
     ),
@@ -358,7 +395,7 @@ _COLUMNS = {
     "mappable": Column("0 or 1", lambda values: (values == 0) | (values == 1)),
     "x_m": _NUMBER,
     "y_m": _NUMBER,
-    "theta_rad": _NUMBER,
+    "theta_rad": Column("a number from -1e6 to 1e6, or empty", _NUMBER.holds, empty=math.nan),
 }
 
 
@@ -380,17 +417,25 @@ def _columns(*names: str) -> dict[str, Column]:
     return {name: _COLUMNS[name] for name in names}
 
 
-def _read_odometry(folder: Path, robot: Robot) -> Odometry:
+def _read_odometry(folder: Path, robot: Robot, notes: list[str]) -> Odometry:
     layouts = [_columns("time_us", *names) for names in ODOMETRY_COLUMNS.values()]
     table = read_table(_require_csv(folder, "odometry"), layouts, _columns(GYRO, GYRO_SD))
     table.require_rows("allowed: at least one")
-    table.require_order("time_us", strict=True)
+    table = _in_order(table, notes, strict=True)
     kind, (a_name, b_name) = next(item for item in ODOMETRY_COLUMNS.items() if item[1][0] in table.values)
     if kind == "ticks":
         _require_tick_range(table, robot)
     a, b = table.values[a_name], table.values[b_name]
     gyro = (table.values.get(GYRO), table.values.get(GYRO_SD))
     return Odometry(kind, table.integers("time_us"), a, b, *gyro)
+
+
+def _in_order(table: Table, notes: list[str], *, strict: bool) -> Table:
+    """Without rows that a logger wrote twice, and a head that is later than what follows; else in order."""
+    table = table.only(table.unrepeated(notes))
+    table = table.only(table.begun("time_us", notes))
+    table.require_order("time_us", strict=strict)
+    return table
 
 
 def _require_tick_range(table: Table, robot: Robot) -> None:
@@ -406,19 +451,29 @@ def _require_tick_range(table: Table, robot: Robot) -> None:
         )
 
 
-def _read_sightings(folder: Path) -> Sightings:
-    layout = _columns("time_us", "beacon_id", "bearing_rad")
-    optional = _columns("range_m", "mappable", *SIGHTING_NUMBERS, CLASS)
-    table = read_table(_require_csv(folder, "sightings"), [layout], optional)
+def _sightings_table(folder: Path, notes: list[str]) -> tuple[Table, NDArray[np.float32] | None]:
+    """The rows of sightings.csv in order, and their signatures."""
+    optional = _columns(BEACON_ID, "range_m", "mappable", *SIGHTING_NUMBERS, CLASS)
+    table = read_table(_require_csv(folder, "sightings"), [_columns("time_us", "bearing_rad")], optional)
+    signature = _read_signatures(folder / SIGNATURES, table.rows)
+    kept = table.unrepeated(notes) if signature is None else np.ones(table.rows, dtype=np.bool_)
+    kept &= table.begun("time_us", notes)
+    table = table.only(kept)
     table.require_order("time_us", strict=False)
+    return table, None if signature is None else signature[kept]
+
+
+def _sightings(
+    table: Table, beacon_id: NDArray[np.int64], signature: NDArray[np.float32] | None
+) -> Sightings:
     return Sightings(
         time_us=table.integers("time_us"),
-        beacon_id=table.integers("beacon_id"),
+        beacon_id=beacon_id,
         bearing_rad=wrap_rad(table.values["bearing_rad"]),
         range_m=table.values.get("range_m", np.full(table.rows, math.nan)),
         mappable=table.values.get("mappable", np.ones(table.rows)).astype(np.bool_),
         **{name: table.values.get(name) for name in SIGHTING_NUMBERS},
-        signature=_read_signatures(folder / SIGNATURES, table.rows),
+        signature=signature,
         beacon_class=table.integers(CLASS) if CLASS in table.values else None,
     )
 
@@ -459,28 +514,34 @@ def _read_looks(path: Path, allowed: str) -> NDArray[np.float32] | None:
     return values
 
 
-def _read_truth(folder: Path) -> Truth | None:
+def _read_truth(folder: Path, notes: list[str]) -> Truth | None:
     path = _find_csv(folder, "truth")
-    return None if path is None else read_truth(path)
+    return None if path is None else read_truth(path, notes)
 
 
-def read_truth(path: Path) -> Truth:
-    """True poses from a truth.csv or .csv.gz. Raises BslamError that names the line and what is allowed."""
-    table = read_table(path, [_columns("time_us", "x_m", "y_m", "theta_rad")])
+def read_truth(path: Path, notes: list[str]) -> Truth:
+    """True poses from a truth.csv or .csv.gz; what is left out goes into the notes.
+
+    Raises BslamError that names the line and what is allowed.
+    """
+    table = read_table(path, [_columns("time_us", "x_m", "y_m")], _columns("theta_rad"))
     table.require_rows("allowed: at least one, or no such file")
-    table.require_order("time_us", strict=True)
-    values = table.values
-    return Truth(table.integers("time_us"), values["x_m"], values["y_m"], wrap_rad(values["theta_rad"]))
+    table = _in_order(table, notes, strict=True)
+    theta_rad = table.values.get("theta_rad", np.full(table.rows, math.nan))
+    return Truth(table.integers("time_us"), table.values["x_m"], table.values["y_m"], wrap_rad(theta_rad))
 
 
-def _read_beacons(folder: Path) -> Beacons | None:
+def _beacons_table(folder: Path, notes: list[str]) -> Table | None:
     path = _find_csv(folder, "beacons")
     if path is None:
         return None
-    table = read_table(path, [_columns("beacon_id", "x_m", "y_m")])
-    beacon_id = table.integers("beacon_id")
+    table = read_table(path, [_columns(BEACON_ID, "x_m", "y_m")])
+    return table.only(table.unrepeated(notes))
+
+
+def _beacons(table: Table, beacon_id: NDArray[np.int64]) -> Beacons:
     first = np.isin(np.arange(table.rows), np.unique(beacon_id, return_index=True)[1])
-    table.require("beacon_id", (beacon_id >= 0) & first, "an integer from 0 that no row above has")
+    table.require(BEACON_ID, first, "an identity that no row above has")
     return Beacons(beacon_id, table.values["x_m"], table.values["y_m"])
 
 

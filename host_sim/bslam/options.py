@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from bslam.core.presets import preset_settings
-from bslam.datasets import dlr, mrclam
 from bslam.errors import BslamError
 from bslam.log import Log, Robot
 
@@ -14,6 +15,7 @@ OBSERVATIONS = ("distance", "direction")
 ASSOCIATIONS = ("known", "nearest", "mahalanobis", "svm", "joint")
 FILTERS = ("standard", "invariant", "smoother")
 MOTIONS = ("euler", "arc")
+ALIGNMENTS = ("none", "rigid", "similarity")
 SENSORS = ("simulated", "camera")
 REALS = ("float", "double")
 # What shows a run that it is lost: nothing; several beacons that fit a pose elsewhere; or also, in a map that
@@ -49,9 +51,12 @@ class RunOptions:
     kept_map: str | None = None  # file of a map to start in, at a place that nobody knows
     frozen: bool = False  # that map stays as it is
     recovery: str | None = None  # one of RECOVERIES; None: the usual one, see `recovery_of`
+    resume_sd: tuple[float, float] | None = None  # m, rad told after an interruption; None: by its length
     sigma_mps: float | None = None  # wheel-speed sigma told to the filter; None: what the log's robot says
     seed: int = 0  # seed of the harness's own randomness (wrong identities)
-    odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: by kind of log
+    odometry_lead_us: int | None = None  # odometry runs this far ahead of the truth; None: as the presets say
+    align: str | None = None  # one of ALIGNMENTS, of the estimate to the truth; None: by the truth's frame
+    map_align: str | None = None  # the same of the map, where `align` is not said; None: as the estimate
     parameters: tuple[tuple[str, Number], ...] = ()  # --params and --set: they win over all else
 
     @property
@@ -79,6 +84,11 @@ def parse_association(text: str) -> tuple[str, float]:
     return name, rate
 
 
+def usual_filter(observation: str) -> str:
+    """What estimates, unless asked otherwise, in a map that is made on the way."""
+    return "smoother" if observation == "direction" else "invariant"
+
+
 def wheel_noise(options: RunOptions, log: Log) -> str:
     """What errs, "speedometer" or "actuation": asked for, else what the log says."""
     return options.noise or log.robot.wheel_noise
@@ -87,17 +97,19 @@ def wheel_noise(options: RunOptions, log: Log) -> str:
 def presets_of(options: RunOptions, log: Log) -> tuple[str, ...]:
     """The presets of the C library that a run starts from: asked for, else by what the log says of itself.
 
-    "paper" where the reading of a wheel errs and not the wheel. It is wrong where the wheel itself jitters,
-    and for real odometry.
+    "commanded" where speeds come without a noise: nobody measured them. "paper" where the reading of a wheel
+    errs and not the wheel. It is wrong where the wheel itself jitters, and for real odometry. "camera" where
+    a detector of images says how sure it is.
     """
     if options.presets:
         return options.presets
+    kind = log.odometry.kind
     sigma_mps = log.robot.wheel_speed_sigma_mps if options.sigma_mps is None else options.sigma_mps
-    is_paper = (
-        log.odometry.kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
-    )
+    is_paper = kind == "wheels" and wheel_noise(options, log) == "speedometer" and sigma_mps > 0.0
     chosen = ["paper" if is_paper else "real-wheels"]
-    chosen += ["camera"] if options.sensor == "camera" else []
+    chosen += ["commanded"] if kind == "velocity" and sigma_mps == 0.0 else []
+    is_camera = options.sensor == "camera" or log.sightings.score is not None
+    chosen += ["camera"] if is_camera else []
     chosen += ["bearing-only"] if options.observation == "direction" else []
     return tuple(chosen)
 
@@ -122,40 +134,52 @@ def recovery_of(options: RunOptions) -> str:
 
 
 def odometry_lead_us(options: RunOptions, log: Log) -> int:
-    """How far odometry runs ahead of the true motion: asked for, else what is known of its data set."""
+    """How far odometry runs ahead of the true motion: asked for, else what commands do."""
     if options.odometry_lead_us is not None:
         return options.odometry_lead_us
-    return mrclam.ODOMETRY_LEAD_US if log.collection == "mrclam" else 0
+    return int(_preset_params(options, log)["sighting_delay_us"])
 
 
 def core_params(options: RunOptions, log: Log) -> dict[str, Number]:
-    """Every setting of the core by its name in C; a later source wins over an earlier one."""
-    association, filter_ = ASSOCIATIONS.index(options.association), FILTERS.index(options.filter)
-    params = preset_settings(presets_of(options, log), association, filter_)
-    params["motion"] = MOTIONS.index(options.motion)
+    """Every setting of the core by its name in C; a later source wins over an earlier one.
+
+    Raises BslamError for a setting of robot.toml that does not exist.
+    """
+    preset = _preset_params(options, log)
+    params = preset | {"motion": MOTIONS.index(options.motion)}
     if options.velocity_states is not None:
         params["velocity_states"] = int(options.velocity_states)
+        params["scale_states"] = (
+            0 if options.velocity_states else preset["scale_states"]
+        )  # they exclude each other
     params |= _robot_params(log.robot, log.odometry.kind)
+    params["ahead_max_us"] = max(int(params["ahead_max_us"]), _odometry_interval_us(log))
+    params["sighting_delay_us"] += preset["sighting_delay_us"]
+    if "commanded" in presets_of(options, log):
+        params |= {name: max(params[name], preset[name]) for name in _SIGHTING_NOISE}
     if options.sigma_mps is not None:
         params |= {"left_speed_sd_mps": options.sigma_mps, "right_speed_sd_mps": options.sigma_mps}
-    params |= _collection_params(options, log.collection) | _recovery_params(recovery_of(options))
-    return params | dict(options.parameters)
+    for name, value in log.robot.settings:
+        if name not in preset:
+            allowed = f"allowed: {', '.join(preset)}"
+            raise BslamError(f"{log.name}: robot.toml, [settings], key {name}: no such setting; {allowed}")
+        params[name] = value
+    return params | _recovery_params(recovery_of(options)) | dict(options.parameters)
 
 
-def _collection_params(options: RunOptions, collection: str | None) -> dict[str, Number]:
-    """What is known of a data set beyond what its log says."""
-    if collection == "dlr":
-        return dict(dlr.SETTINGS)
-    if collection != "mrclam":
-        return {}
-    params = dict(mrclam.SETTINGS)
-    if options.filter == "smoother" and options.observation == "direction":
-        params |= mrclam.BEARING_ONLY_SMOOTHER_SETTINGS
-    if options.association != "known":
-        params |= mrclam.UNKNOWN_IDENTITY_SETTINGS
-    if options.velocity_states:
-        params["scale_states"] = 0  # the two exclude each other, and the user asked for this one
-    return params
+_SIGHTING_NOISE = ("bearing_sd_rad", "range_sd_floor_m", "range_sd_fraction")
+"""What a preset that knows of errors alike for many frames counts at least, whatever their scatter is."""
+
+
+def _odometry_interval_us(log: Log) -> int:
+    """The usual one: no frame after the last reading is older than what odometry would have covered."""
+    times_us = log.odometry.time_us
+    return min(int(np.median(np.diff(times_us))), 10_000_000) if len(times_us) > 1 else 0
+
+
+def _preset_params(options: RunOptions, log: Log) -> dict[str, Number]:
+    association, filter_ = ASSOCIATIONS.index(options.association), FILTERS.index(options.filter)
+    return preset_settings(presets_of(options, log), association, filter_)
 
 
 def _recovery_params(recovery: str) -> dict[str, Number]:

@@ -23,6 +23,7 @@ from bslam.log import (
     Sightings,
     Truth,
     first_steps,
+    has_identities,
     read_folder,
     wrap_rad,
     write_folder,
@@ -223,6 +224,138 @@ def test_read_wraps_angles(tmp_path: Path) -> None:
     assert truth.theta_rad.tolist() == pytest.approx([7.0 - 2.0 * math.pi])
 
 
+def test_rows_that_a_logger_wrote_twice_are_left_out_and_noted(tmp_path: Path) -> None:
+    write_files(
+        tmp_path,
+        odometry_csv="time_us,left_m,right_m\n40000,0.01,0.02\n40000,0.01,0.02\n80000,0.0,0.0\n80000,0.0,0.0\n",
+        sightings_csv="time_us,beacon_id,bearing_rad\n0,3,0.5\n0,4,0.5\n0,3,0.5\n9,3,0.5\n",
+        truth_csv="time_us,x_m,y_m\n0,0,0\n0,0,0\n9,1,1\n",
+        beacons_csv="beacon_id,x_m,y_m\n3,1,2\n4,1,2\n3,1,2\n",
+    )
+    log = read_folder(tmp_path)
+    assert log.odometry.time_us.tolist() == [40_000, 80_000]
+    assert log.sightings.beacon_id.tolist() == [3, 4, 3]
+    assert log.truth is not None and log.truth.x_m.tolist() == [0.0, 1.0]
+    assert log.beacons is not None and log.beacons.beacon_id.tolist() == [3, 4]
+    assert log.notes == (
+        f"{tmp_path}/odometry.csv: left out 2 rows equal to one above, first line 3",
+        f"{tmp_path}/sightings.csv: left out 1 row equal to one above, first line 4",
+        f"{tmp_path}/beacons.csv: left out 1 row equal to one above, first line 4",
+        f"{tmp_path}/truth.csv: left out 1 row equal to one above, first line 3",
+    )
+
+
+def test_a_head_that_is_later_than_what_follows_is_left_out_and_noted(tmp_path: Path) -> None:
+    head = "900,1,0\n800,1,0\n"
+    write_files(
+        tmp_path,
+        odometry_csv=f"time_us,v_mps,omega_radps\n{head}10,2,0\n20,3,0\n",
+        sightings_csv=f"time_us,beacon_id,bearing_rad\n{head}15,2,0\n",
+        truth_csv=f"time_us,x_m,y_m\n{head}10,2,0\n",
+    )
+    np.save(tmp_path / "signatures.npy", np.arange(3 * SIGNATURE_SIZE, dtype=np.float32).reshape(3, -1))
+    log = read_folder(tmp_path)
+    assert log.odometry.a.tolist() == [2.0, 3.0]
+    assert log.sightings.beacon_id.tolist() == [2]
+    assert log.sightings.signature is not None and log.sightings.signature[0, 0] == 2 * SIGNATURE_SIZE
+    assert log.truth is not None and log.truth.x_m.tolist() == [2.0]
+    assert log.notes[0] == (
+        f"{tmp_path}/odometry.csv: left out 2 rows at the start: time runs back to line 4, time_us 10"
+    )
+    assert len(log.notes) == 3
+    long_head = "".join(f"{900 + k},1,0\n" for k in range(20))
+    write_files(tmp_path, odometry_csv=f"time_us,v_mps,omega_radps\n{long_head}10,2,0\n")
+    with pytest.raises(BslamError, match=r"odometry\.csv, line 22, column time_us: '10'"):
+        read_folder(tmp_path)
+
+
+def test_identities_that_are_words_are_kept_as_they_are(tmp_path: Path) -> None:
+    write_files(
+        tmp_path,
+        sightings_csv='time_us,beacon_id,bearing_rad\n0,exit sign,0\n0,"door, left",1\n5, ,1\n9,7.0,0\n',
+        beacons_csv="beacon_id,x_m,y_m\nexit sign,1,2\nTür,3,4\n7,0,0\n",
+    )
+    log = read_folder(tmp_path)
+    assert [log.identity(one) for one in log.sightings.beacon_id.tolist()] == [
+        "exit sign",
+        "door, left",
+        "",
+        "7",
+    ]
+    assert log.beacons is not None
+    assert [log.identity(one) for one in log.beacons.beacon_id.tolist()] == ["exit sign", "Tür", "7"]
+    write_folder(log, tmp_path / "again")
+    again = read_folder(tmp_path / "again")
+    assert_same_log(log, again)
+    assert again.words == log.words
+    # Numbers stay the numbers that they are.
+    assert read_folder(write_files(tmp_path / "again")).words == ()
+
+
+@pytest.mark.parametrize("text", ["nan", "-3", "2.5", "1e99", "inf", "x" * 65, "bell\a"])
+def test_an_identity_that_is_neither_a_number_nor_a_word_is_refused(tmp_path: Path, text: str) -> None:
+    write_files(tmp_path, sightings_csv=f"time_us,beacon_id,bearing_rad\n0,3,0\n0,{text},0\n")
+    with pytest.raises(BslamError, match=r"sightings\.csv, line 3, column beacon_id: .*a word of up to 64"):
+        read_folder(tmp_path)
+
+
+def test_one_identity_at_two_places_is_refused(tmp_path: Path) -> None:
+    write_files(tmp_path, beacons_csv="beacon_id,x_m,y_m\ndoor,0,0\nsign,0,0\ndoor,0,1\n")
+    with pytest.raises(
+        BslamError, match=r"line 4, column beacon_id: 'door'.*an identity that no row above has"
+    ):
+        read_folder(tmp_path)
+
+
+def test_a_log_without_the_column_of_identities_has_none(tmp_path: Path) -> None:
+    write_files(tmp_path, sightings_csv="bearing_rad,time_us\n0.5,0\n")
+    log = read_folder(tmp_path)
+    assert log.sightings.beacon_id.tolist() == [-1]
+    assert not has_identities(log)
+
+
+@pytest.mark.parametrize(
+    "text", ["time_us,x_m,y_m\n0,1,2\n9,3,4\n", "theta_rad,time_us,x_m,y_m\n1,0,1,2\n,9,3,4\n"]
+)
+def test_a_truth_may_lack_headings(tmp_path: Path, text: str) -> None:
+    log = read_folder(write_files(tmp_path, truth_csv=text))
+    assert log.truth is not None and log.truth.x_m.tolist() == [1.0, 3.0]
+    assert math.isnan(log.truth.theta_rad[1])
+    write_folder(log, tmp_path / "again")
+    assert_same_log(log, read_folder(tmp_path / "again"))
+
+
+def test_a_sighting_of_range_alone_is_refused_by_name(tmp_path: Path) -> None:
+    write_files(tmp_path, sightings_csv="time_us,beacon_id,bearing_rad,range_m\n0,3,0.1,2\n5,3,,2\n")
+    with pytest.raises(
+        BslamError, match=r"line 3, column bearing_rad: ''.*a sighting of range alone cannot be"
+    ):
+        read_folder(tmp_path)
+
+
+def test_settings_of_the_core_stand_in_a_table_of_robot_toml(tmp_path: Path) -> None:
+    write_files(tmp_path, robot_toml=ROBOT_TOML + "[settings]\ngate_d2 = 0\nturn_sd_per_sqrt_m = 0.04\n")
+    log = read_folder(tmp_path)
+    assert log.robot.settings == (("gate_d2", 0), ("turn_sd_per_sqrt_m", 0.04))
+    write_folder(log, tmp_path / "again")
+    assert_same_log(log, read_folder(tmp_path / "again"))
+    write_files(tmp_path, robot_toml=ROBOT_TOML + "[settings]\ngate_d2 = 'none'\n")
+    with pytest.raises(
+        BslamError, match=r"robot\.toml, key settings: .*a table of the core's settings, each a"
+    ):
+        read_folder(tmp_path)
+
+
+def test_a_file_that_unpacks_to_more_than_there_is_room_for_is_refused(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("bslam.parsing.csvtable.BYTES_MAX", 1 << 20)
+    write_files(tmp_path, odometry_csv=None)
+    (tmp_path / "odometry.csv.gz").write_bytes(gzip.compress(b"0" * (2 << 20)))
+    with pytest.raises(
+        BslamError, match=r"odometry\.csv\.gz: it holds more than 1 MB of text; allowed: at most"
+    ):
+        read_folder(tmp_path)
+
+
 @given(st.floats(-100.0, 100.0))
 def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
     wrapped = float(wrap_rad(np.array([angle_rad]))[0])
@@ -248,7 +381,7 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
         ({"odometry_csv": "time_us,left_m,right_m,left_m\n"}, r"odometry\.csv, line 1"),
         (
             {"sightings_csv": "time_us,beacon_id,range_m\n"},
-            r"sightings\.csv, line 1.*perhaps range_m,mappable",
+            r"sightings\.csv, line 1.*perhaps beacon_id,range_m,mappable.*a sighting of range alone cannot",
         ),
         # rows
         ({"odometry_csv": "time_us,left_m,right_m\n"}, r"odometry\.csv: no rows below the header"),
@@ -316,10 +449,17 @@ def test_wrap_rad_gives_the_same_direction_in_range(angle_rad: float) -> None:
         ),
         ({"beacons_csv": "beacon_id,x_m,y_m\n,0,0\n"}, r"beacons\.csv, line 2, column beacon_id: ''"),
         # order
-        ({"odometry_csv": "time_us,left_m,right_m\n5,0,0\n5,0,0\n"}, r"line 3, column time_us: '5'.*above"),
-        ({"sightings_csv": "time_us,beacon_id,bearing_rad\n5,1,0\n4,1,0\n"}, r"line 3, column time_us: '4'"),
+        ({"odometry_csv": "time_us,left_m,right_m\n5,0,0\n5,0,1\n"}, r"line 3, column time_us: '5'.*above"),
         (
-            {"truth_csv": "time_us,x_m,y_m,theta_rad\n5,0,0,0\n5,0,0,0\n"},
+            {"odometry_csv": "time_us,left_m,right_m\n5,0,0\n5,0,0\n9,0,0\n8,0,0\n"},
+            r"line 5, column time_us: '8'.*above",
+        ),
+        (
+            {"sightings_csv": "time_us,beacon_id,bearing_rad\n5,1,0\n7,1,0\n6,1,0\n"},
+            r"line 4, column time_us: '6'",
+        ),
+        (
+            {"truth_csv": "time_us,x_m,y_m,theta_rad\n5,0,0,0\n5,0,0,1\n"},
             r"truth\.csv, line 3, column time_us",
         ),
         # ticks

@@ -23,6 +23,7 @@ bslam_settings_t unit_settings(void)
     p.right_radius_m = BSLAM_R(0.05);
     p.ticks_per_revolution = 1000;
     p.counter_bits = 16;
+    p.counter_modulus = 0;
     p.speed_max_mps = 20;
     p.left_speed_sd_mps = BSLAM_R(0.3);
     p.right_speed_sd_mps = BSLAM_R(0.2);

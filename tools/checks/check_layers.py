@@ -97,6 +97,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "options": OPTIONS,
     "evaluation": EVALUATION,
     "calibration": EVALUATION | {"rig", "world"},
+    "logcheck": EVALUATION | {"logcheck", "view"},
     "runs": RUNS,
     "faults": RUNS | {"link", "modelfile"},
     "view": LOG | {"moment"},

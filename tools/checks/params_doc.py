@@ -44,12 +44,16 @@ def number(value: float) -> str:
 def presets_table() -> str:
     """What each preset changes of what it goes on top of."""
     wheels = preset_settings([], KNOWN, INVARIANT)
+    known_speeds = preset_settings(["commanded"], KNOWN, INVARIANT)
+    other_speeds = preset_settings(["commanded"], SVM, INVARIANT) | {"association": KNOWN}
     known_camera = preset_settings(["camera"], KNOWN, INVARIANT)
     other_camera = preset_settings(["camera"], SVM, INVARIANT) | {"association": KNOWN}
     smoother = preset_settings([], KNOWN, SMOOTHER)
     cases = {
         "`real-wheels`": "nothing: they are the defaults",
         "`paper`": changes(wheels, preset_settings(["paper"], KNOWN, INVARIANT)),
+        "`commanded`": changes(wheels, known_speeds),
+        "with unknown identity": changes(known_speeds, other_speeds),
         "`camera`": changes(wheels, known_camera),
         "and with unknown identity": changes(known_camera, other_camera),
         "`bearing-only`": changes(wheels, preset_settings(["bearing-only"], KNOWN, INVARIANT)),

@@ -1,7 +1,10 @@
 #include "bslam/association/association.h"
 
 #include "bslam/association/association_internal.h"
+#include "base/logarithm.h"
+#include "base/scalar.h"
 #include "base/trig.h"
+#include "bslam/model/noise.h"
 
 /// A measure of how far a sighting is from a beacon, squared; negative: it cannot be that beacon.
 typedef bslam_real_t (*distance2_fn)(const bslam_sighting_frame_t *frame, const bslam_sighting_t *sighting,
@@ -91,16 +94,71 @@ static void match_label(const bslam_sighting_frame_t *frame, const bslam_sightin
     }
 }
 
-static bool label_is_repeated(const bslam_sighting_frame_t *frame, int i)
+/// How well a sighting fits what it was taken for: of two that claim one beacon the lesser is used.
+typedef struct claim {
+    int32_t rank;
+    bslam_real_t cost;
+} claim_t;
+
+/// The rank: what fits, with a distance and without; what is new; what does not fit. The cost of one that
+/// fits is the likelihood's: how far it is off in its own noise, and how much of that there is.
+static claim_t claim_of(const bslam_sighting_frame_t *frame, const bslam_record_t *record, int i)
 {
-    for (int j = 0; j < i; j++) {
-        const bslam_sighting_t *earlier = &frame->sightings[j];
-        if (earlier->label == frame->sightings[i].label &&
-            earlier->beacon_class != BSLAM_CLASS_NOT_MAPPABLE) {
-            return true;
+    const bslam_sighting_t *sighting = &frame->sightings[i];
+    const bslam_settings_t *settings = frame->settings;
+    const bslam_match_t *match = &record->match;
+    const int32_t rank = sighting->has_range ? 0 : 1;
+    const bslam_real_t bearing_cost = bslam_ln(bslam_bearing_variance_rad2(settings, sighting));
+    const bslam_real_t noise_cost =
+        sighting->has_range
+            ? bearing_cost + bslam_ln(bslam_range_variance_m2(settings, sighting, sighting->range_m))
+            : bearing_cost;
+    if (match->verdict == BSLAM_VERDICT_NEW) {
+        return (claim_t){2 + rank, noise_cost};
+    }
+    const bslam_sighting_t taken = bslam_ekf_taken_as(&frame->ekf->beacons[match->beacon], sighting);
+    const bslam_real_t distance2 = mahalanobis2(frame, &taken, match->beacon);
+    const bslam_real_t limit = settings->gate_d2 > 0 ? settings->gate_d2 : settings->match_d2;
+    if (!bslam_in_range(distance2, 0, limit)) {
+        return (claim_t){4, distance2 < 0 ? BSLAM_R(1e30) : distance2};
+    }
+    return (claim_t){rank, distance2 + noise_cost};
+}
+
+/// Whichever comes first: so that it does not matter which comes first in the frame.
+static bool is_less(const bslam_sighting_t *a, const bslam_sighting_t *b)
+{
+    if (a->has_range && a->range_m != b->range_m) {
+        return a->range_m < b->range_m;
+    }
+    return a->bearing_rad < b->bearing_rad;
+}
+
+/// Whether sighting j of a label is to be used and not sighting i.
+static bool is_better(const bslam_sighting_frame_t *frame, const bslam_record_t *records, int j, int i)
+{
+    const claim_t a = claim_of(frame, &records[j], j), b = claim_of(frame, &records[i], i);
+    if (a.rank != b.rank) {
+        return a.rank < b.rank;
+    }
+    return a.cost != b.cost ? a.cost < b.cost : is_less(&frame->sightings[j], &frame->sightings[i]);
+}
+
+/// Of several sightings with one label, as of a tag and its mirror image, the best is used.
+static void keep_one_of_each_label(const bslam_sighting_frame_t *frame, bslam_record_t *records)
+{
+    for (int i = 1; i < frame->count; i++) {
+        for (int j = 0; j < i && records[i].match.verdict != BSLAM_VERDICT_REJECT; j++) {
+            if (records[j].match.verdict != BSLAM_VERDICT_REJECT &&
+                frame->sightings[j].label == frame->sightings[i].label) {
+                bslam_match_t *loser =
+                    is_better(frame, records, i, j) ? &records[j].match : &records[i].match;
+                loser->verdict = BSLAM_VERDICT_REJECT;
+                loser->reason = BSLAM_REASON_DUPLICATE;
+                loser->beacon = -1;
+            }
         }
     }
-    return false;
 }
 
 void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_record_t *records)
@@ -113,12 +171,11 @@ void bslam_associate_known(const bslam_sighting_frame_t *frame, bslam_record_t *
         }
         if (sighting->label == BSLAM_LABEL_NONE) {
             match->reason = BSLAM_REASON_NO_IDENTITY;
-        } else if (label_is_repeated(frame, i)) {
-            match->reason = BSLAM_REASON_DUPLICATE;
         } else {
             match_label(frame, sighting, match);
         }
     }
+    keep_one_of_each_label(frame, records);
 }
 
 // ---- by distance ------------------------------------------------------------------------------------------

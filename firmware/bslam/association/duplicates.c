@@ -34,7 +34,8 @@ static bool is_one_place(const bslam_ekf_t *ekf, const bslam_settings_t *setting
     const bslam_real_t xx = floor_m2 + bslam_ekf_covariance(ekf, at, at) + bslam_ekf_covariance(ekf, bt, bt) -
                             2 * bslam_ekf_covariance(ekf, at, bt);
     const bslam_real_t yy = floor_m2 + bslam_ekf_covariance(ekf, at + 1, at + 1) +
-                            bslam_ekf_covariance(ekf, bt + 1, bt + 1) - 2 * bslam_ekf_covariance(ekf, at + 1, bt + 1);
+                            bslam_ekf_covariance(ekf, bt + 1, bt + 1) -
+                            2 * bslam_ekf_covariance(ekf, at + 1, bt + 1);
     const bslam_real_t xy = bslam_ekf_covariance(ekf, at + 1, at) + bslam_ekf_covariance(ekf, bt + 1, bt) -
                             bslam_ekf_covariance(ekf, at + 1, bt) - bslam_ekf_covariance(ekf, bt + 1, at);
     const bslam_real_t det = xx * yy - xy * xy;

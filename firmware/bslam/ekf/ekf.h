@@ -20,16 +20,9 @@
 
 /// The robot's own values: pose, and v, omega or their scale factors.
 #define BSLAM_ROBOT_DIM_MAX 5
-/// By what the sensor differs from what is told: place and yaw, in its own frame; all distances are too long
-/// by the scale; and what it shows is older by the delay.
-enum {
-    BSLAM_SENSOR_X = 0,
-    BSLAM_SENSOR_Y,
-    BSLAM_SENSOR_YAW,
-    BSLAM_SENSOR_SCALE,
-    BSLAM_SENSOR_DELAY,
-    BSLAM_SENSOR_DIM
-};
+/// By what the sensor differs from what is told: place and yaw, in the told frame; all distances are too long
+/// by the scale.
+enum { BSLAM_SENSOR_X = 0, BSLAM_SENSOR_Y, BSLAM_SENSOR_YAW, BSLAM_SENSOR_SCALE, BSLAM_SENSOR_DIM };
 /// The largest state: room for 2 values more a ray, or 1 more for each of twice as many sized beacons.
 #define BSLAM_STATE_MAX (BSLAM_ROBOT_DIM_MAX + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX)
 /// And what comes before others leave: linalg/factor.h.
@@ -84,9 +77,8 @@ typedef struct bslam_ekf {
     bslam_real_t mean[BSLAM_STATE_PADDED];
     bslam_factor_t factor;  ///< of the covariance, but for what waits
     int32_t dim;
-    int32_t base_dim;                    ///< 3, or 5 with velocity or scale states
-    int32_t sensor_dim;                  ///< 0, or BSLAM_SENSOR_DIM behind those
-    bslam_real_t speed_mps, turn_radps;  ///< of late, by which a delay shows
+    int32_t base_dim;    ///< 3, or 5 with velocity or scale states
+    int32_t sensor_dim;  ///< 0, or BSLAM_SENSOR_DIM behind those
     int32_t beacon_count, ray_count, sized_count;
     uint32_t next_uid;
     bslam_beacon_t beacons[BSLAM_BEACONS_MAX];
@@ -334,7 +326,7 @@ void bslam_ekf_beacon_position(const bslam_ekf_t *ekf, int index, bslam_real_t *
 /// Covariance of a beacon's position in the map; zero for a known one.
 bslam_sym2_t bslam_ekf_beacon_covariance(const bslam_ekf_t *ekf, int index);
 
-/// Whether all means and variances are finite, and no variance is negative. O(n).
+/// Whether all means are finite, and so is D, which is not negative. O(n).
 bool bslam_ekf_is_sane(const bslam_ekf_t *ekf);
 
 #endif

@@ -4,7 +4,6 @@
 
 #include "bslam/ekf/ekf.h"
 #include "bslam/ekf/ekf_internal.h"
-#include "bslam/ekf/sensor.h"
 #include "base/trig.h"
 #include "bslam/model/motion.h"
 #include "bslam/model/pose.h"
@@ -388,9 +387,6 @@ void bslam_ekf_predict(bslam_ekf_t *ekf, const bslam_settings_t *settings, const
         measure_speeds(ekf, &speeds);
         bslam_ekf_correct(ekf, settings);
         note_velocity(ekf->mean, moved);
-    }
-    if (ekf->sensor_dim > 0) {
-        bslam_ekf_note_speed(ekf, moved);
     }
 }
 

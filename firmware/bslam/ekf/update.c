@@ -51,6 +51,30 @@ COPIED void add_row(const bslam_factor_t *factor, int place, bslam_real_t a, bsl
     }
 }
 
+/// The same of this row and the next one, by the two weights each.
+COPIED void add_two_rows(const bslam_factor_t *factor, int place, const bslam_real_t *a,
+                         const bslam_real_t *b, const looks_t *looks, const bool two)
+{
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)looks->from;
+    const bslam_real_t *next = bslam_factor_row(factor, place + 1) + 4 * (size_t)looks->from;
+    const bslam_real_t a0 = a[0], a1 = a[1], b0 = b[0], b1 = b[1];
+    bslam_real_t *f = looks->f, *g = looks->g;
+    const int end = (place + 1 < looks->to ? place + 1 : looks->to) - looks->from;
+    for (int j = 0; j < end; j++) {
+        f[j] += a0 * row[4 * j] + a1 * next[4 * j];
+        if (two) {
+            g[j] += b0 * row[4 * j] + b1 * next[4 * j];
+        }
+    }
+    const int own = place + 1 - looks->from;  // of the next row, which is 1 there
+    if (own >= 0 && place + 1 < looks->to) {
+        f[own] += a1;
+        if (two) {
+            g[own] += b1;
+        }
+    }
+}
+
 COPIED void look(const bslam_ekf_t *ekf, const looks_t *looks, const bool two)
 {
     const bslam_factor_t *factor = &ekf->factor;
@@ -68,7 +92,11 @@ COPIED void look(const bslam_ekf_t *ekf, const looks_t *looks, const bool two)
     for (int k = 0; k < a->sensor_dim; k++) {
         add_row(factor, bslam_ekf_place(ekf, a->sensor_at + k), a->sensor[k], b->sensor[k], looks, two);
     }
-    for (int k = 0; k < a->dim; k++) {
+    int k = 0;
+    for (; k + 1 < a->dim && a->at >= ekf->base_dim; k += 2) {
+        add_two_rows(factor, bslam_ekf_place(ekf, a->at + k), &a->other[k], &b->other[k], looks, two);
+    }
+    for (; k < a->dim; k++) {
         add_row(factor, bslam_ekf_place(ekf, a->at + k), a->other[k], b->other[k], looks, two);
     }
 }
@@ -83,7 +111,12 @@ static void look_twice(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam
                        bslam_real_t *f, bslam_real_t *g)
 {
     const looks_t looks = {from, to, a, b, f, g};
-    look(ekf, &looks, true);
+    if (a->at == b->at && a->dim == b->dim && a->sensor_dim == b->sensor_dim) {
+        look(ekf, &looks, true);
+    } else {
+        bslam_ekf_look(ekf, a, from, to, f);
+        bslam_ekf_look(ekf, b, from, to, g);
+    }
 }
 
 static void fill_row(const bslam_beacon_t *beacon, const bslam_real_t by_pose[3],
@@ -120,7 +153,8 @@ static forms_t quadratic(const bslam_ekf_t *ekf, const bslam_row_t *a, const bsl
     for (int from = 0; from < places; from += COLUMNS) {
         const int to = from + COLUMNS < places ? from + COLUMNS : places;
         bslam_real_t of_a[COLUMNS], of_b[COLUMNS];
-        look_twice(ekf, a, b, from, to, of_a, of_b);
+        bslam_ekf_look(ekf, a, from, to, of_a);
+        bslam_ekf_look(ekf, b, from, to, of_b);
         for (int j = 0; j < to - from; j++) {
             const bslam_real_t d = ekf->factor.d[from + j];
             sums.ab += d * of_a[j] * of_b[j];
@@ -199,7 +233,7 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
                                     bslam_innovation_t *innovation)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
-    const bslam_pose_t mount = bslam_ekf_mount(ekf, told);
+    const bslam_pose_t mount = ekf->sensor_dim > 0 ? bslam_ekf_mount(ekf, told) : *told;
     const bslam_real_t scale = bslam_ekf_range_scale(ekf);
     bslam_observation_t seen;
     const bslam_status_t status = observe(ekf, beacon, &mount, &seen);
@@ -353,11 +387,12 @@ static void make_room(bslam_ekf_t *ekf, int count)
 }
 
 /// Takes the measurement in the next slot.
-static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t s, bslam_real_t variance)
+static void accept(bslam_ekf_t *ekf, bslam_real_t innovation, bslam_real_t variance)
 {
-    ekf->gain[ekf->pending_count] = innovation / s;
-    const bslam_waiting_t next = waiting(ekf, ekf->pending_count);
-    bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
+    const int slot = ekf->pending_count;
+    const bslam_waiting_t next = waiting(ekf, slot);
+    const bslam_real_t s = bslam_factor_measure(&next, bslam_factor_places(&ekf->factor), variance, ekf->d);
+    ekf->gain[slot] = innovation / s;
     ekf->pending_count++;
     ekf->has_correction = true;
 }
@@ -369,7 +404,7 @@ void bslam_ekf_apply_scalar(bslam_ekf_t *ekf, const bslam_row_t *row, bslam_real
     const int slot = ekf->pending_count;
     bslam_ekf_look(ekf, row, 0, bslam_factor_places(&ekf->factor), ekf->lambda[slot]);
     const bslam_real_t left = innovation - foresee(ekf, row, slot);
-    accept(ekf, left, variance_of(ekf, slot) + variance, variance);
+    accept(ekf, left, variance);
 }
 
 /// Gate and Huber's rule. The weight divides the measurement's variances.
@@ -424,13 +459,13 @@ bslam_status_t bslam_ekf_fuse(bslam_ekf_t *ekf, const bslam_settings_t *settings
         return status;
     }
     const bslam_real_t bearing_var = innovation->bearing_var_rad2 / fusion->weight;
-    accept(ekf, bearing_left, hph.yy + bearing_var, bearing_var);
+    accept(ekf, bearing_left, bearing_var);
     if (innovation->has_range) {  // conditional on the bearing
         const bslam_waiting_t bearing = waiting(ekf, of_bearing);
         const bslam_real_t range_var = innovation->range_var_m2 / fusion->weight;
         range_left -= bearing.gain *
                       bslam_factor_carry(&bearing, bslam_factor_places(&ekf->factor), ekf->lambda[of_range]);
-        accept(ekf, range_left, variance_of(ekf, of_range) + range_var, range_var);
+        accept(ekf, range_left, range_var);
     }
     return BSLAM_OK;
 }

@@ -87,72 +87,94 @@ void bslam_factor_scale(bslam_factor_t *factor, int i, bslam_real_t by)
 /// A variance that becomes more than this many times larger leaves nothing to add to.
 static const bslam_real_t GROWTH_MAX = 4;
 
-/// What a sum leaves of a column of L, and takes of w.
-typedef struct shares {
-    const bslam_real_t *w, *by, *keep;
-    bool grows;  ///< some column keeps less than all
-} shares_t;
-
-/// What column j's own value takes of a sum; what its row has of w is p. *keep: of the column, 1 if that is
-/// added to.
-static void add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by,
+/// What a column's own value takes of a sum; what its row has of w is p. *keep: of the column, 1 if that is
+/// added to. False: nothing.
+COPIED bool add_to_own(bslam_real_t *d, bslam_real_t p, bslam_real_t *share, bslam_real_t *by,
                        bslam_real_t *keep)
 {
-    const bslam_real_t sum = *d + *share * p * p;
-    *by = 0;
-    *keep = 1;
-    if (sum > VARIANCE_MIN && p != 0) {
-        const bslam_real_t left = *d / sum;
-        *keep = sum > GROWTH_MAX * *d ? left : 1;
-        *by = *share * p / sum;
-        *share *= left;
-        *d = sum;
+    const bslam_real_t scaled = *share * p, sum = *d + scaled * p;
+    if (!(sum > VARIANCE_MIN) || p == 0) {
+        return false;
     }
+    const bslam_real_t inverse = 1 / sum, left = *d * inverse;
+    *keep = sum > GROWTH_MAX * *d ? left : 1;
+    *by = scaled * inverse;
+    *share *= left;
+    *d = sum;
+    return true;
 }
 
-/// A column's part of four rows, of which w had so much before it and behind it. Both ways are the same, but
-/// where little is kept the second one would be a difference of large numbers.
-COPIED bslam_four_t add_to_column(bslam_four_t l, bslam_four_t before, bslam_four_t behind, bslam_real_t by,
-                                  bslam_real_t keep)
+/// A column of four rows, l, of which w had so much before it and has so much behind it.
+COPIED void add_to_column(bslam_real_t *l, bslam_real_t by, bslam_real_t keep, bslam_four_t before,
+                          bslam_four_t behind)
 {
-    return keep < 1 ? keep * l + by * before : l + by * behind;
+    const bslam_four_t old = bslam_four(l);
+    *(bslam_four_at_t *)l = keep < 1 ? keep * old + by * before : old + by * behind;
 }
 
-/// Four rows through the columns from `first` up to `end`, which are others' own. Returns what is left of w.
-COPIED bslam_four_t add_to_rows(bslam_real_t *block, int first, int end, const shares_t *shares,
-                                const bool grows, bslam_four_t rest)
+/// What goes through a factor: w and what columns have taken of it.
+typedef struct passing {
+    bslam_real_t *w, *by, *keep, *d;
+    bslam_real_t share;
+    int first;
+    int grown;  ///< behind the last column that keeps less than all: there the usual way is a difference of
+                ///< large numbers
+} passing_t;
+
+/// Four rows through the columns before theirs. Returns what is left of w.
+COPIED bslam_four_t pass_before(const passing_t *passing, bslam_real_t *block, int at)
 {
-    for (int j = first; j < end; j++) {
-        const bslam_four_t l = load(block, j), before = rest;
-        rest -= shares->w[j] * l;
-        store(block, j, add_to_column(l, before, rest, shares->by[j], grows ? shares->keep[j] : 1));
+    const bslam_real_t *w = passing->w, *by = passing->by;
+    bslam_four_t rest = bslam_four(w + at);
+    int j = passing->first;
+    for (; j < passing->grown && j < at; j++) {
+        const bslam_four_t before = rest;
+        rest -= w[j] * load(block, j);
+        add_to_column(block + 4 * j, by[j], passing->keep[j], before, rest);
+    }
+    for (; j < at; j++) {
+        const bslam_four_t l = load(block, j);
+        rest -= w[j] * l;
+        store(block, j, l + by[j] * rest);
     }
     return rest;
+}
+
+/// And through row `lane`'s own.
+COPIED void pass_own(passing_t *passing, bslam_real_t *block, int at, const int lane, bslam_four_t *rest)
+{
+    const int j = at + lane;
+    const bslam_real_t p = (*rest)[lane];
+    if (j < passing->first) {
+        return;
+    }
+    passing->w[j] = p;
+    passing->by[j] = 0;
+    passing->keep[j] = 1;
+    if (!add_to_own(&passing->d[j], p, &passing->share, &passing->by[j], &passing->keep[j])) {
+        *rest -= p * load(block, j);
+        return;
+    }
+    const bslam_four_t before = *rest;
+    *rest -= p * load(block, j);  // of its own row nothing is left
+    add_to_column(block + 4 * j, passing->by[j], passing->keep[j], before, *rest);
+    if (passing->keep[j] < 1) {
+        passing->grown = j + 1;
+        block[4 * j + lane] = 1;
+    }
 }
 
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
                       bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
-    bslam_real_t *by = scratch[0], *keep = scratch[1];
-    shares_t shares = {w, by, keep, false};
-    if (!(share > 0)) {
-        return;
-    }
-    for (int at = first / 4 * 4; at < bslam_factor_places(factor); at += 4) {
+    passing_t passing = {w, scratch[0], scratch[1], factor->d, share, first, first};
+    for (int at = first / 4 * 4; share > 0 && at < bslam_factor_places(factor); at += 4) {
         bslam_real_t *block = block_of(factor, at);
-        bslam_four_t rest = bslam_four(w + at);
-        rest = shares.grows ? add_to_rows(block, first, at, &shares, true, rest)
-                            : add_to_rows(block, first, at, &shares, false, rest);
-        for (int j = first > at ? first : at; j < at + 4; j++) {
-            const bslam_real_t p = rest[j - at];
-            add_to_own(&factor->d[j], p, &share, &by[j], &keep[j]);
-            const bslam_four_t l = load(block, j), before = rest;
-            rest -= p * l;  // of its own row nothing is left
-            store(block, j, add_to_column(l, before, rest, by[j], keep[j]));
-            block[4 * j + j - at] = l[j - at];
-            w[j] = p;
-            shares.grows = shares.grows || keep[j] < 1;
-        }
+        bslam_four_t rest = pass_before(&passing, block, at);
+        pass_own(&passing, block, at, 0, &rest);
+        pass_own(&passing, block, at, 1, &rest);
+        pass_own(&passing, block, at, 2, &rest);
+        pass_own(&passing, block, at, 3, &rest);
     }
 }
 
@@ -357,7 +379,8 @@ bslam_real_t bslam_factor_carry(const bslam_waiting_t *waiting, int places, bsla
     return sum;
 }
 
-void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance, bslam_real_t *d)
+bslam_real_t bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance,
+                                  bslam_real_t *d)
 {
     bslam_real_t last = variance, last_inverse = 1 / variance;
     for (int at = places - 4; at >= 0; at -= 4) {
@@ -375,6 +398,7 @@ void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real
         last = sum[0];
         last_inverse = inverse[0];
     }
+    return last;
 }
 
 /// Four rows through all columns of their block, from the last one on. The measurement that is taken last

@@ -23,9 +23,9 @@ enum { BSLAM_FACTOR_TAIL_MAX = 3, BSLAM_FACTOR_GROWTH_MAX = 4 };
 
 /// n filled up to a multiple of four.
 #define BSLAM_FACTOR_PADDED(n) (((n) + 3) / 4 * 4)
-/// The largest body: two values of the robot, five of the sensor, two a beacon, two more a ray; and room for
+/// The largest body: two values of the robot, four of the sensor, two a beacon, two more a ray; and room for
 /// seven that come before others leave: what a stored map hung on, or what a new value is made of.
-#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(7 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7)
+#define BSLAM_FACTOR_BODY_MAX BSLAM_FACTOR_PADDED(6 + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX + 7)
 /// Places of the largest: the length of D, and of every vector that goes with it.
 #define BSLAM_FACTOR_PLACES_MAX (BSLAM_FACTOR_BODY_MAX + 4)
 
@@ -124,8 +124,9 @@ typedef struct bslam_waiting {
 /// this one met. O(n).
 bslam_real_t bslam_factor_carry(const bslam_waiting_t *waiting, int places, bslam_real_t *f);
 
-/// Takes a measurement with this noise > 0 into D. O(n).
-void bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance, bslam_real_t *d);
+/// Takes a measurement with this noise > 0 into D. Returns S, the variance of its innovation. O(n).
+bslam_real_t bslam_factor_measure(const bslam_waiting_t *waiting, int places, bslam_real_t variance,
+                                  bslam_real_t *d);
 
 /// Brings L up to date for `count` <= 4 measurements. change[places] += what they change of each value's
 /// mean. O(count n²).

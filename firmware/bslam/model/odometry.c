@@ -5,13 +5,13 @@
 
 static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 static const int64_t TIME_MAX_US = INT64_MAX / 2;
-/// Longer than this is no interval of odometry but an interruption. It also keeps the variance that one
-/// interval can add within what float's digits carry through the next update.
-static const int64_t INTERVAL_MAX_US = INT64_C(4000000);
 /// More than this in one interval is no motion of a robot: 16 turns.
 static const bslam_real_t TURN_MAX_RAD = BSLAM_R(100.0);
 /// Limits of a reading's own gyro noise, as of the setting gyro_sd_radps.
 static const bslam_real_t GYRO_SD_MIN_RADPS = BSLAM_R(1e-6), GYRO_SD_MAX_RADPS = BSLAM_R(100.0);
+
+/// So many readings that jump from the reference and go with one another: the counters began anew.
+enum { ODD_BELIEVED = 3 };
 
 /// Travel of both wheels in one interval.
 typedef struct wheel_travel {
@@ -28,41 +28,48 @@ void bslam_odometry_start(bslam_odometry_t *odometry, int64_t time_us)
 
 void bslam_odometry_restart(bslam_odometry_t *odometry)
 {
-    odometry->has_time = false;
-    odometry->has_ticks = false;
+    *odometry = (bslam_odometry_t){0};
 }
 
-int32_t bslam_odometry_tick_difference(uint32_t before, uint32_t after, int bits)
+uint32_t bslam_odometry_modulus(const bslam_settings_t *settings)
 {
-    const uint32_t mask = UINT32_MAX >> (32 - bits);
-    const uint32_t half = 1u << (bits - 1);
-    const uint32_t up = (after - before) & mask;
-    if (up < half) {
+    return settings->counter_modulus > 0 ? (uint32_t)settings->counter_modulus
+           : settings->counter_bits < 32 ? 1u << settings->counter_bits
+                                         : 0;
+}
+
+int32_t bslam_odometry_tick_difference(uint32_t before, uint32_t after, uint32_t modulus)
+{
+    const uint32_t up = after - before + (after < before ? modulus : 0);
+    const uint32_t down = modulus - up;
+    if (up < down || up == 0) {
         return (int32_t)up;
     }
-    // 2^bits - up, which is at most half, is how far the counter went down.
-    const uint32_t down = (mask - up) + 1u;
-    return down == half && bits == 32 ? INT32_MIN : -(int32_t)down;
+    return down == UINT32_C(1) << 31 ? INT32_MIN : -(int32_t)down;
+}
+
+/// From counts to those of a reading.
+static wheel_travel_t travel_from(const bslam_settings_t *settings, uint32_t left_ticks, uint32_t right_ticks,
+                                  const bslam_odometry_reading_t *reading)
+{
+    const uint32_t modulus = bslam_odometry_modulus(settings);
+    const int32_t left = bslam_odometry_tick_difference(left_ticks, reading->left_ticks, modulus);
+    const int32_t right = bslam_odometry_tick_difference(right_ticks, reading->right_ticks, modulus);
+    const bslam_real_t radians_per_tick = 2 * BSLAM_PI / (bslam_real_t)settings->ticks_per_revolution;
+    return (wheel_travel_t){(bslam_real_t)left * radians_per_tick * settings->left_radius_m,
+                            (bslam_real_t)right * radians_per_tick * settings->right_radius_m};
 }
 
 static bslam_status_t ticks_to_travel(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
                                       const bslam_odometry_reading_t *reading, wheel_travel_t *travel)
 {
-    const uint32_t mask = UINT32_MAX >> (32 - settings->counter_bits);
-    if ((reading->left_ticks & ~mask) != 0 || (reading->right_ticks & ~mask) != 0) {
+    const uint32_t last = bslam_odometry_modulus(settings) - 1;
+    if (reading->left_ticks > last || reading->right_ticks > last) {
         return BSLAM_E_RANGE;
     }
-    if (!odometry->has_ticks) {
-        *travel = (wheel_travel_t){0, 0};
-        return BSLAM_OK;
-    }
-    const int32_t left =
-        bslam_odometry_tick_difference(odometry->left_ticks, reading->left_ticks, settings->counter_bits);
-    const int32_t right =
-        bslam_odometry_tick_difference(odometry->right_ticks, reading->right_ticks, settings->counter_bits);
-    const bslam_real_t radians_per_tick = 2 * BSLAM_PI / (bslam_real_t)settings->ticks_per_revolution;
-    travel->left_m = (bslam_real_t)left * radians_per_tick * settings->left_radius_m;
-    travel->right_m = (bslam_real_t)right * radians_per_tick * settings->right_radius_m;
+    *travel = odometry->has_ticks
+                  ? travel_from(settings, odometry->left_ticks, odometry->right_ticks, reading)
+                  : (wheel_travel_t){0, 0};
     return BSLAM_OK;
 }
 
@@ -124,8 +131,8 @@ static void travel_to_motion(const bslam_settings_t *settings, const wheel_trave
 
 /// The part of an interval in which the robot may have moved unseen: all of it while the tick reference is
 /// missing.
-static bslam_real_t unseen_s(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
-                             const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
+static bslam_real_t unseen(const bslam_odometry_t *odometry, const bslam_settings_t *settings,
+                           const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
 {
     if (reading->source == BSLAM_ODOMETRY_TICKS && !odometry->has_ticks) {
         return dt_s;
@@ -141,7 +148,14 @@ static bool time_is_valid(const bslam_odometry_t *odometry, int64_t time_us)
         return false;
     }
     return !odometry->has_time ||
-           (time_us > odometry->time_us && time_us - odometry->time_us <= INTERVAL_MAX_US);
+           (time_us > odometry->time_us && time_us - odometry->time_us <= BSLAM_INTERVAL_MAX_US);
+}
+
+bool bslam_odometry_is_elsewhere(const bslam_odometry_t *odometry, int64_t time_us)
+{
+    return odometry->has_time && time_us >= 0 && time_us <= TIME_MAX_US &&
+           (time_us > odometry->time_us + BSLAM_INTERVAL_MAX_US ||
+            time_us < odometry->time_us - BSLAM_INTERVAL_MAX_US);
 }
 
 /// True if the wheels cannot have moved like this.
@@ -150,6 +164,51 @@ static bool is_jump(const bslam_settings_t *settings, const wheel_travel_t *trav
     const bslam_real_t travel_max_m = settings->speed_max_mps * dt_s;
     return bslam_abs(travel->left_m) > travel_max_m || bslam_abs(travel->right_m) > travel_max_m ||
            bslam_abs(travel->right_m - travel->left_m) > TURN_MAX_RAD * settings->wheelbase_m;
+}
+
+/// A reading whose counts go with an odd one says that the counters began anew there, once enough do: *travel
+/// is that since then, *unseen_s what went before. One that goes with the reference again says that the odd
+/// one was a glitch, of which nothing is lost.
+static bslam_status_t judge_ticks(bslam_odometry_t *odometry, const bslam_settings_t *settings,
+                                  const bslam_odometry_reading_t *reading, int32_t dt_us,
+                                  wheel_travel_t *travel, bslam_real_t *unseen_s)
+{
+    const bool jumps = is_jump(settings, travel, (bslam_real_t)dt_us * SECONDS_PER_US);
+    const wheel_travel_t since_odd =
+        travel_from(settings, odometry->odd_left_ticks, odometry->odd_right_ticks, reading);
+    const bslam_real_t since_s = (bslam_real_t)(dt_us - odometry->odd_after_us) * SECONDS_PER_US;
+    const bool goes_with_odd = odometry->odd_count > 0 && !is_jump(settings, &since_odd, since_s);
+    if (!jumps && !goes_with_odd) {
+        return BSLAM_OK;
+    }
+    if (!goes_with_odd) {
+        odometry->odd_left_ticks = reading->left_ticks;
+        odometry->odd_right_ticks = reading->right_ticks;
+        odometry->odd_after_us = dt_us;
+        odometry->odd_count = 0;
+    }
+    odometry->odd_count++;
+    if (odometry->odd_count < ODD_BELIEVED) {
+        return BSLAM_E_JUMP;
+    }
+    *travel = since_odd;
+    *unseen_s = (bslam_real_t)odometry->odd_after_us * SECONDS_PER_US;
+    return BSLAM_OK;
+}
+
+static bslam_status_t judge(bslam_odometry_t *odometry, const bslam_settings_t *settings,
+                            const bslam_odometry_reading_t *reading, int32_t dt_us, wheel_travel_t *travel,
+                            bslam_real_t *unseen_s)
+{
+    const bslam_real_t dt_s = (bslam_real_t)dt_us * SECONDS_PER_US;
+    *unseen_s = unseen(odometry, settings, reading, dt_s);
+    if (!odometry->has_time) {
+        return BSLAM_OK;
+    }
+    if (reading->source == BSLAM_ODOMETRY_TICKS && odometry->has_ticks) {
+        return judge_ticks(odometry, settings, reading, dt_us, travel, unseen_s);
+    }
+    return is_jump(settings, travel, dt_s) ? BSLAM_E_JUMP : BSLAM_OK;
 }
 
 static bslam_status_t check_gyro(const bslam_odometry_reading_t *reading, bslam_real_t dt_s)
@@ -192,30 +251,28 @@ bslam_status_t bslam_odometry_read(bslam_odometry_t *odometry, const bslam_setti
         }
     }
     wheel_travel_t travel;
-    const bslam_status_t status = reading_to_travel(odometry, settings, reading, dt_s, &travel);
+    bslam_real_t unseen_s;
+    bslam_status_t status = reading_to_travel(odometry, settings, reading, dt_s, &travel);
+    if (status == BSLAM_OK) {
+        status = judge(odometry, settings, reading, dt_us, &travel, &unseen_s);
+    }
     if (status != BSLAM_OK) {
         return status;
     }
-    if (odometry->has_time && is_jump(settings, &travel, dt_s)) {
-        // Or the same jump would pass as soon as enough time has gone by.
-        odometry->has_ticks = odometry->has_ticks && reading->source != BSLAM_ODOMETRY_TICKS;
-        return BSLAM_E_JUMP;
-    }
+    *motion = (bslam_motion_t){0};
     if (odometry->has_time) {
-        travel_to_motion(settings, &travel, dt_s, unseen_s(odometry, settings, reading, dt_s), motion);
-        if (reading->has_gyro) {
+        travel_to_motion(settings, &travel, dt_s, unseen_s, motion);
+        // A rate is that of the time since the reading before, refused ones too.
+        if (reading->has_gyro && odometry->odd_count == 0) {
             const bslam_real_t own_sd_radps = reading->gyro_sd_radps;
             const bslam_real_t sd_radps = own_sd_radps > 0 ? own_sd_radps : settings->gyro_sd_radps;
             fuse_gyro(motion, reading->gyro_radps * dt_s, square(sd_radps * dt_s));
         }
-    } else {
-        *motion = (bslam_motion_t){0};
     }
-    odometry->time_us = reading->time_us;
-    odometry->has_time = true;
     // A reading of another source covers motion that the counters saw too: the next tick reading starts
     // afresh.
-    odometry->has_ticks = reading->source == BSLAM_ODOMETRY_TICKS;
+    *odometry = (bslam_odometry_t){
+        .time_us = reading->time_us, .has_time = true, .has_ticks = reading->source == BSLAM_ODOMETRY_TICKS};
     if (odometry->has_ticks) {
         odometry->left_ticks = reading->left_ticks;
         odometry->right_ticks = reading->right_ticks;

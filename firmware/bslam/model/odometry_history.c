@@ -86,7 +86,10 @@ static bslam_history_step_t taken_step(const bslam_history_t *history, int32_t b
 {
     bslam_history_step_t step = history->steps[index_back(history, back)];
     if (back < history->filter.waiting) {
+        const bslam_real_t share = (bslam_real_t)history->filter.gone_us / (bslam_real_t)step.duration_us;
         step.duration_us = history->filter.gone_us;
+        step.forward_var_m2 *= share;
+        step.turn_var_rad2 *= share;
         step.forward_m = history->gone_forward_m;
         step.turn_rad = history->gone_turn_rad;
     }
@@ -94,9 +97,9 @@ static bslam_history_step_t taken_step(const bslam_history_t *history, int32_t b
 }
 
 bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bslam_settings_t *settings,
-                                       int64_t back_us, bslam_pose_t *relative)
+                                       int64_t back_us, bslam_history_view_t *view)
 {
-    bslam_pose_t since = {0, 0, 0};
+    bslam_history_view_t since = {.robot = {0, 0, 0}};
     int64_t left_us = back_us;
     const int32_t first = history->filter.waiting - (history->filter.gone_us > 0 ? 1 : 0);
     for (int32_t k = first; k < history->count; k++) {
@@ -106,9 +109,12 @@ bslam_status_t bslam_history_look_back(const bslam_history_t *history, const bsl
         const bslam_real_t share =
             begins_before ? (bslam_real_t)(int32_t)left_us / (bslam_real_t)step.duration_us : 1;
         const bslam_pose_t part = part_of_motion(settings, step.forward_m, step.turn_rad, share);
-        since = bslam_pose_compose(&part, &since);
+        since.robot = bslam_pose_compose(&part, &since.robot);
+        since.forward_var_m2 += step.forward_var_m2 * share;
+        since.turn_var_rad2 += step.turn_var_rad2 * share;
         if (begins_before) {
-            *relative = bslam_pose_inverse(&since);
+            *view = since;
+            view->robot = bslam_pose_inverse(&since.robot);
             return BSLAM_OK;
         }
         left_us -= step.duration_us;

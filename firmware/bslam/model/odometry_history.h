@@ -48,11 +48,16 @@ bslam_motion_t bslam_history_walk(const bslam_history_t *history, bslam_history_
 void bslam_history_take(bslam_history_t *history, const bslam_history_place_t *place,
                         const bslam_motion_t *moved);
 
-/// The robot back_us > 0 before the filter, as seen from where the filter stands. O(count). BSLAM_E_TIME, and
-/// no change: older than the history.
+/// The robot of a moment before the filter's, as seen from where the filter stands.
+typedef struct bslam_history_view {
+    bslam_pose_t robot;
+    bslam_real_t forward_var_m2, turn_var_rad2;  ///< of the way between, as odometry told it
+} bslam_history_view_t;
+
+/// That of back_us > 0 before the filter. O(count). BSLAM_E_TIME, and no change: older than the history.
 BSLAM_MUST_CHECK bslam_status_t bslam_history_look_back(const bslam_history_t *history,
                                                         const bslam_settings_t *settings, int64_t back_us,
-                                                        bslam_pose_t *relative);
+                                                        bslam_history_view_t *view);
 
 /// The newest motion as it stands; dt_s = 0 if there is none.
 bslam_motion_t bslam_history_newest(const bslam_history_t *history);

@@ -55,8 +55,7 @@ bslam_recovery_state_t bslam_recovery_state(const bslam_recovery_t *recovery, co
 
 /// A frame, and which beacon each of its sightings is recognised as.
 typedef struct view {
-    int64_t time_us;
-    bslam_pose_t mount;
+    bslam_vantage_t vantage;
     const bslam_sighting_t *sightings;
     int count, who[BSLAM_SIGHTINGS_MAX];
 } view_t;
@@ -72,9 +71,9 @@ static bslam_real_t heading_var(const bslam_ekf_t *ekf)
 static bslam_memory_t memorise(const bslam_slam_t *slam, const view_t *view, int i)
 {
     bslam_memory_t memory = {.uid = slam->ekf.beacons[view->who[i]].uid,
-                             .time_us = view->time_us,
+                             .time_us = view->vantage.moment_us,
                              .sighting = view->sightings[i],
-                             .mount = view->mount,
+                             .mount = view->vantage.mount,
                              .robot = bslam_ekf_pose(&slam->ekf),
                              .heading_var_rad2 = heading_var(&slam->ekf)};
     memory.sighting.signature = NULL;
@@ -95,8 +94,8 @@ static void make_distance(const bslam_slam_t *slam, const bslam_beacon_t *beacon
     const bool is_sized = beacon->kind == BSLAM_BEACON_SIZED;
     const int at = beacon->at + BSLAM_POINT_DIM;
     bslam_real_t scale = is_sized ? ekf->mean[at] : 1;
-    bslam_real_t scale_var = is_sized ? bslam_ekf_covariance(ekf, at, at)
-                                      : bslam_unknown_scale_var(&slam->settings, sighting);
+    bslam_real_t scale_var =
+        is_sized ? bslam_ekf_covariance(ekf, at, at) : bslam_unknown_scale_var(&slam->settings, sighting);
     if (beacon->known_scale > 0) {
         scale = beacon->known_scale;
         scale_var = 0;
@@ -213,13 +212,14 @@ static tally_t weigh(const bslam_recovery_t *recovery, const bslam_slam_t *slam,
     for (int i = 0; i < view->count; i++) {
         const bslam_sighting_t *sighting = &view->sightings[i];
         const int who = view->who[i];
-        const bslam_real_t distance2 = who >= 0 ? nearest2_of(slam, &view->mount, sighting, who) : -1;
+        const bslam_real_t distance2 = who >= 0 ? nearest2_of(slam, &view->vantage.mount, sighting, who) : -1;
         verdict.recognised += who >= 0 ? 1 : 0;
         if (bslam_in_range(distance2, 0, FIT_D2)) {
             verdict.agreeing++;
         } else if (who < 0) {
-            verdict.agreeing += !in_doubt && fits_any(slam, &view->mount, sighting) ? 1 : 0;
-        } else if (distance2 > CONTRADICT_D2 && (in_doubt || !fits_any(slam, &view->mount, sighting))) {
+            verdict.agreeing += !in_doubt && fits_any(slam, &view->vantage.mount, sighting) ? 1 : 0;
+        } else if (distance2 > CONTRADICT_D2 &&
+                   (in_doubt || !fits_any(slam, &view->vantage.mount, sighting))) {
             verdict.contradicting++;
             verdict.uid = slam->ekf.beacons[who].uid;
         }
@@ -421,7 +421,7 @@ static bool seek(bslam_recovery_t *recovery, const bslam_slam_t *slam, const vie
     bslam_clue_t clues[BSLAM_CLUES_MAX];
     const int count = recall(recovery, slam, clues);
     return bslam_relocate(clues, count, fix) && is_clear(fix) &&
-           confirm(recovery, slam, fix, view->time_us) >=
+           confirm(recovery, slam, fix, view->vantage.moment_us) >=
                (is_verified(fix) ? CONFIRMED_BY_THIRD : CONFIRMED_BY_TIME);
 }
 
@@ -476,12 +476,12 @@ static bool look_around(bslam_recovery_t *recovery, const bslam_slam_t *slam, co
         return false;
     }
     recovery->counters.contradicting += (uint32_t)verdict->contradicting;
-    if (!recovery->has_contradicted || view->time_us - recovery->contradicted_us > CLUE_AGE_US) {
-        recovery->doubted_us = view->time_us;
+    if (!recovery->has_contradicted || view->vantage.moment_us - recovery->contradicted_us > CLUE_AGE_US) {
+        recovery->doubted_us = view->vantage.moment_us;
     }
     recovery->has_contradicted = true;
-    recovery->contradicted_us = view->time_us;
-    return is_elsewhere(recovery, slam, view->time_us, fix);
+    recovery->contradicted_us = view->vantage.moment_us;
+    return is_elsewhere(recovery, slam, view->vantage.moment_us, fix);
 }
 
 /// A frame of a robot in a map that has settled, or in doubt. True if it may be used.
@@ -495,7 +495,7 @@ static bool look_again(bslam_recovery_t *recovery, bslam_slam_t *slam, const vie
         fits_elsewhere(slam, view)) {
         verdict->agreeing = 0;
     }
-    if (notice(recovery, slam, view->time_us, verdict)) {
+    if (notice(recovery, slam, view->vantage.moment_us, verdict)) {
         forget_all(recovery);  // the pose is no longer odometry's alone
         return true;
     }
@@ -511,9 +511,9 @@ static bool look_again(bslam_recovery_t *recovery, bslam_slam_t *slam, const vie
 static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t *view, bool *is_found,
                    bslam_fix_t *fix)
 {
-    note_growth(recovery, slam, view->time_us);
+    note_growth(recovery, slam, view->vantage.moment_us);
     tally_t verdict = weigh(recovery, slam, view);
-    if (recovery->evidence > 0 || !is_growing(recovery, slam, view->time_us)) {
+    if (recovery->evidence > 0 || !is_growing(recovery, slam, view->vantage.moment_us)) {
         return look_again(recovery, slam, view, &verdict);
     }
     *is_found = look_around(recovery, slam, view, &verdict, fix);
@@ -527,13 +527,13 @@ static bool follow(bslam_recovery_t *recovery, bslam_slam_t *slam, const view_t 
 bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t *slam, int64_t time_us,
                                         const bslam_sighting_t *sightings, int count)
 {
-    view_t view = {.time_us = time_us, .sightings = sightings, .count = count};
-    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &view.mount);
+    view_t view = {.sightings = sightings, .count = count};
+    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &view.vantage);
     if (status != BSLAM_OK) {
         return status;
     }
     bslam_identify(slam, sightings, count, view.who);
-    forget_old(recovery, slam, time_us);
+    forget_old(recovery, slam, view.vantage.moment_us);
     bslam_fix_t fix;
     bool use = false;
     bool is_found = false;
@@ -548,7 +548,7 @@ bslam_status_t bslam_recovery_sightings(bslam_recovery_t *recovery, bslam_slam_t
         use = follow(recovery, slam, &view, &is_found, &fix);
     }
     recovery->counters.withheld += use ? 0u : 1u;
-    bslam_slam_close_frame(slam, time_us, sightings, count, &view.mount, use);
+    bslam_slam_close_frame(slam, &view.vantage, sightings, count, use);
     if (is_found) {  // behind it: of a lost robot's frame the map stays as it is
         be_found(recovery, slam, &fix);
     }

@@ -1,3 +1,4 @@
+#include "base/trig.h"
 #include "bslam/association/duplicates.h"
 #include "bslam/association/missed_beacons.h"
 #include "bslam/model/noise.h"
@@ -8,20 +9,82 @@
 static const bslam_real_t DOUBTFUL_HEADING_RAD2 = BSLAM_R(0.01);
 
 static const bslam_real_t MICROMETRES_PER_M = BSLAM_R(1e6);
+static const bslam_real_t SECONDS_PER_US = BSLAM_R(1e-6);
 
-/// Where the sensor of a frame is on the robot, which has come as far as odometry has: of a frame that is
-/// ahead of it, where it will be.
-static bslam_pose_t mount_of_frame(const bslam_slam_t *slam, int64_t behind_us)
+// ---- from where a frame was taken -------------------------------------------------------------------------
+
+/// Of a frame that is older than the filter: the way since is odometry's, and so is its doubt; of speeds that
+/// are states the filter knows more.
+static bslam_pose_t look_back(const bslam_slam_t *slam, int64_t back_us, bslam_vantage_t *vantage)
+{
+    bslam_history_view_t view = {.robot = {0, 0, 0}};
+    const bslam_status_t status = bslam_history_look_back(&slam->history, &slam->settings, back_us, &view);
+    (void)status;  // the frame was checked
+    bslam_real_t forward_var_m2 = view.forward_var_m2, turn_var_rad2 = view.turn_var_rad2;
+    if (slam->settings.velocity_states != 0) {
+        const bslam_robot_t robot = bslam_ekf_robot(&slam->ekf);
+        const bslam_real_t back_s = (bslam_real_t)(int32_t)back_us * SECONDS_PER_US, square = back_s * back_s;
+        forward_var_m2 = square * robot.covariance[BSLAM_STATE_FORWARD][BSLAM_STATE_FORWARD];
+        turn_var_rad2 = square * robot.covariance[BSLAM_STATE_TURN][BSLAM_STATE_TURN];
+    }
+    const bslam_real_t way2_m2 = view.robot.x_m * view.robot.x_m + view.robot.y_m * view.robot.y_m;
+    vantage->position_var_m2 = forward_var_m2 + way2_m2 * turn_var_rad2;
+    vantage->heading_var_rad2 = turn_var_rad2;
+    return view.robot;
+}
+
+/// The filter is there, or has passed it. Of a frame that is ahead of odometry: where the robot will be.
+static bslam_vantage_t vantage_of(const bslam_slam_t *slam, int64_t behind_us)
+{
+    const bslam_settings_t *p = &slam->settings;
+    const int64_t back_us = behind_us - slam->history.filter.behind_us;
+    const int64_t moment_us = slam->elapsed_us - behind_us;
+    bslam_vantage_t vantage = {.mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad},
+                               .moment_us = moment_us > slam->moment_us ? moment_us : slam->moment_us,
+                               .is_elsewhere = back_us != 0};
+    if (vantage.is_elsewhere) {
+        const bslam_motion_t last = bslam_history_newest(&slam->history);
+        const bslam_pose_t robot =
+            back_us < 0 ? bslam_history_look_ahead(p, &last, -back_us) : look_back(slam, back_us, &vantage);
+        vantage.mount = bslam_pose_compose(&robot, &vantage.mount);
+    }
+    return vantage;
+}
+
+/// A sighting of a frame that is older than the filter is as doubtful as the way since makes it.
+static void doubt(const bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam_sighting_t *seen)
+{
+    if (!(vantage->position_var_m2 > 0 || vantage->heading_var_rad2 > 0)) {
+        return;
+    }
+    const bslam_settings_t *settings = &slam->settings;
+    const bslam_real_t sd_rad = seen->bearing_sd_rad > 0 ? seen->bearing_sd_rad : settings->bearing_sd_rad;
+    const bslam_real_t per_m = seen->has_range ? 1 / seen->range_m : settings->ray_inverse_distance_per_m;
+    if (seen->has_range) {
+        seen->range_sd_m =
+            bslam_sqrt(bslam_range_variance_m2(settings, seen, seen->range_m) + vantage->position_var_m2);
+    }
+    seen->bearing_sd_rad =
+        bslam_sqrt(sd_rad * sd_rad + vantage->heading_var_rad2 + vantage->position_var_m2 * per_m * per_m);
+}
+
+/// For the smoother, which knows no place but the filter's: the sighting of a beacon that is off as much
+/// there as the frame's is from where it was taken.
+static void carry_on(const bslam_slam_t *slam, const bslam_vantage_t *vantage, int beacon,
+                     bslam_sighting_t *seen)
 {
     const bslam_settings_t *p = &slam->settings;
     const bslam_pose_t mount = {p->mount_x_m, p->mount_y_m, p->mount_yaw_rad};
-    if (behind_us >= 0) {
-        return mount;
+    bslam_innovation_t there, here;
+    if (vantage->is_elsewhere &&
+        bslam_ekf_innovation(&slam->ekf, p, &vantage->mount, seen, beacon, &there) == BSLAM_OK &&
+        bslam_ekf_innovation(&slam->ekf, p, &mount, seen, beacon, &here) == BSLAM_OK) {
+        seen->bearing_rad += bslam_angle_wrap(there.bearing_rad - here.bearing_rad);
+        seen->range_m += seen->has_range ? there.range_m - here.range_m : 0;
     }
-    const bslam_motion_t last = bslam_history_newest(&slam->history);
-    const bslam_pose_t ahead = bslam_history_look_ahead(p, &last, -behind_us);
-    return bslam_pose_compose(&ahead, &mount);
 }
+
+// ---- accounts ---------------------------------------------------------------------------------------------
 
 static void fill_account(bslam_account_t *account, bslam_outcome_t outcome, bslam_reason_t reason,
                          const bslam_beacon_t *beacon)
@@ -76,8 +139,18 @@ static void count_tentative(bslam_slam_t *slam, int64_t time_us, const bslam_rec
     }
 }
 
+/// What of a sighting the smoother keeps.
+static void keep_seen(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sighting,
+                      int index)
+{
+    bslam_sighting_t taken = bslam_ekf_taken_as(&slam->ekf.beacons[index], sighting);
+    doubt(slam, vantage, &taken);
+    carry_on(slam, vantage, index, &taken);
+    bslam_smoother_see(slam->smoother, &taken, index);
+}
+
 /// Fuses a sighting with the beacon that association chose.
-static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_record_t *record)
+static void fuse_match(bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam_record_t *record)
 {
     bslam_beacon_t *beacon = &slam->ekf.beacons[record->match.beacon];
     bslam_innovation_t *innovation = &record->innovation;
@@ -100,11 +173,10 @@ static void fuse_match(bslam_slam_t *slam, int64_t time_us, bslam_record_t *reco
     account->weight = fusion.weight;
     slam->counters.down_weighted += fusion.weight < 1 ? 1u : 0u;
     if (bslam_slam_smooths(slam)) {
-        const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
-        bslam_smoother_see(slam->smoother, &taken, record->match.beacon);
+        keep_seen(slam, vantage, record->sighting, record->match.beacon);
     }
     beacon->travelled_um = slam->travelled_um;
-    note_match(slam, time_us, record->sighting, beacon, fusion.distance2);
+    note_match(slam, vantage->moment_us, record->sighting, beacon, fusion.distance2);
 }
 
 /// Known data association: a new beacon contradicts another of its label, and that one it.
@@ -118,15 +190,35 @@ static void note_competitors(bslam_slam_t *slam, int index)
     }
 }
 
-static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                    const bslam_record_t *record)
+/// Whether there is room for what a sighting shows, or for the sensor where that has no distance.
+static bool may_begin(const bslam_slam_t *slam, const bslam_pose_t *mount, const bslam_sighting_t *sighting)
+{
+    const bslam_pose_t pose = bslam_ekf_pose(&slam->ekf);
+    const bslam_real_t range_m = sighting->has_range ? sighting->range_m : 0;
+    const bslam_sighted_point_t place = bslam_locate_point(&pose, mount, range_m, sighting->bearing_rad);
+    return bslam_slam_reaches(place.x_m, place.y_m) && bslam_slam_has_uid(slam);
+}
+
+/// As the filter takes it, or the smoother in its place.
+static bslam_status_t begin_beacon(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                                   const bslam_sighting_t *sighting, int *index)
+{
+    const bslam_pose_t *mount = &vantage->mount;
+    bslam_sighting_t seen = *sighting;
+    if (!may_begin(slam, mount, sighting)) {
+        return BSLAM_E_MAP_FULL;
+    }
+    doubt(slam, vantage, &seen);
+    return bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, &seen, index)
+                                    : bslam_ekf_add(&slam->ekf, &slam->settings, mount, &seen, index);
+}
+
+static void add_new(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_record_t *record)
 {
     const bslam_sighting_t *sighting = record->sighting;
     bslam_account_t *account = record->account;
     int index;
-    const bslam_status_t status =
-        bslam_slam_smooths(slam) ? bslam_smoother_add(slam->smoother, &slam->ekf, mount, sighting, &index)
-                                 : bslam_ekf_add(&slam->ekf, &slam->settings, mount, sighting, &index);
+    const bslam_status_t status = begin_beacon(slam, vantage, sighting, &index);
     if (status != BSLAM_OK) {
         reject(slam, BSLAM_REASON_MAP_FULL, NULL, account);
         return;
@@ -135,14 +227,14 @@ static void add_new(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
     beacon->label = sighting->label;
     beacon->beacon_class = sighting->beacon_class;
     beacon->class_lead = sighting->has_range ? 1 : 0;
-    beacon->first_seen_us = time_us;
-    beacon->last_seen_us = time_us;
+    beacon->first_seen_us = vantage->moment_us;
+    beacon->last_seen_us = vantage->moment_us;
     beacon->sightings = 1;
     beacon->travelled_um = slam->travelled_um;
     bslam_slam_confirm_new(slam, beacon, sighting);
     note_competitors(slam, index);
     if (bslam_slam_smooths(slam)) {
-        bslam_smoother_see(slam->smoother, sighting, index);
+        keep_seen(slam, vantage, sighting, index);
     }
     fill_account(account, BSLAM_OUTCOME_NEW, BSLAM_REASON_NONE, beacon);
     account->weight = 1;
@@ -175,11 +267,16 @@ static bool is_vague(const bslam_slam_t *slam, int64_t time_us, const bslam_sigh
 
 // ---- the stages, in their order: bslam_slam_close_frame ---------------------------------------------------
 
-static void associate(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount,
-                      const bslam_sighting_t *sightings, int count)
+static void associate(bslam_slam_t *slam, const bslam_vantage_t *vantage, const bslam_sighting_t *sightings,
+                      int count)
 {
-    const bslam_sighting_frame_t frame = {&slam->ekf, &slam->settings, slam->appearance, mount,
-                                          sightings,  count,           time_us};
+    const bslam_sighting_frame_t frame = {.ekf = &slam->ekf,
+                                          .settings = &slam->settings,
+                                          .appearance = slam->appearance,
+                                          .mount = &vantage->mount,
+                                          .sightings = sightings,
+                                          .count = count,
+                                          .time_us = vantage->moment_us};
     for (int i = 0; i < count; i++) {
         slam->records[i].sighting = &sightings[i];
         slam->records[i].account = &slam->accounts[i];
@@ -200,15 +297,16 @@ static void choose_distances(bslam_slam_t *slam, const bslam_pose_t *mount, int 
     }
 }
 
-static void take_innovation(bslam_slam_t *slam, const bslam_pose_t *mount, bslam_real_t gate_d2,
+static void take_innovation(bslam_slam_t *slam, const bslam_vantage_t *vantage, bslam_real_t gate_d2,
                             bslam_record_t *record)
 {
     bslam_match_t *match = &record->match;
     bslam_innovation_t *innovation = &record->innovation;
     const bslam_beacon_t *beacon = &slam->ekf.beacons[match->beacon];
-    const bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
-    if (bslam_ekf_innovation(&slam->ekf, &slam->settings, mount, &taken, match->beacon, innovation) !=
-        BSLAM_OK) {
+    bslam_sighting_t taken = bslam_ekf_taken_as(beacon, record->sighting);
+    doubt(slam, vantage, &taken);
+    if (bslam_ekf_innovation(&slam->ekf, &slam->settings, &vantage->mount, &taken, match->beacon,
+                             innovation) != BSLAM_OK) {
         reject(slam, BSLAM_REASON_SINGULAR, beacon, record->account);
         match->verdict = BSLAM_VERDICT_REJECT;
     }
@@ -218,14 +316,15 @@ static void take_innovation(bslam_slam_t *slam, const bslam_pose_t *mount, bslam
 
 /// Accounts for every sighting that is not to be fused, and takes the innovations of those that are: all of
 /// them before the first is fused, so that the order within a frame does not matter.
-static void measure(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, int count)
+static void measure(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
-    choose_distances(slam, mount, count);
-    const bslam_real_t gate_d2 = gate_of(slam, time_us);
+    const int64_t moment_us = vantage->moment_us;
+    choose_distances(slam, &vantage->mount, count);
+    const bslam_real_t gate_d2 = gate_of(slam, moment_us);
     for (int i = 0; i < count; i++) {
         bslam_record_t *record = &slam->records[i];
         bslam_match_t *match = &record->match;
-        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, time_us, record->sighting, match)) {
+        if (match->verdict == BSLAM_VERDICT_MATCH && is_vague(slam, moment_us, record->sighting, match)) {
             match->verdict = BSLAM_VERDICT_DEFER;
             match->reason = BSLAM_REASON_AMBIGUOUS;
         }
@@ -234,19 +333,19 @@ static void measure(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mou
         } else if (match->verdict == BSLAM_VERDICT_DEFER) {
             fill_account(record->account, BSLAM_OUTCOME_DEFERRED, match->reason, NULL);
         } else if (match->verdict == BSLAM_VERDICT_MATCH) {
-            take_innovation(slam, mount, gate_d2, record);
+            take_innovation(slam, vantage, gate_d2, record);
         }
     }
 }
 
-static void fuse(bslam_slam_t *slam, int64_t time_us, int count)
+static void fuse(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
     for (int i = 0; i < count; i++) {
         bslam_record_t *record = &slam->records[i];
         if (record->match.verdict == BSLAM_VERDICT_TENTATIVE) {
-            count_tentative(slam, time_us, record);
+            count_tentative(slam, vantage->moment_us, record);
         } else if (record->match.verdict == BSLAM_VERDICT_MATCH) {
-            fuse_match(slam, time_us, record);
+            fuse_match(slam, vantage, record);
         }
     }
 }
@@ -264,26 +363,26 @@ static void correct(bslam_slam_t *slam, int count)
     }
 }
 
-static void augment(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount, int count)
+static void augment(bslam_slam_t *slam, const bslam_vantage_t *vantage, int count)
 {
     for (int i = 0; i < count; i++) {
         const bslam_record_t *record = &slam->records[i];
         if (record->match.verdict == BSLAM_VERDICT_NEW && slam->is_frozen) {
             reject(slam, BSLAM_REASON_FROZEN, NULL, record->account);
         } else if (record->match.verdict == BSLAM_VERDICT_NEW) {
-            add_new(slam, time_us, mount, record);
+            add_new(slam, vantage, record);
         }
     }
 }
 
 /// Not to be inlined: association, before it, goes deepest, and would have its frame on the stack.
-__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, int64_t time_us,
-                                                  const bslam_pose_t *mount, int count)
+__attribute__((noinline)) static void use_matches(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                                                  int count)
 {
-    measure(slam, time_us, mount, count);
-    fuse(slam, time_us, count);
+    measure(slam, vantage, count);
+    fuse(slam, vantage, count);
     correct(slam, count);
-    augment(slam, time_us, mount, count);
+    augment(slam, vantage, count);
 }
 
 // ---- learning ---------------------------------------------------------------------------------------------
@@ -404,10 +503,10 @@ static void tidy_map(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mo
 }
 
 /// Time passes in a withheld frame, too: it leaves what one without sightings does.
-static void tidy(bslam_slam_t *slam, int64_t time_us, const bslam_pose_t *mount)
+static void tidy(bslam_slam_t *slam, const bslam_vantage_t *vantage)
 {
     if (!slam->is_lost) {
-        tidy_map(slam, time_us, mount);
+        tidy_map(slam, vantage->moment_us, &vantage->mount);
     }
     if (bslam_slam_smooths(slam)) {
         bslam_smoother_frame(slam->smoother, &slam->settings, &slam->ekf);
@@ -430,7 +529,7 @@ static void count_accounts(bslam_slam_t *slam, int count)
 }
 
 bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
-                                     int count, bslam_pose_t *mount)
+                                     int count, bslam_vantage_t *vantage)
 {
     int64_t behind_us;
     const bslam_status_t status = bslam_slam_check_frame(slam, time_us, sightings, count, &behind_us);
@@ -438,8 +537,11 @@ bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us, const 
         slam->counters.frames_refused++;
         return status;
     }
+    bslam_slam_note_frame(slam, time_us, sightings, count);
     bslam_slam_predict_until(slam, behind_us > 0 ? behind_us : 0);
-    *mount = mount_of_frame(slam, behind_us);
+    *vantage = vantage_of(slam, behind_us);
+    slam->moment_us = vantage->moment_us;
+    bslam_odometry_start(&slam->odometry, time_us);
     return BSLAM_OK;
 }
 
@@ -450,21 +552,18 @@ static void withhold(bslam_slam_t *slam, int count)
     }
 }
 
-void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
-                            const bslam_pose_t *mount, bool use)
+void bslam_slam_close_frame(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                            const bslam_sighting_t *sightings, int count, bool use)
 {
     if (use && !slam->is_lost) {
-        associate(slam, time_us, mount, sightings, count);
+        associate(slam, vantage, sightings, count);
         bslam_slam_mark_tentative(slam, count);
-        use_matches(slam, time_us, mount, count);  // measure, fuse, correct, augment
-        learn(slam, time_us, sightings, count);
+        use_matches(slam, vantage, count);  // measure, fuse, correct, augment
+        learn(slam, vantage->moment_us, sightings, count);
     } else {
         withhold(slam, count);
     }
-    tidy(slam, time_us, mount);
-    slam->last_frame_us = time_us;
-    slam->has_frame = true;
-    bslam_odometry_start(&slam->odometry, time_us);
+    tidy(slam, vantage);
     slam->account_count = count;
     count_accounts(slam, count);
 }
@@ -472,10 +571,10 @@ void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sig
 bslam_status_t bslam_slam_sightings(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
                                     int count)
 {
-    bslam_pose_t mount;
-    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &mount);
+    bslam_vantage_t vantage;
+    const bslam_status_t status = bslam_slam_open_frame(slam, time_us, sightings, count, &vantage);
     if (status == BSLAM_OK) {
-        bslam_slam_close_frame(slam, time_us, sightings, count, &mount, true);
+        bslam_slam_close_frame(slam, &vantage, sightings, count, true);
     }
     return status;
 }

@@ -67,6 +67,67 @@ static bslam_status_t check_sighting(const bslam_sighting_t *sighting)
     return is_finite(sighting) ? BSLAM_E_RANGE : BSLAM_E_NOT_FINITE;
 }
 
+/// Whether the filter has not passed a moment yet, or odometry tells the way back.
+static bool is_remembered(const bslam_slam_t *slam, int64_t behind_us)
+{
+    const int64_t back_us = behind_us - slam->history.filter.behind_us;
+    bslam_history_view_t unused;
+    return back_us <= 0 ||
+           bslam_history_look_back(&slam->history, &slam->settings, back_us, &unused) == BSLAM_OK;
+}
+
+// ---- frames that come again -------------------------------------------------------------------------------
+
+static uint32_t add_word(uint32_t sum, uint32_t word)
+{
+    return (sum ^ word) * UINT32_C(16777619);  // FNV-1a
+}
+
+static uint32_t add_number(uint32_t sum, bslam_real_t number)
+{
+    uint32_t words[sizeof number / sizeof(uint32_t)];
+    memcpy(words, &number, sizeof words);
+    for (size_t w = 0; w < sizeof words / sizeof words[0]; w++) {
+        sum = add_word(sum, words[w]);
+    }
+    return sum;
+}
+
+/// What tells a frame from others; 0: none does, it is empty.
+static uint32_t sum_of(int64_t time_us, const bslam_sighting_t *sightings, int count)
+{
+    uint32_t sum = add_word(add_word(UINT32_C(2166136261), (uint32_t)time_us), (uint32_t)(time_us >> 32));
+    for (int i = 0; i < count; i++) {
+        sum = add_number(add_word(sum, (uint32_t)sightings[i].label), sightings[i].bearing_rad);
+        sum = sightings[i].has_range ? add_number(sum, sightings[i].range_m) : sum;
+    }
+    return count > 0 ? sum : 0;
+}
+
+/// What is newer than all frames was not.
+static bool was_taken(const bslam_slam_t *slam, int64_t behind_us, uint32_t sum)
+{
+    bool found = false;
+    if (slam->elapsed_us - behind_us > slam->moment_us) {
+        return found;
+    }
+    for (int f = 0; f < BSLAM_HISTORY_MAX; f++) {
+        found = found || (sum != 0 && slam->frames[f] == sum);
+    }
+    return found;
+}
+
+void bslam_slam_note_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count)
+{
+    const uint32_t sum = sum_of(time_us, sightings, count);
+    if (sum != 0) {
+        slam->frames[slam->next_frame] = sum;
+        slam->next_frame = (slam->next_frame + 1) % BSLAM_HISTORY_MAX;
+    }
+}
+
+// ---- the whole --------------------------------------------------------------------------------------------
+
 bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings,
                                       int count, int64_t *behind_us)
 {
@@ -74,7 +135,7 @@ bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const
     if (count < 0 || count > BSLAM_SIGHTINGS_MAX) {
         return BSLAM_E_COUNT;
     }
-    if (time_us < 0 || time_us > INT64_MAX / 2 || (slam->has_frame && time_us <= slam->last_frame_us)) {
+    if (time_us < 0 || time_us > INT64_MAX / 2) {
         return BSLAM_E_TIME;
     }
     for (int i = 0; i < count; i++) {
@@ -85,7 +146,7 @@ bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us, const
         }
     }
     *behind_us = bslam_slam_behind_us(slam, time_us - slam->settings.sighting_delay_us);
-    const bool in_reach =
-        *behind_us <= slam->history.filter.behind_us && *behind_us >= -slam->settings.ahead_max_us;
-    return in_reach ? BSLAM_OK : BSLAM_E_TIME;
+    const bool in_reach = *behind_us >= -slam->settings.ahead_max_us && is_remembered(slam, *behind_us);
+    return in_reach && !was_taken(slam, *behind_us, sum_of(time_us, sightings, count)) ? BSLAM_OK
+                                                                                       : BSLAM_E_TIME;
 }

@@ -43,9 +43,10 @@ static void queue_motion(bslam_slam_t *slam, int32_t duration_us, const bslam_mo
         predict_step(slam, 0);
     }
     bslam_history_add(&slam->history, room, duration_us, motion);
+    slam->elapsed_us += duration_us;
 }
 
-static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
+bslam_status_t bslam_slam_queue_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
 {
     bslam_odometry_t odometry = slam->odometry;
     bslam_motion_t motion;
@@ -68,18 +69,6 @@ static bslam_status_t take_odometry(bslam_slam_t *slam, const bslam_odometry_rea
     }
     slam->odometry = odometry;
     return BSLAM_OK;
-}
-
-bslam_status_t bslam_slam_odometry(bslam_slam_t *slam, const bslam_odometry_reading_t *reading)
-{
-    const bslam_status_t status = take_odometry(slam, reading);
-    if (status == BSLAM_OK) {
-        slam->counters.odometry++;
-    } else {
-        slam->counters.odometry_refused++;
-        slam->counters.jumps += status == BSLAM_E_JUMP ? 1u : 0u;
-    }
-    return status;
 }
 
 int64_t bslam_slam_behind_us(const bslam_slam_t *slam, int64_t time_us)

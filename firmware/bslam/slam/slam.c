@@ -6,9 +6,6 @@
 #include "bslam/settings_internal.h"
 #include "base/scalar.h"
 
-static const bslam_real_t POSITION_SD_MAX_M = BSLAM_R(30.0);
-static const bslam_real_t HEADING_SD_MAX_RAD = BSLAM_R(3.2);
-
 bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *settings, int *bad_id)
 {
     const bslam_status_t status = bslam_settings_check(settings, bad_id);
@@ -19,6 +16,7 @@ bslam_status_t bslam_slam_init(bslam_slam_t *slam, const bslam_settings_t *setti
     *slam = (bslam_slam_t){0};
     slam->settings = copy;
     slam->bad_sighting = -1;
+    slam->elapsed_us = slam->moment_us = 1;  // what was never seen is of 0
     bslam_ekf_init(&slam->ekf, &slam->settings);
     return BSLAM_OK;
 }
@@ -32,26 +30,10 @@ void bslam_slam_restart_smoother(bslam_slam_t *slam)
 
 // ---- the pose ---------------------------------------------------------------------------------------------
 
-static bool are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
+bool bslam_slam_are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_rad)
 {
-    return bslam_in_range(position_sd_m, 0, POSITION_SD_MAX_M) &&
-           bslam_in_range(heading_sd_rad, 0, HEADING_SD_MAX_RAD);
-}
-
-bslam_status_t bslam_slam_resume_odometry(bslam_slam_t *slam, bslam_real_t position_sd_m,
-                                          bslam_real_t heading_sd_rad)
-{
-    if (!are_doubts(position_sd_m, heading_sd_rad)) {
-        return BSLAM_E_RANGE;
-    }
-    bslam_slam_predict_until(slam, 0);
-    bslam_ekf_resume(&slam->ekf, &slam->settings, position_sd_m * position_sd_m,
-                     heading_sd_rad * heading_sd_rad);
-    bslam_slam_restart_smoother(slam);
-    bslam_odometry_restart(&slam->odometry);
-    bslam_history_clear(&slam->history);
-    slam->has_frame = false;
-    return BSLAM_OK;
+    return bslam_in_range(position_sd_m, 0, BSLAM_POSITION_SD_MAX_M) &&
+           bslam_in_range(heading_sd_rad, 0, BSLAM_HEADING_SD_MAX_RAD);
 }
 
 bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bslam_real_t position_sd_m,
@@ -60,7 +42,7 @@ bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
     if (!bslam_is_number(pose->x_m) || !bslam_is_number(pose->y_m) || !bslam_is_number(pose->theta_rad)) {
         return BSLAM_E_NOT_FINITE;
     }
-    if (!are_doubts(position_sd_m, heading_sd_rad)) {
+    if (!bslam_slam_are_doubts(position_sd_m, heading_sd_rad)) {
         return BSLAM_E_RANGE;
     }
     bslam_ekf_set_pose(&slam->ekf, pose, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
@@ -122,7 +104,7 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
     if (!bslam_is_number(x_m) || !bslam_is_number(y_m)) {
         return BSLAM_E_NOT_FINITE;
     }
-    if (label < 0) {
+    if (label < 0 || !bslam_slam_reaches(x_m, y_m)) {
         return BSLAM_E_RANGE;
     }
     for (int b = 0; b < slam->ekf.beacon_count; b++) {
@@ -131,7 +113,8 @@ bslam_status_t bslam_slam_add_known_beacon(bslam_slam_t *slam, int32_t label, bs
         }
     }
     int index;
-    const bslam_status_t status = bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index);
+    const bslam_status_t status =
+        bslam_slam_has_uid(slam) ? bslam_ekf_add_known(&slam->ekf, x_m, y_m, &index) : BSLAM_E_MAP_FULL;
     if (status == BSLAM_OK) {
         slam->ekf.beacons[index].label = label;
         bslam_slam_restart_smoother(slam);
@@ -185,12 +168,11 @@ bslam_status_t bslam_slam_pose_at(const bslam_slam_t *slam, int64_t time_us, bsl
         (void)bslam_slam_robot_at(slam, behind_us, pose);
         return BSLAM_OK;
     }
-    bslam_pose_t relative;
-    const bslam_status_t status =
-        bslam_history_look_back(&slam->history, &slam->settings, back_us, &relative);
+    bslam_history_view_t view;
+    const bslam_status_t status = bslam_history_look_back(&slam->history, &slam->settings, back_us, &view);
     if (status == BSLAM_OK) {
         const bslam_pose_t filter = bslam_ekf_pose(&slam->ekf);
-        *pose = bslam_pose_compose(&filter, &relative);
+        *pose = bslam_pose_compose(&filter, &view.robot);
     }
     return status;
 }
@@ -207,9 +189,9 @@ void bslam_slam_pose_covariance(const bslam_slam_t *slam, bslam_real_t lower[6])
         }
     }
     if (slam->is_lost) {
-        lower[0] += POSITION_SD_MAX_M * POSITION_SD_MAX_M;
-        lower[2] += POSITION_SD_MAX_M * POSITION_SD_MAX_M;
-        lower[5] += HEADING_SD_MAX_RAD * HEADING_SD_MAX_RAD;
+        lower[0] += BSLAM_POSITION_SD_MAX_M * BSLAM_POSITION_SD_MAX_M;
+        lower[2] += BSLAM_POSITION_SD_MAX_M * BSLAM_POSITION_SD_MAX_M;
+        lower[5] += BSLAM_HEADING_SD_MAX_RAD * BSLAM_HEADING_SD_MAX_RAD;
     }
 }
 

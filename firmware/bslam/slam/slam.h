@@ -8,20 +8,29 @@
 #include "bslam/model/odometry_history.h"
 #include "bslam/smoother/smoother.h"
 
+/// Readings that are refused for their time, and follow one another.
+typedef struct bslam_clock_watch {
+    int64_t from_us, to_us;
+    bool has_some;
+} bslam_clock_watch_t;
+
 typedef struct bslam_slam {
     bslam_settings_t settings;
     bslam_ekf_t ekf;
     bslam_odometry_t odometry;
     bslam_history_t history;
     uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
-    int64_t last_frame_us;
-    bool has_frame;
-    bool confirmed_now;              ///< within a frame: it has confirmed a beacon
-    bool measures_distance;          ///< some sighting had one
-    bool is_lost;                    ///< the pose is what odometry makes of one that is unknown
-    bool is_frozen;                  ///< the map: no beacon is added, learned or taken out by itself
-    bslam_appearance_t *appearance;  ///< the caller's; NULL: none attached
-    bslam_smoother_t *smoother;      ///< the caller's; NULL: none attached
+    int64_t elapsed_us;     ///< of odometry: the pipeline's own time, which goes on whatever the clock does
+    int64_t moment_us;      ///< the newest frame's, in it
+    bslam_clock_watch_t watch;
+    uint32_t frames[BSLAM_HISTORY_MAX];  ///< sums over the last ones, so that none is used twice
+    int32_t next_frame;                  ///< where the next sum goes
+    bool confirmed_now;                  ///< within a frame: it has confirmed a beacon
+    bool measures_distance;              ///< some sighting had one
+    bool is_lost;                        ///< the pose is what odometry makes of one that is unknown
+    bool is_frozen;                      ///< the map: no beacon is added, learned or taken out by itself
+    bslam_appearance_t *appearance;      ///< the caller's; NULL: none attached
+    bslam_smoother_t *smoother;          ///< the caller's; NULL: none attached
     bslam_slam_counters_t counters;
     bslam_account_t accounts[BSLAM_SIGHTINGS_MAX];
     int32_t account_count;

@@ -2,9 +2,14 @@
 #ifndef BSLAM_SLAM_SLAM_INTERNAL_H
 #define BSLAM_SLAM_SLAM_INTERNAL_H
 
+#include "base/scalar.h"
 #include "bslam/slam/slam.h"
 
 // ---- odometry_queue.c: odometry waits until a frame shows what comes after it -----------------------------
+
+/// bslam_slam_odometry, but for the counters and a clock that begins again.
+BSLAM_MUST_CHECK bslam_status_t bslam_slam_queue_odometry(bslam_slam_t *slam,
+                                                          const bslam_odometry_reading_t *reading);
 
 /// The filter goes on to the moment until_us before the newest odometry.
 void bslam_slam_predict_until(bslam_slam_t *slam, int64_t until_us);
@@ -22,6 +27,9 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_check_frame(bslam_slam_t *slam, int64_t time_us,
                                                        const bslam_sighting_t *sightings, int count,
                                                        int64_t *behind_us);
+
+/// Remembers a frame that is taken: it is refused when it comes again.
+void bslam_slam_note_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count);
 
 // ---- confirmation.c ---------------------------------------------------------------------------------------
 
@@ -55,21 +63,49 @@ void bslam_slam_vote_class(bslam_slam_t *slam, int index, const bslam_sighting_t
 
 // ---- frame.c: the two halves of bslam_slam_sightings, for who judges a frame first ----------------------
 
-/// Checks a frame and takes the filter to its moment; *mount is where its sensor is on the robot. After
-/// BSLAM_OK bslam_slam_close_frame must follow with the same frame.
+/// From where a frame was taken, as the filter has it that uses the frame.
+typedef struct bslam_vantage {
+    bslam_pose_t mount;  ///< the sensor, from the robot where the filter stands
+    int64_t moment_us;   ///< in the pipeline's own time, which never goes back
+    bool is_elsewhere;   ///< the frame is older than the filter, or newer than odometry
+    bslam_real_t position_var_m2, heading_var_rad2;  ///< of the way since, where the frame is older
+} bslam_vantage_t;
+
+/// Checks a frame and takes the filter to its moment, if it is not there yet. After BSLAM_OK
+/// bslam_slam_close_frame must follow with the same frame.
 BSLAM_MUST_CHECK bslam_status_t bslam_slam_open_frame(bslam_slam_t *slam, int64_t time_us,
                                                       const bslam_sighting_t *sightings, int count,
-                                                      bslam_pose_t *mount);
+                                                      bslam_vantage_t *vantage);
 
 /// Works the frame off. If it is not to be used, it leaves what one without sightings does, but for the
 /// accounts; where the robot is lost, the map stays as it is.
-void bslam_slam_close_frame(bslam_slam_t *slam, int64_t time_us, const bslam_sighting_t *sightings, int count,
-                            const bslam_pose_t *mount, bool use);
+void bslam_slam_close_frame(bslam_slam_t *slam, const bslam_vantage_t *vantage,
+                            const bslam_sighting_t *sightings, int count, bool use);
 
 // ---- slam.c -----------------------------------------------------------------------------------------------
 
+/// The largest doubts of a pose.
+#define BSLAM_POSITION_SD_MAX_M BSLAM_R(30.0)
+#define BSLAM_HEADING_SD_MAX_RAD BSLAM_R(3.2)
+
+/// Whether the doubts of a pose are within 0 and these.
+bool bslam_slam_are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_rad);
+
 /// Where a beacon is in the map, or -1.
 int bslam_slam_find_beacon(const bslam_slam_t *slam, uint32_t uid);
+
+/// Whether the map reaches to a place.
+static inline bool bslam_slam_reaches(bslam_real_t x_m, bslam_real_t y_m)
+{
+    return bslam_in_range(x_m, -BSLAM_PLACE_MAX_M, BSLAM_PLACE_MAX_M) &&
+           bslam_in_range(y_m, -BSLAM_PLACE_MAX_M, BSLAM_PLACE_MAX_M);
+}
+
+/// Whether a uid is left for one more beacon.
+static inline bool bslam_slam_has_uid(const bslam_slam_t *slam)
+{
+    return slam->ekf.next_uid != BSLAM_ALL_BEACONS;
+}
 
 /// Takes a beacon out of the map, and what is known of its appearance with it.
 void bslam_slam_drop_beacon(bslam_slam_t *slam, int index);

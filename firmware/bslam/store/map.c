@@ -18,6 +18,8 @@ enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RA
 
 static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e12);  // so that what it is made of can be written again
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
+// A beacon may have moved away from where it began; no other value is as large.
+static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
 // A beacon of a loaded map was last fused so long ago that its errors are no more alike.
 static const uint32_t LONG_TRAVEL_UM = 1000000000u;
 
@@ -70,6 +72,13 @@ typedef struct stored_beacon {
     uint8_t seen_as[BSLAM_APPEARANCE_CLASSES];
 } stored_beacon_t;
 
+static bslam_real_t move_value(bslam_codec_t *codec, bslam_real_t value)
+{
+    const bslam_real_t moved = bslam_codec_real(codec, value);
+    bslam_codec_require(codec, bslam_in_range(moved, -VALUE_MAX, VALUE_MAX), BSLAM_MAP_CONTENT);
+    return moved;
+}
+
 static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
 {
     bslam_beacon_t *beacon = &record->beacon;
@@ -81,8 +90,8 @@ static void move_record(bslam_codec_t *codec, stored_beacon_t *record)
     beacon->sightings = bslam_codec_whole(codec, beacon->sightings, 4);
     record->scale = bslam_codec_real(codec, record->scale);
     bslam_codec_require(codec, bslam_in_range(record->scale, 0, SCALE_MAX), BSLAM_MAP_CONTENT);
-    record->x_m = bslam_codec_real(codec, record->x_m);
-    record->y_m = bslam_codec_real(codec, record->y_m);
+    record->x_m = move_value(codec, record->x_m);
+    record->y_m = move_value(codec, record->y_m);
     bslam_codec_bytes(codec, record->seen_as, sizeof record->seen_as);
     record->column = bslam_codec_whole(codec, record->column, 2);
     bslam_codec_require(codec, label <= INT32_MAX || label == UINT32_MAX, BSLAM_MAP_CONTENT);
@@ -242,7 +251,7 @@ static void read_values(bslam_codec_t *codec, const header_t *header, const targ
         ekf->dim += (int32_t)header->columns;
     }
     for (uint32_t c = 0; c < header->columns; c++) {
-        const bslam_real_t value = columns->are_values[c] ? bslam_codec_real(codec, 0) : 0;
+        const bslam_real_t value = columns->are_values[c] ? move_value(codec, 0) : 0;
         if (ekf != NULL) {
             ekf->mean[bslam_ekf_map_at(ekf) + (int)c] = value;
         }
@@ -367,7 +376,8 @@ static void read_all(bslam_codec_t *codec, uint32_t crc, const target_t *target)
     bslam_codec_require(codec, codec->at + CRC_BYTES == header.length, BSLAM_MAP_CONTENT);
     bslam_codec_require(codec, ~codec->crc == crc, BSLAM_MAP_UNREADABLE);
     if (target != NULL && codec->fault == BSLAM_MAP_FINE) {
-        target->slam->ekf.next_uid = header.next_uid;
+        uint32_t *next_uid = &target->slam->ekf.next_uid;
+        *next_uid = header.next_uid > *next_uid ? header.next_uid : *next_uid;
     }
 }
 

@@ -5,8 +5,11 @@
 #include "base/crc32.h"
 
 #define MAGIC 0x534c5342u  // "BSLS"
+/// What fills a piece up: as most flash has it before it is written.
+#define ERASED 0xff
 
-enum { HEAD_WORDS = 4, HEAD_BYTES = 16 };
+/// The head has a piece to itself, and the map begins with the next one.
+enum { HEAD_WORDS = 4, HEAD_BYTES = 16, MAP_AT = BSLAM_FLASH_PIECE };
 
 /// One slot as it is found.
 typedef struct slot {
@@ -39,12 +42,19 @@ static void fill_head(uint8_t head[HEAD_BYTES], uint32_t sequence, uint32_t leng
 static bool read_map(const void *context, uint32_t at, void *bytes, uint32_t count)
 {
     const slot_t *slot = context;
-    return slot->flash->read(slot->flash->context, slot->number, HEAD_BYTES + at, bytes, count);
+    return slot->flash->read(slot->flash->context, slot->number, MAP_AT + at, bytes, count);
 }
 
 static bslam_map_source_t source_of(const slot_t *slot)
 {
     return (bslam_map_source_t){read_map, slot, slot->length};
+}
+
+/// Whether an area holds a map of so many bytes, in whole pieces.
+static bool has_room(const bslam_flash_t *flash, uint32_t length)
+{
+    const uint32_t pieces = flash->slot_bytes / BSLAM_FLASH_PIECE;
+    return pieces > 0 && length <= (pieces - 1) * BSLAM_FLASH_PIECE;
 }
 
 static slot_t read_slot(const bslam_flash_t *flash, int number)
@@ -59,7 +69,7 @@ static slot_t read_slot(const bslam_flash_t *flash, int number)
     slot.length = word_at(&head[8]);
     uint8_t expected[HEAD_BYTES];
     fill_head(expected, slot.sequence, slot.length);
-    slot.has_head = memcmp(head, expected, sizeof head) == 0 && slot.length <= flash->slot_bytes - HEAD_BYTES;
+    slot.has_head = memcmp(head, expected, sizeof head) == 0 && has_room(flash, slot.length);
     if (slot.has_head) {
         const bslam_map_source_t source = source_of(&slot);
         slot.fault = bslam_map_check(&source);
@@ -93,15 +103,14 @@ typedef struct writer {
     int slot;
     uint32_t at;
     uint32_t waiting;
-    uint8_t piece[BSLAM_FLASH_PIECE];
+    _Alignas(8) uint8_t piece[BSLAM_FLASH_PIECE];
 } writer_t;
 
 static bool flush(writer_t *writer)
 {
-    memset(&writer->piece[writer->waiting], 0xff, BSLAM_FLASH_PIECE - writer->waiting);
-    const bool fits = writer->at + BSLAM_FLASH_PIECE <= writer->flash->slot_bytes;
-    const bool done = fits && writer->flash->write(writer->flash->context, writer->slot, writer->at,
-                                                   writer->piece, BSLAM_FLASH_PIECE);
+    memset(&writer->piece[writer->waiting], ERASED, BSLAM_FLASH_PIECE - writer->waiting);
+    const bool done = writer->flash->write(writer->flash->context, writer->slot, writer->at, writer->piece,
+                                           BSLAM_FLASH_PIECE);
     writer->at += BSLAM_FLASH_PIECE;
     writer->waiting = 0;
     return done;
@@ -124,7 +133,7 @@ static bool write_piece(void *context, const void *bytes, uint32_t count)
 /// Writes the map behind the head, and looks whether it is there.
 static bslam_map_fault_t write_map(const slot_t *slot, const bslam_slam_t *slam)
 {
-    writer_t writer = {.flash = slot->flash, .slot = slot->number, .at = HEAD_BYTES};
+    writer_t writer = {.flash = slot->flash, .slot = slot->number, .at = MAP_AT};
     const bslam_map_sink_t sink = {write_piece, &writer};
     bslam_map_fault_t fault;
     if (bslam_map_write(slam, &sink, &fault) != BSLAM_OK || (writer.waiting > 0 && !flush(&writer))) {
@@ -142,11 +151,12 @@ bslam_status_t bslam_slots_save(const bslam_flash_t *flash, const bslam_slam_t *
     const bool newer_is_whole = slots[0].fault == BSLAM_MAP_FINE;
     slot_t *slot = newer_is_whole || slots[1].fault != BSLAM_MAP_FINE ? &slots[1] : &slots[0];
     const uint32_t sequence = slots[0].has_head ? slots[0].sequence + 1 : 1;
-    uint8_t head[HEAD_BYTES];
+    _Alignas(8) uint8_t head[BSLAM_FLASH_PIECE];
+    memset(head, ERASED, sizeof head);
     *fault = BSLAM_MAP_UNREADABLE;
     slot->length = bslam_map_size(slam);
     fill_head(head, sequence, slot->length);
-    if (slot->length > flash->slot_bytes - HEAD_BYTES || !flash->erase(flash->context, slot->number)) {
+    if (!has_room(flash, slot->length) || !flash->erase(flash->context, slot->number)) {
         return BSLAM_E_MAP;
     }
     *fault = write_map(slot, slam);
@@ -164,7 +174,7 @@ bslam_status_t bslam_slots_load(const bslam_flash_t *flash, bslam_slam_t *slam, 
     slot_t slots[BSLAM_SLOTS];
     find_slots(flash, slots);
     bslam_status_t status = BSLAM_E_MAP;
-    // One that looks whole may be refused yet: for its covariance, or because it can no longer be read.
+    // One that looks whole may be refused yet: because it can no longer be read.
     for (int s = 0; s < BSLAM_SLOTS && status != BSLAM_OK; s++) {
         const bslam_map_source_t source = source_of(&slots[s]);
         if (slots[s].fault == BSLAM_MAP_FINE) {

@@ -61,6 +61,8 @@ def calibrate(log: Log) -> Calibration:
     truth = log.truth
     if truth is None:
         raise BslamError(f"{log.name}: has no truth; allowed: a log with truth to calibrate with")
+    if not np.isfinite(truth.theta_rad).all():
+        raise BslamError(f"{log.name}: its truth lacks headings; allowed: theta_rad in each row")
     commanded = log.odometry.kind == "velocity"
     lead_us = _best_lead_us(log, truth) if commanded else 0
     windows = _windows(log, truth, lead_us)

@@ -78,8 +78,8 @@ def _pairs(rows: NDArray[np.intp], where: NDArray[np.complex128]) -> Sequence[tu
 
 
 def _poses_at(log: Log, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The robot's poses (n, 3), by the truth if there is one, and where they are known."""
-    if log.truth is not None:
+    """The robot's poses (n, 3), by the truth if there is one with headings, and where they are known."""
+    if log.truth is not None and np.isfinite(log.truth.theta_rad).all():
         return truth_at(log.truth, time_us)
     steps_us, track = step_times_us(log), dead_reckoning(log)
     track[:, 2] = np.unwrap(track[:, 2])

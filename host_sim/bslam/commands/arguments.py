@@ -6,6 +6,7 @@ import argparse
 import math
 import tomllib
 from collections.abc import Callable, Container, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from bslam.errors import BslamError
 from bslam.log import WHEEL_NOISES, WHEEL_SPEED_SIGMA_MPS
 from bslam.maps.blob import SUFFIX
 from bslam.options import (
+    ALIGNMENTS,
     ASSOCIATIONS,
     FILTERS,
     MOTIONS,
@@ -27,9 +29,10 @@ from bslam.options import (
     Number,
     RunOptions,
     parse_association,
+    usual_filter,
 )
 from bslam.runs.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
-from bslam.runs.sources import CameraSource, ScenarioSource
+from bslam.runs.sources import CameraSource, Says, ScenarioSource
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 from bslam.world.scenario import load_scenario
 
@@ -52,14 +55,14 @@ def add_filter_options(parser: argparse.ArgumentParser, lists: Container[str] = 
     add(
         "observation",
         _word(OBSERVATIONS),
-        "distance",
+        "distance" if "observation" in lists else None,
         _names(OBSERVATIONS),
-        "what a sighting tells (default: distance)",
+        "what a sighting tells (default: distance, and direction on a log without any)",
     )
     associations = "{known,known:RATE," + ",".join(ASSOCIATIONS[1:]) + "}"
     meaning = (
         "whose a sighting is; known:RATE: identity wrong at that rate (default: svm where sightings have "
-        "signatures and the map is not known, else known)"
+        "signatures and the map is not known, else known; mahalanobis on a log without identities)"
     )
     add("association", _association, None, associations, meaning)
     meaning = (
@@ -181,6 +184,16 @@ def _rig(arguments: argparse.Namespace) -> str:
     return arguments.rig or load_scenario(arguments.scenario).rig or DEFAULT_RIG
 
 
+def add_align_option(parser: argparse.ArgumentParser) -> None:
+    """How the estimate is brought to a truth that has a frame of its own."""
+    parser.add_argument(
+        "--align",
+        choices=ALIGNMENTS,
+        help="of the estimate to the truth before it is scored (default: none where the truth starts at the "
+        "robot, rigid where it has a frame of its own)",
+    )
+
+
 def add_algorithm_options(parser: argparse.ArgumentParser) -> Any:
     """Algorithms of the user's own; the group, for more of the kind."""
     group = parser.add_argument_group("algorithms")
@@ -249,17 +262,20 @@ def _check_map(arguments: argparse.Namespace) -> None:
         raise BslamError("--known-map with --map: allowed is one of them")
 
 
-def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **changes: Any) -> RunOptions:
+def run_options(
+    arguments: argparse.Namespace, *, says: Says = ScenarioSource.says, **changes: Any
+) -> RunOptions:
     """Options of one run; `changes` win, and are needed where the command takes lists.
 
-    has_looks: the sightings have signatures, as all simulated ones do.
+    says: what the sightings tell; by default as all simulated ones do.
     """
     _check_map(arguments)
     association = changes.pop("association", arguments.association)
-    by_sight = has_looks and not arguments.known_map
-    name, rate = association or ("svm" if by_sight else "known", 0.0)
+    if arguments.known_map and says.identities:
+        says = replace(says, signatures=False)
+    name, rate = association or (says.association, 0.0)
     values = {
-        "observation": arguments.observation,
+        "observation": arguments.observation or says.observation,
         "filter": arguments.filter,
         "sigma_mps": arguments.sigma,
         "motion": arguments.motion,
@@ -274,12 +290,15 @@ def run_options(arguments: argparse.Namespace, *, has_looks: bool = True, **chan
         "kept_map": None if arguments.map is None else str(arguments.map),
         "frozen": arguments.frozen,
         "recovery": arguments.recovery,
+        "align": getattr(arguments, "align", None),
         "parameters": tuple(core_parameters(arguments).items()),
     }
     values |= changes
+    if values["sensor"] == "recorded":  # how a map lies as a whole is an error of the first metres
+        values.setdefault("map_align", "rigid")
     if values["filter"] is None:
         has_map = values["known_map"] or values["kept_map"] is not None
-        values["filter"] = "smoother" if values["observation"] == "direction" and not has_map else "invariant"
+        values["filter"] = "invariant" if has_map else usual_filter(values["observation"])
     return RunOptions(association=name, wrong_identity_rate=rate, **values)
 
 

@@ -81,8 +81,8 @@ def compare(
     arguments: argparse.Namespace,
 ) -> tuple[list[Method], list[RunOptions], ContestResult, list[dict[str, Any]]]:
     """The algorithms, the drives' options, what came of it, and a line for each algorithm."""
-    methods = _methods(arguments)
     sources, options = _drives(arguments)
+    methods = _methods(arguments, options[0].observation)
     for method in methods:
         method.prepare()
     for source in {source.shared: source for source in sources if source.shared is not None}.values():
@@ -92,13 +92,10 @@ def compare(
     return methods, options, result, means(result, methods, BOUND, arguments.map_every)
 
 
-def _methods(arguments: argparse.Namespace) -> list[Method]:
+def _methods(arguments: argparse.Namespace, observation: str) -> list[Method]:
     """Those that come with bslam, all or as --only says, and then the user's. Raises BslamError."""
     shipped = shipped_methods(arguments.map_every)
-    if arguments.only is None:
-        chosen = _possible(shipped, arguments.observation)
-    else:
-        chosen = _named(shipped, arguments.only)
+    chosen = _possible(shipped, observation) if arguments.only is None else _named(shipped, arguments.only)
     for text in arguments.own:
         own = own_method(text)
         if any(other.name == own.name for other in chosen):
@@ -140,8 +137,7 @@ def _drives(arguments: argparse.Namespace) -> tuple[list[Source], list[RunOption
     if Path(arguments.scenario).is_dir():
         source = FolderSource(Path(arguments.scenario).absolute())
         options = [
-            run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed)
-            for seed in arguments.seeds
+            run_options(arguments, says=source.says, sensor="recorded", seed=seed) for seed in arguments.seeds
         ]
         return [source] * len(options), options
     wheels = load_scenario(arguments.scenario).wheels

@@ -25,6 +25,7 @@ from bslam.recording.entries import Call, Counters, Frame, Gap, Map, Reading, St
 from bslam.recording.recorder import MAP_PERIOD_US
 from bslam.runs.kept import read_blob
 from bslam.runs.runner import run_log
+from bslam.runs.sources import what_it_says
 from bslam.target.lines import TARGET_KINDS, TargetError, allowed_targets, open_line
 from bslam.target.remote import RemoteSlam, Told
 from bslam.world.simulate import load_scenario, simulate
@@ -90,9 +91,8 @@ def execute(arguments: argparse.Namespace) -> int:
 def _drive(arguments: argparse.Namespace) -> int:
     folder = Path(arguments.drive)
     log = read_folder(folder) if folder.is_dir() else simulate(load_scenario(arguments.drive), arguments.seed)
-    by_sight = log.sightings.signature is not None
     arguments.target = arguments.robot
-    options = run_options(arguments, has_looks=by_sight, sensor="recorded", seed=arguments.seed)
+    options = run_options(arguments, says=what_it_says(log), sensor="recorded", seed=arguments.seed)
     screen = _Screen(f"{arguments.robot}, driven by {log.name}")
     _Driven(screen, log, options).run(arguments.record, arguments.seconds)
     return 0

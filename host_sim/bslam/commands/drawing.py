@@ -16,11 +16,19 @@ from bslam.view.room import Mapped, Room, draw_room
 from bslam.view.series import Series, draw_run
 from bslam.view.style import png
 
+_ALIGNED = {
+    "none": "",
+    "rigid": " (rigidly aligned with the truth)",
+    "similarity": " (aligned with the truth, scale included)",
+}
+
 
 def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> None:
     """Write NAME.map.png and, if there is a truth, NAME.error.png."""
     write_atomically(out / f"{name}.map.png", png(draw_room(room(name, source, log, trace, evaluation))))
-    if evaluation is not None:
+    path = out / f"{name}.error.png"
+    path.unlink(missing_ok=True)
+    if evaluation is not None and np.isfinite(evaluation.error_m).any():
         series = Series(
             name,
             evaluation.time_s,
@@ -29,7 +37,7 @@ def draw(out: Path, name: str, source: Source, log: Log, trace: Trace, evaluatio
             nees_band_95(1),
             WINDOW_S,
         )
-        write_atomically(out / f"{name}.error.png", png(draw_run(series)))
+        write_atomically(path, png(draw_run(series)))
 
 
 def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluation | None) -> Room:
@@ -38,16 +46,18 @@ def room(name: str, source: Source, log: Log, trace: Trace, evaluation: Evaluati
         mapped = [Mapped(one.x_m, one.y_m, one.covariance_m2, one.confirmed) for one in trace.beacons]
         return Room(name, trace.pose[:, :2], mapped=mapped)
     return Room(
-        title=f"{name} (path and map each rigidly aligned with the truth)" if source.align else name,
+        title=name + _ALIGNED[evaluation.map_align],
         estimate_m=evaluation.estimate[:, :2],
-        truth_m=evaluation.truth[:, :2],
+        truth_m=evaluation.truth[:, :2] if log.truth is not None else None,
         beacons=log.beacons,
-        mapped=[_in_truth(beacon, source, evaluation) for beacon in trace.beacons],
+        identity=log.identity,
+        mapped=[_in_truth(beacon, evaluation) for beacon in trace.beacons],
         walls_m=source.walls_m(),
     )
 
 
-def _in_truth(beacon: MapBeacon, source: Source, evaluation: Evaluation) -> Mapped:
+def _in_truth(beacon: MapBeacon, evaluation: Evaluation) -> Mapped:
     """A beacon in the frame of the truth; if aligned without ellipse, which is relative to the start."""
     x_m, y_m = evaluation.map_to_truth.points(np.array([[beacon.x_m, beacon.y_m]]))[0]
-    return Mapped(float(x_m), float(y_m), None if source.align else beacon.covariance_m2, beacon.confirmed)
+    covariance_m2 = beacon.covariance_m2 if evaluation.map_align == "none" else None
+    return Mapped(float(x_m), float(y_m), covariance_m2, beacon.confirmed)

@@ -10,13 +10,14 @@ import numpy as np
 
 from bslam.errors import BslamError
 from bslam.log import Log, read_folder, write_folder
-from bslam.options import RunOptions
+from bslam.options import RunOptions, usual_filter
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.recording.entries import State, TruePose
 from bslam.recording.reader import SUFFIX
 from bslam.runs.output import tum, write_atomically
 from bslam.runs.runner import run_log
+from bslam.runs.sources import what_it_says
 
 SUMMARY = "write a recording or a log in another format: tum, csv, mcap"
 EXAMPLES = """examples:
@@ -84,8 +85,10 @@ def _to_mcap(path: Path, out: Path) -> list[Path]:
 
 
 def _default_options(log: Log) -> RunOptions:
-    by_sight = log.sightings.signature is not None
-    return RunOptions(association="svm" if by_sight else "known", sensor="recorded")
+    says = what_it_says(log)
+    return RunOptions(
+        says.observation, says.association, filter=usual_filter(says.observation), sensor="recorded"
+    )
 
 
 _FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"tum": _to_tum, "csv": _to_csv, "mcap": _to_mcap}

@@ -7,7 +7,6 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bslam.commands.report import table_of
 from bslam.core.builds import SIZE_CLASSES
@@ -30,10 +29,9 @@ EXAMPLES = f"""examples:
   bslam map merge one{SUFFIX} other{SUFFIX} both{SUFFIX}
   bslam run paper_room --seeds 1:2 --map out/first/paper_room_seed0{SUFFIX}
 
-show prints the beacons and draws NAME.png into --out. export writes JSON, import the map again, to the same
-bytes. merge takes the second map into the frame of the first: it finds the beacons that both have by labels,
-looks and geometry, and is refused where they share too little, or fit together in two ways. docs/MAP.md has
-every byte."""
+show prints the beacons and draws NAME.png into --out. export writes JSON, import the map again. merge takes
+the second map into the frame of the first: it finds the beacons that both have by labels, looks and geometry,
+and is refused where they share too little, or fit together in two ways. docs/MAP.md has every byte."""
 _FILES = {"show": 1, "export": 2, "import": 2, "merge": 3}
 _USES = {"show": "MAP", "export": "MAP FILE.json", "import": "FILE.json MAP", "merge": "MAP MAP MAP"}
 
@@ -79,24 +77,17 @@ def _from_text(path: Path) -> KeptMap:
 
 
 def _write(path: Path, kept: KeptMap) -> None:
-    blob = pack(kept)
+    try:
+        blob = pack(kept)
+    except BslamError as error:
+        raise BslamError(f"{path}: {error}") from error
     ensure_sound(path, blob)
     write_atomically(path, blob)
     print(f"written: {path}, {len(kept.beacons)} beacons, {len(blob)} bytes")
 
 
-def _least_eigenvalue(covariance: NDArray[np.float64]) -> float:
-    """Of the correlations: below 0, but for rounding, it is no covariance."""
-    known = np.diag(covariance) > 0  # the others go with nothing
-    part = covariance[np.ix_(known, known)]
-    sd = np.sqrt(np.diag(part))
-    return float(np.linalg.eigvalsh(part / np.outer(sd, sd))[0]) if known.any() else 1.0
-
-
 def _show(path: Path, out: Path) -> None:
     kept = read_map(path)
-    values = f"{len(kept.values)} state values"
-    print(f"{values}, least eigenvalue of their correlations {_least_eigenvalue(kept.covariance):.1e}")
     slam = Slam(beacons_max=SIZE_CLASSES[-1])
     slam.load_map(path.read_bytes())
     rows = [["uid", "label", "kind", "class", "x m", "y m", "sd m", "scale", "sightings", "machine"]]

@@ -22,7 +22,7 @@ from bslam.commands.drawing import draw
 from bslam.commands.replay import COLLECTIONS, log_sources
 from bslam.commands.report import finish
 from bslam.errors import BslamError
-from bslam.evaluation.truth import step_times_us
+from bslam.evaluation.truth import starts_at_origin, step_times_us
 from bslam.log import Log
 from bslam.moment import FAILED, Stage
 from bslam.options import RunOptions
@@ -132,7 +132,7 @@ class _Show:
         self._job, self._log, self._out = job, log, out
         self._outcome: Outcome | None = None
         self._eye = eye
-        self.player = Player(log, self._run, align=job.source.align, speed=speed, eye=eye)
+        self.player = Player(log, self._run, align=self.stage.aligned, speed=speed, eye=eye)
 
     def _run(self, watcher: Watcher) -> None:
         """All of it, and its files; in the player's thread."""
@@ -163,8 +163,8 @@ def _what(arguments: argparse.Namespace) -> tuple[Source, RunOptions]:
         sources = log_sources(kind, rest, arguments.robot)
         if len(sources) != 1:
             raise BslamError(f"{kind}: {len(sources)} logs; allowed: one DIR, and --robot N with mrclam")
-        looks = sources[0].has_looks
-        return sources[0], run_options(arguments, has_looks=looks, sensor="recorded", seed=arguments.seed)
+        says = sources[0].says
+        return sources[0], run_options(arguments, says=says, sensor="recorded", seed=arguments.seed)
     if rest:
         raise BslamError(
             f"'{rest[0]}' after {kind}; allowed: one SCENARIO or FILE.mcap, or {{csv,mrclam}} DIR"
@@ -193,9 +193,10 @@ def _open(job: Job) -> tuple[Log, Eye | None]:
 def _stage(job: Job, log: Log) -> Stage:
     walls_m = job.source.walls_m()
     points = [walls_m.reshape(-1, 2), np.zeros((1, 2))]
-    if log.truth is not None and not job.source.align:
+    aligned = log.truth is not None and not starts_at_origin(log)
+    if log.truth is not None and not aligned:
         points.append(np.column_stack([log.truth.x_m, log.truth.y_m]))
-    if log.beacons is not None and not job.source.align:
+    if log.beacons is not None and not aligned:
         points.append(np.column_stack([log.beacons.x_m, log.beacons.y_m]))
     robot = log.robot
     low_m, high_m = np.nanmin(np.concatenate(points), axis=0), np.nanmax(np.concatenate(points), axis=0)
@@ -207,7 +208,7 @@ def _stage(job: Job, log: Log) -> Stage:
         walls_m=walls_m,
         beacon_id=np.empty(0, np.int64) if log.beacons is None else log.beacons.beacon_id,
         sensor=(robot.sensor_x_m, robot.sensor_y_m, robot.sensor_yaw_rad),
-        aligned=job.source.align,
+        aligned=aligned,
         has_camera=job.options.sensor == "camera",
         extent_m=extent_m,
     )

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bslam.commands.arguments import add_batch_options, add_filter_options, core_parameters, run_options
+from bslam.commands.arguments import (
+    add_align_option,
+    add_batch_options,
+    add_filter_options,
+    core_parameters,
+    run_options,
+)
 from bslam.commands.drawing import draw
 from bslam.commands.report import finish
 from bslam.datasets.datasets import find_directory
@@ -23,6 +30,7 @@ EXAMPLES = """examples:
   bslam replay drive.mcap --target qemu:mps2_an386
   bslam replay csv out/run/paper_room_seed0
   bslam replay csv recordings/* --filter standard --out out/standard
+  bslam replay csv my_drive --align rigid --preset real-wheels
   bslam replay mrclam MRCLAM_Dataset6 --robot 3
   bslam replay mrclam MRCLAM_Dataset1 MRCLAM_Dataset6 --set huber_d=3
   bslam replay dlr dlr_spatial_cognition --association known
@@ -32,8 +40,8 @@ state is held against the recorded one; exit status 1 if a bit differs. With --s
 otherwise, and nothing is compared.
 csv: DIR is a folder with odometry.csv, sightings.csv, robot.toml and, if known, truth.csv and beacons.csv.
 mrclam: DIR is a set of the UTIAS Multi-Robot Cooperative Localization and Mapping data; all robots without
---robot; figures after rigid alignment.
-dlr: DIR is the DLR Spatial Cognition data set, held against its least-squares solution after rigid alignment.
+--robot.
+dlr: DIR is the DLR Spatial Cognition data set, held against its least-squares solution.
 A DIR that is no path is looked for in the directory named by BSLAM_DATA, else in ../shared/data."""
 COLLECTIONS = {"csv": "paper_room", "mrclam": "mrclam", "dlr": ""}  # folders of the data directory
 _OF_THE_RECORDING = (
@@ -57,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", type=int, choices=range(1, ROBOTS + 1), help="mrclam: one robot (default: all)"
     )
+    add_align_option(parser)
     add_filter_options(parser)
     add_batch_options(parser, "replay")
     parser.set_defaults(defaults={name: parser.get_default(name) for name in _OF_THE_RECORDING})
@@ -82,8 +91,9 @@ def jobs_of(arguments: argparse.Namespace, kind: str, directories: list[str]) ->
     """A run for each log and seed. Raises BslamError."""
     logs = log_sources(kind, directories, arguments.robot)
     pairs = [
-        (source, run_options(arguments, has_looks=source.has_looks, sensor="recorded", seed=seed))
+        (source, run_options(arguments, says=says, sensor="recorded", seed=seed))
         for source in logs
+        for says in [source.says]
         for seed in arguments.seeds
     ]
     return make_jobs([source for source, _ in pairs], [one for _, one in pairs], draw, arguments.pictures)
@@ -99,7 +109,10 @@ def _replay_recordings(arguments: argparse.Namespace, paths: list[str]) -> int:
             raise BslamError(f"{option}: a recording runs with its own parameters; allowed: --set KEY=VALUE")
     changes = core_parameters(arguments)
     sources = [RecordingSource(Path(path)) for path in paths]
-    options = [options_of(source.recording(), arguments.target, changes) for source in sources]
+    options = [
+        replace(options_of(source.recording(), arguments.target, changes), align=arguments.align)
+        for source in sources
+    ]
     jobs = make_jobs(sources, options, draw, arguments.pictures)
     result = run_batch(jobs, arguments.out, arguments.jobs)
     status = finish(result, arguments.out)

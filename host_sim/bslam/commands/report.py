@@ -30,31 +30,50 @@ _COLUMNS = (
 )
 HEADINGS = [heading for heading, _ in _COLUMNS]
 _MOST_ROWS = 40
+_MOST_NOTES = 20
 
 
 def finish(
     result: BatchResult, out: Path, text: str | None = None, more: str = "", means: bool = True
 ) -> int:
-    """Print the runs (or `text` in their place) and where the files are; the exit status.
+    """Print the runs (or `text` in their place), where the files are, and what has to be said of them; the
+    exit status.
 
     Raises BslamError if an input was bad, after all that could run did.
     """
     print(text if text is not None else table([outcome.entry for outcome in result.outcomes], means))
-    presets = dict.fromkeys(", ".join(outcome.entry.get("presets", ())) for outcome in result.outcomes)
-    if any(presets):
-        print(f"presets: {'; '.join(filter(None, presets))}")
+    entries = [outcome.entry for outcome in result.outcomes]
+    _say_each("presets", [", ".join(entry.get("presets", ())) for entry in entries])
+    _say_each("align", [entry.get("align", "") for entry in entries])
     print(f"files in {out}: {', '.join(_files(result, more))}")
     for outcome in result.outcomes:
         if outcome.crash is not None:
             print(f"{outcome.name} failed:\n{outcome.crash}", file=sys.stderr)
-        elif _is_nameless(outcome.entry):
-            hint = "no sighting has an identity: --association nearest or mahalanobis needs none"
-            print(f"{outcome.name}: {hint}", file=sys.stderr)
+    fit = _say_remarks(entries)
     if result.interrupted:
         print("stopped: what was finished is kept", file=sys.stderr)
     if result.bad_input is not None:
         raise BslamError(result.bad_input)
-    return 0 if result.ok else 1
+    return 0 if result.ok and fit else 1
+
+
+def _say_remarks(entries: Sequence[dict[str, Any]]) -> bool:
+    """What is to be said of each run; whether none has a problem."""
+    notes, problems = (
+        [f"{one['name']}: {text}" for one in entries for text in one.get(key, ())]
+        for key in ("notes", "problems")
+    )
+    more = [f"{len(notes) - _MOST_NOTES} more notes in summary.json"] if len(notes) > _MOST_NOTES else []
+    for text in [*notes[:_MOST_NOTES], *more, *problems]:
+        print(text, file=sys.stderr)
+    return not problems
+
+
+def _say_each(what: str, words: Sequence[str]) -> None:
+    """Each different word once."""
+    different = dict.fromkeys(filter(None, words))
+    if different:
+        print(f"{what}: {'; '.join(different)}")
 
 
 def _files(result: BatchResult, more: str) -> list[str]:
@@ -63,12 +82,6 @@ def _files(result: BatchResult, more: str) -> list[str]:
     if not all(outcome.failed for outcome in result.outcomes):
         files += ["NAME.estimate.tum", "NAME.truth.tum", "NAME.map.csv", f"NAME{SUFFIX}", "*.png"]
     return files + ([more] if more else [])
-
-
-def _is_nameless(entry: dict[str, Any]) -> bool:
-    """With identities known, the first sighting that has one is never rejected."""
-    known = str(entry["association"]).startswith("known")
-    return known and 0 < entry.get("sightings", 0) == entry["rejected"]
 
 
 def table(entries: Sequence[dict[str, Any]], means: bool = True) -> str:

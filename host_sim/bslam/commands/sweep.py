@@ -80,22 +80,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario", metavar="FILE", help="a sweep file; or a scenario, by name or path of a TOML file"
     )
-    parser.add_argument(
-        "--restart", action="store_true", help="throw away the runs that DIR keeps, and begin anew"
-    )
+    add_restart_option(parser)
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="a Dask scheduler whose workers make the runs, tcp://HOST:PORT"
     )
     _add_run_options(parser)
 
 
-def _add_run_options(parser: argparse.ArgumentParser) -> None:
+def add_restart_option(parser: argparse.ArgumentParser) -> None:
+    """For a command that keeps its runs."""
+    parser.add_argument(
+        "--restart", action="store_true", help="throw away the runs that DIR keeps, and begin anew"
+    )
+
+
+def add_files_option(parser: argparse.ArgumentParser) -> None:
+    """For a command with many runs."""
     parser.add_argument(
         "--files",
         action=argparse.BooleanOptionalAction,
         default=True,
         help="trajectories and map of each run, about 0.7 MB (default: yes)",
     )
+
+
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
+    add_files_option(parser)
     add_algorithm_options(parser)
     add_sensor_options(parser)
     add_filter_options(parser, lists=_LISTS)
@@ -105,29 +115,40 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
     jobs, plan = jobs_and_plan(arguments)
-    out: Path = arguments.out
-    if arguments.restart:
-        forget(out)
     with contextlib.ExitStack() as stack:
         backend = stack.enter_context(cluster(arguments.cluster)) if arguments.cluster else None
-        store = stack.enter_context(Store(out, plan))
-        result = run_sweep(jobs, store, out, arguments.jobs, backend)
-    status = _finish(result, out)
+        result = make_runs(arguments, jobs, plan, backend)
+    text = combinations(result.entries) if result.entries else ""
+    status = finish(result, arguments.out, "sweep.txt", text)
     if jobs_and_plan(arguments)[1] != plan:
         raise BslamError(f"{arguments.scenario}: was changed while its runs were made, which are of before")
     return status
 
 
-def _finish(result: SweepResult, out: Path) -> int:
-    """Write and say what came of it; the exit status. Raises BslamError if an input was bad."""
+def make_runs(
+    arguments: argparse.Namespace, jobs: Sequence[Job], plan: Mapping[str, str], backend: str | None = None
+) -> SweepResult:
+    """The runs of `jobs`, those that arguments.out keeps and those that it lacks. Raises BslamError."""
+    if arguments.restart:
+        forget(arguments.out)
+    with Store(arguments.out, plan) as store:
+        return run_sweep(jobs, store, arguments.out, arguments.jobs, backend)
+
+
+def finish(result: SweepResult, out: Path, table: str, text: str, **more: Any) -> int:
+    """Write and say what came of it; the exit status. Raises BslamError if an input was bad.
+
+    `table` is the file of `text`, `more` what else summary.json says.
+    """
     failures = [one.entry for one in result.failed]
-    more = {"interrupted": True} if result.missing else {}
+    more |= {"interrupted": True} if result.missing else {}
     write_summary(out, [*result.entries, *failures], **more)
-    files = ["summary.json", "sweep.txt", STORE]
-    if result.entries:
-        text = combinations(result.entries)
-        write_atomically(out / "sweep.txt", text + "\n")
+    files = ["summary.json", STORE]
+    if text:
+        write_atomically(out / table, text + "\n")
+        files.insert(1, table)
         print(text)
+    if result.entries:
         try:
             write_parquet(out / PARQUET, result.entries)
             files.insert(0, PARQUET)

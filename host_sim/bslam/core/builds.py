@@ -4,7 +4,7 @@ from pathlib import Path
 
 FIRMWARE_DIR = Path(__file__).resolve().parents[3] / "firmware"
 
-SIZE_CLASSES = (20, 80)
+SIZE_CLASSES = (20, 80, 250)
 """Beacons that a build holds; `Slam` takes the smallest that suffices."""
 
 REALS = ("float", "double")

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from bslam.core.raw import library
 from bslam.errors import BslamError
 
-PRESETS = ("real-wheels", "paper", "camera", "bearing-only")
+PRESETS = ("real-wheels", "paper", "commanded", "camera", "bearing-only")
 """Their names, in the order of bslam_preset_t. The first two set everything, the others go on top."""
 
 

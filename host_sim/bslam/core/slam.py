@@ -8,17 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core.appearance import SIGNATURE_SIZE, encode
+from bslam.core.inputs import INT32, checked_rows, frame_rows, number, whole
 from bslam.core.raw import Flash, library
 from bslam.errors import BslamError
 
 BY_APPEARANCE = 3
 """The setting `association` by which classifiers learn (BSLAM_ASSOCIATION_SVM)."""
+_TICKS = (0, 2**32 - 1)
 _NOT_MAPPABLE = 255  # BSLAM_CLASS_NOT_MAPPABLE
-# What velocity_states = 1 allows of other parameters: the only contradictions that there are.
-_BESIDE_VELOCITY_STATES = {
-    "scale_states": "0",
-    "left_speed_sd_mps": "a number above 0",
-    "right_speed_sd_mps": "a number above 0",
+_BESIDE_SPEEDS = "contradicts velocity_states = 1: allowed beside it is"
+# What is wrong with a parameter that is within its range.
+_CONTRADICTIONS = {
+    "scale_states": f"{_BESIDE_SPEEDS} 0",
+    "left_speed_sd_mps": f"{_BESIDE_SPEEDS} a number above 0",
+    "right_speed_sd_mps": f"{_BESIDE_SPEEDS} a number above 0",
+    "range_sd_floor_m": "leaves distances without noise: allowed are range_sd_floor_m, range_sd_fraction and "
+    "range_sd_per_m that make 1 mm or more at 1 m",
+    "counter_modulus": "tells no direction: allowed are 0 and whole numbers from 3",
 }
 
 
@@ -81,7 +87,7 @@ class Slam:
         real: str = "float",
         seeds: NDArray[np.float32] | None = None,
     ) -> None:
-        self._raw = library(real, beacons_max)
+        self._raw = library(str(real), whole(beacons_max, "beacons_max", INT32))
         self._lib, self._ffi = self._raw.lib, self._raw.ffi
         self._robot = self._ffi.new("bslam_t *")
         self._reading = self._ffi.new("bslam_odometry_reading_t *")
@@ -105,10 +111,12 @@ class Slam:
         self._begin(self._robot)
 
     def _set(self, params: Mapping[str, float]) -> None:
+        if not isinstance(params, Mapping):
+            raise BslamError(f"settings {params!r}: allowed is a mapping, names to numbers")
         for name, value in params.items():
             if name not in self._table:
                 raise BslamError(f"parameter {name!r} does not exist; allowed are {', '.join(self._table)}")
-            parameter = self._table[name]
+            parameter, value = self._table[name], number(value, f"parameter {name} =")
             if not parameter.low <= value <= parameter.high or (parameter.is_integer and value != int(value)):
                 kind = "a whole number" if parameter.is_integer else "a number"
                 allowed = f"{kind} from {parameter.low:g} to {parameter.high:g}"
@@ -129,8 +137,8 @@ class Slam:
         status = self._lib.bslam_init_sized(robot, size, sizes, self._settings, bad)
         if bad[0] >= 0:
             name = self._raw.text(self._lib.bslam_settings_info(bad[0]).name)
-            message = f"parameter {name} = {getattr(self._settings, name):g} contradicts velocity_states = 1"
-            self._raw.ensure(status, f"{message}: allowed beside it is {_BESIDE_VELOCITY_STATES[name]}")
+            value = getattr(self._settings, name)
+            self._raw.ensure(status, f"parameter {name} = {value:g} {_CONTRADICTIONS[name]}")
         self._raw.ensure(status, f"{self._settings.seed_count} seeds")
 
     def restart(self, position_sd_m: float, heading_sd_rad: float) -> None:
@@ -138,7 +146,8 @@ class Slam:
 
         Only with the setting `guard`. Raises CoreError if the memory holds no such state.
         """
-        status = self._lib.bslam_restart(self._robot, position_sd_m, heading_sd_rad)
+        doubt = _doubt(position_sd_m, heading_sd_rad)
+        status = self._lib.bslam_restart(self._robot, *doubt)
         self._raw.ensure(status, f"restart with sd {position_sd_m} m, {heading_sd_rad} rad")
 
     @staticmethod
@@ -196,27 +205,26 @@ class Slam:
         if kind not in self._sources:
             raise BslamError(f"odometry of kind {kind!r}: allowed are {', '.join(self._sources)}")
         source, name_a, name_b = self._sources[kind]
+        where = f"odometry at {time_us} us"
         reading = self._reading
+        reading.time_us = whole(time_us, f"{where}: time_us")
+        for name, value in ((name_a, a), (name_b, b)):
+            what = f"{where}: {name}"
+            setattr(reading, name, whole(value, what, _TICKS) if kind == "ticks" else number(value, what))
         reading.source = source
-        try:
-            reading.time_us = time_us
-            setattr(reading, name_a, a)
-            setattr(reading, name_b, b)
-        except OverflowError as error:
-            raise BslamError(f"odometry at {time_us} us ({name_a} {a}, {name_b} {b}): {error}") from error
         reading.has_gyro = gyro_radps is not None
-        reading.gyro_radps = gyro_radps or 0.0
-        reading.gyro_sd_radps = gyro_sd_radps
+        reading.gyro_radps = 0.0 if gyro_radps is None else number(gyro_radps, f"{where}: gyro_radps")
+        reading.gyro_sd_radps = number(gyro_sd_radps, f"{where}: gyro_sd_radps")
         status = self._lib.bslam_odometry(self._robot, reading)
         if status:
-            self._raw.ensure(status, f"odometry at {time_us} us ({name_a} {a}, {name_b} {b})")
+            self._raw.ensure(status, f"{where} ({name_a} {a}, {name_b} {b})")
 
     def resume_odometry(self, position_sd_m: float, heading_sd_rad: float) -> None:
         """After an interruption: the next reading starts the clock, and the pose is this much more doubtful.
 
         Raises CoreError if a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
-        status = self._lib.bslam_resume_odometry(self._robot, position_sd_m, heading_sd_rad)
+        status = self._lib.bslam_resume_odometry(self._robot, *_doubt(position_sd_m, heading_sd_rad))
         self._raw.ensure(status, f"resume with sd {position_sd_m} m, {heading_sd_rad} rad")
 
     def sightings(
@@ -242,21 +250,31 @@ class Slam:
 
         Raises CoreError if refused, BslamError for what C cannot be told: the estimate is then unchanged.
         """
-        silent = [0.0] * len(bearing_rad)
-        noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
-        classes = told_classes(mappable, beacon_class)
-        rows = list(zip(bearing_rad, range_m, label, classes, *noise, score or silent, strict=True))
+        where = f"frame at {time_us} us"
+        at_us = whole(time_us, f"{where}: time_us")
+        rows = frame_rows(
+            where,
+            bearing_rad=bearing_rad,
+            range_m=range_m,
+            label=label,
+            mappable=mappable,
+            bearing_sd_rad=bearing_sd_rad,
+            range_sd_m=range_sd_m,
+            range_scale_sd=range_scale_sd,
+            beacon_class=beacon_class,
+            score=score,
+        )
         if signature is not None:
             signature = _checked_signatures(signature, len(rows))
         try:
             array = self._raw.sightings(rows, signature)
-            status = self._lib.bslam_sightings(self._robot, time_us, array, len(rows))
-        except OverflowError as error:
-            raise BslamError(f"frame at {time_us} us: {error}") from error
+        except (OverflowError, TypeError, ValueError):
+            array = self._raw.sightings(checked_rows(where, rows), signature)
+        status = self._lib.bslam_sightings(self._robot, at_us, array, len(rows))
         if status:
             bad = self._lib.bslam_health(self._robot).bad_sighting
             which = f", sighting {bad} {rows[bad]}" if bad >= 0 else f", {len(rows)} sightings"
-            self._raw.ensure(status, f"frame at {time_us} us{which}")
+            self._raw.ensure(status, f"{where}{which}")
         accounts = self._lib.bslam_results(self._robot, self._ffi.new("int *"))
         return [self._account(accounts[i]) for i in range(len(rows))]
 
@@ -276,7 +294,7 @@ class Slam:
 
     def pose_at(self, time_us: int) -> tuple[float, float, float]:
         """The pose at a time within the history. Raises CoreError outside it."""
-        status = self._lib.bslam_pose_at(self._robot, time_us, self._pose)
+        status = self._lib.bslam_pose_at(self._robot, whole(time_us, "pose at time_us"), self._pose)
         if status:
             self._raw.ensure(status, f"pose at {time_us} us")
         return self._pose.x_m, self._pose.y_m, self._pose.theta_rad
@@ -317,7 +335,9 @@ class Slam:
 
     def add_known_beacon(self, label: int, x_m: float, y_m: float) -> None:
         """A beacon whose position is given and never changes. Raises CoreError."""
-        status = self._lib.bslam_add_known_beacon(self._robot, label, x_m, y_m)
+        place = (number(x_m, "known beacon: x_m"), number(y_m, "known beacon: y_m"))
+        identity = whole(label, "known beacon: label", INT32)
+        status = self._lib.bslam_add_known_beacon(self._robot, identity, *place)
         self._raw.ensure(status, f"known beacon {label} at ({x_m}, {y_m})")
 
     def set_pose(
@@ -327,8 +347,9 @@ class Slam:
 
         Raises CoreError if it is not finite, or a standard deviation is outside 0 to 30 m or 0 to 3.2 rad.
         """
-        pose = self._ffi.new("bslam_pose_t *", (x_m, y_m, theta_rad))
-        status = self._lib.bslam_set_pose(self._robot, pose, position_sd_m, heading_sd_rad)
+        values = zip(("x_m", "y_m", "theta_rad"), (x_m, y_m, theta_rad), strict=True)
+        pose = self._ffi.new("bslam_pose_t *", tuple(number(one, f"pose: {name}") for name, one in values))
+        status = self._lib.bslam_set_pose(self._robot, pose, *_doubt(position_sd_m, heading_sd_rad))
         doubt = f"sd {position_sd_m} m, {heading_sd_rad} rad"
         self._raw.ensure(status, f"pose ({x_m}, {y_m}, {theta_rad}) with {doubt}")
 
@@ -355,13 +376,15 @@ class Slam:
             self._raw.ensure(status, f"map of {len(blob)} bytes: {reason}")
 
     def map_fault(self, blob: bytes) -> str:
-        """What `load_map` would say of a blob if there were no map yet: "fine", "bad crc", ..."""
+        """What `load_map` would say of a blob: "fine", "bad crc", ..."""
         empty = self._ffi.new("bslam_t *")
         self._begin(empty)
         return self._load(empty, blob)[1]
 
     def _load(self, robot: Any, blob: bytes) -> tuple[int, str]:
         """Status and the name of the fault."""
+        if not isinstance(blob, (bytes, bytearray, memoryview)):
+            raise BslamError(f"map {blob!r}: allowed are bytes, as save_map gives them")
         context = self._ffi.new_handle(bytes(blob))
         source = self._ffi.new("bslam_map_source_t *", (self._lib.source_read, context, len(blob)))
         fault = self._ffi.new("bslam_map_fault_t *")
@@ -386,7 +409,8 @@ class Slam:
 
     def remove_beacon(self, uid: int) -> None:
         """Takes a beacon out of the map. Raises CoreError if there is none."""
-        self._raw.ensure(self._lib.bslam_remove_beacon(self._robot, uid), f"beacon {uid}")
+        number_of_it = whole(uid, "beacon: uid", (0, 2**32 - 1))
+        self._raw.ensure(self._lib.bslam_remove_beacon(self._robot, number_of_it), f"beacon {uid}")
 
     def counters(self) -> dict[str, int]:
         """Never-decreasing counts by the names in bslam_counters_t; of what is switched off they are 0."""
@@ -406,10 +430,8 @@ class Slam:
         self._raw.ensure(status, "a pose that nobody knows")
 
 
-def told_classes(mappable: Sequence[bool], beacon_class: Sequence[int] | None) -> list[int]:
-    """As C has them: 0 where none is told, 255 for what is not to be mapped."""
-    told = beacon_class or [0] * len(mappable)
-    return [one if is_mappable else _NOT_MAPPABLE for one, is_mappable in zip(told, mappable, strict=True)]
+def _doubt(position_sd_m: Any, heading_sd_rad: Any) -> tuple[float, float]:
+    return number(position_sd_m, "position_sd_m"), number(heading_sd_rad, "heading_sd_rad")
 
 
 def _checked_signatures(signature: NDArray[np.float32], count: int) -> NDArray[np.float32]:
@@ -417,4 +439,7 @@ def _checked_signatures(signature: NDArray[np.float32], count: int) -> NDArray[n
     if np.shape(signature) != (count, SIGNATURE_SIZE):
         shape = np.shape(signature)
         raise BslamError(f"signatures of shape {shape}; allowed: ({count}, {SIGNATURE_SIZE}), or none")
-    return np.ascontiguousarray(signature, np.float32)
+    try:
+        return np.ascontiguousarray(signature, np.float32)
+    except (TypeError, ValueError) as error:
+        raise BslamError(f"signatures: {error}; allowed: numbers") from error

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bslam.core.inputs import number, whole
 from bslam.core.raw import VisionLibrary, vision_library
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
@@ -166,7 +167,7 @@ class FrontEnd:
         `moved`: the robot moved since this camera's picture before. BslamError for another shape, dtype or
         camera than allowed.
         """
-        self._stream(rgb, rgb.shape[0], camera)
+        self._stream(rgb, None, camera)
         self._library.ensure(self._library.lib.bslam_vision_end(self._vision, moved), "the end of a frame")
         return Seeing(tuple(self._candidates()), self._last_reason(), self._turn())
 
@@ -179,16 +180,16 @@ class FrontEnd:
         status = lib.bslam_vision_end(self._vision, True)
         return self._library.ffi.string(lib.bslam_status_name(status)).decode(), self._last_reason()
 
-    def _stream(self, rgb: Picture, rows: int, camera: int) -> None:
-        """Begins a frame, and gives its upper rows."""
+    def _stream(self, rgb: Picture, rows: int | None, camera: int) -> None:
+        """Begins a frame, and gives its upper rows; None: all."""
         lib = self._library.lib
-        self._check_picture(rgb, camera)
+        self._check_picture(rgb, self._checked_camera(camera))
         height, width = rgb.shape[:2]
         pixels_are = lib.BSLAM_PIXELS_RGB888 if rgb.ndim == 3 else lib.BSLAM_PIXELS_RGB565
         begun = lib.bslam_vision_begin(self._vision, camera, pixels_are, width, height)
         self._library.ensure(begun, f"a frame of {width}x{height} for camera {camera}")
         pixels = self._library.pixels(rgb)
-        for row in range(rows):
+        for row in range(height if rows is None else rows):
             self._library.ensure(
                 lib.bslam_vision_row(self._vision, pixels + row * rgb.strides[0]), f"row {row}"
             )
@@ -204,12 +205,13 @@ class FrontEnd:
 
     def threshold(self, camera: int = 0) -> float:
         """The score from which on a box in a camera's pictures is a candidate."""
-        model, kind = self._model, self._cameras[camera].lens.kind
+        model, kind = self._model, self._cameras[self._checked_camera(camera)].lens.kind
         return float((model.pinhole if kind == "pinhole" else model.wide).threshold)
 
     def point(self, camera: int, yaw_rad: float) -> None:
         """Turns a camera on a pan unit. BslamError: no such camera, or |yaw| above pi."""
-        status = self._library.lib.bslam_vision_point(self._vision, camera, yaw_rad)
+        yaw = number(yaw_rad, f"camera {camera}: yaw_rad")
+        status = self._library.lib.bslam_vision_point(self._vision, self._checked_camera(camera), yaw)
         self._library.ensure(status, f"camera {camera} turned to {yaw_rad} rad")
 
     def counts(self) -> dict[str, int]:
@@ -217,17 +219,16 @@ class FrontEnd:
         frames = self._library.lib.bslam_vision_counters(self._vision).frames
         return {self._reason(number): count for number, count in enumerate(frames)}
 
+    def _checked_camera(self, camera: int) -> int:
+        return whole(camera, "camera", (0, len(self._cameras) - 1))
+
     def _check_picture(self, rgb: Picture, camera: int) -> None:
-        if not 0 <= camera < len(self._cameras):
-            raise BslamError(f"camera {camera}: allowed are 0 to {len(self._cameras) - 1}")
         lens = self._cameras[camera].lens
         colour, packed = (lens.height_px, lens.width_px, 3), (lens.height_px, lens.width_px)
-        if (rgb.shape, rgb.dtype) not in (
-            (colour, np.uint8),
-            (packed, np.uint16),
-        ) or not rgb.flags.c_contiguous:
+        what = (getattr(rgb, "shape", "none"), getattr(rgb, "dtype", type(rgb).__name__))
+        if what not in ((colour, np.uint8), (packed, np.uint16)) or not rgb.flags.c_contiguous:
             raise BslamError(
-                f"a picture of shape {rgb.shape}, {rgb.dtype}: allowed for camera {camera}, C-contiguous: "
+                f"a picture of shape {what[0]}, {what[1]}: allowed for camera {camera}, C-contiguous: "
                 f"{colour} uint8, or {packed} uint16 (RGB565)"
             )
 

@@ -36,20 +36,10 @@ ROBOT: Final = Robot(
     range_sigma_scale_m=math.inf,
     range_sigma_floor_m=0.04,
     wheel_noise="actuation",
+    # What the file says of each step's noise, as it grows with travel. Sightings err by up to many times what
+    # it says, and a gate refuses too many of them.
+    settings=(("forward_sd_per_sqrt_m", 0.0095), ("turn_sd_per_sqrt_m", 0.041), ("gate_d2", 0)),
 )
-
-
-# What the file says of each step's noise, as it grows with travel; no speed is known to be steady. Sightings
-# err by up to many times what it says, and a gate refuses too many of them.
-SETTINGS: Final[dict[str, int | float]] = {
-    "velocity_states": 0,
-    "left_speed_sd_mps": 0.0,
-    "right_speed_sd_mps": 0.0,
-    "forward_sd_per_sqrt_m": 0.0095,
-    "turn_sd_per_sqrt_m": 0.041,
-    "gate_d2": 0,
-}
-"""Settings of the core."""
 
 
 def load_dlr(directory: Path | str) -> Log:
@@ -68,7 +58,6 @@ def load_dlr(directory: Path | str) -> Log:
         truth=truth,
         beacons=beacons,
         robot=ROBOT,
-        collection="dlr",
     )
 
 

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth
+from bslam.log import Beacons, Log, Odometry, Robot, Sightings, Truth, wrap_rad
+from bslam.parsing.csvtable import began_at, rows_text
 
 ROBOTS: Final = 5
 # Odometry is resampled to the frame rate of the paper: raw rows come every 10 ms, at times twice, at times
@@ -31,67 +32,18 @@ _TRUTHS: Final = (("full", ""), ("rebuilt", "_rebuilt"), ("sparse", "_sparse"))
 _SWAPPED: Final = {11: (3.15071999, 2.38294871), 17: (0.03596156, -2.84396626)}
 
 # The base of these robots; the widest view in the recordings; the scatter about the truth: range sd 0.02 m +
-# 0.035 r.
+# 0.035 r. An image's stamp is 20 to 40 ms late.
 ROBOT: Final = Robot(
     wheelbase_m=0.258,
-    wheel_speed_sigma_mps=0.0,  # odometry is a command; its errors grow with the motion
+    wheel_speed_sigma_mps=0.0,  # odometry is a command: preset "commanded"
     step_us=STEP_US,
     field_of_view_rad=1.18,
     bearing_sigma_rad=0.02,
     range_sigma_fraction=0.035,
     range_sigma_scale_m=math.inf,
     range_sigma_floor_m=0.02,
+    sighting_delay_us=30_000,
 )
-
-
-# Velocity commands lead the motion that a motion-capture system sees by 0.15-0.20 s (every robot).
-ODOMETRY_LEAD_US: Final = 175_000
-# The stamp of an image is 20-40 ms late.
-_IMAGE_DELAY_US: Final = 30_000
-
-SETTINGS: Final[dict[str, int | float]] = {
-    # A commanded speed is not the driven one, and by how much differs from robot to robot: estimate the
-    # scales.
-    "scale_states": 1,
-    "scale_sd": 0.3,
-    "scale_walk_sqrt_s": 0.001,
-    # What a robot that follows commands errs by grows with travel and turn. The wheels themselves read
-    # nothing.
-    "left_speed_sd_mps": 0.0,
-    "right_speed_sd_mps": 0.0,
-    "forward_sd_per_sqrt_m": 0.05,
-    "turn_sd_per_sqrt_m": 0.05,
-    "turn_sd_per_sqrt_rad": 0.25,
-    # The scatter is 0.02 rad and 0.02 m + 0.035 r, but successive errors are strongly correlated (0.67; 0.96
-    # for the distance), and each robot's distances are biased by 1-2 %: counted as 0.05 rad and 0.18 r.
-    "bearing_sd_rad": 0.05,
-    "range_sd_floor_m": 0.06,
-    "range_sd_fraction": 0.18,
-    "range_sd_per_m": 0.0,
-    # After a wheel slips a hard gate rejects sightings for good; Huber weights let the estimate come back.
-    "gate_d2": 0,
-    "huber_d": 0.5,
-    "sighting_delay_us": ODOMETRY_LEAD_US + _IMAGE_DELAY_US,
-}
-"""Settings of the core: one set for every robot and recording."""
-
-# SETTINGS suit a filter that counts directions without distance for three times their variance besides
-# (bearing_only_variance_factor), which the smoother does not; its errors are as correlated. Tuned on the
-# fifteen runs: with .05, .07, .15 and .2 rad 1, 0, 0 and 0 of them are lost.
-BEARING_ONLY_SMOOTHER_SETTINGS: Final[dict[str, int | float]] = {"bearing_sd_rad": 0.1}
-"""On top of them, for the smoother by directions alone."""
-
-UNKNOWN_IDENTITY_SETTINGS: Final[dict[str, int | float]] = {
-    "scale_sd": 0.08,
-    "turn_sd_per_sqrt_rad": 0.1,
-    "bearing_sd_rad": 0.03,
-    "range_sd_fraction": 0.06,
-    "huber_d": 1.0,
-    "match_d2": 12.0,
-    "new_d2": 100.0,
-    "confirm_window_us": 3_000_000,
-}
-"""On top of them, with identity unknown: association wants sharp noise, consistency wants it inflated."""
 
 
 @dataclass(frozen=True)
@@ -100,17 +52,25 @@ class _Table:
 
     path: Path
     rows: NDArray[np.float64]  # (n, columns)
+    left_out: int = 0  # rows at the start
 
-    def time_us(self, strict: bool) -> NDArray[np.int64]:
-        """First column in microseconds. Raises BslamError where time falls, or if `strict` stands still."""
+    def begun(self, notes: list[str]) -> _Table:
+        """Without rows at the start that time then runs back over."""
+        first = began_at(self.rows[:, 0])
+        if first:
+            back = f"time runs back to {self.rows[first, 0]:.3f} in data row {first + 1}"
+            notes.append(f"{self.path}: left out {rows_text(first)} at the start: {back}")
+        return _Table(self.path, self.rows[first:], first)
+
+    def time_us(self) -> NDArray[np.int64]:
+        """First column in microseconds. Raises BslamError where time falls."""
         times_us = np.rint(self.rows[:, 0] * 1e6).astype(np.int64)
-        step_us = np.diff(times_us)
-        bad = np.flatnonzero(step_us <= 0 if strict else step_us < 0)
+        bad = np.flatnonzero(np.diff(times_us) < 0)
         if len(bad):
             row = int(bad[0]) + 1
             raise BslamError(
-                f"{self.path}, data row {row + 1}: time {self.rows[row, 0]:.3f} does not come after "
-                f"{self.rows[row - 1, 0]:.3f}; allowed: rows in order of time"
+                f"{self.path}, data row {self.left_out + row + 1}: time {self.rows[row, 0]:.3f} does not "
+                f"come after {self.rows[row - 1, 0]:.3f}; allowed: rows in order of time"
             )
         return times_us
 
@@ -123,16 +83,16 @@ def load_mrclam(directory: Path | str, robot: int) -> Log:
     folder = Path(directory)
     if robot not in robots_in(folder):
         raise BslamError(f"{folder}: no robot {robot}; allowed: {_listed(robots_in(folder))}")
-    subject_of = _read_barcodes(folder)
+    subject_of, notes = _read_barcodes(folder), list[str]()
     kind, truth_path = best_truth(folder, robot)
     return Log(
         name=f"{folder.resolve().name}_robot{robot}",
-        odometry=_read_odometry(folder, robot),
-        sightings=_read_sightings(folder, robot, subject_of),
-        truth=_read_truth(truth_path) if kind != "none" else None,
+        odometry=_read_odometry(folder, robot, notes),
+        sightings=_read_sightings(folder, robot, subject_of, notes),
+        truth=_read_truth(truth_path, notes) if kind != "none" else None,
         beacons=_read_landmarks(folder),
         robot=ROBOT,
-        collection="mrclam",
+        notes=tuple(notes),
     )
 
 
@@ -155,14 +115,14 @@ def best_truth(folder: Path, robot: int) -> tuple[str, Path]:
     return "none", folder
 
 
-def _read_odometry(folder: Path, robot: int) -> Odometry:
+def _read_odometry(folder: Path, robot: int, notes: list[str]) -> Odometry:
     """Rows at a steady rate. A command holds from its row until the next one, however far or near that is.
 
     The held command is integrated exactly and divided by the step, so that equal stamps, pauses and jitter of
     the recording leave nothing behind. The first row only marks the start.
     """
-    table = _read_table(_require(folder, f"Robot{robot}_Odometry"), 3)
-    times_us = table.time_us(strict=False)
+    table = _read_table(_require(folder, f"Robot{robot}_Odometry"), 3).begun(notes)
+    times_us = table.time_us()
     start_us = int(times_us[0])
     steps = int(times_us[-1] - start_us) // STEP_US
     grid_us = STEP_US * np.arange(steps + 1, dtype=np.int64)
@@ -173,7 +133,7 @@ def _read_odometry(folder: Path, robot: int) -> Odometry:
     return Odometry("velocity", start_us + grid_us, mean[:, 0], mean[:, 1])
 
 
-def _read_sightings(folder: Path, robot: int, subject_of: dict[int, int]) -> Sightings:
+def _read_sightings(folder: Path, robot: int, subject_of: dict[int, int], notes: list[str]) -> Sightings:
     """The file holds barcodes, whatever its header says; rows of one stamp are one image.
 
     Other robots are not mappable. A barcode in no table is a decoding error: something was seen there, but
@@ -181,12 +141,12 @@ def _read_sightings(folder: Path, robot: int, subject_of: dict[int, int]) -> Sig
     things that carry a barcode are landmarks: for unknown association it is one more sighting to decide
     about, and a wrong decision counts.
     """
-    table = _read_table(_require(folder, f"Robot{robot}_Measurement"), 4)
+    table = _read_table(_require(folder, f"Robot{robot}_Measurement"), 4).begun(notes)
     subject = np.array([subject_of.get(int(code), -1) for code in table.rows[:, 1]], dtype=np.int64)
     return Sightings(
-        time_us=table.time_us(strict=False),
+        time_us=table.time_us(),
         beacon_id=subject,
-        bearing_rad=table.rows[:, 3],
+        bearing_rad=wrap_rad(table.rows[:, 3]),
         range_m=table.rows[:, 2],
         mappable=(subject > ROBOTS) | (subject < 0),
     )
@@ -211,9 +171,15 @@ def _read_landmarks(folder: Path) -> Beacons:
     return Beacons(subject, rows[:, 1], rows[:, 2])
 
 
-def _read_truth(path: Path) -> Truth:
-    table = _read_table(path, 4)
-    return Truth(table.time_us(strict=True), table.rows[:, 1], table.rows[:, 2], table.rows[:, 3])
+def _read_truth(path: Path, notes: list[str]) -> Truth:
+    """True poses; of rows with one stamp, the first."""
+    table = _read_table(path, 4).begun(notes)
+    times_us = table.time_us()
+    first = np.diff(times_us, prepend=-1) > 0
+    if not first.all():
+        notes.append(f"{path}: left out {rows_text(int((~first).sum()))} stamped as the row above")
+    _, x_m, y_m, theta_rad = table.rows[first, :4].T
+    return Truth(times_us[first], x_m, y_m, wrap_rad(theta_rad))
 
 
 def _find(folder: Path, stem: str) -> Path | None:

@@ -1,4 +1,4 @@
-"""Alignment in the plane: rotation and shift, and beside it the scale that directions do not tell."""
+"""Alignment in the plane: rotation and shift, and where wanted the scale, which directions do not tell."""
 
 from __future__ import annotations
 
@@ -38,6 +38,33 @@ class Rigid:
         return Rigid(-self.turn_rad, -float(back[0]), -float(back[1]))
 
 
+@dataclass(frozen=True)
+class Similarity(Rigid):
+    """p -> scale R(turn_rad) p + shift_m."""
+
+    scale: float = 1.0
+
+    def points(self, points_m: Points) -> Points:
+        """(n, 2) -> (n, 2)."""
+        return super().points(points_m * self.scale)
+
+    def inverse(self) -> Similarity:
+        """The transform that undoes this one."""
+        back = Rigid(-self.turn_rad).points(np.array([[self.shift_x_m, self.shift_y_m]]))[0] / self.scale
+        return Similarity(-self.turn_rad, -float(back[0]), -float(back[1]), 1.0 / self.scale)
+
+
+def fit(kind: str, moving_m: Points, fixed_m: Points) -> Rigid:
+    """The transform of a kind, "none", "rigid" or "similarity", that brings one nearest to the other."""
+    if kind == "none":
+        return Rigid()
+    if kind == "rigid":
+        return fit_rigid(moving_m, fixed_m)
+    scale = fit_scale(moving_m, fixed_m)
+    rigid = fit_rigid(scale * moving_m, fixed_m)
+    return Similarity(rigid.turn_rad, rigid.shift_x_m, rigid.shift_y_m, scale)
+
+
 def fit_rigid(moving_m: Points, fixed_m: Points) -> Rigid:
     """The transform that brings `moving_m` nearest to `fixed_m`: least squares over pairs of rows.
 
@@ -56,13 +83,13 @@ def fit_rigid(moving_m: Points, fixed_m: Points) -> Rigid:
 def fit_scale(moving_m: Points, fixed_m: Points) -> float:
     """By how much `moving_m` is to be enlarged so that, after `fit_rigid`, it is nearest to `fixed_m`.
 
-    1 where fewer than two different points leave it open.
+    1 where fewer than two different points, on either side, leave it open.
     """
     if len(moving_m) == 0:
         return 1.0
     p = fit_rigid(moving_m, fixed_m).points(moving_m) - fixed_m.mean(axis=0)
-    spread_m2 = float(np.sum(p**2))
-    return float(np.sum(p * (fixed_m - fixed_m.mean(axis=0)))) / spread_m2 if spread_m2 > 0.0 else 1.0
+    spread_m2, common_m2 = float(np.sum(p**2)), float(np.sum(p * (fixed_m - fixed_m.mean(axis=0))))
+    return common_m2 / spread_m2 if spread_m2 > 0.0 and common_m2 > 0.0 else 1.0
 
 
 def wrap_angle(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:

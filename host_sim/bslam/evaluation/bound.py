@@ -34,7 +34,7 @@ def has_bound(log: Log, options: RunOptions) -> bool:
         options.observation == "direction"
         and log.sightings.bearing_sd_rad is None  # white and alike: no camera's
         and log.truth is not None
-        and starts_at_origin(log.truth)
+        and starts_at_origin(log)
         and log.beacons is not None
         and log.odometry.kind == "wheels"
         and log.robot.sighting_delay_us == 0

@@ -38,6 +38,7 @@ class Ledger:
     missed              rejected, deferred or in a refused frame, although its beacon is in the map
     deferred            left undecided, or of a beacon that is on trial
     rejected            gated out, for whatever reason but that the detector calls it a moving thing
+    refused             in a frame that the core refused as a whole
     """
 
     def __init__(self, uids_in_map: Callable[[], Iterable[int]]) -> None:
@@ -59,6 +60,7 @@ class Ledger:
         """Enter a frame that the core refused as a whole."""
         mapped = self._identities_in_map(set())
         self._counts["sightings"] += len(true_id)
+        self._counts["refused"] += len(true_id)
         self._counts["missed"] += sum(
             use and one in mapped for one, use in zip(true_id, mappable, strict=True)
         )
@@ -81,6 +83,7 @@ class Ledger:
             missed=counts["missed"],
             deferred=counts["deferred"],
             rejected=counts["rejected"] - counts["moving"],
+            refused=counts["refused"],
         )
 
     def _identities_in_map(self, made: set[int]) -> set[int]:

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.evaluation.align import Rigid, fit_rigid, fit_scale
+from bslam.evaluation.align import Points, Rigid, fit, fit_rigid, fit_scale
 from bslam.evaluation.bound import has_bound, mean_bound_m
 from bslam.evaluation.consistency import POSE_95, nees
 from bslam.evaluation.failure import NEES_MAX, is_exact, map_one_to_one, was_off
-from bslam.evaluation.trace import SightingCounts, Trace
-from bslam.evaluation.truth import dead_reckoning, is_dense, odometry_increments, truth_at
-from bslam.log import Log
+from bslam.evaluation.nameless import lay_over, nearest_of
+from bslam.evaluation.remarks import notes_on, problems_of
+from bslam.evaluation.trace import MapBeacon, SightingCounts, Trace
+from bslam.evaluation.truth import (
+    dead_reckoning,
+    is_dense,
+    odometry_increments,
+    starts_at_origin,
+    truth_at,
+)
+from bslam.log import Log, has_identities
 from bslam.options import RunOptions, presets_of, recovery_of, uses_velocity_states, wheel_noise
 
 WINDOW_S: Final = 50.0  # "first" and "last" 50 s
@@ -26,7 +35,9 @@ BEACON_SIGHTINGS: Final = 4  # a true beacon counts if it was sighted at least s
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A run held against the truth; rows as in the trace, NaN where nothing is known."""
+    """A run held against the truth; rows as in the trace, NaN where nothing is known: of a log with nothing
+    but true beacons, in every row.
+    """
 
     time_s: NDArray[np.float64]  # (n + 1,) since the start
     truth: NDArray[np.float64]  # (n + 1, 3) true poses, frame of the truth
@@ -36,22 +47,34 @@ class Evaluation:
     ]  # (n + 1,) distance of the two; NaN at the start, where it is 0 by definition
     nees: NDArray[np.float64]  # (n + 1,) of the pose; NaN before step 51
     dead_reckoning_error_m: NDArray[np.float64]  # (n + 1,)
-    to_truth: Rigid  # map frame -> frame of the truth, by the path
+    align: str  # how the estimate was brought there: "none", "rigid", "similarity"
+    map_align: str  # the same of the map
+    to_truth: Rigid  # map frame -> frame of the truth, by the path; where none is known, by the beacons
     map_to_truth: Rigid  # the same by the beacons: they are judged by their own alignment
 
 
-def evaluate(log: Log, trace: Trace, options: RunOptions, align: bool) -> Evaluation | None:
-    """Errors of a run; None if the log has no truth. `align`: the truth has its own frame (real logs)."""
-    if log.truth is None:
+def evaluate(log: Log, trace: Trace, options: RunOptions) -> Evaluation | None:
+    """Errors of a run; None if the log has neither truth nor true beacons.
+
+    The estimate is aligned as the options say; else not at all where the truth starts at the robot, and
+    rigidly where it has a frame of its own. The map's alignment is its own, and may be of another kind.
+    """
+    if log.truth is None and log.beacons is None:
         return None
-    truth, known = truth_at(log.truth, trace.time_us)
+    align = options.align or ("none" if starts_at_origin(log) else "rigid")
+    map_align = options.align or options.map_align or align
+    truth, known = np.full_like(trace.pose, np.nan), np.zeros(len(trace.pose), dtype=np.bool_)
+    if log.truth is not None:
+        truth, known = truth_at(log.truth, trace.time_us)
     scored = known.copy()
     scored[0] = False
-    to_truth = _fit(trace.pose, truth, scored) if align else Rigid()
+    by_path = fit(align, trace.pose[scored, :2], truth[scored, :2])
+    by_map = _fit_map(map_align, log, trace, by_path if scored.sum() > 1 else None)
+    to_truth = by_path if log.truth is not None else by_map
     estimate = to_truth.poses(trace.pose)
     scales = (float(trace.parameters.get(name, 1.0)) for name in ("forward_scale", "turn_scale"))
     alone = dead_reckoning(log, *scales)
-    alone = (_fit(alone, truth, scored) if align else Rigid()).poses(alone)
+    alone = fit(align, alone[scored, :2], truth[scored, :2]).poses(alone)
     return Evaluation(
         time_s=trace.time_s,
         truth=truth,
@@ -59,8 +82,10 @@ def evaluate(log: Log, trace: Trace, options: RunOptions, align: bool) -> Evalua
         error_m=np.where(scored, _distance(estimate, truth), np.nan),
         nees=_nees(trace, to_truth.inverse().poses(truth), scored, options),
         dead_reckoning_error_m=np.where(scored, _distance(alone, truth), np.nan),
+        align=align,
+        map_align=map_align,
         to_truth=to_truth,
-        map_to_truth=_fit_map(log, trace) if align else Rigid(),
+        map_to_truth=by_map,
     )
 
 
@@ -73,7 +98,7 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         "path_m": _path_m(log, evaluation),
         "seen_any_share": float(np.mean(trace.seen[1:])) if trace.steps else 0.0,
         "beacons_mapped": sum(beacon.confirmed for beacon in trace.beacons),
-        **_count_figures(trace.counts),
+        **_count_figures(log, trace.counts),
         "refused_inputs": sum(trace.refusals.values()),
         "counters": trace.counters,
         "diverged": not np.isfinite(trace.pose).all(),
@@ -82,21 +107,22 @@ def summarise(log: Log, trace: Trace, options: RunOptions, evaluation: Evaluatio
         entry["target_image"] = trace.target
     else:
         entry["step_us_median"] = trace.step_us_median
-    if log.beacons is not None:
+    if log.beacons is not None and has_identities(log):
         entry["beacons_true"] = int(_often_sighted(log).sum())
     if evaluation is not None:
+        entry |= {"align": evaluation.align, "map_align": evaluation.map_align}
         entry |= _position_figures(evaluation)
         entry |= _map_figures(log, trace, evaluation)
-        if options.observation == "direction" and evaluation.to_truth != Rigid():
+        if options.observation == "direction" and evaluation.align != "none":
             entry |= _scaled_figures(log, trace, evaluation)
         if has_bound(log, options) and np.isfinite(evaluation.truth).all():
             entry["bound_error_m"] = mean_bound_m(log, trace.time_us, evaluation.truth)
         entry["diverged"] = bool(entry["diverged"] or _is_lost(evaluation))
-        if log.beacons is not None and (log.sightings.beacon_id >= 0).any():
+        if log.beacons is not None and has_identities(log):
             entry["map_one_to_one"] = _map_one_to_one(log, trace, evaluation)
     entry["failed_by"] = _failures(entry, evaluation)
     entry["failed"] = bool(entry["failed_by"])
-    return entry
+    return entry | {"notes": notes_on(log, trace, options), "problems": problems_of(log, trace, options)}
 
 
 def _failures(entry: dict[str, Any], evaluation: Evaluation | None) -> list[str]:
@@ -113,9 +139,15 @@ def _failures(entry: dict[str, Any], evaluation: Evaluation | None) -> list[str]
     return failures
 
 
-def _count_figures(counts: SightingCounts) -> dict[str, int]:
+_BY_IDENTITY: Final = ("wrong_associations", "false_new", "missed")
+"""Counts that rest on the true identity of each sighting."""
+
+
+def _count_figures(log: Log, counts: SightingCounts) -> dict[str, int]:
     figures = asdict(counts)
-    return figures if figures.pop("told") else {"sightings": counts.sightings}
+    if not figures.pop("told"):
+        return {"sightings": counts.sightings}
+    return {name: one for name, one in figures.items() if has_identities(log) or name not in _BY_IDENTITY}
 
 
 def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
@@ -145,32 +177,40 @@ def describe(options: RunOptions, log: Log | None = None) -> dict[str, Any]:
         "kept_map": options.kept_map,
         "frozen": options.frozen or None,
         "recovery": recovery_of(options),
+        "align": options.align,
     }
     return {word: value for word, value in words.items() if value is not None}
 
 
-def map_pairs(log: Log, trace: Trace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Confirmed beacons and the true ones they stand for, (b, 2) m each; a duplicate counts twice."""
-    if log.beacons is None:
+def map_pairs(
+    log: Log, trace: Trace, to_truth: Rigid | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Confirmed beacons and the true ones they stand for, (b, 2) m each; a duplicate counts twice.
+
+    Where no sighting has an identity, each stands for the true one nearest to it by `to_truth`.
+    """
+    if log.beacons is None or len(log.beacons.x_m) == 0:
         return np.empty((0, 2)), np.empty((0, 2))
-    columns = (log.beacons.beacon_id.tolist(), log.beacons.x_m.tolist(), log.beacons.y_m.tolist())
-    true_m = {identity: (x_m, y_m) for identity, x_m, y_m in zip(*columns, strict=True)}
-    pairs = [
-        ((beacon.x_m, beacon.y_m), true_m[beacon.true_id])
-        for beacon in trace.beacons
-        if beacon.confirmed and beacon.true_id in true_m
-    ]
-    both = np.array(pairs, dtype=np.float64).reshape(-1, 2, 2)
-    return both[:, 0], both[:, 1]
+    mapped = [one for one in trace.beacons if one.confirmed]
+    true_m = np.column_stack([log.beacons.x_m, log.beacons.y_m])
+    if not has_identities(log):
+        mapped_m = _places_m(mapped)
+        near = nearest_of((to_truth or Rigid()).points(mapped_m), true_m)
+        return mapped_m, true_m[near]
+    row_of = {identity: row for row, identity in enumerate(log.beacons.beacon_id.tolist())}
+    mapped = [one for one in mapped if one.true_id in row_of]
+    return _places_m(mapped), true_m[[row_of[one.true_id] for one in mapped]]
 
 
-def _fit(poses: NDArray[np.float64], truth: NDArray[np.float64], rows: NDArray[np.bool_]) -> Rigid:
-    return fit_rigid(poses[rows, :2], truth[rows, :2])
+def _places_m(beacons: Sequence[MapBeacon]) -> Points:
+    return np.array([(one.x_m, one.y_m) for one in beacons], dtype=np.float64).reshape(-1, 2)
 
 
-def _fit_map(log: Log, trace: Trace) -> Rigid:
-    mapped_m, true_m = map_pairs(log, trace)
-    return fit_rigid(mapped_m, true_m)
+def _fit_map(align: str, log: Log, trace: Trace, by_path: Rigid | None) -> Rigid:
+    if has_identities(log) or log.beacons is None:
+        return fit(align, *map_pairs(log, trace))
+    true_m = np.column_stack([log.beacons.x_m, log.beacons.y_m])
+    return lay_over(align, _places_m([one for one in trace.beacons if one.confirmed]), true_m, by_path)
 
 
 def _distance(poses: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -184,6 +224,7 @@ def _nees(
     rows = scored.copy()
     rows[:NEES_FIRST_STEP] = False
     rows &= np.isfinite(trace.covariance).all(axis=(1, 2))  # not every algorithm says how sure it is
+    rows &= np.isfinite(truth[:, 2])
     result = np.full(len(rows), np.nan)
     result[rows] = nees(trace.pose[rows], truth[rows], trace.covariance[rows], options.filter)
     return result
@@ -207,8 +248,10 @@ def _often_sighted(log: Log) -> NDArray[np.bool_]:
 
 
 def _map_one_to_one(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, int]:
+    """Of the beacons whose true place somebody knows, and of clutter that was taken for one."""
     assert log.beacons is not None
-    confirmed_m = np.array([(one.x_m, one.y_m) for one in trace.beacons if one.confirmed]).reshape(-1, 2)
+    judged = {-1, *log.beacons.beacon_id.tolist()}
+    confirmed_m = _places_m([one for one in trace.beacons if one.confirmed and one.true_id in judged])
     true_m = np.column_stack([log.beacons.x_m, log.beacons.y_m])
     return map_one_to_one(evaluation.map_to_truth.points(confirmed_m), true_m, _often_sighted(log))
 
@@ -243,7 +286,7 @@ def _mean_if_any(name: str, values: NDArray[np.float64]) -> dict[str, float]:
 
 
 def _map_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, float]:
-    mapped_m, true_m = map_pairs(log, trace)
+    mapped_m, true_m = map_pairs(log, trace, evaluation.map_to_truth)
     if len(mapped_m) == 0:
         return {}
     distance_m = _distance(evaluation.map_to_truth.points(mapped_m), true_m)
@@ -253,7 +296,7 @@ def _map_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, fl
 def _scaled_figures(log: Log, trace: Trace, evaluation: Evaluation) -> dict[str, float]:
     """What is left of path and map if the scale, which directions leave to odometry, is fitted, too."""
     known = np.isfinite(evaluation.error_m)
-    mapped_m, true_m = map_pairs(log, trace)
+    mapped_m, true_m = map_pairs(log, trace, evaluation.map_to_truth)
     figures = {}
     for name, moving_m, fixed_m in (
         ("position", trace.pose[known, :2], evaluation.truth[known, :2]),

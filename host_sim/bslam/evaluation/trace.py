@@ -35,6 +35,7 @@ class SightingCounts:
     missed: int = 0
     deferred: int = 0
     rejected: int = 0
+    refused: int = 0
     told: bool = True  # False: nobody said what became of them, only `sightings` counts
 
 

@@ -35,9 +35,12 @@ def truth_at(truth: Truth, time_us: NDArray[np.int64]) -> tuple[NDArray[np.float
     return poses, known
 
 
-def starts_at_origin(truth: Truth) -> bool:
-    """True if the truth's frame is that of the start pose, as the map's is."""
-    return max(abs(truth.x_m[0]), abs(truth.y_m[0]), abs(truth.theta_rad[0])) <= 1e-6
+def starts_at_origin(log: Log) -> bool:
+    """True if the truth says that the drive starts at its origin: then its frame is the map's."""
+    if log.truth is None:
+        return False
+    pose, known = truth_at(log.truth, step_times_us(log)[:1])
+    return bool(known[0] and np.all(np.abs(pose[0]) <= 1e-6))
 
 
 def is_dense(truth: Truth) -> bool:
@@ -79,11 +82,18 @@ def _wheels_start_us(log: Log) -> int:
     for a while before the drive must not make its first step longer.
     """
     first_us = int(log.odometry.time_us[0])
-    latest_us = max(first_us - log.robot.step_us, 0)
+    latest_us = max(first_us - _step_us(log), 0)
     tables_us = [log.sightings.time_us] + ([log.truth.time_us] if log.truth is not None else [])
     seen_us = np.concatenate(tables_us)
     near = (seen_us <= latest_us) & (seen_us >= first_us - START_WINDOW_US)
     return int(seen_us[near].max()) if near.any() else latest_us
+
+
+def _step_us(log: Log) -> int:
+    """As the robot says, or where its rows come much more rarely than that, as they do."""
+    times_us = log.odometry.time_us
+    usual_us = int(np.median(np.diff(times_us))) if len(times_us) > 1 else 0
+    return usual_us if usual_us > 1.5 * log.robot.step_us else log.robot.step_us
 
 
 def odometry_increments(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

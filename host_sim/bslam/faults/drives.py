@@ -271,7 +271,7 @@ def _outliers(seeds: int, protected: bool) -> Measured:
 
 def _mean_error_m(log: Log, options: RunOptions) -> tuple[float, Trace]:
     trace = run_log(log, options)
-    evaluation = evaluate(log, trace, options, False)
+    evaluation = evaluate(log, trace, options)
     assert evaluation is not None
     return float(np.nanmean(evaluation.error_m)), trace
 
@@ -293,7 +293,7 @@ def _hours(protected: bool) -> Measured:
     options = RunOptions(association="known", filter=kind, sigma_mps=0.3, velocity_states=protected)
     single_m, single = _mean_error_m(log, options)
     duplicate_m, double = _mean_error_m(log, replace(options, real="double"))
-    evaluation = evaluate(log, single, options, False)
+    evaluation = evaluate(log, single, options)
     assert evaluation is not None
     mean_nees = float(np.nanmean(evaluation.nees))
     repairs = single.counters["insane"] + double.counters["insane"]

@@ -157,7 +157,7 @@ def _roll_over(protected: bool) -> Measured:
 def _encoder_reset(protected: bool) -> Measured:
     course = _ticks(30000, 100, 0, **({} if protected else {"speed_max_mps": 1000.0}))
     jumps = course.slam.counters()["jumps"]
-    kept = jumps == 1 and course.error_m() < 0.05
+    kept = jumps == 2 and course.error_m() < 0.05
     return Measured(kept, f"{jumps} counted, error {course.error_m():.3f} m")
 
 
@@ -310,7 +310,7 @@ def input_faults() -> list[Fault]:
         Fault("dt too long", "refused; after resuming, as doubtful as told", clock, _too_long),
         Fault("long gap", "the covariance covers what was not seen", "the noise of a gap", _long_gap),
         Fault("encoder roll-over", "no jump: error < 2 cm", "the modular difference", _roll_over),
-        Fault("encoder reset", "counted as one jump, error < 5 cm", "speed_max_mps", _encoder_reset),
+        Fault("encoder reset", "two jumps counted, error < 5 cm", "speed_max_mps", _encoder_reset),
         Fault("odometry lost", "ticks: error < 5 cm", "counters in place of increments", _lost_odometry),
         Fault(
             "odometry twice", "refused, pose unchanged", clock, lambda on: _odometry_again(50 * STEP_US, on)

@@ -57,11 +57,11 @@ def _is_noticed(slam: Slam) -> bool:
 
 
 def _indefinite(protected: bool) -> Measured:
-    """The variance of x becomes negative."""
+    """The variance of the heading, which the factor of the covariance begins with, becomes negative."""
     guarded, course = (started(filter=0, guard=on) for on in (int(protected), 0))
     for one in (guarded, course):
         byte, bit = _SIGN
-        flip(one.slam, places_of(one.slam, one.slam.pose_covariance_lower()[0])[0] + byte, bit)
+        flip(one.slam, places_of(one.slam, one.slam.pose_covariance_lower()[5])[0] + byte, bit)
     noticed = _is_noticed(guarded.slam)
     course.drive(1)
     insane = course.slam.counters()["insane"] if protected else 0

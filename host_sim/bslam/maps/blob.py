@@ -13,18 +13,20 @@ from numpy.typing import NDArray
 from bslam.errors import BslamError
 
 SUFFIX: Final = ".bslam"
-VERSION: Final = 2
+VERSION: Final = 3
 KINDS: Final = ("point", "ray", "known", "sized")
 VALUES_OF: Final = {"point": 2, "ray": 4, "known": 0, "sized": 3}
 FEATURES: Final = 71
 CLASSES: Final = 8
 SEED: Final = 255
 _NO_MACHINE: Final = 0xFFFF
-_HEADER: Final = struct.Struct("<4sHHIHHHHII")
-_BEACON: Final = struct.Struct("<IiBBHIfff")
+_HEADER: Final = struct.Struct("<4sHHIHHHHIHH")
+_BEACON: Final = struct.Struct("<IiBBHIfff8BH")
 _MACHINE: Final = struct.Struct("<BBHf")
 _MAGIC: Final = b"BSLM"
 _ORDER: Final = 0x0102
+_ROUNDING: Final = 1e-13
+"""Of a variance: what a sum of products in double may be off by."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +66,12 @@ class KeptMachine:
 
 @dataclass(frozen=True)
 class KeptMap:
-    """A kept map. Covariance: of the state values, in their order."""
+    """A kept map. Covariance: of the state values, in their order. It must be positive semidefinite."""
 
     beacons: tuple[KeptBeacon, ...]
-    values: NDArray[np.float64]  # (n,): x, y of a point, and the scale of a sized one; four of a ray
+    values: NDArray[
+        np.float64
+    ]  # (n,) by beacon: x, y of a point, and the scale of a sized one; four of a ray
     covariance: NDArray[np.float64]  # (n, n)
     next_uid: int
     machines: tuple[KeptMachine, ...] = field(default=())
@@ -80,7 +84,7 @@ class KeptMap:
 
 
 def parse(blob: bytes) -> KeptMap:
-    """What the bytes say. Raises BslamError for what is no whole map of version 1 or 2.
+    """What the bytes say. Raises BslamError for what is no whole map of this version.
 
     The C library looks closer (`Slam.map_fault`): ask it first whether the bytes are sound.
     """
@@ -91,8 +95,10 @@ def parse(blob: bytes) -> KeptMap:
 
 
 def _parse(blob: bytes) -> KeptMap:
-    magic, order, version, length, count, values, machines, features, next_uid, _ = _HEADER.unpack_from(blob)
-    if magic != _MAGIC or order != _ORDER or not 1 <= version <= VERSION:
+    magic, order, version, length, count, values, machines, features, next_uid, columns, _ = (
+        _HEADER.unpack_from(blob)
+    )
+    if (magic, order, version) != (_MAGIC, _ORDER, VERSION):
         raise ValueError("no map, or of another version")
     if (
         length != len(blob)
@@ -102,26 +108,41 @@ def _parse(blob: bytes) -> KeptMap:
         raise ValueError("damaged")
     at = _HEADER.size
     beacons = []
+    own: list[int] = []  # the columns of the state values, by beacon
     for _ in range(count):
-        uid, label, kind, one_class, machine, sightings, scale, x_m, y_m = _BEACON.unpack_from(blob, at)
+        uid, label, kind, one_class, machine, sightings, scale, x_m, y_m, *seen_as, column = (
+            _BEACON.unpack_from(blob, at)
+        )
         at += _BEACON.size
-        seen_as: tuple[int, ...] = (0,) * CLASSES
-        if version >= 2:
-            seen_as = tuple(blob[at : at + CLASSES])
-            at += CLASSES
         owner = None if machine == _NO_MACHINE else machine
         beacons.append(
-            KeptBeacon(uid, label, KINDS[kind], one_class, owner, sightings, scale, x_m, y_m, seen_as)
+            KeptBeacon(uid, label, KINDS[kind], one_class, owner, sightings, scale, x_m, y_m, tuple(seen_as))
         )
-    mean = np.frombuffer(blob, "<f4", values, at).astype(np.float64)
-    at += 4 * values
-    lower = np.frombuffer(blob, "<f4", values * (values + 1) // 2, at)
-    at += 4 * len(lower)
+        own += range(column, column + VALUES_OF[KINDS[kind]])
+    if len(own) != values or len(set(own)) != values or max(own, default=-1) >= columns:
+        raise ValueError("columns of two beacons, or of none")
+    mean, covariance, at = _parse_values(blob, at, own, columns)
     kept = []
     for _ in range(machines):
         machine_read, at = _parse_machine(blob, at)
         kept.append(machine_read)
-    return KeptMap(tuple(beacons), mean, from_lower(lower, values), next_uid, tuple(kept))
+    return KeptMap(tuple(beacons), mean, covariance, next_uid, tuple(kept))
+
+
+def _parse_values(
+    blob: bytes, at: int, own: list[int], columns: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    """Means and covariance of the state values that have these columns, and where the blob goes on."""
+    mean, rows = np.zeros(columns), np.eye(columns)
+    saved = sorted(own)
+    mean[saved] = np.frombuffer(blob, "<f4", len(saved), at)
+    at += 4 * len(saved)
+    variance = np.frombuffer(blob, "<f4", columns, at).astype(np.float64)
+    at += 4 * columns
+    for column in saved:
+        rows[column, :column] = np.frombuffer(blob, "<f4", column, at)
+        at += 4 * column
+    return mean[own], (rows[own] * variance) @ rows[own].T, at
 
 
 def _parse_machine(blob: bytes, at: int) -> tuple[KeptMachine, int]:
@@ -143,21 +164,43 @@ def _parse_machine(blob: bytes, at: int) -> tuple[KeptMachine, int]:
 
 
 def pack(kept: KeptMap) -> bytes:
-    """The bytes of a map, in the newest version."""
+    """The bytes of a map. Raises BslamError for a covariance that is none."""
     body = bytearray()
+    column = 0
     for one in kept.beacons:
         owner = _NO_MACHINE if one.machine is None else one.machine
         kind = KINDS.index(one.kind)
         words = (one.uid, one.label, kind, one.beacon_class, owner, one.sightings)
-        body += _BEACON.pack(*words, one.scale, one.x_m, one.y_m) + bytes(one.seen_as)
-    body += kept.values.astype("<f4").tobytes()
-    body += kept.covariance[np.tril_indices(len(kept.values))].astype("<f4").tobytes()
+        body += _BEACON.pack(*words, one.scale, one.x_m, one.y_m, *one.seen_as, column)
+        column += VALUES_OF[one.kind]
+    rows, variance = _factor(kept.covariance)
+    for numbers in (kept.values, variance, rows[np.tril_indices(column, -1)]):
+        body += numbers.astype("<f4").tobytes()
     for machine in kept.machines:
         body += _pack_machine(machine)
     counts = (len(kept.beacons), len(kept.values), len(kept.machines), FEATURES)
     length = _HEADER.size + len(body) + 4
-    whole = _HEADER.pack(_MAGIC, _ORDER, VERSION, length, *counts, kept.next_uid, 0) + bytes(body)
+    whole = _HEADER.pack(_MAGIC, _ORDER, VERSION, length, *counts, kept.next_uid, column, 0) + bytes(body)
     return whole + struct.pack("<I", zlib.crc32(whole))
+
+
+def _factor(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """L and D of L D Lᵀ. Raises BslamError where a value has less variance than it shares with others."""
+    own = np.diag(covariance)
+    rows, variance, rest = np.eye(len(own)), np.zeros(len(own)), covariance.copy()
+    for k, rounding in enumerate(_ROUNDING * own):
+        left = rest[k:, k].copy()
+        fits = left[0] >= -rounding
+        if left[0] > rounding:
+            variance[k], rows[k:, k] = left[0], left / left[0]
+            rest[k:, k:] -= np.outer(left, rows[k:, k])
+        else:
+            fits &= (left[1:] ** 2 <= rounding * own[k + 1 :]).all()
+        if not fits:
+            raise BslamError(
+                f"covariance: value {k} is left {left[0]:.1e} of its variance; allowed: 0 or more"
+            )
+    return rows, variance
 
 
 def _pack_machine(machine: KeptMachine) -> bytes:

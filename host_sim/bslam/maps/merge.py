@@ -30,6 +30,7 @@ _CLEAR: Final = 1.0  # another way to fit them must count less by this
 _SAME_MOVE: Final = np.array([0.5, 0.5, 0.2])  # m, m, rad
 _STEPS: Final = 10
 _COUNT_MAX: Final = 255
+_UID_END: Final = 2**32 - 1  # the core gives no uid from here on
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,8 @@ def _solve(a: _Points, b: _Points, layout: _Layout, move: Floats) -> tuple[Float
         normal = by_a.T @ weight_a @ by_a + by_b.T @ weight_b @ by_b
         right = by_a.T @ weight_a @ (a.values - by_a @ x) + by_b.T @ weight_b @ (b.values - seen_b)
         x = x + np.linalg.solve(normal, right)
-    covariance: Floats = np.asarray(np.linalg.inv(normal), np.float64)
+    root = np.linalg.inv(np.linalg.cholesky(normal))
+    covariance: Floats = root.T @ root
     end = layout.size
     x[end + 2] = _wrapped(float(x[end + 2]))
     return x[:end], covariance[:end, :end], x[end:], np.sqrt(np.diag(covariance)[end:])
@@ -285,9 +287,12 @@ def _solve(a: _Points, b: _Points, layout: _Layout, move: Floats) -> tuple[Float
 
 def _join(first: KeptMap, second: KeptMap, layout: _Layout, values: Floats, covariance: Floats) -> KeptMap:
     machines, number = _machines(first, second, layout)
+    free_uid = max(first.next_uid, second.next_uid)
+    if free_uid + len(layout.only) > _UID_END:
+        raise BslamError(f"{len(layout.only)} uids from {free_uid} on; allowed are those below {_UID_END}")
     source: list[int] = []
     beacons = []
-    for index, one in enumerate(_beacons(first, layout, number)):
+    for index, one in enumerate(_beacons(free_uid, layout, number)):
         x_m, y_m = values[2 * index : 2 * index + 2].tolist()
         kind = "sized" if index in layout.scale_at and one.kind != "known" else one.kind
         if kind != "known":
@@ -301,20 +306,20 @@ def _join(first: KeptMap, second: KeptMap, layout: _Layout, values: Floats, cova
         tuple(beacons),
         values[source],
         covariance[np.ix_(source, source)],
-        first.next_uid + len(layout.only),
+        free_uid + len(layout.only),
         machines,
     )
 
 
-def _beacons(first: KeptMap, layout: _Layout, number: dict[int, int]) -> list[KeptBeacon]:
-    """All beacons as their maps have them, renamed."""
+def _beacons(free_uid: int, layout: _Layout, number: dict[int, int]) -> list[KeptBeacon]:
+    """All beacons as their maps have them, renamed; uids from `free_uid` on neither map has given."""
     partner = {i: layout.b.beacons[j] for i, j in layout.pairs}
     beacons = [_united(one, partner.get(i), number) for i, one in enumerate(layout.a.beacons)]
     for k, j in enumerate(layout.only):
         new = layout.b.beacons[j]
         machine = None if new.machine is None else number[new.machine]
         kind = "point" if new.kind == "known" else new.kind  # it is as sure as the motion is
-        beacons.append(replace(new, uid=first.next_uid + k, machine=machine, kind=kind))
+        beacons.append(replace(new, uid=free_uid + k, machine=machine, kind=kind))
     return beacons
 
 

@@ -1,4 +1,4 @@
-"""A kept map as JSON, to be read, mended or made by other programs. It comes back to the same bytes."""
+"""A kept map as JSON, to be read, mended or made by other programs. It comes back but for rounding."""
 
 from __future__ import annotations
 

@@ -1,12 +1,14 @@
-"""CSV files with a header and numbers below it, read strictly: every error names file, line and column."""
+"""CSV files with a header and rows below it, read strictly: every error names file, line and column."""
 
 from __future__ import annotations
 
+import csv
 import gzip
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +23,19 @@ class Column:
     allowed: str
     holds: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
     empty: float | None = None  # what an empty field stands for; None: a field must not be empty
+    why: str = ""  # it must be there
+    words: bool = False  # its fields are texts, which somebody else makes sense of
 
 
 def is_count(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Integer, not negative, and small enough to be exact in a double."""
     return (values >= 0) & (values <= 2.0**53) & (np.floor(values) == values)
+
+
+BYTES_MAX = 256 << 20
+"""Of a file's text, unpacked: some days of a drive, and what this computer has room for."""
+HEAD_ROWS = 10
+"""So many rows at the start may have stamps that the clock has not come to: a logger's buffer of before."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +44,25 @@ class Table:
 
     path: Path
     texts: Mapping[str, Sequence[str]]  # the fields as they stand in the file, by column
-    values: Mapping[str, NDArray[np.float64]]  # (rows,) each
+    values: Mapping[str, NDArray[np.float64]]  # (rows,) each; NaN in a column of words
+    line: NDArray[np.int64]  # (rows,) of the file
 
     @property
     def rows(self) -> int:
-        return len(next(iter(self.values.values())))
+        return len(self.line)
 
     def integers(self, column: str) -> NDArray[np.int64]:
         return self.values[column].astype(np.int64)
+
+    def only(self, kept: NDArray[np.bool_]) -> Table:
+        """The same without the rows that are not `kept`."""
+        texts = {
+            name: [one for one, keep in zip(column, kept, strict=True) if keep]
+            for name, column in self.texts.items()
+        }
+        return Table(
+            self.path, texts, {name: one[kept] for name, one in self.values.items()}, self.line[kept]
+        )
 
     def require_rows(self, allowed: str) -> None:
         """Raise BslamError if there is nothing below the header."""
@@ -51,8 +72,11 @@ class Table:
     def require(self, column: str, good: NDArray[np.bool_], allowed: str) -> None:
         """Raise BslamError for the first row of `column` that is not `good`."""
         if not good.all():
-            row = int(np.argmin(good))
-            raise _field_error(self.path, row, column, self.texts[column][row], allowed)
+            raise self.error(int(np.argmin(good)), column, allowed)
+
+    def error(self, row: int, column: str, allowed: str) -> BslamError:
+        """That a field is not allowed, and what is."""
+        return _field_error(self.path, int(self.line[row]), column, self.texts[column][row], allowed)
 
     def require_order(self, column: str, strict: bool) -> None:
         """The values, none negative, must rise from row to row; unless `strict`, they may also stay."""
@@ -60,27 +84,65 @@ class Table:
         good = step > 0 if strict else step >= 0
         self.require(column, good, f"a value {'above' if strict else 'not below'} that of the row before")
 
+    def unrepeated(self, notes: list[str]) -> NDArray[np.bool_]:
+        """Which rows do not say once more, in every column, what one above says; notes what is left out."""
+        columns = [
+            np.array(self.texts[name]) if np.isnan(one).all() else one for name, one in self.values.items()
+        ]
+        codes = [np.unique(one, return_inverse=True)[1] for one in columns]
+        kept = np.zeros(self.rows, dtype=np.bool_)
+        kept[np.unique(np.column_stack(codes), axis=0, return_index=True)[1]] = True
+        if not kept.all():
+            count, first = self.rows - int(kept.sum()), self.line[int(np.argmin(kept))]
+            notes.append(f"{self.path}: left out {rows_text(count)} equal to one above, first line {first}")
+        return kept
+
+    def begun(self, column: str, notes: list[str]) -> NDArray[np.bool_]:
+        """Which rows do not stand at the start with stamps that time then runs back over; notes them."""
+        times = self.values[column]
+        first = began_at(times)
+        if first:
+            where = f"line {self.line[first]}, {column} {self.texts[column][first]}"
+            notes.append(f"{self.path}: left out {rows_text(first)} at the start: time runs back to {where}")
+        return np.arange(self.rows) >= first
+
+
+def rows_text(count: int) -> str:
+    """ "1 row", "2 rows"."""
+    return f"{count} row{'s' if count > 1 else ''}"
+
+
+def began_at(times: NDArray[Any]) -> int:
+    """The row at which the clock begins: 0, or behind a short head of rows that are all later than it."""
+    back = np.flatnonzero(np.diff(times[: HEAD_ROWS + 1]) < 0)
+    first = int(back[-1]) + 1 if len(back) else 0
+    return first if first and times[:first].min() >= times[first] else 0
+
 
 def read_table(
     path: Path, layouts: Sequence[Mapping[str, Column]], optional: Mapping[str, Column] | None = None
 ) -> Table:
     """Read a file with the columns of one of `layouts`, in any order, and perhaps some `optional` ones.
 
-    The file is UTF-8 text, gzipped if it is named so. Raises BslamError that names file, line, column, value
-    and what is allowed.
+    The file is UTF-8 text, gzipped if it is named so; a field may stand in double quotes. Raises BslamError
+    that names file, line, column, value and what is allowed.
     """
     lines = _read_text(path).splitlines()
-    names = [name.strip() for name in lines[0].split(",")] if lines else []
+    names = [name.strip() for name in _fields(lines[0])] if lines else []
     columns = _match_layout(path, names, layouts, optional or {})
     texts = dict(zip(names, _split(path, lines, len(names)), strict=True))
-    return Table(path, texts, {name: _parse(path, name, columns[name], texts[name]) for name in names})
+    line = np.arange(2, len(lines) + 1, dtype=np.int64)
+    return Table(path, texts, {name: _parse(path, name, columns[name], texts[name]) for name in names}, line)
 
 
 def _read_text(path: Path) -> str:
     try:
-        content = path.read_bytes()
-        if path.suffix == ".gz":
-            content = gzip.decompress(content)
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            content = file.read(BYTES_MAX + 1)
+        if len(content) > BYTES_MAX:
+            raise BslamError(
+                f"{path}: it holds more than {BYTES_MAX >> 20} MB of text; allowed: at most that"
+            )
         return content.decode("utf-8-sig")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise BslamError(
@@ -97,44 +159,56 @@ def _match_layout(
             return {**layout, **optional}
     wanted = " or ".join(",".join(layout) for layout in layouts)
     extra = f" (and perhaps {','.join(optional)})" if optional else ""
-    raise BslamError(f"{path}, line 1: columns {','.join(names)!r} are not allowed; allowed: {wanted}{extra}")
+    why = "".join(f"; {one.why}" for name, one in layouts[0].items() if one.why and name not in names)
+    raise BslamError(
+        f"{path}, line 1: columns {','.join(names)!r} are not allowed; allowed: {wanted}{extra}{why}"
+    )
 
 
-def _split(path: Path, lines: Sequence[str], width: int) -> list[tuple[str, ...]]:
-    """The fields below the header, column by column."""
-    rows = [line.split(",") for line in lines[1:]]
+def _fields(line: str) -> list[str]:
+    return next(csv.reader([line]), [""]) if '"' in line else line.split(",")
+
+
+def _split(path: Path, lines: Sequence[str], width: int) -> list[list[str]]:
+    """The fields below the header, column by column, without blanks around them."""
+    rows = [_fields(line) for line in lines[1:]]
     for line_number, row in enumerate(rows, start=2):
         if len(row) != width:
             text = lines[line_number - 1]
             raise BslamError(f"{path}, line {line_number}: {text!r} has {len(row)} fields; allowed: {width}")
-    return list(zip(*rows, strict=True)) or [()] * width
+    return [[field.strip() for field in column] for column in zip(*rows, strict=True)] or [
+        [] for _ in range(width)
+    ]
 
 
 def _parse(path: Path, name: str, column: Column, texts: Sequence[str]) -> NDArray[np.float64]:
     """The numbers of one column; an empty field becomes what the column says it stands for."""
+    if column.words:
+        return np.full(len(texts), np.nan)
     try:
         values = np.array([float(text or "nan") for text in texts], dtype=np.float64)
     except ValueError:
-        row = next(row for row, text in enumerate(texts) if not _is_number(text))
-        raise _field_error(path, row, name, texts[row], column.allowed) from None
+        row = next(row for row, text in enumerate(texts) if not is_number(text or "nan"))
+        raise _field_error(path, row + 2, name, texts[row], column.allowed) from None
     good = column.holds(values)
     if column.empty is not None:
         empty = np.array([text == "" for text in texts], dtype=np.bool_)
         values[empty] = column.empty
         good |= empty
-    table = Table(path, {name: texts}, {name: values})
-    table.require(name, good, column.allowed)
+    if not good.all():
+        row = int(np.argmin(good))
+        raise _field_error(path, row + 2, name, texts[row], column.allowed)
     return values
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether Python reads it as a number, nan and inf among them."""
     try:
-        float(text or "nan")
+        float(text)
     except ValueError:
         return False
     return True
 
 
-def _field_error(path: Path, row: int, name: str, text: str, allowed: str) -> BslamError:
-    """The error for one field; row 0 is the first below the header, which is line 2 of the file."""
-    return BslamError(f"{path}, line {row + 2}, column {name}: {text!r} is not allowed; allowed: {allowed}")
+def _field_error(path: Path, line: int, name: str, text: str, allowed: str) -> BslamError:
+    return BslamError(f"{path}, line {line}, column {name}: {text!r} is not allowed; allowed: {allowed}")

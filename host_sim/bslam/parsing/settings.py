@@ -50,7 +50,14 @@ class Rule:
         raise BslamError(f"{where}: {value!r} is not allowed; allowed: {self.allowed}")
 
 
-_SCHEMA_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean", list: "array"}
+_SCHEMA_TYPES = {
+    float: "number",
+    int: "integer",
+    str: "string",
+    bool: "boolean",
+    list: "array",
+    dict: "object",
+}
 
 
 def one_of(*words: str) -> Rule:

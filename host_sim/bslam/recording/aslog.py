@@ -36,6 +36,8 @@ def as_log(recording: Recording) -> Log:
         beacons=_beacons(beacons) if beacons else None,
         robot=_robot(recording.start, odometry),
         seeds=recording.start.seeds,
+        words=recording.start.words,
+        notes=() if recording.complete else (f"{recording.path}: it was cut short; its end is missing",),
     )
 
 
@@ -52,6 +54,7 @@ def start_of(log: Log, params: Mapping[str, int | float], beacons_max: int, real
         seeds=log.seeds if params["association"] == BY_APPEARANCE else None,
         robot=robot_text(log.robot),
         true_beacons=known,
+        words=log.words,
         real=real,
     )
 

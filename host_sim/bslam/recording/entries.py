@@ -36,6 +36,7 @@ class Start:
     seeds: NDArray[np.float32] | None = None  # (k, 71) signatures of what is no beacon
     robot: str | None = None  # the text of robot.toml, where the log has one
     true_beacons: tuple[tuple[int, float, float], ...] = ()  # beacon_id, x_m, y_m, where somebody knows them
+    words: tuple[str, ...] = ()  # what a beacon_id stands for where identities are words
     real: str = "float"  # the core's scalar type
     kept_map: str | None = None  # the map that it starts in, in base64; None: an empty one
     frozen: bool = False  # that map stays as it is
@@ -111,7 +112,7 @@ class Counters:
 
 @dataclass(frozen=True)
 class TruePose:
-    """Where the robot really was, where somebody knows it."""
+    """Where the robot really was, where somebody knows it; heading NaN: not known."""
 
     time_us: int
     pose: Pose
@@ -135,7 +136,8 @@ def _start_to(one: Start) -> Json:
 
 def _start_from(content: Json) -> Start:
     true_beacons = tuple((int(i), float(x), float(y)) for i, x, y in content["true_beacons"])
-    return Start(**content | {"seeds": _signatures(content["seeds"]), "true_beacons": true_beacons})
+    seeds, words = _signatures(content["seeds"]), tuple(content.get("words", ()))
+    return Start(**content | {"seeds": seeds, "true_beacons": true_beacons, "words": words})
 
 
 def _reading_to(one: Reading) -> Json:
@@ -232,7 +234,12 @@ def _map_from(content: Json) -> Map:
 
 def _true_pose_to(one: TruePose) -> Json:
     x_m, y_m, theta_rad = one.pose
-    return {"time_us": one.time_us, "x_m": x_m, "y_m": y_m, "theta_rad": theta_rad}
+    return {"time_us": one.time_us, "x_m": x_m, "y_m": y_m, "theta_rad": _number_or_none(theta_rad)}
+
+
+def _true_pose_from(content: Json) -> TruePose:
+    x_m, y_m, theta_rad = _pose(content)
+    return TruePose(content["time_us"], (x_m, y_m, math.nan if theta_rad is None else theta_rad))
 
 
 def _pose(content: Json) -> Pose:
@@ -278,11 +285,6 @@ FORMATS: dict[type, Format] = {
     State: Format("/state", "bslam.State", _state_to, _state_from),
     Map: Format("/map", "bslam.Map", _map_to, _map_from),
     Counters: Format("/counters", "bslam.Counters", lambda one: one.counts, Counters),
-    TruePose: Format(
-        "/truth",
-        "bslam.TruePose",
-        _true_pose_to,
-        lambda content: TruePose(content["time_us"], _pose(content)),
-    ),
+    TruePose: Format("/truth", "bslam.TruePose", _true_pose_to, _true_pose_from),
     Gap: Format("/gap", "bslam.Gap", asdict, lambda content: Gap(**content)),
 }

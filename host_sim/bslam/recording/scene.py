@@ -27,9 +27,10 @@ _NOTHING: dict[str, list[Any]] = {
 
 
 def pose_in_frame(log_ns: int, pose: Pose) -> Json:
-    """foxglove.PoseInFrame."""
+    """foxglove.PoseInFrame; it has no word for a heading that nobody knows, which is drawn as 0."""
     x_m, y_m, theta_rad = pose
-    return {"timestamp": _time(log_ns), "frame_id": FRAME, "pose": _pose(x_m, y_m, 0.0, theta_rad)}
+    heading_rad = 0.0 if math.isnan(theta_rad) else theta_rad
+    return {"timestamp": _time(log_ns), "frame_id": FRAME, "pose": _pose(x_m, y_m, 0.0, heading_rad)}
 
 
 def map_scene(log_ns: int, beacons: list[Beacon]) -> Json:

@@ -88,6 +88,7 @@ SCHEMAS: dict[str, Json] = {
         name=_TEXT,
         params=_object(),
         beacons_max=_WHOLE,
+        words=_list(_TEXT),
         seeds=_TEXT,
         real=_TEXT,
         kept_map=_TEXT,

@@ -35,9 +35,6 @@ _LOST = (
     "a process died (killed, or out of memory) before this run was finished; fewer --jobs need less memory"
 )
 
-_BY_IDENTITY = ("wrong_associations", "false_new", "missed", "beacons_true")
-"""Figures that rest on the sightings' true identities."""
-
 # Draws the pictures of a run: out directory, name, source, log, trace, evaluation.
 Draw = Callable[[Path, str, Source, Log, Trace, Evaluation | None], None]
 
@@ -159,9 +156,7 @@ def run_job(
     """The trace of the run, and what the entry of a recording says otherwise. Raises BslamError."""
     if isinstance(job.source, RecordingSource):
         trace, comparison = rerun(job.source.recording(), job.options, watcher)
-        nameless = not (log.sightings.beacon_id >= 0).any()
-        unknown = dict.fromkeys(["presets", "step_us_median", *(_BY_IDENTITY if nameless else ())])
-        return trace, unknown | {"recording": asdict(comparison)}
+        return trace, dict.fromkeys(["presets", "step_us_median"]) | {"recording": asdict(comparison)}
     record = out / f"{job.name}.mcap" if job.record else None
     return run_log(log, job.options, watcher=watcher, record=record, frames=frames), {}
 
@@ -178,10 +173,11 @@ def write_files(
     job: Job, out: Path, log: Log, trace: Trace, more: Mapping[str, Any] = MappingProxyType({})
 ) -> Outcome:
     """Judge a run that is over, and write its files; `more` goes into its entry. Raises BslamError."""
-    evaluation = evaluate(log, trace, job.options, job.source.align)
+    evaluation = evaluate(log, trace, job.options)
     if job.files:
         start_map = job.options.kept_map
-        write_run(out, job.name, trace, evaluation, None if start_map is None else Path(start_map))
+        kept = None if start_map is None else Path(start_map)
+        write_run(out, job.name, trace, evaluation, kept, log.identity)
     if job.draw is not None:
         job.draw(out, job.name, job.source, log, trace, evaluation)
     entry = summarise(log, trace, job.options, evaluation) | {

@@ -29,7 +29,7 @@ from bslam.rig import Rig
 from bslam.runs.compass import Compass
 from bslam.world.arena import Arena, Beacon
 from bslam.world.camera import Renderer, Scene, dress
-from bslam.world.scenario import Scenario
+from bslam.world.scenario import Mismatch, Scenario
 from bslam.world.simulate import simulate, true_drive, with_noise
 
 # What is left of an object's errors stays alike for so far, metres. Tried on paper_room, seeds 1020:1036 and
@@ -184,10 +184,17 @@ def unseen_log(
 
 
 def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig: Rig) -> Scenario:
-    """The scenario with the noise that is asked for. Raises BslamError for cameras that stand apart."""
+    """The scenario with the noise that is asked for. Raises BslamError for cameras that stand apart, and for
+    what only simulated sightings have.
+    """
     first = rig.cameras[0]
     if any((one.x_m, one.y_m) != (first.x_m, first.y_m) for one in rig.cameras):
         raise BslamError(f"rig {rig.name}: its cameras stand apart; allowed: one x_m and y_m for all of them")
+    for table, there in (("mismatch", scenario.mismatch != Mismatch()), ("gaps", scenario.gaps is not None)):
+        if there:
+            raise BslamError(
+                f"scenario {scenario.name}, [{table}]: cameras do not know it; allowed: --sensor simulated"
+            )
     return with_noise(scenario, sigma_mps, noise)
 
 

@@ -20,6 +20,7 @@ class LocalMap:
         self._slam = slam
         self._room = room
         self._left: dict[int, Beacon] = {}  # by uid
+        self._removed = 0
         self._last_seen: dict[int, int] = {}
         self._frame = 0
 
@@ -44,6 +45,12 @@ class LocalMap:
             if one.confirmed:
                 self._left[one.uid] = one
             self._slam.remove_beacon(one.uid)
+            self._removed += 1
+
+    def counters(self) -> dict[str, int]:
+        """As the core's; the map was full for each beacon that had to leave, too."""
+        counts = dict(self._slam.counters())
+        return counts | {"map_full": counts["map_full"] + self._removed}
 
     def beacons(self) -> list[Beacon]:
         """The filter's beacons, and those that left it and are not in it again by their label."""

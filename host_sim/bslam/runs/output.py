@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,7 +70,12 @@ def finite(content: Any) -> Any:
 
 
 def write_run(
-    out: Path, name: str, trace: Trace, evaluation: Evaluation | None, start_map: Path | None = None
+    out: Path,
+    name: str,
+    trace: Trace,
+    evaluation: Evaluation | None,
+    start_map: Path | None = None,
+    identity: Callable[[int], str] = str,
 ) -> None:
     """Write NAME.estimate.tum, NAME.truth.tum (if there is a truth), NAME.map.csv and the map itself: where
     none could be saved, none of an earlier run stays but `start_map`, which this one started in.
@@ -77,10 +84,12 @@ def write_run(
     them.
     """
     write_atomically(out / f"{name}.estimate.tum", tum(trace.time_us, trace.pose))
-    if evaluation is not None:
-        known = np.isfinite(evaluation.truth[:, 0])
+    known = np.zeros(1, dtype=np.bool_) if evaluation is None else np.isfinite(evaluation.truth[:, 0])
+    if evaluation is None or not known.any():
+        (out / f"{name}.truth.tum").unlink(missing_ok=True)
+    else:
         write_atomically(out / f"{name}.truth.tum", tum(trace.time_us[known], evaluation.truth[known]))
-    write_atomically(out / f"{name}.map.csv", map_csv(trace))
+    write_atomically(out / f"{name}.map.csv", map_csv(trace, identity))
     kept = out / f"{name}{SUFFIX}"
     if trace.kept_map is not None:
         write_atomically(kept, trace.kept_map)
@@ -89,8 +98,10 @@ def write_run(
 
 
 def tum(time_us: NDArray[np.int64], poses: NDArray[np.float64]) -> str:
-    """TUM format: time_s x y z qx qy qz qw, one line a pose; (n,) and (n, 3)."""
-    half = 0.5 * poses[:, 2]
+    """TUM format: time_s x y z qx qy qz qw, one line a pose; (n,) and (n, 3). The format has no word for a
+    heading that nobody knows: it stands as 0.
+    """
+    half = 0.5 * np.nan_to_num(poses[:, 2])
     columns = (
         time_us.tolist(),
         poses[:, 0].tolist(),
@@ -104,22 +115,28 @@ def tum(time_us: NDArray[np.int64], poses: NDArray[np.float64]) -> str:
     )
 
 
-def map_csv(trace: Trace) -> str:
+def map_csv(trace: Trace, identity: Callable[[int], str] = str) -> str:
     """The final map, one beacon a line: by its label, or where it has none by its number in the map.
 
     `true_beacon` is what the harness knows: the identity of the sighting that made the beacon, empty for
-    clutter.
+    clutter. identity: a label as the log has it.
     """
-    lines = [_MAP_HEADER]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_MAP_HEADER.split(","))
     for beacon in trace.beacons:
         covariance = beacon.covariance_m2
         numbers = (beacon.x_m, beacon.y_m, covariance[0, 0], covariance[0, 1], covariance[1, 1])
-        lines.append(
-            f"{beacon.label if beacon.label >= 0 else beacon.uid},"
-            + ",".join(f"{float(number):.9g}" for number in (*numbers, beacon.range_m, beacon.phi_rad))
-            + f",{beacon.sightings},{int(beacon.confirmed)},{beacon.true_id if beacon.true_id >= 0 else ''}"
+        writer.writerow(
+            [
+                identity(beacon.label) if beacon.label >= 0 else beacon.uid,
+                *(f"{float(number):.9g}" for number in (*numbers, beacon.range_m, beacon.phi_rad)),
+                beacon.sightings,
+                int(beacon.confirmed),
+                identity(beacon.true_id) if beacon.true_id >= 0 else "",
+            ]
         )
-    return "\n".join(lines) + "\n"
+    return text.getvalue()
 
 
 def _is_sayable(value: Any) -> bool:

@@ -88,7 +88,7 @@ class _Drive:
             if feel is not None and not math.isnan(rate_radps):
                 feel(times_us[step], rate_radps, sd_radps)
             algorithm.odometry(times_us[step], left_m, right_m)
-            self._observe_until(times_us[step + 1] if step + 1 < len(times_us) else None)
+            self._observe_until(times_us[step] if step + 1 < len(times_us) else None)
             self._keep(step)
             self._step_ns.append(clock() - began)
             alive(step)
@@ -99,11 +99,12 @@ class _Drive:
             self._frames.take()  # from before the drive
         if not self._frames.waiting_before(times_us[0] + 1):
             self._algorithm.observe(times_us[0], [])
-        self._observe_until(times_us[1] if len(times_us) > 1 else None)
+        self._observe_until(times_us[0] if len(times_us) > 1 else None)
 
     def _observe_until(self, until_us: int | None) -> None:
+        """What was seen up to then; None: all that is left."""
         seen = False
-        while self._frames.waiting_before(until_us):
+        while self._frames.waiting_before(None if until_us is None else until_us + 1):
             seen = True
             time_us, true_id, columns = self._frames.take()
             sightings = _as_sightings(columns)

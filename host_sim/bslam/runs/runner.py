@@ -141,10 +141,19 @@ def uses_appearance(options: RunOptions) -> bool:
 def beacons_to_hold(log: Log, options: RunOptions) -> int:
     """Beacons that there are, as far as the log tells, and room for false ones where identity is unknown."""
     sighted = log.sightings.beacon_id[log.sightings.mappable]
+    sighted = np.unique(sighted[sighted >= 0])
     given = 0 if log.beacons is None else len(log.beacons.beacon_id)
-    true_beacons = max(1, given, len(np.unique(sighted[sighted >= 0])))
-    is_all = options.association == "known" and options.kept_map is None
-    return true_beacons if is_all else max(true_beacons, FALSE_BEACONS_ROOM)
+    true_beacons, most = max(1, given, len(sighted)), SIZE_CLASSES[-1]
+    is_known = options.association == "known" and options.kept_map is None
+    if options.target != "host":
+        return true_beacons if is_known else max(true_beacons, FALSE_BEACONS_ROOM)
+    if is_known:  # and for competitors of one label
+        room = true_beacons + (true_beacons - 1) // SIZE_CLASSES[0]
+    elif given or len(sighted):
+        room = max(true_beacons + true_beacons // 2, FALSE_BEACONS_ROOM)
+    else:
+        room = most
+    return max(true_beacons, min(room, most))
 
 
 class _Run:
@@ -155,7 +164,7 @@ class _Run:
     ) -> None:
         self.slam, self.watcher = slam, watcher
         self.recorded = isinstance(slam, Recorder)
-        self.frames = frames
+        self.frames, self.resume_sd = frames, options.resume_sd
         self.ledger = Ledger(lambda: [beacon.uid for beacon in slam.beacons()])
         if options.known_map:
             self._give_map(log)
@@ -172,7 +181,7 @@ class _Run:
         """Give the true beacons to the filter. Raises BslamError if their frame is not the start's."""
         if log.beacons is None:
             raise BslamError(f"{log.name}: --known-map: the log has no beacons.csv")
-        if log.truth is not None and not starts_at_origin(log.truth):
+        if log.truth is not None and not starts_at_origin(log):
             raise BslamError(f"{log.name}: --known-map: its beacons are not in the frame of the start pose")
         columns = (log.beacons.beacon_id.tolist(), log.beacons.x_m.tolist(), log.beacons.y_m.tolist())
         for identity, x_m, y_m in zip(*columns, strict=True):
@@ -181,7 +190,10 @@ class _Run:
             self.ledger.know(beacon.uid, beacon.label)
 
     def _run(self, odometry: Odometry) -> None:
-        """Feed everything, and keep what there is to say at each of the steps' times."""
+        """Feed everything, and keep what there is to say at each of the steps' times.
+
+        A frame goes in after the odometry that covers it: what the robot did until then need not be guessed.
+        """
         kind, times_us = odometry.kind, self.times_us
         number = np.int64 if kind == "ticks" else np.float64
         a, b = (one.astype(number).tolist() for one in (odometry.a, odometry.b))
@@ -190,15 +202,15 @@ class _Run:
             self._start_clock(times_us[0])
         else:
             self._read(kind, *rows.pop(0))
-        self._frames_until(times_us[1] if len(times_us) > 1 else None)
+        self._frames_until(times_us[0] if rows else None)
         self._keep(times_us[0])
-        last_us = times_us[0]
-        for row, until_us in zip(rows, [*times_us[2:], None], strict=False):
+        last_us, end_us = times_us[0], times_us[-1]
+        for row in rows:
             time_us = row[1]
             if time_us - last_us > INTERRUPTION_US:
-                self._resume(time_us - last_us)
+                self._resume(last_us, time_us)
             last_us = time_us
-            core_ns = self._read(kind, *row) + self._frames_until(until_us)
+            core_ns = self._read(kind, *row) + self._frames_until(None if time_us == end_us else time_us)
             self.step_ns.append(core_ns)
             self._keep(time_us)
 
@@ -221,17 +233,29 @@ class _Run:
         if not self.frames.waiting_before(time_us + 1):
             self._try(self.slam.sightings, time_us, [], [], [], [])
 
-    def _resume(self, unseen_us: int) -> None:
-        """Go on after an interruption, with a pose as doubtful as that makes it."""
-        position_sd_m = min(UNSEEN_SPEED_MPS * unseen_us * 1e-6, UNSEEN_POSITION_SD_MAX_M)
-        self.slam.resume_odometry(position_sd_m, UNSEEN_HEADING_SD_RAD)
+    def _resume(self, last_us: int, next_us: int) -> None:
+        """Go on after an interruption, with a pose as doubtful as that makes it.
+
+        No odometry will cover the frames in it: the first may be near enough to the last reading.
+        """
+        self._feed_frames(next_us - 1)
+        position_sd_m = min(UNSEEN_SPEED_MPS * (next_us - last_us) * 1e-6, UNSEEN_POSITION_SD_MAX_M)
+        self.slam.resume_odometry(*(self.resume_sd or (position_sd_m, UNSEEN_HEADING_SD_RAD)))
         self.refusals["interruption"] += 1
 
     def _frames_until(self, until_us: int | None) -> int:
-        """Feed the frames stamped before `until_us` (None: all that are left); CPU time of the core, ns."""
+        """Feed a row's frames, see `_feed_frames`; CPU time of the core, ns."""
+        core_ns, seen = self._feed_frames(until_us)
+        self.seen.append(seen)
+        return core_ns
+
+    def _feed_frames(self, until_us: int | None) -> tuple[int, bool]:
+        """Feed the frames stamped up to `until_us` (None: all that are left); CPU time of the core, ns, and
+        whether there was one.
+        """
         clock, core_ns, frames = self._clock, 0, self.frames
         seen = False
-        while frames.waiting_before(until_us):
+        while frames.waiting_before(None if until_us is None else until_us + 1):
             seen = True
             time_us, true_id, columns = frames.take()
             if self.recorded:
@@ -245,8 +269,7 @@ class _Run:
                 self.ledger.book(true_id, columns[MAPPABLE], accounts)
             if self.watcher is not None:
                 self.watcher.frame(time_us, true_id, columns, accounts)
-        self.seen.append(seen)
-        return core_ns
+        return core_ns, seen
 
     def _clock(self) -> int:
         """CPU time, ns, without what a recorder took."""
@@ -423,8 +446,7 @@ def columns_for_filter(sightings: Sightings, options: RunOptions) -> list[list[A
         mappable_id = np.where(sightings.mappable, sightings.beacon_id, -1)
         label = corrupt_identities(mappable_id, options.wrong_identity_rate, options.seed)
     columns = [sightings.bearing_rad, range_m, label, sightings.mappable]
-    if sightings.bearing_sd_rad is not None and sightings.range_sd_m is not None:
-        alike = sightings.range_scale_sd
-        columns += [sightings.bearing_sd_rad, sightings.range_sd_m]
-        columns += [np.zeros(len(label)) if alike is None else alike]
+    noise = (sightings.bearing_sd_rad, sightings.range_sd_m, sightings.range_scale_sd)
+    if any(one is not None for one in noise):
+        columns += [np.zeros(len(label)) if one is None else one for one in noise]
     return [column.tolist() for column in columns]

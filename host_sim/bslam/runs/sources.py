@@ -12,14 +12,43 @@ from numpy.typing import NDArray
 
 from bslam.datasets.dlr import load_dlr
 from bslam.datasets.mrclam import best_truth, load_mrclam
+from bslam.errors import BslamError
 from bslam.evaluation.align import Rigid
-from bslam.log import SIGNATURES, Log, read_folder
+from bslam.log import Log, has_identities, read_folder
 from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
 from bslam.runs.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import load_scenario, simulate
+
+
+@dataclass(frozen=True)
+class Says:
+    """What the sightings of a log tell, by which a run chooses what it was not told."""
+
+    signatures: bool = False
+    ranges: bool = True
+    identities: bool = True
+
+    @property
+    def observation(self) -> str:
+        """What a run takes of them, unless asked otherwise."""
+        return "distance" if self.ranges else "direction"
+
+    @property
+    def association(self) -> str:
+        """What tells whose they are."""
+        return "svm" if self.signatures else "known" if self.identities else "mahalanobis"
+
+
+def what_it_says(log: Log) -> Says:
+    """Of a log at hand."""
+    sightings = log.sightings
+    has_ranges = bool(np.isfinite(sightings.range_m).any()) or len(sightings.range_m) == 0
+    return Says(
+        sightings.signature is not None, has_ranges, has_identities(log) or not len(sightings.time_us)
+    )
 
 
 class Source(Protocol):
@@ -30,16 +59,12 @@ class Source(Protocol):
         """Scenario, or the log's own name."""
 
     @property
-    def align(self) -> bool:
-        """The truth has a frame of its own, so that an estimate is aligned before it is compared."""
-
-    @property
     def truth_kind(self) -> str:
         """ "simulated", "recorded" or how complete a data set's truth is."""
 
     @property
-    def has_looks(self) -> bool:
-        """Its sightings have signatures."""
+    def says(self) -> Says:
+        """What its sightings tell."""
 
     @property
     def shared(self) -> Hashable | None:
@@ -74,17 +99,20 @@ class ScenarioSource(_Unshared):
     noise: str | None  # what errs; None: as the scenario says
     noise_draw: int = field(default=0, kw_only=True)  # of [wheels]; 0: the scenario's
 
-    align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "simulated"
-    has_looks: ClassVar[bool] = True
+    says: ClassVar[Says] = Says(signatures=True)
 
     @property
     def name(self) -> str:
         return Path(self.scenario).stem
 
+    def world(self) -> Scenario:
+        """What is simulated."""
+        return load_scenario(self.scenario)
+
     def redrawn(self) -> Scenario:
-        """The scenario, with its wheels' noise drawn as is asked for."""
-        scenario = load_scenario(self.scenario)
+        """The same, with its wheels' noise drawn as is asked for."""
+        scenario = self.world()
         wheels = replace(scenario.wheels, draw=self.noise_draw or scenario.wheels.draw)
         return replace(scenario, wheels=wheels)
 
@@ -92,7 +120,7 @@ class ScenarioSource(_Unshared):
         return simulate(self.redrawn(), self.seed, self.sigma_mps, self.noise)
 
     def walls_m(self) -> NDArray[np.float64]:
-        scenario = load_scenario(self.scenario)
+        scenario = self.world()
         start = scenario.start
         ends_m = np.array([(*wall.start, *wall.end) for wall in scenario.arena.walls], dtype=np.float64)
         to_start = Rigid(start.heading_rad, start.x_m, start.y_m).inverse()
@@ -122,11 +150,10 @@ class CameraSource(ScenarioSource):
 
 @dataclass(frozen=True)
 class FolderSource(_Unshared):
-    """A recorded log folder; its truth is in the frame of the start pose."""
+    """A recorded log folder."""
 
     path: Path
 
-    align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "recorded"
 
     @property
@@ -134,8 +161,11 @@ class FolderSource(_Unshared):
         return self.path.resolve().name
 
     @property
-    def has_looks(self) -> bool:
-        return (self.path / SIGNATURES).is_file()
+    def says(self) -> Says:
+        try:
+            return what_it_says(self.load())
+        except BslamError:  # which its run meets again, and reports
+            return Says()
 
     def load(self) -> Log:
         return read_folder(self.path)
@@ -150,9 +180,8 @@ class DlrSource(_Unshared):
 
     directory: Path
 
-    align: ClassVar[bool] = True
     truth_kind: ClassVar[str] = "least squares"
-    has_looks: ClassVar[bool] = False
+    says: ClassVar[Says] = Says()
 
     @property
     def name(self) -> str:
@@ -172,8 +201,7 @@ class MrclamSource(_Unshared):
     directory: Path
     robot: int
 
-    align: ClassVar[bool] = True
-    has_looks: ClassVar[bool] = False
+    says: ClassVar[Says] = Says()
 
     @property
     def name(self) -> str:
@@ -192,13 +220,12 @@ class MrclamSource(_Unshared):
 
 @dataclass(frozen=True)
 class RecordingSource(_Unshared):
-    """A recording; its truth is in the frame of the start pose."""
+    """A recording."""
 
     path: Path
 
-    align: ClassVar[bool] = False
     truth_kind: ClassVar[str] = "recorded"
-    has_looks: ClassVar[bool] = True
+    says: ClassVar[Says] = Says(signatures=True)
 
     @property
     def name(self) -> str:

@@ -30,7 +30,7 @@ from bslam.evaluation.failure import was_off
 from bslam.options import RunOptions
 from bslam.runs.batch import Job, Outcome, outcomes_of, prepare
 from bslam.runs.output import finite, write_atomically
-from bslam.runs.sources import ScenarioSource
+from bslam.runs.sources import Source
 
 STORE: Final = "sweep.sqlite"
 PARQUET: Final = "results.parquet"
@@ -230,9 +230,8 @@ def beside_known(jobs: Sequence[Job]) -> dict[str, str]:
     return {name: other for name, other in pairs.items() if name != other}
 
 
-def _drive(job: Job) -> tuple[str, RunOptions]:
-    where = job.source.scenario if isinstance(job.source, ScenarioSource) else job.source.name
-    return where, replace(job.options, association="known", wrong_identity_rate=0.0)
+def _drive(job: Job) -> tuple[Source, RunOptions]:
+    return job.source, replace(job.options, association="known", wrong_identity_rate=0.0)
 
 
 def _packed(outcome: Outcome) -> bytes:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import secrets
+import struct
+import time
 from collections import deque
 from dataclasses import dataclass
 
@@ -12,6 +14,8 @@ from bslam.link.messages import ANSWER, LINK_STATUSES, Info, Message, Report
 from bslam.target.lines import Line, TargetError
 
 ANSWER_TIMEOUT_S = 2.0
+NOISE_MAX = 100_000  # bytes without a frame among them: some seconds of a serial line
+_PATIENCE = 5  # so many times that, while a robot speaks of other things
 _MEANING = {
     "STORE": ": the board keeps nothing over a restart, or has no room for such a map",
     "TYPE": ": the image has no such message",
@@ -28,7 +32,10 @@ class Answer:
 
 
 def _started_anew(ready: Frame) -> TargetError:
-    return TargetError(f"the target started anew: {messages.read_start(ready.payload)}")
+    try:
+        return TargetError(f"the target started anew: {messages.read_start(ready.payload)}")
+    except (IndexError, KeyError):
+        return TargetError("the target started anew, and says so in another way than this program")
 
 
 class Client:
@@ -40,6 +47,7 @@ class Client:
         self._frames: deque[Frame] = deque()
         self._sequence = secrets.randbelow(1 << 16)
         self.repeats = 0
+        self._noise = 0  # bytes since the last frame
         self._reports: deque[Frame] = deque()
         self._last_report: int | None = None
         self.reports_lost = 0
@@ -47,7 +55,10 @@ class Client:
         line.write(b"\0")
         payload = messages.hello(session, fingerprints=fingerprints, as_it_is=as_it_is)
         answer = self.ask(Message.HELLO, payload)
-        self.info: Info = messages.read_info(answer.body)
+        try:
+            self.info: Info = messages.read_info(answer.body)
+        except struct.error:
+            raise TargetError(f"{len(answer.body)} bytes answer HELLO: not as this program speaks") from None
         self._open = True
 
     _open = False
@@ -62,10 +73,17 @@ class Client:
             frame = self._answer(message)
             if frame is not None:
                 return self._checked(message, frame)
-        raise TargetError(f"no answer to {message.name} after {self._line.attempts} attempts")
+            if self._noise > NOISE_MAX:
+                break
+        noise = f"; {self._noise} bytes came that are no message of a robot" if self._noise else ""
+        raise TargetError(f"no answer to {message.name} after {attempt + 1} attempts{noise}")
 
     def _answer(self, message: Message) -> Frame | None:
-        """The answer to the last message; None if it did not come in time."""
+        """The answer to the last message; None if it did not come in time. Noise is not waited for, a robot
+        that speaks is, for a while.
+        """
+        end_s = time.monotonic() + ANSWER_TIMEOUT_S
+        last_s = time.monotonic() + _PATIENCE * ANSWER_TIMEOUT_S
         while True:
             while self._frames:
                 frame = self._frames.popleft()
@@ -74,17 +92,25 @@ class Client:
                 self._keep_report(frame)
                 if frame.type == message | ANSWER and frame.sequence == self._sequence:
                     return frame
-            data = self._line.read(ANSWER_TIMEOUT_S)
-            if not data:
+            data = self._line.read(max(end_s - time.monotonic(), 0.0))
+            self._take(data)
+            if self._frames:
+                end_s = min(time.monotonic() + ANSWER_TIMEOUT_S, last_s)
+            elif not data or time.monotonic() > end_s or self._noise > NOISE_MAX:
                 return None
-            self._frames.extend(self._decoder.push(data))
+
+    def _take(self, data: bytes) -> None:
+        """What came, frames or not."""
+        before = len(self._frames)
+        self._frames.extend(self._decoder.push(data))
+        self._noise = 0 if len(self._frames) > before else self._noise + len(data)
 
     def listen(self, timeout_s: float | None) -> list[Frame]:
         """What the robot has reported of itself, at once or within the time-out; None: what it had reported
         before its last answer. Raises TargetError.
         """
         if not self._reports and timeout_s is not None:
-            self._frames.extend(self._decoder.push(self._line.read(timeout_s)))
+            self._take(self._line.read(timeout_s))
         while self._frames and timeout_s is not None:
             frame = self._frames.popleft()
             if frame.type == Report.READY:

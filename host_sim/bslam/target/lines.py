@@ -307,12 +307,15 @@ class SerialLine:
     ns_per_instruction: int | None = None
     attempts = ATTEMPTS
     BAUD = 115200
+    WRITE_TIMEOUT_S = 5.0  # of a device that takes nothing more
 
     def __init__(self, device: str) -> None:
         import serial  # here, since it takes time and few need it
 
         try:
-            self._serial = serial.serial_for_url(device, baudrate=self.BAUD, timeout=0.1)
+            self._serial = serial.serial_for_url(
+                device, baudrate=self.BAUD, timeout=0.1, write_timeout=self.WRITE_TIMEOUT_S
+            )
         except (serial.SerialException, ValueError) as error:
             allowed = "allowed: a device such as /dev/ttyUSB0"
             raise BslamError(f"serial device '{device}': {error}; {allowed}") from error

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from bslam.core.builds import SIZE_CLASSES
 from bslam.core.errors import CoreError
+from bslam.core.inputs import frame_rows
 from bslam.core.raw import library
-from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam, told_classes
+from bslam.core.slam import BY_APPEARANCE, Account, Beacon, Slam
 from bslam.errors import BslamError
 from bslam.link import messages
-from bslam.link.frames import crc16
+from bslam.link.frames import Frame, crc16
 from bslam.link.messages import NO_DETAIL, LookReport, Message, PoseReport, Report, Seen, Step
 from bslam.target.client import Answer, Client
 from bslam.target.lines import Line, TargetError, open_line
@@ -163,10 +164,18 @@ class RemoteSlam:
         score: Sequence[float] | None = None,
     ) -> list[Account]:
         """As `Slam.sightings`."""
-        silent = [0.0] * len(bearing_rad)
-        noise = (bearing_sd_rad or silent, range_sd_m or silent, range_scale_sd or silent)
-        classes = told_classes(mappable, beacon_class)
-        rows = list(zip(bearing_rad, range_m, label, classes, *noise, score or silent, strict=True))
+        rows = frame_rows(
+            f"frame at {time_us} us",
+            bearing_rad=bearing_rad,
+            range_m=range_m,
+            label=label,
+            mappable=mappable,
+            bearing_sd_rad=bearing_sd_rad,
+            range_sd_m=range_sd_m,
+            range_scale_sd=range_scale_sd,
+            beacon_class=beacon_class,
+            score=score,
+        )
         signed, most = signature is not None, self._client.info.sightings_max
         payload = _packed(f"frame at {time_us} us", messages.sightings, rows, signed, most)
         if signature is not None:
@@ -375,13 +384,9 @@ class RemoteSlam:
         """
         found: list[Told] = []
         for frame in self._client.listen(timeout_s):
-            if frame.type == Report.SIGHTED:
-                kept = self._sighted if frame.payload[0] else []  # a report may have been lost
-                self._sighted = [*kept, messages.read_seen(frame.payload)]
+            report = self._read_report(frame)
+            if report is None:
                 continue
-            is_reading = frame.type == Report.POSE
-            read = messages.read_pose_report if is_reading else messages.read_look_report
-            report = read(frame.payload)
             refused = self._refusal(report.status)
             if isinstance(report, LookReport):
                 accounts = [self._account(one) for one in report.accounts]
@@ -391,6 +396,20 @@ class RemoteSlam:
                 found.append(Told(frame.time_us, report, refused))
             self._step = report.step
         return found
+
+    def _read_report(self, frame: Frame) -> PoseReport | LookReport | None:
+        """None: a sighting, which is kept until the report of its picture. Raises TargetError."""
+        try:
+            if frame.type == Report.POSE:
+                return messages.read_pose_report(frame.payload)
+            if frame.type == Report.LOOKED:
+                return messages.read_look_report(frame.payload)
+            kept = self._sighted if frame.payload[0] else []  # a report may have been lost
+            self._sighted = [*kept, messages.read_seen(frame.payload)]
+        except (struct.error, IndexError):
+            said = f"a report of type {frame.type} has {len(frame.payload)} bytes"
+            raise TargetError(f"{said}: not as this program speaks") from None
+        return None
 
     @property
     def reports_lost(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -40,6 +40,7 @@ class Room:
     beacons: Beacons | None = None
     mapped: Sequence[Mapped] = ()
     walls_m: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))  # (w, 4) x1, y1, x2, y2
+    identity: Callable[[int], str] = str  # a beacon_id as the log has it
 
 
 def draw_room(room: Room) -> Figure:
@@ -58,7 +59,7 @@ def draw_room(room: Room) -> Figure:
     start: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
     axes.plot(*room.estimate_m[0], color=ESTIMATE, label="start", zorder=7, **start)
     if room.beacons is not None:
-        _draw_beacons(axes, room.beacons)
+        _draw_beacons(axes, room.beacons, room.identity)
     for confirmed in (True, False):
         _draw_mapped(axes, [one for one in room.mapped if one.confirmed == confirmed], confirmed)
     axes.set_aspect("equal")
@@ -80,7 +81,7 @@ def _draw_truth(axes: Any, truth_m: NDArray[np.float64]) -> None:
     axes.plot(*shown.T, color=TRUTH, label="true path", zorder=3, **style)
 
 
-def _draw_beacons(axes: Any, beacons: Beacons) -> None:
+def _draw_beacons(axes: Any, beacons: Beacons, name: Callable[[int], str]) -> None:
     style = {
         "marker": "*",
         "markersize": 14,
@@ -89,9 +90,9 @@ def _draw_beacons(axes: Any, beacons: Beacons) -> None:
         "linestyle": "",
     }
     axes.plot(beacons.x_m, beacons.y_m, color=BEACON, label="true beacon", zorder=5, **style)
-    for identity, x_m, y_m in zip(beacons.beacon_id, beacons.x_m, beacons.y_m, strict=True):
-        offset = {"xytext": (7, 6), "textcoords": "offset points"}
-        axes.annotate(str(identity), (x_m, y_m), fontsize=8, color="#6b4b00", **offset)
+    for identity, x_m, y_m in zip(beacons.beacon_id.tolist(), beacons.x_m, beacons.y_m, strict=True):
+        style = {"xytext": (7, 6), "textcoords": "offset points", "fontsize": 8, "color": "#6b4b00"}
+        axes.annotate(name(identity), (x_m, y_m), parse_math=False, **style)
 
 
 def _draw_mapped(axes: Any, beacons: Sequence[Mapped], confirmed: bool) -> None:

@@ -16,6 +16,7 @@ from bslam.world.crowd import Crowd
 from bslam.world.planner import RoutePlanner
 from bslam.world.robot import Body
 from bslam.world.scenario import Area, Scenario
+from bslam.world.untold import NO_MISHAPS, Mishaps
 
 _GOAL_DRAWS = 1000  # so many goals drawn in turn that the robot is at already: there is nowhere to go
 
@@ -42,7 +43,10 @@ class Drive:
 
 
 def drive(
-    scenario: Scenario, random: np.random.Generator, wheel_jitter_m: NDArray[np.float64] | None = None
+    scenario: Scenario,
+    random: np.random.Generator,
+    wheel_jitter_m: NDArray[np.float64] | None = None,
+    mishaps: Mishaps = NO_MISHAPS,
 ) -> Drive:
     """Drive all the steps. `wheel_jitter_m` (steps, 2) is added to the left and right wheel's travel.
 
@@ -59,17 +63,21 @@ def drive(
     body.others = crowd.discs()
     others = [body.others]
     jitter_m = [(0.0, 0.0)] * scenario.steps if wheel_jitter_m is None else wheel_jitter_m.tolist()
+    grips = [(1.0, 1.0)] * scenario.steps if mishaps.grip is None else mishaps.grip.tolist()
     poses, travels_m, stalls = [start], [], []
-    for left_jitter_m, right_jitter_m in jitter_m:
-        v_mps, omega_radps = driver.command()
+    for step, (jitters_m, (left_grip, right_grip)) in enumerate(zip(jitter_m, grips, strict=True)):
+        left_jitter_m, right_jitter_m = (0.0, 0.0) if step in mishaps.off else jitters_m
+        v_mps, omega_radps = (0.0, 0.0) if step in mishaps.off else driver.command()
         half_turn_m = 0.5 * omega_radps * wheelbase_m * step_s
         left_m = v_mps * step_s - half_turn_m + left_jitter_m
         right_m = v_mps * step_s + half_turn_m + right_jitter_m
         crowd.step(body.pose[:2])
         body.others = crowd.discs()
         others.append(body.others)
-        rolled = body.roll(left_m, right_m)
+        rolled = body.roll(left_m * left_grip, right_m * right_grip)
         driver.feel(stalled=not rolled)
+        if step in mishaps.carried:
+            driver.carry(mishaps.carried[step])
         poses.append(body.pose)
         travels_m.append((left_m, right_m) if rolled else (0.0, 0.0))
         stalls.append(not rolled)
@@ -121,6 +129,19 @@ class Driver:
         if stalled and self._bump_turn_steps == 0:
             self._v_mps = self._omega_radps = 0.0
             self._turn_away()
+
+    def carry(self, moves: NDArray[np.float64]) -> None:
+        """Somebody puts the robot elsewhere: by the first move (x, y m, turn rad) to where it could drive."""
+        x_m, y_m, theta_rad = self._body.pose
+        places = self._planner.places
+        for dx_m, dy_m, turn_rad in moves.tolist():
+            away_m = np.hypot(*(places - (x_m + dx_m, y_m + dy_m)).T)
+            if away_m.min() <= self._settings.cell_m:
+                new_x_m, new_y_m = places[away_m.argmin()].tolist()
+                self._body.pose = (new_x_m, new_y_m, theta_rad + turn_rad)
+                self._v_mps = self._omega_radps = 0.0
+                self._route = []
+                return
 
     def _turn_away(self) -> None:
         side = self._bump_random.choice((-1.0, 1.0))

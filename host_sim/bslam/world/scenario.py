@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 
 from bslam.errors import BslamError
 from bslam.log import (
-    BEACON_ID_MAX,
     BEARING_SIGMA_RAD,
     GYRO_SIGMA_RADPS,
     RANGE_SIGMA_FLOOR_M,
@@ -29,6 +28,7 @@ from bslam.log import (
     WHEELBASE_M,
     read_truth,
 )
+from bslam.parsing.identities import BEACON_ID_MAX
 from bslam.parsing.settings import (
     ANY,
     FIELD_OF_VIEW,
@@ -103,7 +103,15 @@ _SIZE = Rule(
     _POINT.schema,
 )
 _TRUE_OR_FALSE = Rule("true or false", bool)
-_GAPS = Rule(
+_DURATION = Rule(
+    "[shortest, longest], two numbers, 0 < shortest <= longest",
+    list,
+    lambda v: _is_point(v) and 0 < v[0] <= v[1],
+    _to_point,
+    _TWO_NUMBERS,
+)
+_SCALE = number(0.5, 2.0)
+_DOORS = Rule(
     "[[from, to], ...], stretches along the wall in m, in order, from < to",
     list,
     lambda v: all(_is_point(gap) and gap[0] < gap[1] for gap in v),
@@ -167,12 +175,13 @@ class Wheels:
     """`sigma_mps` is the sd of each wheel's speed, each step: of the reading or of the motion, by `noise`.
 
     `draw`: above 0 the noise is drawn anew for the same seed, so that with "speedometer" path and sightings
-    stay.
+    stay. The filter takes the noise for white.
     """
 
     sigma_mps: float = setting(WHEEL_SPEED_SIGMA_MPS)
     noise: str = setting(one_of(*WHEEL_NOISES), "speedometer")
     draw: int = setting(integer(0, 1_000_000), 0)
+    noise_time_s: float = setting(NOT_NEGATIVE, 0.0)  # correlation time of the noise; 0: it is white
 
 
 @dataclass(frozen=True)
@@ -208,6 +217,58 @@ class Sensor:
     yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
     delay_us: int = setting(SIGHTING_DELAY_US, 0)  # the stamp of a sighting is so much later than the sight
     outlier_share: float = setting(SHARE, 0.0)  # share of sightings with any direction and range
+    bearing_outlier_share: float = setting(SHARE, 0.0)  # share with any direction, and the right range
+    miss_share: float = setting(SHARE, 0.0)  # share of what is in view that is not reported
+    noise_time_s: float = setting(NOT_NEGATIVE, 0.0)  # correlation time of a beacon's noise; 0: it is white
+
+
+@dataclass(frozen=True)
+class Slips:
+    """The left wheel, the right one or both roll, and the robot does not follow.
+
+    As with gaps, one lies somewhere in each of `count` equal parts of the middle half of the drive.
+    """
+
+    count: int = setting(integer(1, 1000))
+    lasts_s: tuple[float, float] = setting(_DURATION, (0.5, 1.5))  # drawn anew each time
+    ratio: float = setting(SHARE, 1.0)  # share of a wheel's roll that moves nothing
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Stretches of which no odometry is recorded; the travel of a counter that goes on is not lost.
+
+    The robot drives on, or it may stand and be carried, to a place that it could drive to.
+    """
+
+    count: int = setting(integer(1, 1000))
+    lasts_s: tuple[float, float] = setting(_DURATION)  # drawn anew each time
+    blind: bool = setting(_TRUE_OR_FALSE, False)  # no sightings either
+    carried_sd_m: float = setting(number(0.0, 100.0), 0.0)  # in x and in y
+    carried_sd_rad: float = setting(number(0.0, 100.0), 0.0)
+
+    @property
+    def carries(self) -> bool:
+        """Somebody moves the robot."""
+        return self.carried_sd_m > 0.0 or self.carried_sd_rad > 0.0
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """What truly is, against what the filter is told in the other tables.
+
+    Scales of wheels are the true value over the told one; what is no scale is added to the told value.
+    """
+
+    range_scale: float = setting(_SCALE, 1.0)  # distances are measured so many times too long
+    range_scale_sd: float = setting(number(0.0, 0.5), 0.0)  # each beacon's by a factor of its own, too
+    sensor_x_m: float = setting(ANY, 0.0)
+    sensor_y_m: float = setting(ANY, 0.0)
+    sensor_yaw_rad: float = setting(SENSOR_YAW_RAD, 0.0)
+    delay_us: int = setting(integer(-10_000_000, 10_000_000), 0)
+    left_radius_scale: float = setting(_SCALE, 1.0)
+    right_radius_scale: float = setting(_SCALE, 1.0)
+    wheelbase_scale: float = setting(_SCALE, 1.0)
 
 
 @dataclass(frozen=True)
@@ -229,9 +290,12 @@ class Scenario:
     body: BodySettings
     driving: Driving
     wheels: Wheels
-    encoders: Encoders | None
     sensor: Sensor
+    encoders: Encoders | None = None
     gyro: Gyro | None = None
+    slips: Slips | None = None
+    gaps: Gaps | None = None
+    mismatch: Mismatch = Mismatch()
     movers: tuple[Mover, ...] = ()
     recorded: tuple[tuple[float, float, float, float], ...] = ()
     rig: str | None = None
@@ -268,7 +332,7 @@ class _MoverTable:
 class _WallTable:
     start: tuple[float, float] = setting(_POINT)
     end: tuple[float, float] = setting(_POINT)
-    doors: tuple[Point, ...] = setting(_GAPS, ())
+    doors: tuple[Point, ...] = setting(_DOORS, ())
 
 
 @dataclass(frozen=True)
@@ -295,8 +359,14 @@ TABLES: dict[str, type] = {
     "encoders": Encoders,
     "gyro": Gyro,
     "sensor": Sensor,
+    "slips": Slips,
+    "gaps": Gaps,
+    "mismatch": Mismatch,
 }
-OPTIONAL = ("encoders", "gyro", "areas", "beacons", "boxes", "movers", "rig")
+OPTIONAL = (
+    *("encoders", "gyro", "slips", "gaps", "mismatch"),
+    *("areas", "beacons", "boxes", "movers", "rig"),
+)
 LISTS: dict[str, type] = {
     "walls": _WallTable,
     "beacons": _BeaconTable,
@@ -329,8 +399,9 @@ def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
         if key in document
     }
     tables: dict[str, Any] = {
-        key: _parse_one(cls, document[key], f"{path}, [{key}]") if key in document else None
+        key: _parse_one(cls, document[key], f"{path}, [{key}]")
         for key, cls in TABLES.items()
+        if key in document
     }
     lists: dict[str, Any] = {
         key: _parse_list(cls, document.get(key, []), path, key) for key, cls in LISTS.items()
@@ -353,7 +424,7 @@ def _parse_scenario(document: Mapping[str, Any], path: Path) -> Scenario:
         **top,
         **tables,
     )
-    _check_together(scenario, path)
+    check_together(scenario, str(path))
     return scenario
 
 
@@ -379,7 +450,9 @@ def _read_recorded(
         raise BslamError(
             f"{where}: there is no file {file}; allowed: a truth.csv, from the scenario's folder"
         )
-    truth = read_truth(file)
+    truth = read_truth(file, [])
+    if not math.isfinite(sum(truth.theta_rad)):
+        raise BslamError(f"{where}: {file} has rows without theta_rad; allowed: a heading in each")
     rows = zip(
         truth.time_us.tolist(), truth.x_m.tolist(), truth.y_m.tolist(), truth.theta_rad.tolist(), strict=True
     )
@@ -469,14 +542,35 @@ def _check_inside(scenario: Scenario, require: Callable[[bool, str, object, str]
     check("[driving], key waypoints", *scenario.driving.waypoints)
 
 
-def _check_together(scenario: Scenario, path: Path) -> None:
-    """What no value shows by itself."""
+def _check_untold(scenario: Scenario, require: Callable[[bool, str, object, str], None]) -> None:
+    """What the filter is not told is possible, too."""
+    off, sensor, radius_m = scenario.mismatch, scenario.sensor, scenario.body.diameter_m / 2.0
+    on_body = math.hypot(sensor.x_m + off.sensor_x_m, sensor.y_m + off.sensor_y_m) <= radius_m
+    place = (off.sensor_x_m, off.sensor_y_m)
+    allowed = "what added to [sensor] is a place on the robot's body"
+    require(on_body, "[mismatch], keys sensor_x_m, sensor_y_m", place, allowed)
+    allowed = "what added to that of [sensor] is not negative"
+    require(sensor.delay_us + off.delay_us >= 0, "[mismatch], key delay_us", off.delay_us, allowed)
+    room_us = scenario.steps * scenario.step_us / 4  # half of the part of the drive in which they lie
+    for name, one in (("slips", scenario.slips), ("gaps", scenario.gaps)):
+        if one is not None:
+            fits = one.count * one.lasts_s[1] * 1e6 <= room_us
+            allowed = f"{room_us * 1e-6:g} s at most in all, a quarter of the drive"
+            require(fits, f"[{name}], keys count, lasts_s", (one.count, *one.lasts_s), allowed)
+    allowed = "not where [driving] has recorded, since it changes the way"
+    moved = scenario.gaps is not None and scenario.gaps.carries
+    require(scenario.slips is None or not scenario.recorded, "[slips]", scenario.slips, allowed)
+    require(not moved or not scenario.recorded, "[gaps], keys carried_sd_m, carried_sd_rad", True, allowed)
+
+
+def check_together(scenario: Scenario, where: str) -> None:
+    """What no value shows by itself. Raises BslamError that starts with `where`."""
     radius_m = scenario.body.diameter_m / 2.0
     driving, sensor, start = scenario.driving, scenario.sensor, scenario.start
 
     def require(good: bool, key: str, value: object, allowed: str) -> None:
         if not good:
-            raise BslamError(f"{path}, {key}: {value!r} is not allowed; allowed: {allowed}")
+            raise BslamError(f"{where}, {key}: {value!r} is not allowed; allowed: {allowed}")
 
     require(bool(scenario.arena.walls), "key walls", scenario.arena.walls, "some wall left between the doors")
     seen: set[int] = set()
@@ -497,6 +591,7 @@ def _check_together(scenario: Scenario, path: Path) -> None:
     _check_inside(scenario, require)
     mount = (sensor.x_m, sensor.y_m)
     require(math.hypot(*mount) <= radius_m, "[sensor], keys x_m, y_m", mount, "a place on the robot's body")
+    _check_untold(scenario, require)
     path_m, cell_m = driving.path_clearance_m, driving.cell_m
     require(
         path_m > radius_m, "[driving], key path_clearance_m", path_m, f"above the body's radius, {radius_m:g}"

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from bslam.log import Sightings, wrap_rad
 from bslam.world.arena import Arena
 from bslam.world.crowd import Screens
-from bslam.world.scenario import Sensor
+from bslam.world.scenario import Mismatch, Sensor
 from bslam.world.signatures import Looks
+from bslam.world.untold import coloured
 
 Matrix = NDArray[np.float64]
+
+_AS_TOLD = Mismatch()
 
 
 def see(
@@ -26,10 +29,12 @@ def see(
     poses: Matrix,
     random: np.random.Generator,
     screens: Screens | None = None,
+    mismatch: Mismatch = _AS_TOLD,
 ) -> Sightings:
     """Sightings of every visible beacon; poses (n, 3) are x m, y m, theta rad in the arena's frame.
 
-    `screens` moved about in the meantime and may have stood in front.
+    `screens` moved about in the meantime and may have stood in front. Of `mismatch` the scales of distances
+    count; `sensor` is the true one.
 
     Noise is drawn for every beacon at every pose, seen or not, so that what one sighting gets does not hang
     on the others. An outlier keeps its beacon's identity, but its direction and range mean nothing.
@@ -41,18 +46,19 @@ def see(
         step, beacon = np.nonzero(seen)
         eye, _ = _mount(sensor, poses)
         seen[step, beacon] = ~screens.hide(step, eye[step], arena.beacon_xy_m[beacon])
-    bearing_noise, range_noise = random.standard_normal((2, *seen.shape))
+    # What is drawn from these changes nothing of the rest, above all not how things look.
+    looks_random, scale_random, miss_random, bearing_random = random.spawn(4)
+    white = random.standard_normal((2, *seen.shape))
+    bearing_noise, range_noise = coloured(white, float(np.ptp(time_us[:2])) * 1e-6, sensor.noise_time_s)
     bearing_rad = wrap_rad(bearing_rad + sensor.bearing_sigma_rad * bearing_noise)
-    range_m = range_m + range_sigma_m(sensor, range_m) * range_noise
-    if sensor.outlier_share > 0.0:
-        lot, direction, distance = random.random((3, *seen.shape))
-        spoilt = lot < sensor.outlier_share
-        bearing_rad = np.where(spoilt, sensor.field_of_view_rad * (direction - 0.5), bearing_rad)
-        range_m = np.where(spoilt, _farthest_m(arena, sensor) * distance, range_m)
+    own_scale = 1.0 + mismatch.range_scale_sd * scale_random.standard_normal(len(arena.beacons))
+    range_m = mismatch.range_scale * own_scale * range_m + range_sigma_m(sensor, range_m) * range_noise
+    bearing_rad, range_m = _spoil(arena, sensor, random, bearing_random, bearing_rad, range_m)
+    if sensor.miss_share > 0.0:
+        seen &= miss_random.random(seen.shape) >= sensor.miss_share
     seen &= range_m > 0.0  # from afar the noise can exceed the range; no detector would report that
     step, beacon = np.nonzero(seen)
     beacon_id = np.array([one.beacon_id for one in arena.beacons], dtype=np.int64)
-    looks_random = random.spawn(1)[0]  # how things look changes nothing of where they are seen
     looks = Looks(arena, looks_random)
     return Sightings(
         time_us=time_us[step] + sensor.delay_us,
@@ -62,6 +68,27 @@ def see(
         mappable=np.ones(len(step), dtype=np.bool_),
         signature=looks.see(beacon, side_rad[seen], true_range_m[seen], looks_random),
     )
+
+
+def _spoil(
+    arena: Arena,
+    sensor: Sensor,
+    random: np.random.Generator,
+    bearing_random: np.random.Generator,
+    bearing_rad: Matrix,
+    range_m: Matrix,
+) -> tuple[Matrix, Matrix]:
+    """Bearing and range with outliers among them, each kind from a stream of its own."""
+    if sensor.outlier_share > 0.0:
+        lot, direction, distance = random.random((3, *bearing_rad.shape))
+        spoilt = lot < sensor.outlier_share
+        bearing_rad = np.where(spoilt, sensor.field_of_view_rad * (direction - 0.5), bearing_rad)
+        range_m = np.where(spoilt, _farthest_m(arena, sensor) * distance, range_m)
+    if sensor.bearing_outlier_share > 0.0:
+        lot, direction = bearing_random.random((2, *bearing_rad.shape))
+        spoilt = lot < sensor.bearing_outlier_share
+        bearing_rad = np.where(spoilt, sensor.field_of_view_rad * (direction - 0.5), bearing_rad)
+    return bearing_rad, range_m
 
 
 def look(arena: Arena, sensor: Sensor, poses: Matrix) -> tuple[Matrix, Matrix]:

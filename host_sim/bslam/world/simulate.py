@@ -25,10 +25,12 @@ from bslam.world.driving import Drive, drive
 from bslam.world.scenario import Scenario, Start, load_scenario, scenario_names
 from bslam.world.sensor import see
 from bslam.world.signatures import generic_looks
+from bslam.world.untold import as_built, coloured, gaps_us, mishaps, within
 from bslam.world.wheels import count_ticks, read_gyro, read_travel
 
 __all__ = ["load_scenario", "scenario_names", "simulate", "true_drive", "with_noise"]
 
+_DRIVING, _WHEELS, _SENSING, _GYRO, _SLIPS, _GAPS = range(6)  # streams of random numbers
 _REDRAW_STREAM = 77  # of wheels whose noise is drawn anew
 _BIAS_AS_NOISE_S = 2.0
 
@@ -44,14 +46,17 @@ def simulate(scenario: Scenario, seed: int, sigma_mps: float | None = None, nois
     time_us = np.arange(scenario.steps + 1, dtype=np.int64) * scenario.step_us
     path = true_drive(scenario, seed)
     poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1)
-    sightings = see(
-        scenario.arena, scenario.sensor, time_us, poses, _random_streams(seed)[2], _screens(scenario, path)
-    )
+    stream, screens = _random_streams(seed)[_SENSING], _screens(scenario, path)
+    true_sensor = as_built(scenario).sensor
+    sightings = see(scenario.arena, true_sensor, time_us, poses, stream, screens, scenario.mismatch)
+    missing_us = gaps_us(scenario, _random_streams(seed)[_GAPS])
+    blind_us = missing_us if scenario.gaps is not None and scenario.gaps.blind else missing_us[:0]
+    in_time = sightings.time_us <= time_us[-1]  # those that are delayed arrive after the end
     x_m, y_m = _to_map_frame(scenario.start, path.x_m, path.y_m)
     return Log(
         name=f"{scenario.name}_seed{seed}",
-        odometry=_read_odometry(scenario, seed, time_us[1:], path),
-        sightings=_until(sightings, int(time_us[-1])),
+        odometry=_without(_read_odometry(scenario, seed, time_us[1:], path), missing_us),
+        sightings=_kept(sightings, in_time & ~within(sightings.time_us, blind_us)),
         truth=Truth(time_us, x_m, y_m, wrap_rad(path.theta_rad - scenario.start.heading_rad)),
         beacons=_true_map(scenario),
         robot=_describe_robot(scenario),
@@ -71,7 +76,9 @@ def _screens(scenario: Scenario, path: Drive) -> Screens | None:
 def true_drive(scenario: Scenario, seed: int) -> Drive:
     """The motion behind the log that `simulate` makes, in the arena's frame."""
     jitter_m = _wheel_noise_m(scenario, seed) if scenario.wheels.noise == "actuation" else None
-    return drive(scenario, _random_streams(seed)[0], jitter_m)
+    streams = _random_streams(seed)
+    untold = mishaps(scenario, streams[_SLIPS], streams[_GAPS])
+    return drive(as_built(scenario), streams[_DRIVING], jitter_m, untold)
 
 
 def with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -> Scenario:
@@ -86,43 +93,56 @@ def with_noise(scenario: Scenario, sigma_mps: float | None, noise: str | None) -
 
 
 def _random_streams(seed: int) -> list[np.random.Generator]:
-    """Driving, wheels, sensing, gyro."""
+    """One for each of _DRIVING to _GAPS: more of them leave the first ones as they are."""
     if seed < 0:
         raise BslamError(f"seed: {seed!r} is not allowed; allowed: an integer from 0")
-    return np.random.default_rng(seed).spawn(4)
+    return np.random.default_rng(seed).spawn(6)
 
 
 def _wheel_noise_m(scenario: Scenario, seed: int) -> NDArray[np.float64]:
     """Noise of the left and right wheel's travel in each step, (steps, 2)."""
     sigma_m = scenario.wheels.sigma_mps * scenario.step_us * 1e-6
-    first, draw = _random_streams(seed)[1], scenario.wheels.draw
+    first, draw = _random_streams(seed)[_WHEELS], scenario.wheels.draw
     stream = np.random.default_rng([seed, _REDRAW_STREAM, draw]) if draw > 0 else first
-    return sigma_m * stream.standard_normal((scenario.steps, 2))
+    white = stream.standard_normal((scenario.steps, 2))
+    return sigma_m * coloured(white, scenario.step_us * 1e-6, scenario.wheels.noise_time_s)
 
 
 def _read_odometry(scenario: Scenario, seed: int, time_us: NDArray[np.int64], path: Drive) -> Odometry:
-    """What the wheels' sensors say: the travel with noise, or the travel without the jitter that it had."""
+    """What the wheels' sensors say: the travel with noise, or the travel without the jitter that it had.
+
+    A wheel that is larger than told turns less on its way.
+    """
     travel_m = np.stack([path.left_m, path.right_m], axis=1)
+    off = scenario.mismatch
+    told_over_true = 1.0 / np.array([off.left_radius_scale, off.right_radius_scale])
     noise_m = _wheel_noise_m(scenario, seed)
     if scenario.wheels.noise == "speedometer":
-        travel_m = travel_m + noise_m
+        travel_m = travel_m * told_over_true + noise_m
     else:
-        travel_m = travel_m - np.where(path.stalled[:, np.newaxis], 0.0, noise_m)
+        travel_m = (travel_m - np.where(path.stalled[:, np.newaxis], 0.0, noise_m)) * told_over_true
     if scenario.encoders is None:
         odometry = read_travel(time_us, travel_m)
     else:
         odometry = count_ticks(scenario.encoders, time_us, travel_m)
     if scenario.gyro is None:
         return odometry
-    rate_radps = read_gyro(scenario.gyro, _random_streams(seed)[3], path.theta_rad, scenario.step_us)
+    rate_radps = read_gyro(scenario.gyro, _random_streams(seed)[_GYRO], path.theta_rad, scenario.step_us)
     unsaid = np.full(len(odometry.time_us) - len(rate_radps), np.nan)  # the counters' first row moves nothing
     return replace(odometry, gyro_radps=np.concatenate([unsaid, rate_radps]))
 
 
-def _until(sightings: Sightings, end_us: int) -> Sightings:
-    """Without those that, being delayed, arrive after the end."""
+def _without(odometry: Odometry, missing_us: NDArray[np.int64]) -> Odometry:
+    """The rows that are not in a gap."""
+    kept = ~within(odometry.time_us, missing_us)
+    gyro_radps = None if odometry.gyro_radps is None else odometry.gyro_radps[kept]
+    columns = (odometry.time_us[kept], odometry.a[kept], odometry.b[kept])
+    return Odometry(odometry.kind, *columns, gyro_radps)
+
+
+def _kept(sightings: Sightings, kept: NDArray[np.bool_]) -> Sightings:
+    """Those rows of what `see` gives."""
     assert sightings.signature is not None
-    kept = sightings.time_us <= end_us
     return Sightings(
         time_us=sightings.time_us[kept],
         beacon_id=sightings.beacon_id[kept],
@@ -165,7 +185,7 @@ def _describe_robot(scenario: Scenario) -> Robot:
         sensor_y_m=sensor.y_m,
         sensor_yaw_rad=sensor.yaw_rad,
         sighting_delay_us=sensor.delay_us,
-        **_gyro_noise(scenario),
+        gyro_sigma_radps=_gyro_sigma_radps(scenario),
         left_radius_m=None if encoders is None else encoders.left_radius_m,
         right_radius_m=None if encoders is None else encoders.right_radius_m,
         ticks_per_revolution=None if encoders is None else encoders.ticks_per_revolution,
@@ -173,10 +193,10 @@ def _describe_robot(scenario: Scenario) -> Robot:
     )
 
 
-def _gyro_noise(scenario: Scenario) -> dict[str, float]:
+def _gyro_sigma_radps(scenario: Scenario) -> float:
     """What the filter is told, which has no state for the bias: noise as bad after _BIAS_AS_NOISE_S."""
     gyro = scenario.gyro
     if gyro is None:
-        return {}
+        return float(Robot.gyro_sigma_radps)  # the default of what plays no part
     steps = _BIAS_AS_NOISE_S / (scenario.step_us * 1e-6)
-    return {"gyro_sigma_radps": math.hypot(gyro.sigma_radps, gyro.bias_sigma_radps * math.sqrt(steps))}
+    return math.hypot(gyro.sigma_radps, gyro.bias_sigma_radps * math.sqrt(steps))

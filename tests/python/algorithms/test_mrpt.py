@@ -35,7 +35,7 @@ def log():
 def test_path_and_map_of_a_quiet_drive_are_the_true_ones(log):
     METHOD.prepare()
     trace = run_algorithm(log, OPTIONS, methods.load_method(METHOD), lambda _step: None)
-    assert evaluate(log, trace, OPTIONS, align=False).error_m[1:].max() < 0.02
+    assert evaluate(log, trace, OPTIONS).error_m[1:].max() < 0.02
     seen = set(log.sightings.beacon_id.tolist())
     assert {one.label for one in trace.beacons} == seen and len(trace.beacons) == len(seen)
     for one in trace.beacons:

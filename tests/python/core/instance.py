@@ -1,6 +1,5 @@
 """The filter's state as the C instance holds it."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -8,17 +7,6 @@ from numpy.typing import NDArray
 
 from bslam.core import Slam
 from internals import inside, module_of
-
-
-@cache
-def _places(dim: int) -> NDArray[np.int64]:
-    """(dim, dim) places of the elements in the packed triangle: bslam/linalg/symmat.h."""
-    row, column = (
-        np.maximum.outer(np.arange(dim), np.arange(dim)),
-        np.minimum.outer(np.arange(dim), np.arange(dim)),
-    )
-    block = row // 4
-    return 4 * (block + 1) * (2 * block + row % 4) + column
 
 
 def _array(slam: Slam, field: object) -> NDArray[np.float64]:
@@ -38,8 +26,21 @@ def mean(slam: Slam) -> NDArray[np.float64]:
 
 
 def covariance(slam: Slam) -> NDArray[np.float64]:
-    """(n, n) its covariance."""
-    return _array(slam, inside(slam).slam.ekf.covariance)[_places(dim(slam))]
+    """(n, n) its covariance: L D Lᵀ of the factor (bslam/linalg/factor.h), in the state's order."""
+    ekf = inside(slam).slam.ekf
+    body, tail = int(ekf.factor.body_count), int(ekf.factor.tail_count)
+    places = -(-body // 4) * 4 + 4
+    flat = _array(slam, ekf.factor.body)
+    lower = np.zeros((places, places))
+    for at in range(0, places - 4, 4):
+        block = flat[at * (at + 4) // 2 :][: 4 * (at + 4)]
+        lower[at : at + 4, : at + 4] = block.reshape(-1, 4).T
+    lower[places - 4 :] = _array(slam, ekf.factor.tail)[: 4 * places].reshape(-1, 4).T
+    full = lower @ np.diag(_array(slam, ekf.factor.d)[:places]) @ lower.T
+    heading = int(ekf.base_dim) - tail - 1
+    robot = [places - 4 + tail - 2, places - 4 + tail - 1, heading, places - 4, 0][: int(ekf.base_dim)]
+    order = [*robot, *range(heading + 1, body)]
+    return full[np.ix_(order, order)]
 
 
 def beacons(slam: Slam) -> list[Any]:
@@ -65,10 +66,11 @@ def copy_of(slam: Slam) -> Slam:
 
 
 def state_without_counters(slam: Slam) -> bytes:
-    """Every byte of the instance but those that a refusal may change: the counters, and which sighting was
-    bad.
+    """Every byte of the instance but those that a refusal may change: the counters, which sighting was bad,
+    and stamps that were refused.
     """
-    return _blanked(slam, ("slam", "counters"), ("slam", "bad_sighting"), ("guard", "counters"))
+    changing = (("slam", name) for name in ("counters", "bad_sighting", "watch"))
+    return _blanked(slam, *changing, ("guard", "counters"))
 
 
 def state_without_addresses(slam: Slam) -> bytes:

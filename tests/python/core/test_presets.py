@@ -47,6 +47,19 @@ def test_camera_goes_on_top_and_chooses_by_association():
     assert changes("paper", "camera") == changes("paper") | known
 
 
+def test_commanded_goes_on_top_and_chooses_by_association_and_filter():
+    known, unknown, smoothed = (
+        changes("commanded", association=association, filter_=filter_)
+        for association, filter_ in ((KNOWN, INVARIANT), (SVM, INVARIANT), (KNOWN, SMOOTHER))
+    )
+    assert known["scale_states"] == 1 and known["left_speed_sd_mps"] == known["gate_d2"] == 0
+    assert known["sighting_delay_us"] == 175_000
+    assert smoothed == known | {"bearing_sd_rad": 0.1}
+    # Association wants sharp noise, consistency wants it wide.
+    assert unknown["bearing_sd_rad"] < known["bearing_sd_rad"]
+    assert set(unknown) - set(known) == {"match_d2", "new_d2", "confirm_window_us"}
+
+
 def test_bearing_only_is_for_the_smoother():
     assert changes("bearing-only") == {}
     assert changes("bearing-only", filter_=SMOOTHER)["velocity_walk_mps_sqrt_s"] == 30.0

@@ -35,6 +35,8 @@ def plain(level: int) -> np.ndarray:
         np.zeros((240, 320, 3), np.float32),
         np.zeros((240, 640, 3), np.uint8)[:, ::2],
         np.zeros((240, 320), np.uint8),
+        [[0, 0, 0]],
+        None,
     ],
 )
 def test_see_picture_of_another_kind_is_refused_with_what_is_allowed(

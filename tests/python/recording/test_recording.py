@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from zstandard import ZstdCompressor
 
+from bslam.cli import main
 from bslam.core.slam import Account, Beacon, Slam
 from bslam.errors import BslamError
 from bslam.log import first_steps, read_folder, write_folder
@@ -104,6 +107,7 @@ entries = st.one_of(
     st.builds(Map, st.lists(beacons, max_size=2)),
     st.builds(Counters, st.just({"odometry": 3})),
     st.builds(TruePose, times, poses),
+    st.builds(TruePose, times, st.tuples(floats, floats, st.just(math.nan))),
     st.builds(Gap, st.integers(1, 9)),
 )
 
@@ -284,6 +288,47 @@ def test_a_file_that_was_cut_is_read_as_far_as_it_goes(recorded, tmp_path):
     assert not part.complete and recorded.complete
     assert 0 < len(part.entries) < len(recorded.entries)
     assert list(map(text, part.entries)) == list(map(text, recorded.entries[: len(part.entries)]))
+
+
+def test_a_replay_of_a_file_that_was_cut_says_so(recorded, tmp_path, capsys):
+    data = recorded.path.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) * 3 // 4])
+    words = ["--pictures", "0", "--out", str(tmp_path / "out")]
+    assert main(["replay", str(tmp_path / "cut.mcap"), *words]) == 0
+    assert "cut.mcap: it was cut short; its end is missing" in capsys.readouterr().err
+    (tmp_path / "cut.mcap").write_bytes(data[:200])
+    with pytest.raises(BslamError, match=r"cut\.mcap: it was cut short, and does not begin with /start"):
+        load(tmp_path / "cut.mcap")
+
+
+def chunked(path, contents, packed="zstd", says=None):
+    """An MCAP file whose chunks hold these bytes, and say of themselves what they are asked to."""
+    data = b"\x89MCAP0\r\n"
+    for content in contents:
+        body = ZstdCompressor().compress(content) if packed == "zstd" else content
+        size = len(content) if says is None else says
+        head = struct.pack("<QQQI", 0, 1, size, 0) + struct.pack("<I", len(packed)) + packed.encode()
+        data += b"\x06" + struct.pack("<Q", len(head) + 8 + len(body)) + head
+        data += struct.pack("<Q", len(body)) + body
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("says", [None, 10])
+def test_a_chunk_that_unpacks_to_more_than_ours_do_is_refused(tmp_path, says):
+    chunked(tmp_path / "bomb.mcap", [bytes(17 << 20)], says=says)
+    with pytest.raises(BslamError, match=r"bomb\.mcap: a chunk unpacks to more than 16 MB; allowed: a"):
+        load(tmp_path / "bomb.mcap")
+
+
+def test_chunks_that_together_unpack_to_more_than_there_is_room_for_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("bslam.recording.reader.BYTES_MAX", 4 << 20)
+    unknown = b"\x99" + struct.pack("<Q", 1 << 20) + bytes(1 << 20)
+    chunked(tmp_path / "bomb.mcap", [unknown] * 5)
+    with pytest.raises(BslamError, match=r"bomb\.mcap: it unpacks to more than 4 MB; allowed: at most that"):
+        load(tmp_path / "bomb.mcap")
+    chunked(tmp_path / "other.mcap", [unknown], packed="lz4")
+    with pytest.raises(BslamError, match=r"other\.mcap: a chunk packed by 'lz4'; allowed"):
+        load(tmp_path / "other.mcap")
 
 
 @pytest.mark.parametrize("content", [b"", b"no recording", b"\x89MCAP0\r\n"])

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -127,17 +126,6 @@ def test_the_overview_lists_every_command(capsys):
 def test_the_version_is_that_of_the_package(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"bslam {version('bslam')}\n"
-
-
-def test_a_log_without_identities_is_told_what_it_needs(made, tmp_path, capsys):
-    log = made.circle_log(20)
-    nameless = replace(log.sightings, beacon_id=np.full_like(log.sightings.beacon_id, -1))
-    for name, one in (("named", log), ("nameless", replace(log, sightings=nameless))):
-        write_folder(one, tmp_path / name)
-    words = ["replay", "csv", str(tmp_path / "named"), str(tmp_path / "nameless"), "--pictures", "0"]
-    main([*words, "--jobs", "1", "--out", str(tmp_path / "out")])
-    hints = [line for line in capsys.readouterr().err.splitlines() if "--association" in line]
-    assert hints == ["nameless: no sighting has an identity: --association nearest or mahalanobis needs none"]
 
 
 def test_replay_with_options_in_any_order(log_folder, made, tmp_path, capsys):
@@ -306,10 +294,8 @@ def test_preset_is_asked_for_printed_and_kept(tmp_path, capsys):
     assert not entry["velocity_states"]
     with pytest.raises(SystemExit):
         main([*run, "--preset", "wheels"])
-    assert (
-        "'wheels' does not exist; allowed: real-wheels, paper, camera, bearing-only"
-        in capsys.readouterr().err
-    )
+    allowed = "allowed: real-wheels, paper, commanded, camera, bearing-only"
+    assert f"'wheels' does not exist; {allowed}" in capsys.readouterr().err
 
 
 def test_a_broken_log_exits_2_after_the_others_ran(log_folder, made, tmp_path, capsys):

@@ -22,7 +22,7 @@ def test_late_sightings_leave_the_filter_consistent(delay_us, velocity_states):
         log = simulate(late, seed, sigma_mps=0.6)
         options = RunOptions(velocity_states=velocity_states)
         trace = run_log(log, options)
-        evaluation = metrics.evaluate(log, trace, options, align=False)
+        evaluation = metrics.evaluate(log, trace, options)
         entry = metrics.summarise(log, trace, options, evaluation)
         nees.append(entry["nees_mean"])
         error_cm.append(100.0 * entry["position_error_m"]["mean"])

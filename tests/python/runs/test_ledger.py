@@ -111,7 +111,7 @@ def test_a_refused_frame_counts_its_sightings_and_what_was_missed(ledger, in_map
     in_map += [10]
     book(ledger, (3, True, Account("new", 10)))
     ledger.book_refused([3, 5, 3], [True, True, False])
-    assert ledger.counts() == SightingCounts(sightings=4, missed=1)
+    assert ledger.counts() == SightingCounts(sightings=4, missed=1, refused=3)
 
 
 def test_corrupt_identities_changes_the_share_asked_for_to_others_that_exist():

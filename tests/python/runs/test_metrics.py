@@ -25,8 +25,9 @@ def true_poses(log):
     return np.column_stack([log.truth.x_m, log.truth.y_m, log.truth.theta_rad])
 
 
-def figures(log, trace, options=OPTIONS, align=False):
-    return summarise(log, trace, options, evaluate(log, trace, options, align))
+def figures(log, trace, options=OPTIONS, align=None):
+    options = replace(options, align=align)
+    return summarise(log, trace, options, evaluate(log, trace, options))
 
 
 def test_position_error_is_the_distance_at_each_step_after_the_first(made, log):
@@ -110,11 +111,11 @@ def test_alignment_takes_away_a_rigid_motion_and_only_that(made, log):
     moved = Rigid(2.0, 30.0, -7.0)
     poses = moved.poses(true_poses(log))
     trace = made.trace(poses, step_times_us(log))
-    assert figures(log, trace, align=True)["position_error_m"]["max"] < 1e-9
+    assert figures(log, trace, align="rigid")["position_error_m"]["max"] < 1e-9
     assert figures(log, trace)["position_error_m"]["min"] > 1.0
     scaled = poses * [1.1, 1.1, 1.0]
     # A circle of 1.1 m about the same centre: 0.1 m everywhere.
-    entry = figures(log, made.trace(scaled, step_times_us(log)), align=True)
+    entry = figures(log, made.trace(scaled, step_times_us(log)), align="rigid")
     assert entry["position_error_m"]["mean"] == pytest.approx(0.1, abs=0.01)
 
 
@@ -125,7 +126,7 @@ def test_nees_is_the_same_wherever_an_aligned_truth_has_its_frame(made, log):
     elsewhere = replace(log, truth=Truth(log.truth.time_us, *truth.T))
     for name in ("standard", "invariant"):
         options = RunOptions(filter=name)
-        here, there = (figures(one, trace, options, align=True)["nees_mean"] for one in (log, elsewhere))
+        here, there = (figures(one, trace, options, align="rigid")["nees_mean"] for one in (log, elsewhere))
         assert here == pytest.approx(there)
 
 
@@ -136,7 +137,9 @@ def test_a_sparse_truth_counts_only_where_it_is_known(made, log):
     poses[:, 0] += 50.0
     poses[rows, 0] -= 49.7
     # 50 ms about each stamp hold the step itself and its two neighbours, which are 50 m off.
-    evaluation = evaluate(replace(log, truth=sparse), made.trace(poses, step_times_us(log)), OPTIONS, False)
+    evaluation = evaluate(
+        replace(log, truth=sparse), made.trace(poses, step_times_us(log)), replace(OPTIONS, align="none")
+    )
     assert np.flatnonzero(np.isfinite(evaluation.error_m)).tolist() == sorted([*rows - 1, *rows, *rows + 1])
     assert evaluation.error_m[rows] == pytest.approx([0.3] * 3)
 
@@ -163,8 +166,8 @@ def test_the_map_has_its_own_alignment(made, log):
     pairs = zip(made.beacons.beacon_id, places, strict=True)
     beacons = [made.map_beacon(uid, identity, *place) for uid, (identity, place) in enumerate(pairs)]
     trace = made.trace(true_poses(log), step_times_us(log), beacons)
-    assert figures(log, trace, align=True)["map_rmse_m"] < 1e-9
-    assert figures(log, trace, align=False)["map_rmse_m"] > 1.0
+    assert figures(log, trace, align="rigid")["map_rmse_m"] < 1e-9
+    assert figures(log, trace, align="none")["map_rmse_m"] > 1.0
 
 
 def test_directions_are_judged_with_and_without_the_scale_that_they_do_not_tell(made, log):
@@ -173,12 +176,11 @@ def test_directions_are_judged_with_and_without_the_scale_that_they_do_not_tell(
     beacons = [made.map_beacon(uid, identity, *place) for uid, (identity, place) in enumerate(pairs)]
     poses = true_poses(log) * (0.8, 0.8, 1.0)
     trace = made.trace(poses, step_times_us(log), beacons)
-    options = replace(OPTIONS, observation="direction")
-    entry = summarise(log, trace, options, evaluate(log, trace, options, True))
+    entry = figures(log, trace, replace(OPTIONS, observation="direction"), align="rigid")
     assert [entry["position_scale"], entry["map_scale"]] == pytest.approx([1.25, 1.25])
     assert max(entry["position_rmse_scaled_m"], entry["map_rmse_scaled_m"]) < 1e-9
     assert min(entry["position_error_m"]["rmse"], entry["map_rmse_m"]) > 0.1
-    assert "map_scale" not in figures(log, trace, align=True)
+    assert "map_scale" not in figures(log, trace, align="rigid")
 
 
 def test_beacons_true_needs_four_mappable_sightings(made, log):

@@ -133,6 +133,29 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
         load_mrclam(tmp_path, 1)
 
 
+def test_rows_at_the_start_that_time_runs_back_over_are_left_out_and_noted(folder):
+    """As four of the published recordings have them."""
+    whole = load_mrclam(folder, 1)
+    for name, row in (("Odometry", "0.9 9.9"), ("Measurement", "5 9.9 0.1"), ("Groundtruth", "9.0 9.0 0.0")):
+        path = next(folder.glob(f"Robot1_{name}.dat*"))
+        text = gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
+        path.unlink()
+        (folder / f"Robot1_{name}.dat").write_text(f"{T0 + 0.11:.3f} {row}\n{T0 + 0.105:.3f} {row}\n{text}")
+    log = load_mrclam(folder, 1)
+    for part in ("odometry", "sightings", "truth"):
+        for name, theirs in vars(getattr(whole, part)).items():
+            np.testing.assert_array_equal(vars(getattr(log, part))[name], theirs)
+    assert len(log.notes) == 3
+    assert "Robot1_Odometry.dat: left out 2 rows at the start: time runs back to" in log.notes[0]
+
+
+def test_of_true_poses_with_one_stamp_the_first_counts(folder):
+    (folder / "Robot1_Groundtruth.dat").write_text("1.0 5 1 0\n1.0 6 1 0\n2.0 7 1 0\n")
+    log = load_mrclam(folder, 1)
+    assert log.truth.x_m.tolist() == [5.0, 7.0]
+    assert log.notes == (f"{folder}/Robot1_Groundtruth.dat: left out 1 row stamped as the row above",)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -146,13 +169,13 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
         ("Robot1_Measurement.dat", "1.0 5 nan 0.1\n", r"line 1: .* allowed: 4 finite numbers"),
         (
             "Robot1_Measurement.dat",
-            "2.0 5 1 0\n1.0 5 1 0\n",
-            r"data row 2: time 1\.000 does not come after 2\.000",
+            "2.0 5 1 0\n3.0 5 1 0\n2.5 5 1 0\n",
+            r"data row 3: time 2\.500 does not come after 3\.000",
         ),
         (
             "Robot1_Groundtruth.dat",
-            "1.0 5 1 0\n1.0 5 1 0\n",
-            r"data row 2: time 1\.000 does not come after 1\.000",
+            "1.0 5 1 0\n3.0 5 1 0\n2.0 5 1 0\n",
+            r"data row 3: time 2\.000 does not come after 3\.000",
         ),
     ],
 )

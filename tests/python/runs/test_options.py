@@ -8,7 +8,7 @@ import pytest
 
 from bslam.core.presets import preset_settings
 from bslam.core.slam import Slam
-from bslam.datasets import dlr, mrclam
+from bslam.datasets import dlr
 from bslam.errors import BslamError
 from bslam.log import Odometry, Robot
 from bslam.options import (
@@ -41,8 +41,7 @@ def test_every_parameter_exists_in_the_core(made):
     for one in (log, ticks, velocity(log)):
         for observation in ("distance", "direction"):
             assert set(core_params(RunOptions(observation=observation), one)) == set(known)
-    of_a_set = (mrclam.SETTINGS, mrclam.UNKNOWN_IDENTITY_SETTINGS, mrclam.BEARING_ONLY_SMOOTHER_SETTINGS)
-    assert {name for settings in (*of_a_set, dlr.SETTINGS) for name in settings} <= set(known)
+    assert {name for name, _ in dlr.ROBOT.settings} <= set(known)
 
 
 def test_the_robot_s_noise_and_geometry_reach_the_filter(made):
@@ -174,20 +173,59 @@ def test_what_a_run_notices_of_being_lost(made, options, expected):
     assert params["settled_us"] == settled_us
 
 
-def test_real_logs_have_their_own_set(made):
-    own = velocity(made.circle_log(steps=1))
-    log = replace(own, collection="mrclam")
-    params = core_params(RunOptions(), log)
-    assert mrclam.SETTINGS.items() <= params.items()
-    assert params["velocity_states"] == 0
-    assert odometry_lead_us(RunOptions(), log) == mrclam.ODOMETRY_LEAD_US
-    # A folder with velocities is told by its own robot.toml.
-    assert odometry_lead_us(RunOptions(), own) == 0
-    assert core_params(RunOptions(), own)["left_speed_sd_mps"] == own.robot.wheel_speed_sigma_mps
-    asked = core_params(RunOptions(velocity_states=True), log)
-    assert (asked["velocity_states"], asked["scale_states"]) == (1, 0)
+def test_speeds_without_a_noise_count_as_commands(made):
+    measured = velocity(made.circle_log(steps=1))
+    log = replace(measured, robot=replace(measured.robot, wheel_speed_sigma_mps=0.0, sighting_delay_us=5_000))
+    assert presets_of(RunOptions(), log) == ("real-wheels", "commanded")
+    params, preset = core_params(RunOptions(), log), preset_settings(["commanded"], 0, 1)
+    same = ("scale_states", "forward_sd_per_sqrt_m", "turn_sd_per_sqrt_rad", "huber_d", "gate_d2")
+    assert [params[name] for name in same] == [preset[name] for name in same]
+    assert params["left_speed_sd_mps"] == params["velocity_states"] == 0
+    # Commands lead the motion; the images' own delay is on top.
+    assert odometry_lead_us(RunOptions(), log) == preset["sighting_delay_us"] == 175_000
+    assert params["sighting_delay_us"] == 180_000
+    # Errors alike for many frames: the scatter that the log tells counts for more, never for less.
+    assert params["bearing_sd_rad"] == preset["bearing_sd_rad"] > log.robot.bearing_sigma_rad
+    coarse = replace(log, robot=replace(log.robot, bearing_sigma_rad=0.3))
+    assert core_params(RunOptions(), coarse)["bearing_sd_rad"] == 0.3
     directions = core_params(RunOptions(observation="direction", filter="smoother"), log)
     assert directions["bearing_sd_rad"] == 2 * params["bearing_sd_rad"]
+    asked = core_params(RunOptions(velocity_states=True), log)
+    assert (asked["velocity_states"], asked["scale_states"]) == (1, 0)
+
+
+@pytest.mark.parametrize("options", [RunOptions(sigma_mps=0.1), RunOptions(presets=("real-wheels",))])
+def test_speeds_with_a_noise_are_measured(made, options):
+    log = velocity(made.circle_log(steps=1))
+    log = replace(log, robot=replace(log.robot, wheel_speed_sigma_mps=0.0))
+    assert presets_of(options, log) == ("real-wheels",)
+    assert odometry_lead_us(options, log) == 0
+    assert core_params(options, log)["left_speed_sd_mps"] == (options.sigma_mps or 0.0)
+
+
+def test_a_detector_that_scores_is_a_camera(made):
+    log = made.circle_log(steps=1)
+    scored = replace(log.sightings, score=np.ones(len(log.sightings.time_us)))
+    assert presets_of(RunOptions(), replace(log, sightings=scored)) == ("paper", "camera")
+
+
+def test_settings_of_the_log_win_over_presets_and_lose_against_the_user(made):
+    log = made.circle_log(steps=1)
+    told = replace(log, robot=replace(log.robot, settings=(("gate_d2", 0), ("turn_sd_per_sqrt_m", 0.04))))
+    assert core_params(RunOptions(), told)["turn_sd_per_sqrt_m"] == 0.04
+    assert core_params(RunOptions(parameters=(("gate_d2", 9.0),)), told)["gate_d2"] == 9.0
+    wrong = replace(log, robot=replace(log.robot, settings=(("gate", 0),)))
+    with pytest.raises(
+        BslamError, match=r"robot\.toml, \[settings\], key gate: no such setting; allowed: whe"
+    ):
+        core_params(RunOptions(), wrong)
+
+
+def test_a_frame_may_be_ahead_by_as_much_as_readings_are_apart(made):
+    log = made.circle_log(steps=3)
+    assert core_params(RunOptions(), log)["ahead_max_us"] == Slam.defaults()["ahead_max_us"]
+    slow = replace(log.odometry, time_us=log.odometry.time_us * 25)
+    assert core_params(RunOptions(), replace(log, odometry=slow))["ahead_max_us"] == 25 * made.step_us
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_write_run_replaces_what_was_there(made, tmp_path):
     trace = made.trace(poses, step_times_us(log), [made.map_beacon(1, 3, 1.0, 1.0)])
     for suffix in (".map.csv", ".bslam"):  # this run has no map of its own to keep
         (tmp_path / f"x{suffix}").write_text("old")
-    write_run(tmp_path, "x", trace, evaluate(log, trace, RunOptions(), False))
+    write_run(tmp_path, "x", trace, evaluate(log, trace, RunOptions()))
     estimate, truth = (np.loadtxt(tmp_path / f"x.{one}.tum") for one in ("estimate", "truth"))
     assert estimate.shape == truth.shape == (6, 8)
     assert np.allclose(estimate[:, 1:3], poses[:, :2], atol=1e-6)
@@ -91,7 +91,7 @@ def test_a_run_that_saves_no_map_leaves_the_one_that_it_started_in(made, tmp_pat
     trace = made.trace(poses, step_times_us(log), [made.map_beacon(1, 3, 1.0, 1.0)])
     (tmp_path / "x.bslam").write_text("old")
     monkeypatch.chdir(tmp_path)
-    evaluation = evaluate(log, trace, RunOptions(), False)
+    evaluation = evaluate(log, trace, RunOptions())
     write_run(tmp_path, "x", trace, evaluation, Path("x.bslam"))
     assert (tmp_path / "x.bslam").read_text() == "old"
     write_run(tmp_path, "x", trace, evaluation, Path("another.bslam"))

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def replay(log, options, align):
+def replay(log, options):
     trace = run_log(log, options)
-    return summarise(log, trace, options, evaluate(log, trace, options, align))
+    return summarise(log, trace, options, evaluate(log, trace, options))
 
 
 @pytest.mark.parametrize("filter_name", ["standard", "invariant"])
@@ -35,7 +35,7 @@ def test_filters_reach_what_an_independent_prototype_reached(filter_name):
         }
     options = RunOptions(filter=filter_name, velocity_states=False)
     for name in ("paper_room_700_sigma0.3", "paper_room_704_sigma0.6"):
-        entry = replay(read_folder(folder / name), options, align=False)
+        entry = replay(read_folder(folder / name), options)
         # The same filter, but not the same program: 5 % and a millimetre.
         expected_cm = float(reference[name]["mean_cm"])
         assert 100.0 * entry["position_error_m"]["mean"] == pytest.approx(expected_cm, rel=0.05, abs=0.1)
@@ -48,7 +48,7 @@ def test_a_real_robot_is_not_lost_and_its_map_is_right():
     assert best_truth(folder, 1)[0] == "full"
     assert np.sum(log.sightings.beacon_id == -1) == 1  # one decoding error
     assert set(log.sightings.beacon_id[~log.sightings.mappable].tolist()) <= {1, 2, 3, 4, 5}
-    entry = replay(log, RunOptions(), align=True)
+    entry = replay(log, RunOptions())
     assert entry["diverged"] is False
     assert entry["beacons_mapped"] == entry["beacons_true"] == 15
     assert (
@@ -62,7 +62,7 @@ def test_a_real_robot_is_not_lost_and_its_map_is_right():
 def test_a_real_robot_that_sees_directions_for_seconds_minutes_apart_is_not_lost(data_set, robot):
     """What was seen last is settled while nothing is seen: with work in frames alone maps shrank."""
     log = load_mrclam(ROOT / "mrclam" / f"MRCLAM_Dataset{data_set}", robot)
-    entry = replay(log, RunOptions(observation="direction", filter="smoother"), align=True)
+    entry = replay(log, RunOptions(observation="direction", filter="smoother"))
     assert entry["diverged"] is False
     assert entry["beacons_mapped"] == 15
     assert entry["map_scale"] == pytest.approx(1.0, abs=0.4)

@@ -24,7 +24,7 @@ def test_drive_stays_near_the_bound_and_knows_what_it_errs_by(seed, field_of_vie
     log = simulate(replace(room, sensor=replace(room.sensor, field_of_view_rad=field_of_view_rad)), seed, 1.0)
     options = RunOptions(observation="direction", association="known", filter="smoother", seed=seed)
     trace = run_log(log, options)
-    figures = summarise(log, trace, options, evaluate(log, trace, options, align=False))
+    figures = summarise(log, trace, options, evaluate(log, trace, options))
     assert not figures["diverged"]
     assert figures["position_error_m"]["mean"] < 1.5 * figures["bound_error_m"]
     assert figures["nees_mean"] < 6.0

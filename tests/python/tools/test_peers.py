@@ -26,7 +26,7 @@ def core():
 def own(log):
     """Mean error and beacons of the same core by way of Python."""
     trace = run_log(log, OPTIONS)
-    evaluation = evaluate(log, trace, OPTIONS, align=False)
+    evaluation = evaluate(log, trace, OPTIONS)
     return evaluation.error_m[1:].mean(), len(trace.beacons)
 
 

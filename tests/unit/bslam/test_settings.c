@@ -240,6 +240,46 @@ static void test_check_velocity_states_need_noise_of_both_wheels(void **state)
     assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
 }
 
+/// Distances without noise make a filter that believes them to every digit.
+static void test_check_distances_need_a_millimetre_of_noise_at_a_metre(void **state)
+{
+    bslam_settings_t settings = unit_settings();
+    settings.range_sd_floor_m = settings.range_sd_fraction = settings.range_sd_per_m = 0;
+    assert_check_blames(&settings, "range_sd_floor_m");
+    static const double too_little[] = {9e-4, 1e-6, 1e-20, 1e-38};
+    for (int i = 0; i < COUNT_OF(too_little); i++) {
+        settings.range_sd_floor_m = real(too_little[i]);
+        assert_check_blames(&settings, "range_sd_floor_m");
+    }
+    bslam_real_t *const parts[] = {&settings.range_sd_floor_m, &settings.range_sd_fraction,
+                                   &settings.range_sd_per_m};
+    for (int i = 0; i < COUNT_OF(parts); i++) {
+        int bad_id = -1;
+        settings.range_sd_floor_m = settings.range_sd_fraction = settings.range_sd_per_m = 0;
+        *parts[i] = BSLAM_R(1e-3);
+        assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
+    }
+}
+
+static void test_check_directions_need_noise(void **state)
+{
+    bslam_settings_t settings = unit_settings();
+    settings.bearing_sd_rad = 0;
+    assert_check_blames(&settings, "bearing_sd_rad");
+}
+
+static void test_check_modulus_of_a_counter_that_tells_no_direction_is_refused(void **state)
+{
+    bslam_settings_t settings = unit_settings();
+    for (int32_t modulus = 1; modulus < 3; modulus++) {
+        settings.counter_modulus = modulus;
+        assert_check_blames(&settings, "counter_modulus");
+    }
+    int bad_id = -1;
+    settings.counter_modulus = 3;
+    assert_int_equal(bslam_settings_check(&settings, &bad_id), BSLAM_OK);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -261,6 +301,9 @@ int main(void)
         cmocka_unit_test(test_check_both_limits_of_every_field_are_taken),
         cmocka_unit_test(test_check_velocity_and_scale_states_together_are_refused),
         cmocka_unit_test(test_check_velocity_states_need_noise_of_both_wheels),
+        cmocka_unit_test(test_check_distances_need_a_millimetre_of_noise_at_a_metre),
+        cmocka_unit_test(test_check_directions_need_noise),
+        cmocka_unit_test(test_check_modulus_of_a_counter_that_tells_no_direction_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -127,6 +127,9 @@ static void test_any_flipped_bit_of_the_newer_gives_the_older(void **state)
 {
     assert_true(keep(1) && keep(2));
     for (int bit = 0; bit < 8 * (BSLAM_FLASH_PIECE + COUNT); bit++) {
+        if (bit == 8 * (int)sizeof(head_t)) {
+            bit = 8 * BSLAM_FLASH_PIECE;  // what fills the head's piece says nothing
+        }
         areas[1][bit / 8] ^= (uint8_t)(1 << bit % 8);
         assert_int_equal(kept_version(), 1);
         areas[1][bit / 8] ^= (uint8_t)(1 << bit % 8);

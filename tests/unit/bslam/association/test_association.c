@@ -91,18 +91,90 @@ static void test_known_sighting_without_a_label_is_rejected(void **state)
     assert_rejected(&d.records[0].match, BSLAM_REASON_NO_IDENTITY);
 }
 
-static void test_known_repeated_label_leaves_the_first(void **state)
+static bslam_sighting_t with_sd(bslam_sighting_t sighting, double bearing_sd_rad, double range_sd_m)
+{
+    sighting.bearing_sd_rad = real(bearing_sd_rad);
+    sighting.range_sd_m = real(range_sd_m);
+    return sighting;
+}
+
+/// Sightings of one label, the one to be used first: it is, wherever in the frame it comes.
+static void assert_first_is_used(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
+                                 const bslam_sighting_t *twins, int count, bslam_verdict_t expected)
+{
+    for (int turn = 0; turn < count; turn++) {
+        for (int back = 0; back < 2; back++) {
+            bslam_sighting_t seen[3];
+            for (int i = 0; i < count; i++) {
+                seen[(turn + (back ? count - i : i)) % count] = twins[i];
+            }
+            const decision_t d = decide(bslam_associate_known, ekf, settings, &on_axle, seen, count);
+            for (int i = 0; i < count; i++) {
+                const bool is_first = memcmp(&seen[i], &twins[0], sizeof seen[i]) == 0;
+                assert_int_equal(d.records[i].match.verdict, is_first ? expected : BSLAM_VERDICT_REJECT);
+                assert_int_equal(d.records[i].match.reason,
+                                 is_first ? BSLAM_REASON_NONE : BSLAM_REASON_DUPLICATE);
+            }
+        }
+    }
+}
+
+/// Beacon 10 of the map stands 4 m ahead.
+static void test_known_repeated_label_leaves_the_best_in_any_order(void **state)
+{
+    static const double gates[] = {13.8, 0};
+    for (int g = 0; g < COUNT_OF(gates); g++) {
+        bslam_settings_t settings = unit_settings();
+        settings.gate_d2 = real(gates[g]);
+        bslam_ekf_t ekf = three_beacons(&settings);
+        ekf.beacons[0].confirmed = true;
+        const bslam_sighting_t twins[][3] = {
+            // In its mirror image, and a little off.
+            {unit_polar(0.01, 4.02, 10), unit_polar(0.9, 2, 10), unit_polar(0.05, 4.2, 10)},
+            // Without a distance it is as good where it fits, and less than one that has it.
+            {unit_direction(0.01, 10), unit_polar(0.9, 2, 10), unit_direction(1.2, 10)},
+            {unit_polar(0.03, 4.1, 10), unit_direction(0, 10), unit_direction(0.01, 10)},
+            // As near, and surer; nothing fits.
+            {with_sd(unit_polar(0.01, 4.02, 10), 0.01, 0.02), with_sd(unit_polar(0.01, 4.02, 10), 0.05, 0.5),
+             with_sd(unit_polar(0.01, 4.02, 10), 0.01, 0.3)},
+            {unit_polar(0.9, 2, 10), unit_polar(1.2, 1.5, 10), unit_polar(2, 6, 10)},
+        };
+        for (int i = 0; i < COUNT_OF(twins); i++) {
+            assert_first_is_used(&ekf, &settings, twins[i], 3, BSLAM_VERDICT_MATCH);
+        }
+    }
+}
+
+static void test_known_repeated_label_that_is_new_begins_with_the_surest_in_any_order(void **state)
 {
     const bslam_settings_t settings = unit_settings();
     const bslam_ekf_t ekf = three_beacons(&settings);
-    const bslam_sighting_t seen[] = {unit_polar(0, 4, 10), unit_polar(0, 4, 10), unit_polar(0, 4, 7),
-                                     unit_polar(0, 5, 7), unit_polar(0, 4, 10)};
-    const decision_t d = decide(bslam_associate_known, &ekf, &settings, &on_axle, seen, COUNT_OF(seen));
-    assert_match(&d.records[0].match, 0);
-    assert_rejected(&d.records[1].match, BSLAM_REASON_DUPLICATE);
-    assert_new(&d.records[2].match);
-    assert_rejected(&d.records[3].match, BSLAM_REASON_DUPLICATE);
-    assert_rejected(&d.records[4].match, BSLAM_REASON_DUPLICATE);
+    const bslam_sighting_t twins[][3] = {
+        {unit_polar(0.3, 4, 7), unit_polar(0.3, 5, 7), unit_direction(0.3, 7)},
+        {with_sd(unit_polar(0.3, 5, 7), 0.01, 0.01), unit_polar(0.3, 4, 7), unit_direction(1, 7)},
+        {unit_polar(-0.3, 4, 7), unit_polar(0.3, 4, 7),
+         unit_polar(1.3, 4, 7)},  // the same, but for the place
+        {with_sd(unit_direction(0.3, 7), 0.001, 0), unit_direction(-0.3, 7), unit_direction(0.1, 7)},
+    };
+    for (int i = 0; i < COUNT_OF(twins); i++) {
+        assert_first_is_used(&ekf, &settings, twins[i], 3, BSLAM_VERDICT_NEW);
+    }
+}
+
+/// Until one of its beacons is confirmed: what fits one of them before what starts another.
+static void test_known_repeated_label_of_tentative_beacons_goes_on_with_what_fits(void **state)
+{
+    bslam_settings_t settings = unit_settings();
+    settings.gate_d2 = BSLAM_R(13.8);
+    static const double places[2][2] = {{4, 0}, {0, 3}};
+    bslam_ekf_t ekf = unit_map_of(&settings, places, 2);
+    for (int b = 0; b < 2; b++) {
+        ekf.beacons[b].label = 10;
+        ekf.beacons[b].confirmed = false;
+    }
+    const bslam_sighting_t twins[3] = {unit_polar(0.01, 4.02, 10), unit_polar(-1.5, 2, 10),
+                                       unit_polar(1.6, 3.2, 10)};
+    assert_first_is_used(&ekf, &settings, twins, 3, BSLAM_VERDICT_MATCH);
 }
 
 /// A sighting far from all that a label may be starts another competitor, but not without end.
@@ -409,7 +481,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_known_label_of_the_map_is_a_match_and_another_is_new),
         cmocka_unit_test(test_known_sighting_without_a_label_is_rejected),
-        cmocka_unit_test(test_known_repeated_label_leaves_the_first),
+        cmocka_unit_test(test_known_repeated_label_leaves_the_best_in_any_order),
+        cmocka_unit_test(test_known_repeated_label_that_is_new_begins_with_the_surest_in_any_order),
+        cmocka_unit_test(test_known_repeated_label_of_tentative_beacons_goes_on_with_what_fits),
         cmocka_unit_test(test_known_label_has_so_many_competitors_and_no_more),
         cmocka_unit_test(test_known_competitor_that_cannot_be_weighed_is_not_the_nearest),
         cmocka_unit_test(test_known_not_mappable_sighting_does_not_use_its_label_up),

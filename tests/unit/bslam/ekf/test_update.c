@@ -326,6 +326,29 @@ static void test_distance2_is_the_textbooks(void **state)
     }
 }
 
+static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **state)
+{
+    const bslam_settings_t settings = params_of(0, true);
+    unit_random_t random = {20};
+    const bslam_ekf_t ekf = random_filter(&settings, &random);
+    const twin_t twin = twin_of(&ekf);
+    for (int i = 0; i < 5; i++) {
+        for (int j = 0; j < 5; j++) {
+            const plan_t plans[] = {random_plan(&random, i, true), random_plan(&random, j, true)};
+            const bslam_sighting_t seen[] = {sighting_of(&ekf, &plans[0]), sighting_of(&ekf, &plans[1])};
+            const bslam_innovation_t a = innovation_of(&ekf, &settings, i, &seen[0]);
+            const bslam_innovation_t b = innovation_of(&ekf, &settings, j, &seen[1]);
+            const dense_t rows = twin_rows(&ekf, &mount, i), others = twin_rows(&ekf, &mount, j);
+            const dense_t columns = dense_transposed(&others);
+            const dense_t p = dense_product(&rows, &twin.covariance), all = dense_product(&p, &columns);
+            assert_near(bslam_ekf_row_covariance(&ekf, &a.range_row, &b.bearing_row), all.at[0][1],
+                        TOLERANCE);
+            assert_near(bslam_ekf_row_covariance(&ekf, &a.bearing_row, &b.bearing_row), all.at[1][1],
+                        TOLERANCE);
+        }
+    }
+}
+
 static void test_fuse_distance2_is_conditional_on_what_was_fused_before(void **state)
 {
     const bslam_settings_t settings = params_of(0, false);
@@ -774,6 +797,7 @@ int main(void)
         cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
+        cmocka_unit_test(test_row_covariance_of_any_two_sightings_is_the_textbooks),
         cmocka_unit_test(test_fuse_distance2_is_conditional_on_what_was_fused_before),
         cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),

@@ -1,515 +1,698 @@
 #include "covariance.h"
 #include "support.h"
 
-/// Of numbers of order 1 after some hundred roundings; where a share makes them larger, times that.
-#define TOLERANCE (300 * UNIT_ROUNDING)
+#include <math.h>
 
-/// Sizes on both sides of a multiple of four.
-enum { BODY_MOST = 9, SIZES = 2 * (BODY_MOST + 1) };
+/// A hundred roundings, and the number of terms that a small factor sums.
+#define TOLERANCE (200 * UNIT_ROUNDING)
 
-static bslam_real_t w[BSLAM_FACTOR_PLACES_MAX], scratch[2][BSLAM_FACTOR_PLACES_MAX];
+enum { BODY_MAX = 13 };
 
-static bslam_factor_t random_factor(unit_random_t *random, int body, int tail)
+/// A factor, and what it stands for: the operation is done to both.
+static bslam_factor_t factor;
+static dense_t p;
+/// The deviation of each value before and after it, whichever is larger: what rounding goes by.
+static double sd[DENSE_MAX];
+
+static bslam_real_t w[BSLAM_FACTOR_PLACES_MAX];
+static bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX];
+
+static void note_deviations(int from, int to, int count)
 {
-    bslam_factor_t factor;
-    bslam_factor_begin(&factor, body, tail);
-    for (int i = 0; i < body + tail; i++) {
-        const int place = covariance_place(&factor, i);
-        factor.d[place] = real(unit_random(random, 0.2, 1));
-        for (int j = 0; j < i; j++) {
-            *bslam_factor_element(&factor, place, covariance_place(&factor, j)) =
-                real(unit_random(random, -1, 1));
-        }
+    for (int k = 0; k < count; k++) {
+        sd[to + k] = fmax(sd[to + k], sqrt(fmax(0, p.at[from + k][from + k])));
     }
-    return factor;
 }
 
-static void assert_is(const bslam_factor_t *factor, const dense_t *expected, double tolerance)
+static void begin_operation(void)
 {
-    const dense_t p = covariance_of_factor(factor);
-    covariance_assert_sound(factor);
-    assert_int_equal(p.rows, expected->rows);
+    p = covariance_of_factor(&factor);
+    memset(sd, 0, sizeof sd);
+    note_deviations(0, 0, p.rows);
+}
+
+/// The factor stands for p now, and is one.
+static void assert_done(double tolerance)
+{
+    const dense_t now = covariance_of_factor(&factor);
+    assert_int_equal(now.rows, p.rows);
+    note_deviations(0, 0, p.rows);
     for (int i = 0; i < p.rows; i++) {
-        for (int j = 0; j < p.rows; j++) {
-            assert_near(p.at[i][j], expected->at[i][j], tolerance);
+        for (int j = 0; j <= i; j++) {
+            assert_near(now.at[i][j], p.at[i][j], tolerance * sd[i] * sd[j]);
         }
     }
+    covariance_assert_sound(&factor);
 }
 
-/// A vector over the values, and in `by_place` what of it stands at each place.
-static dense_t random_vector(unit_random_t *random, const bslam_factor_t *factor, int first,
-                             bslam_real_t *by_place)
+/// B Bᵀ, with deviations from 0.01 to 100.
+static dense_t random_covariance(unit_random_t *random, int n)
 {
-    const int count = factor->body_count + factor->tail_count;
-    dense_t vector = dense_zero(count, 1);
-    memset(by_place, 0, sizeof w);
-    for (int i = first; i < count; i++) {
-        const bslam_real_t value = real(unit_random(random, -1, 1));
-        vector.at[i][0] = (double)value;
-        by_place[covariance_place(factor, i)] = value;
-    }
-    return vector;
-}
-
-static dense_t plus_square(dense_t p, double share, const dense_t *vector)
-{
-    for (int i = 0; i < p.rows; i++) {
-        for (int j = 0; j < p.rows; j++) {
-            p.at[i][j] += share * vector->at[i][0] * vector->at[j][0];
+    dense_t b = dense_zero(n, n + 2);
+    for (int i = 0; i < n; i++) {
+        const double scale = pow(10, unit_random(random, -2, 2));
+        for (int k = 0; k < n + 2; k++) {
+            b.at[i][k] = scale * unit_random(random, -1, 1);
         }
     }
-    return p;
+    const dense_t identity = dense_identity(n + 2);
+    return dense_sandwich(&b, &identity);
 }
 
-/// Size n of SIZES: each body with each tail.
-static int body_of(int n)
-{
-    return n / 2;
-}
+/// Factors of each size: of full rank; of half of it; of values that are all known.
+enum { KINDS = 3 };
 
-static int tail_of(int n)
+static void make_factor(unit_random_t *random, int body, int tail, int kind)
 {
-    return 2 + n % 2;
-}
-
-// ---- reading, rows ----------------------------------------------------------------------------------------
-
-static void test_factor_begin_has_values_without_variance(void **state)
-{
-    bslam_factor_t factor;
-    for (int n = 0; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        memset(&factor, 0x55, sizeof factor);
+    const int n = body + tail;
+    const dense_t start = random_covariance(random, n);
+    memset(&factor, 0, sizeof factor);
+    if (kind == 2) {
         bslam_factor_begin(&factor, body, tail);
-        const dense_t none = dense_zero(body + tail, body + tail);
-        assert_is(&factor, &none, 0);
-        assert_int_equal(bslam_factor_tail_at(&factor), (body + 3) / 4 * 4);
-        assert_int_equal(bslam_factor_places(&factor), (body + 3) / 4 * 4 + 4);
+    } else {
+        covariance_factor(&start, tail, &factor);
     }
+    for (int i = 0; kind == 1 && i < n; i++) {
+        factor.d[covariance_place(&factor, i)] *= unit_random(random, 0, 1) < 0.5 ? 0 : 1;
+    }
+    begin_operation();
 }
 
-static void test_factor_get_is_the_product(void **state)
+/// Calls `check` with a factor of every kind and size, and with every value.
+static void for_every_value(uint64_t seed, void (*check)(unit_random_t *random, int value))
 {
-    unit_random_t random = {1};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        const bslam_factor_t factor = random_factor(&random, body, tail);
-        const dense_t p = covariance_of_factor(&factor);
-        for (int i = 0; i < p.rows; i++) {
-            for (int j = 0; j < p.rows; j++) {
-                const int a = covariance_place(&factor, i), b = covariance_place(&factor, j);
-                assert_near(bslam_factor_get(&factor, a, b), p.at[i][j], TOLERANCE);
+    unit_random_t random = {seed};
+    for (int tail = 2; tail <= BSLAM_FACTOR_TAIL_MAX; tail++) {
+        for (int body = 1; body <= BODY_MAX; body++) {
+            for (int value = 0; value < (body + tail) * KINDS; value++) {
+                make_factor(&random, body, tail, value % KINDS);
+                check(&random, value / KINDS);
             }
         }
     }
 }
 
-static void test_factor_add_row_is_the_sandwich(void **state)
+static int place(int value)
 {
-    unit_random_t random = {2};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int i = 1; i < body + tail; i++) {
-            for (int k = 0; k < i; k++) {
-                bslam_factor_t factor = random_factor(&random, body, tail);
-                const dense_t p = covariance_of_factor(&factor);
-                dense_t a = dense_identity(p.rows);
-                a.at[i][k] = 0.7;
-                const dense_t expected = dense_sandwich(&a, &p);
-                bslam_factor_add_row(&factor, covariance_place(&factor, i), covariance_place(&factor, k),
-                                     real(0.7));
-                assert_is(&factor, &expected, TOLERANCE);
+    return covariance_place(&factor, value);
+}
+
+/// P <- A P Aᵀ.
+static void transform(const dense_t *a)
+{
+    p = dense_sandwich(a, &p);
+}
+
+// ---- layout -----------------------------------------------------------------------------------------------
+
+static void test_layout_every_element_has_its_own_place_within_its_array(void **state)
+{
+    for (int tail = 2; tail <= BSLAM_FACTOR_TAIL_MAX; tail++) {
+        for (int body = 1; body <= BSLAM_FACTOR_BODY_MAX; body++) {
+            static bool body_taken[COUNT_OF(factor.body)], tail_taken[COUNT_OF(factor.tail)];
+            memset(body_taken, 0, sizeof body_taken);
+            memset(tail_taken, 0, sizeof tail_taken);
+            factor.body_count = body;
+            factor.tail_count = tail;
+            assert_true(bslam_factor_places(&factor) <= BSLAM_FACTOR_PLACES_MAX);
+            for (int i = 0; i < body + tail; i++) {
+                for (int j = 0; j <= i; j++) {
+                    const bslam_real_t *at = bslam_factor_element(&factor, place(i), place(j));
+                    assert_ptr_equal(at, bslam_factor_row(&factor, place(i)) + 4 * place(j));
+                    bool *taken = i < body ? &body_taken[at - factor.body] : &tail_taken[at - factor.tail];
+                    assert_false(*taken);
+                    *taken = true;
+                }
             }
         }
     }
 }
 
-static void test_factor_scale_is_the_sandwich(void **state)
+static void test_begin_has_no_variance_whatever_was_there(void **state)
 {
-    unit_random_t random = {3};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int i = 0; i < body + tail; i++) {
-            bslam_factor_t factor = random_factor(&random, body, tail);
-            const dense_t p = covariance_of_factor(&factor);
-            dense_t a = dense_identity(p.rows);
-            a.at[i][i] = 0.3;
-            const dense_t expected = dense_sandwich(&a, &p);
-            bslam_factor_scale(&factor, covariance_place(&factor, i), real(0.3));
-            assert_is(&factor, &expected, TOLERANCE);
+    for (int tail = 2; tail <= BSLAM_FACTOR_TAIL_MAX; tail++) {
+        for (int body = 1; body <= BODY_MAX; body++) {
+            memset(&factor, 0xff, sizeof factor);
+            bslam_factor_begin(&factor, body, tail);
+            begin_operation();
+            p = dense_zero(body + tail, body + tail);
+            assert_done(0);
         }
     }
+}
+
+static void check_get(unit_random_t *random, int value)
+{
+    for (int j = 0; j < p.rows; j++) {
+        const bslam_real_t got = bslam_factor_get(&factor, place(value), place(j));
+        assert_near(got, p.at[value][j], TOLERANCE * sd[value] * sd[j]);
+        assert_true(got == bslam_factor_get(&factor, place(j), place(value)));
+    }
+}
+
+static void test_get_is_the_product_from_both_sides(void **state)
+{
+    for_every_value(1, check_get);
+}
+
+// ---- rows -------------------------------------------------------------------------------------------------
+
+static void check_add_row(unit_random_t *random, int value)
+{
+    for (int k = 0; k < value; k++) {
+        const bslam_real_t share = real(unit_random(random, -3, 3));
+        dense_t a = dense_identity(p.rows);
+        a.at[value][k] = (double)share;
+        begin_operation();
+        transform(&a);
+        bslam_factor_add_row(&factor, place(value), place(k), share);
+        sd[value] += fabs((double)share) * sd[k];
+        assert_done(TOLERANCE);
+    }
+}
+
+static void test_add_row_adds_a_share_of_any_value_before(void **state)
+{
+    for_every_value(2, check_add_row);
+}
+
+static void check_scale(unit_random_t *random, int value)
+{
+    const bslam_real_t by = real(pow(10, unit_random(random, -2, 2)));
+    dense_t a = dense_identity(p.rows);
+    a.at[value][value] = (double)by;
+    transform(&a);
+    bslam_factor_scale(&factor, place(value), by);
+    assert_done(TOLERANCE);
+}
+
+static void test_scale_multiplies_any_value(void **state)
+{
+    for_every_value(3, check_scale);
 }
 
 // ---- sums -------------------------------------------------------------------------------------------------
 
-/// A share of 1 adds to columns; one of 1000 leaves little of them.
-static void test_factor_add_is_the_sum(void **state)
+static void add_both(unit_random_t *random, int first, double share)
 {
-    unit_random_t random = {4};
-    static const double shares[] = {1e-3, 1, 1e3};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int first = 0; first < body + tail; first++) {
-            for (int k = 0; k < COUNT_OF(shares); k++) {
-                bslam_factor_t factor = random_factor(&random, body, tail);
-                factor.d[covariance_place(&factor, (first + 1) % (body + tail))] = 0;
-                const dense_t p = covariance_of_factor(&factor);
-                const dense_t vector = random_vector(&random, &factor, first, w);
-                const dense_t expected = plus_square(p, shares[k], &vector);
-                bslam_factor_add(&factor, covariance_place(&factor, first), real(shares[k]), w, scratch);
-                assert_is(&factor, &expected, TOLERANCE * (1 + shares[k]));
-            }
+    memset(w, 0, sizeof w);
+    for (int i = first; i < p.rows; i++) {
+        w[place(i)] = real(unit_random(random, -1, 1) * (sd[i] > 0 ? sd[i] : 1));
+    }
+    for (int i = first; i < p.rows; i++) {
+        for (int j = first; j < p.rows; j++) {
+            p.at[i][j] += (double)real(share) * (double)w[place(i)] * (double)w[place(j)];
         }
+    }
+    bslam_factor_add(&factor, place(first), real(share), w, scratch);
+}
+
+static void check_add(unit_random_t *random, int first)
+{
+    static const double shares[] = {1e-12, 1e-3, 1, 10, 1e6};
+    const bslam_factor_t start = factor;
+    for (int i = 0; i < COUNT_OF(shares); i++) {
+        factor = start;
+        begin_operation();
+        add_both(random, first, shares[i]);
+        assert_done(TOLERANCE);
     }
 }
 
-/// Beside what a large share adds, what was there before stays as exact as it was: here all but w's own
-/// direction, in which the sum is larger by 1e12.
-static void test_factor_add_much_keeps_what_is_across(void **state)
+static void test_add_of_little_or_much_is_the_sum(void **state)
 {
-    unit_random_t random = {5};
-    for (int n = 4; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        bslam_factor_t factor = random_factor(&random, body, tail);
-        const dense_t p = covariance_of_factor(&factor);
-        const dense_t vector = random_vector(&random, &factor, 0, w);
-        bslam_factor_add(&factor, 0, real(1e12), w, scratch);
-        covariance_assert_sound(&factor);
-        // One across: u w = 0.
-        dense_t u = dense_zero(1, p.rows);
-        u.at[0][0] = vector.at[p.rows - 1][0];
-        u.at[0][p.rows - 1] = -vector.at[0][0];
-        const dense_t before = dense_sandwich(&u, &p);
-        double after = 0;
-        for (int j = 0; j < p.rows; j++) {
-            const bslam_real_t *l = NULL;
-            double f = 0;
-            for (int i = 0; i < p.rows; i++) {
-                l = bslam_factor_row(&factor, covariance_place(&factor, i));
-                f += j <= i ? u.at[0][i] * (double)l[4 * covariance_place(&factor, j)] : 0;
-            }
-            after += (double)factor.d[covariance_place(&factor, j)] * f * f;
-        }
-        // f of the first column is a difference of numbers that are rounded: squared, times 1e12.
-        assert_near(after, before.at[0][0],
-                    1e-3 * before.at[0][0] + 1e12 * 4 * UNIT_ROUNDING * UNIT_ROUNDING);
-    }
+    for_every_value(4, check_add);
 }
 
-static void test_factor_add_nothing_changes_nothing(void **state)
+static void check_add_nothing(unit_random_t *random, int first)
 {
-    static const double shares[] = {0, -1, NAN};
+    const bslam_factor_t before = factor;
+    add_both(random, first, 0);
+    assert_memory_equal(&factor, &before, sizeof before);
+    memset(w, 0, sizeof w);
+    bslam_factor_add(&factor, place(first), 1, w, scratch);
+    assert_memory_equal(&factor, &before, sizeof before);
+}
+
+static void test_add_of_nothing_changes_no_bit(void **state)
+{
+    for_every_value(5, check_add_nothing);
+}
+
+/// A value that is known but for a millionth of what is added to it, and others that went with it.
+static void test_add_of_much_to_what_is_known_keeps_what_is_beside(void **state)
+{
     unit_random_t random = {6};
-    for (int k = 0; k < COUNT_OF(shares); k++) {
-        bslam_factor_t factor = random_factor(&random, 5, 3);
-        const bslam_factor_t before = factor;
-        (void)random_vector(&random, &factor, 0, w);
-        bslam_factor_add(&factor, 0, real(shares[k]), w, scratch);
-        assert_memory_equal(&factor, &before, sizeof factor);
-    }
-}
-
-/// Variances so small that a quotient by them would not be finite are none.
-static void test_factor_add_next_to_nothing_to_nothing_stays_finite(void **state)
-{
-    for (double tiny = 1e-37; tiny < 1e-22; tiny *= 10) {
-        bslam_factor_t factor;
-        bslam_factor_begin(&factor, 3, 2);
+    for (int round = 0; round < 200; round++) {
+        make_factor(&random, 6, 2, 0);
+        for (int k = 0; k < 3; k++) {
+            factor.d[k] *= real(pow(10, unit_random(&random, -12, -2)));
+        }
+        begin_operation();
+        // Only of the first ones: what the others have of these goes, and the rest of them stays.
         memset(w, 0, sizeof w);
-        w[0] = 1;
-        w[1] = real(1e3);
-        w[4] = real(-1e3);
-        bslam_factor_add(&factor, 0, real(tiny), w, scratch);
-        covariance_assert_sound(&factor);
-        assert_near(bslam_factor_get(&factor, 1, 1), 1e6 * tiny, 1e6 * tiny * TOLERANCE + 2e-24);
-    }
-}
-
-static void test_factor_forget_leaves_the_others_as_they_were(void **state)
-{
-    unit_random_t random = {7};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int k = 0; k < body + tail; k++) {
-            bslam_factor_t factor = random_factor(&random, body, tail);
-            dense_t expected = covariance_of_factor(&factor);
-            for (int i = 0; i < expected.rows; i++) {
-                expected.at[i][k] = expected.at[k][i] = i == k ? 0.125 : 0;
-            }
-            bslam_factor_forget(&factor, covariance_place(&factor, k), real(0.125), w, scratch);
-            assert_is(&factor, &expected, TOLERANCE);
-        }
-    }
-}
-
-// ---- a body that grows and shrinks ------------------------------------------------------------------------
-
-static void test_factor_remove_leaves_the_others_as_they_were(void **state)
-{
-    unit_random_t random = {8};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int count = 1; count <= 4; count++) {
-            for (int first = 0; first + count <= body; first++) {
-                bslam_factor_t factor = random_factor(&random, body, tail);
-                const dense_t p = covariance_of_factor(&factor);
-                const dense_t expected = dense_without(&p, first, count);
-                bslam_factor_remove(&factor, first, count, w, scratch);
-                assert_int_equal(factor.body_count, body - count);
-                assert_is(&factor, &expected, TOLERANCE);
+        for (int i = 0; i < 3; i++) {
+            w[i] = real(unit_random(&random, -10, 10));
+            for (int j = 0; j <= i; j++) {
+                p.at[i][j] += (double)w[i] * (double)w[j];
+                p.at[j][i] = p.at[i][j];
             }
         }
+        bslam_factor_add(&factor, 0, 1, w, scratch);
+        assert_done(TOLERANCE);
     }
 }
 
-static void test_factor_cut_leaves_the_others_as_they_were(void **state)
+// ---- values that come and go ------------------------------------------------------------------------------
+
+/// Row and column `value` become 0 but for a variance.
+static void forget_in(dense_t *m, int value, double variance)
 {
-    unit_random_t random = {9};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int first = 0; first <= body; first++) {
-            bslam_factor_t factor = random_factor(&random, body, tail);
-            const dense_t p = covariance_of_factor(&factor);
-            const dense_t expected = first < body ? dense_without(&p, first, body - first) : p;
-            bslam_factor_cut(&factor, first);
-            assert_int_equal(factor.body_count, first);
-            assert_is(&factor, &expected, TOLERANCE);
-        }
+    for (int i = 0; i < m->rows; i++) {
+        m->at[i][value] = m->at[value][i] = i == value ? variance : 0;
     }
 }
 
-/// A tail without variance has nothing to be divided by.
-static void test_factor_cut_of_an_exact_tail_is_exact(void **state)
+static void check_forget(unit_random_t *random, int value)
 {
-    bslam_factor_t factor;
-    bslam_factor_begin(&factor, 4, 3);
-    const dense_t none = dense_zero(4, 4);
-    bslam_factor_cut(&factor, 1);
-    assert_is(&factor, &none, 0);
-}
-
-/// With a variance that was, and with what stood where they come to stand.
-static void test_factor_widen_after_removal_adds_exact_values(void **state)
-{
-    unit_random_t random = {10};
-    for (int n = 8; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int count = 1; count <= 5; count++) {
-            bslam_factor_t factor = random_factor(&random, body, tail);
-            bslam_factor_remove(&factor, 1, 3, w, scratch);
-            const dense_t p = covariance_of_factor(&factor);
-            const int left = body - 3;
-            dense_t expected = dense_zero(p.rows + count, p.rows + count);
-            for (int i = 0; i < p.rows; i++) {
-                for (int j = 0; j < p.rows; j++) {
-                    expected.at[i < left ? i : i + count][j < left ? j : j + count] = p.at[i][j];
-                }
-            }
-            bslam_factor_widen(&factor, count);
-            assert_int_equal(factor.body_count, left + count);
-            assert_is(&factor, &expected, TOLERANCE);
-        }
-    }
-}
-
-/// New values are rows over the old ones and noises; P <- [A; B] diag(P, noises) [A; B]ᵀ, in the factor's
-/// order.
-static void assert_append(unit_random_t *random, int body, int tail, int count, int noise_count)
-{
-    bslam_factor_t factor = random_factor(random, body, tail);
-    const int old = body + tail, all = old + noise_count;
-    const dense_t p = covariance_of_factor(&factor);
-    static bslam_real_t rows[BSLAM_FACTOR_GROWTH_MAX][BSLAM_FACTOR_PLACES_MAX];
-    bslam_growth_t growth = {.count = count, .noise_count = noise_count};
-    dense_t a = dense_zero(old + count, all), of_all = dense_zero(all, all);
-    for (int i = 0; i < old; i++) {
-        a.at[i < body ? i : i + count][i] = 1;
-        memcpy(of_all.at[i], p.at[i], (size_t)old * sizeof p.at[i][0]);
-    }
-    for (int r = 0; r < count; r++) {
-        const int here = body + r;
-        bslam_real_t by_value[BSLAM_FACTOR_PLACES_MAX];
-        const dense_t by = random_vector(random, &factor, 0, by_value);
-        for (int j = 0; j < old; j++) {
-            a.at[here][j] = by.at[j][0];
-        }
-        memset(rows[r], 0, sizeof rows[r]);
-        for (int i = 0; i < bslam_factor_places(&factor); i++) {  // rowᵀ L
-            for (int j = 0; by_value[i] != 0 && j <= i; j++) {
-                rows[r][j] += by_value[i] * bslam_factor_row(&factor, i)[4 * j];
-            }
-        }
-        growth.rows[r] = rows[r];
-        for (int c = 0; c < noise_count; c++) {
-            growth.by_noise[r][c] = real(unit_random(random, -1, 1));
-            a.at[here][old + c] = (double)growth.by_noise[r][c];
-        }
-    }
-    for (int c = 0; c < noise_count; c++) {
-        growth.noise_var[c] = real(unit_random(random, 0.1, 1));
-        of_all.at[old + c][old + c] = (double)growth.noise_var[c];
-    }
-    const dense_t expected = dense_sandwich(&a, &of_all);
-    bslam_factor_append(&factor, &growth);
-    assert_int_equal(factor.body_count, body + count);
-    assert_is(&factor, &expected, 4 * TOLERANCE);
-}
-
-static void test_factor_append_is_the_textbooks(void **state)
-{
-    unit_random_t random = {11};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int count = 1; count <= BSLAM_FACTOR_GROWTH_MAX; count++) {
-            for (int noises = 0; noises <= 3; noises++) {
-                assert_append(&random, body, tail, count, noises);
-            }
-        }
-    }
-}
-
-// ---- scalar measurements ----------------------------------------------------------------------------------
-
-enum { SCALARS_MOST = 4 };
-
-/// Scalars that are to be measured, each with what the textbook says of it when those before it are taken.
-typedef struct scalars {
-    dense_t h[SCALARS_MOST];  ///< rows
-    bslam_real_t v[SCALARS_MOST][BSLAM_FACTOR_PLACES_MAX], lambda[SCALARS_MOST][BSLAM_FACTOR_PLACES_MAX];
-    bslam_waiting_t waiting[SCALARS_MOST];
-} scalars_t;
-
-/// lambda <- Lᵀ h
-static void look(const bslam_factor_t *factor, const dense_t *h, bslam_real_t *lambda)
-{
-    memset(lambda, 0, sizeof w);
-    for (int i = 0; i < h->columns; i++) {
-        const int place = covariance_place(factor, i);
-        for (int j = 0; j <= place; j++) {
-            lambda[j] += real(h->at[0][i]) * bslam_factor_row(factor, place)[4 * j];
-        }
-    }
-}
-
-/// P <- P - P hᵀ h P / s, and *change += gain P hᵀ. Returns P hᵀ by the old P.
-static dense_t measure(dense_t *p, const dense_t *h, double variance, double gain, dense_t *change)
-{
-    const dense_t across = dense_transposed(h), column = dense_product(p, &across);
-    const dense_t predicted = dense_product(h, &column);
-    const double s = predicted.at[0][0] + variance;
-    for (int i = 0; i < p->rows; i++) {
-        change->at[i][0] += gain * column.at[i][0];
-    }
-    *p = plus_square(*p, -1 / s, &column);
-    return column;
-}
-
-static void assert_measured(unit_random_t *random, bslam_factor_t factor, int count, double variance)
-{
-    static scalars_t scalars;
-    dense_t p = covariance_of_factor(&factor), change = dense_zero(p.rows, 1);
-    bslam_real_t d[BSLAM_FACTOR_PLACES_MAX], changed[BSLAM_FACTOR_PLACES_MAX];
-    const int places = bslam_factor_places(&factor);
-    memcpy(d, factor.d, sizeof d);
-    for (int k = 0; k < count; k++) {
-        const dense_t across = random_vector(random, &factor, 0, w);
-        scalars.h[k] = dense_transposed(&across);
-        scalars.waiting[k] =
-            (bslam_waiting_t){scalars.v[k], scalars.lambda[k], real(unit_random(random, -1, 1))};
-        look(&factor, &scalars.h[k], scalars.lambda[k]);
-        dense_t before = covariance_of_factor(&factor), unused = dense_zero(p.rows, 1);
-        for (int b = 0; b < k; b++) {
-            const dense_t column = measure(&before, &scalars.h[b], variance, 0, &unused);
-            const dense_t expected = dense_product(&scalars.h[k], &column);
-            const bslam_real_t met = bslam_factor_carry(&scalars.waiting[b], places, scalars.lambda[k]);
-            assert_near(met, expected.at[0][0], 10 * TOLERANCE);
-        }
-        (void)measure(&p, &scalars.h[k], variance, (double)scalars.waiting[k].gain, &change);
-        bslam_factor_measure(&scalars.waiting[k], places, real(variance), d);
-    }
-    memcpy(factor.d, d, sizeof d);
-    for (int i = 0; i < places; i++) {
-        changed[i] = 2;
-    }
-    bslam_factor_settle(&factor, scalars.waiting, count, changed);
-    assert_is(&factor, &p, 10 * TOLERANCE);
+    const bslam_real_t variance = value % 3 == 0 ? 0 : real(unit_random(random, 0, 4));
+    forget_in(&p, value, (double)variance);
+    bslam_factor_forget(&factor, place(value), variance, w, scratch);
+    assert_done(TOLERANCE);
     for (int i = 0; i < p.rows; i++) {
-        assert_near(changed[covariance_place(&factor, i)], 2 + change.at[i][0], 10 * TOLERANCE);
+        if (i != value) {
+            assert_true(bslam_factor_get(&factor, place(i), place(value)) == 0);
+        }
+    }
+    assert_true(bslam_factor_get(&factor, place(value), place(value)) == variance);
+}
+
+static void test_forget_leaves_any_value_with_no_other_one(void **state)
+{
+    for_every_value(7, check_forget);
+}
+
+/// The operation took values first to first + count - 1 out.
+static void assert_without(int first, int count)
+{
+    const int behind = p.rows - first - count;
+    p = dense_without(&p, first, count);
+    memmove(&sd[first], &sd[first + count], (size_t)behind * sizeof sd[0]);
+    assert_done(TOLERANCE);
+}
+
+static void check_remove(unit_random_t *random, int first)
+{
+    const bslam_factor_t start = factor;
+    for (int count = 1; first + count <= start.body_count; count++) {
+        factor = start;
+        begin_operation();
+        bslam_factor_remove(&factor, first, count, w, scratch);
+        assert_int_equal(factor.body_count, start.body_count - count);
+        assert_without(first, count);
     }
 }
 
-static void test_factor_measure_is_the_textbooks(void **state)
+static void test_remove_of_any_stretch_leaves_the_others(void **state)
+{
+    for_every_value(8, check_remove);
+}
+
+static void check_cut(unit_random_t *random, int first)
+{
+    if (first <= factor.body_count) {
+        const int count = factor.body_count - first;
+        bslam_factor_cut(&factor, first);
+        assert_int_equal(factor.body_count, first);
+        assert_without(first, count);
+    }
+}
+
+static void test_cut_leaves_what_is_before_and_the_tail(void **state)
+{
+    for_every_value(9, check_cut);
+}
+
+/// The operation put `count` values at the body's end: `grown` has them behind the tail.
+static void assert_with(const dense_t *grown, int body, int count)
+{
+    const int n = grown->rows - count;
+    dense_t order = dense_zero(grown->rows, grown->rows);
+    for (int i = 0; i < grown->rows; i++) {
+        order.at[i][i < body ? i : i < body + count ? n + i - body : i - count] = 1;
+    }
+    p = dense_sandwich(&order, grown);
+    memset(&sd[body], 0, (size_t)(grown->rows - body) * sizeof sd[0]);
+    assert_int_equal(factor.body_count, body + count);
+    assert_done(TOLERANCE);
+}
+
+static void check_widen(unit_random_t *random, int count)
+{
+    const int body = factor.body_count;
+    dense_t grown = dense_zero(p.rows + count, p.rows + count);
+    for (int i = 0; i < p.rows; i++) {
+        memcpy(grown.at[i], p.at[i], (size_t)p.rows * sizeof grown.at[i][0]);
+    }
+    bslam_factor_widen(&factor, count);
+    assert_with(&grown, body, count);
+}
+
+static void test_widen_puts_values_without_variance_at_the_bodys_end(void **state)
+{
+    for_every_value(10, check_widen);
+}
+
+/// New values made of all that there are, or of none, and of noises.
+static void check_append(unit_random_t *random, int kind)
+{
+    static bslam_real_t rows[BSLAM_FACTOR_GROWTH_MAX][BSLAM_FACTOR_PLACES_MAX];
+    const int n = p.rows, body = factor.body_count, noises = kind % (BSLAM_FACTOR_GROWTH_MAX + 1);
+    bslam_growth_t growth = {.count = 1 + kind % BSLAM_FACTOR_GROWTH_MAX, .noise_count = noises};
+    dense_t a = dense_zero(n + growth.count, n + noises), joint = dense_zero(n + noises, n + noises);
+    memset(rows, 0, sizeof rows);
+    for (int i = 0; i < n; i++) {
+        a.at[i][i] = 1;
+        memcpy(joint.at[i], p.at[i], (size_t)n * sizeof joint.at[i][0]);
+    }
+    for (int k = 0; k < noises; k++) {
+        growth.noise_var[k] = real(unit_random(random, 0, 2));
+        joint.at[n + k][n + k] = (double)growth.noise_var[k];
+    }
+    for (int r = 0; r < growth.count; r++) {
+        growth.rows[r] = rows[r];
+        for (int k = 0; k < noises; k++) {
+            growth.by_noise[r][k] = real(unit_random(random, -1, 1));
+            a.at[n + r][n + k] = (double)growth.by_noise[r][k];
+        }
+        for (int i = kind % 5 == 4 ? n : 0; i < n; i++) {
+            const bslam_real_t by = real(unit_random(random, -1, 1));
+            a.at[n + r][i] = (double)by;
+            for (int j = 0; j <= i; j++) {
+                rows[r][place(j)] += by * *bslam_factor_element(&factor, place(i), place(j));
+            }
+        }
+    }
+    const dense_t grown = dense_sandwich(&a, &joint);
+    bslam_factor_append(&factor, &growth);
+    assert_with(&grown, body, growth.count);
+}
+
+static void test_append_puts_values_made_of_others_and_of_noises_at_the_bodys_end(void **state)
+{
+    for_every_value(11, check_append);
+}
+
+/// A copy of a value, as a ray's origin is of the robot's place: both go on as one.
+static void test_append_of_a_copy_is_singular_and_goes_on(void **state)
 {
     unit_random_t random = {12};
-    for (int n = 2; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int count = 1; count <= SCALARS_MOST; count++) {
-            assert_measured(&random, random_factor(&random, body, tail), count, 0.5);
+    for (int body = 1; body <= BODY_MAX; body++) {
+        make_factor(&random, body, 2, 0);
+        bslam_real_t row[BSLAM_FACTOR_PLACES_MAX] = {0};
+        for (int j = 0; j <= body; j++) {
+            row[place(j)] = *bslam_factor_element(&factor, place(body), place(j));
         }
+        const bslam_growth_t growth = {.count = 1, .rows = {row}};
+        bslam_factor_append(&factor, &growth);
+        const int copy = place(body), of = place(body + 1);
+        const double var = (double)bslam_factor_get(&factor, of, of);
+        assert_near(bslam_factor_get(&factor, copy, copy), var, TOLERANCE * var);
+        assert_near(bslam_factor_get(&factor, copy, of), var, TOLERANCE * var);
+        covariance_assert_sound(&factor);
+        begin_operation();
+        bslam_factor_remove(&factor, 0, 1, w, scratch);
+        assert_without(0, 1);
+        assert_near(bslam_factor_get(&factor, place(body - 1), place(body)), var, TOLERANCE * var);
     }
 }
 
-static void test_factor_measure_where_values_are_exact_is_the_textbooks(void **state)
+// ---- measurements -----------------------------------------------------------------------------------------
+
+enum { WAITING_MAX = 4 };
+
+static bslam_real_t v[WAITING_MAX][BSLAM_FACTOR_PLACES_MAX], lambda[WAITING_MAX][BSLAM_FACTOR_PLACES_MAX];
+static bslam_real_t d[BSLAM_FACTOR_PLACES_MAX], change[BSLAM_FACTOR_PLACES_MAX];
+static bslam_waiting_t waiting[WAITING_MAX];
+
+/// f = Lᵀ h.
+static void look(const dense_t *h, bslam_real_t f[BSLAM_FACTOR_PLACES_MAX])
 {
-    unit_random_t random = {13};
-    for (int n = 4; n < SIZES; n++) {
-        const int body = body_of(n), tail = tail_of(n);
-        for (int exact = 0; exact < body + tail; exact++) {
-            bslam_factor_t factor = random_factor(&random, body, tail);
-            factor.d[covariance_place(&factor, exact)] = 0;
-            assert_measured(&random, factor, 1 + exact % SCALARS_MOST, 0.5);
+    memset(f, 0, BSLAM_FACTOR_PLACES_MAX * sizeof f[0]);
+    for (int i = 0; i < h->columns; i++) {
+        for (int j = 0; j <= i; j++) {
+            f[place(j)] += real(h->at[0][i]) * *bslam_factor_element(&factor, place(i), place(j));
         }
     }
 }
 
-/// D falls by as much as there is, however precise the measurement is.
-static void test_factor_measure_ever_more_precisely_leaves_a_covariance(void **state)
+/// A row that looks at all values by as much as they are in doubt, or at three of them.
+static dense_t random_row(unit_random_t *random, bool is_sparse)
+{
+    dense_t h = dense_zero(1, p.rows);
+    for (int k = 0; k < (is_sparse ? 3 : p.rows); k++) {
+        const int i = is_sparse ? (int)unit_random(random, 0, p.rows) : k;
+        h.at[0][i] = (double)real(unit_random(random, -1, 1) / (sd[i] > 0 ? sd[i] : 1));
+    }
+    return h;
+}
+
+/// a b ᵀ p a's of rows.
+static double product(const dense_t *a, const dense_t *m, const dense_t *b)
+{
+    const dense_t bt = dense_transposed(b), mb = dense_product(m, &bt);
+    return dense_product(a, &mb).at[0][0];
+}
+
+/// p, and the mean's change, after a scalar of noise `variance`: P - P hᵀ h P / S.
+static void measure_dense(const dense_t *h, double variance, double innovation, double mean[DENSE_MAX])
+{
+    const dense_t ht = dense_transposed(h), ph = dense_product(&p, &ht);
+    const double s = product(h, &p, h) + variance;
+    for (int i = 0; i < p.rows; i++) {
+        mean[i] += ph.at[i][0] * innovation / s;
+        for (int j = 0; j < p.rows; j++) {
+            p.at[i][j] -= ph.at[i][0] * ph.at[j][0] / s;
+        }
+    }
+}
+
+/// So many measurements in one pass; each foresees what those before it say of it.
+static void measure_both(unit_random_t *random, int count, double variance)
+{
+    const int places = bslam_factor_places(&factor);
+    dense_t rows[WAITING_MAX], met[WAITING_MAX];
+    double mean[DENSE_MAX] = {0};
+    memcpy(d, factor.d, sizeof d);
+    memset(change, 0, sizeof change);
+    for (int k = 0; k < count; k++) {
+        const double noise = (double)real(variance * unit_random(random, 0.5, 2));
+        rows[k] = random_row(random, k % 2 == 1);
+        look(&rows[k], lambda[k]);
+        bslam_real_t left = 1;  // the innovation
+        for (int before = 0; before < k; before++) {
+            const double expected = product(&rows[k], &met[before], &rows[before]);
+            const bslam_real_t common = bslam_factor_carry(&waiting[before], places, lambda[k]);
+            assert_near(common, expected, TOLERANCE * p.rows * p.rows);  // of rows that see deviations as 1
+            left -= waiting[before].gain * common;
+        }
+        double s = noise;
+        for (int j = 0; j < places; j++) {
+            s += (double)(d[j] * (lambda[k][j] * lambda[k][j]));
+        }
+        waiting[k] = (bslam_waiting_t){v[k], lambda[k], left / real(s)};
+        bslam_factor_measure(&waiting[k], places, real(noise), d);
+        double already = 0;
+        for (int i = 0; i < p.rows; i++) {
+            already += rows[k].at[0][i] * mean[i];
+        }
+        met[k] = p;
+        measure_dense(&rows[k], noise, 1 - already, mean);
+    }
+    memcpy(factor.d, d, sizeof d);
+    bslam_factor_settle(&factor, waiting, count, change);
+    for (int i = 0; i < p.rows; i++) {
+        // Of a noise that is small the innovation is known as much less well.
+        assert_near(change[place(i)], mean[i], TOLERANCE * p.rows * sd[i] * fmax(1, 1 / sqrt(variance)));
+    }
+}
+
+static void check_measure(unit_random_t *random, int kind)
+{
+    static const double variances[] = {1e-3, 0.1, 1, 1e3};
+    measure_both(random, 1 + kind % WAITING_MAX, variances[kind / WAITING_MAX % COUNT_OF(variances)]);
+    assert_done(TOLERANCE * 4);
+}
+
+static void test_settle_any_number_of_measurements_is_their_update(void **state)
+{
+    for_every_value(13, check_measure);
+}
+
+static void test_settle_no_measurement_changes_no_bit(void **state)
 {
     unit_random_t random = {14};
-    for (double variance = 1; variance > 1e-30; variance /= 100) {
-        static scalars_t scalars;
-        bslam_factor_t factor = random_factor(&random, 5, 3);
-        const dense_t p = covariance_of_factor(&factor);
-        const dense_t across = random_vector(&random, &factor, 0, w);
-        const dense_t h = dense_transposed(&across), hph = dense_sandwich(&h, &p);
-        bslam_real_t unused[BSLAM_FACTOR_PLACES_MAX] = {0};
-        scalars.waiting[0] = (bslam_waiting_t){scalars.v[0], scalars.lambda[0], 1};
-        look(&factor, &h, scalars.lambda[0]);
-        double product = 1, expected = variance / (hph.at[0][0] + variance);
-        for (int i = 0; i < p.rows; i++) {
-            expected *= (double)factor.d[covariance_place(&factor, i)];
+    make_factor(&random, 7, 3, 0);
+    const bslam_factor_t before = factor;
+    memset(change, 0, sizeof change);
+    bslam_factor_settle(&factor, waiting, 0, change);
+    assert_memory_equal(&factor, &before, sizeof before);
+    for (int i = 0; i < COUNT_OF(change); i++) {
+        assert_true(change[i] == 0);
+    }
+}
+
+/// The change of the mean is added to what stands there.
+static void test_settle_adds_its_change(void **state)
+{
+    unit_random_t random = {15};
+    make_factor(&random, 9, 2, 0);
+    const bslam_factor_t before = factor;
+    measure_both(&random, 3, 1);
+    bslam_real_t once[BSLAM_FACTOR_PLACES_MAX], twice[BSLAM_FACTOR_PLACES_MAX];
+    memcpy(once, change, sizeof once);
+    memcpy(twice, change, sizeof twice);
+    factor = before;
+    bslam_factor_settle(&factor, waiting, 3, twice);
+    for (int i = 0; i < bslam_factor_places(&factor); i++) {
+        assert_near(twice[i], 2 * once[i], TOLERANCE * fabs((double)once[i]));
+    }
+}
+
+/// Two values that go together to a millionth, looked at more and more finely: what is left of D comes near 0
+/// and never below.
+static void test_measure_never_takes_more_than_there_is(void **state)
+{
+    unit_random_t random = {16};
+    for (int round = 0; round < 300; round++) {
+        make_factor(&random, 1 + round % 9, 2 + round % 2, round % 2);
+        for (int k = 0; k < 20; k++) {
+            const double before = (double)bslam_factor_get(&factor, place(0), place(0));
+            const dense_t h = random_row(&random, k % 2 == 0);
+            const bslam_real_t variance = real(pow(10, unit_random(&random, -16, -2)));
+            look(&h, lambda[0]);
+            waiting[0] = (bslam_waiting_t){v[0], lambda[0], 0};
+            bslam_factor_measure(&waiting[0], bslam_factor_places(&factor), variance, factor.d);
+            bslam_factor_settle(&factor, waiting, 1, change);
+            covariance_assert_sound(&factor);
+            assert_true((double)bslam_factor_get(&factor, place(0), place(0)) <= before * (1 + TOLERANCE));
         }
-        bslam_factor_measure(&scalars.waiting[0], bslam_factor_places(&factor), real(variance), factor.d);
-        bslam_factor_settle(&factor, scalars.waiting, 1, unused);
-        covariance_assert_sound(&factor);
-        for (int i = 0; i < p.rows; i++) {
-            product *= (double)factor.d[covariance_place(&factor, i)];
+    }
+}
+
+// ---- all of them in a row ---------------------------------------------------------------------------------
+
+/// As a filter goes: it moves, sees, and its map grows and shrinks. The dense matrix goes its own way.
+static void go_on(unit_random_t *random)
+{
+    const int n = p.rows, body = factor.body_count;
+    const int value = 1 + (int)unit_random(random, 0, n - 1), choice = (int)unit_random(random, 0, 6);
+    if (choice == 0) {
+        dense_t a = dense_identity(n);
+        const int k = (int)unit_random(random, 0, value);
+        const bslam_real_t share = real(unit_random(random, -0.3, 0.3) * sd[value] / (sd[k] + 1e-3));
+        a.at[value][k] = (double)share;
+        transform(&a);
+        bslam_factor_add_row(&factor, place(value), place(k), share);
+    } else if (choice == 1) {
+        add_both(random, value, unit_random(random, 0, 0.3));
+    } else if (choice == 2) {
+        forget_in(&p, value, 1);
+        bslam_factor_forget(&factor, place(value), 1, w, scratch);
+    } else if (choice == 3 && body > 4) {
+        const int first = (int)unit_random(random, 0, body - 3);
+        p = dense_without(&p, first, 3);
+        bslam_factor_remove(&factor, first, 3, w, scratch);
+    } else if (choice == 4 && body < 20) {
+        dense_t grown = dense_zero(n + 2, n + 2);
+        for (int i = 0; i < n + 2; i++) {
+            const int from = i < body ? i : i < body + 2 ? -1 : i - 2;
+            for (int j = 0; j < n + 2; j++) {
+                const int to = j < body ? j : j < body + 2 ? -1 : j - 2;
+                grown.at[i][j] = from >= 0 && to >= 0 ? p.at[from][to] : i == j;
+            }
         }
-        assert_near(product, expected, 100 * TOLERANCE * expected);  // determinants
+        p = grown;
+        bslam_factor_widen(&factor, 2);
+        factor.d[body] = factor.d[body + 1] = 1;
+    } else if (choice == 5) {
+        measure_both(random, 1 + value % WAITING_MAX, 0.5);
+    }
+}
+
+static void test_any_row_of_operations_is_that_of_the_dense_matrix(void **state)
+{
+    unit_random_t random = {17};
+    for (int round = 0; round < 20; round++) {
+        make_factor(&random, 1 + round, 2 + round % 2, 0);
+        for (int step = 0; step < 150; step++) {
+            go_on(&random);
+            memset(sd, 0, sizeof sd);
+            assert_done(TOLERANCE * 100);
+        }
+    }
+}
+
+/// Numbers from a hundred millionth to a hundred million, without any order: no D below 0, and none that is
+/// no number.
+static void test_absurd_numbers_leave_a_covariance(void **state)
+{
+    unit_random_t random = {18};
+    for (int round = 0; round < 300; round++) {
+        make_factor(&random, 1 + round % BODY_MAX, 2 + round % 2, round % KINDS);
+        for (int step = 0; step < 60; step++) {
+            const int n = factor.body_count + factor.tail_count, value = (int)unit_random(&random, 1, n);
+            const bslam_real_t much = real(pow(10, unit_random(&random, -8, 8)));
+            begin_operation();
+            if (step % 3 == 0) {
+                memset(w, 0, sizeof w);
+                for (int i = value; i < n; i++) {
+                    w[place(i)] = real(unit_random(&random, -1, 1) * pow(10, unit_random(&random, -4, 4)));
+                }
+                bslam_factor_add(&factor, place(value), much, w, scratch);
+            } else if (step % 3 == 1) {
+                dense_t h = random_row(&random, true);
+                h.at[0][value] = unit_random(&random, -1, 1) * pow(10, unit_random(&random, -4, 4));
+                look(&h, lambda[0]);
+                waiting[0] = (bslam_waiting_t){v[0], lambda[0], 0};
+                bslam_factor_measure(&waiting[0], bslam_factor_places(&factor), much, factor.d);
+                bslam_factor_settle(&factor, waiting, 1, change);
+            } else {
+                bslam_factor_forget(&factor, place(value), much, w, scratch);
+            }
+            covariance_assert_sound(&factor);
+        }
     }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_factor_begin_has_values_without_variance),
-        cmocka_unit_test(test_factor_get_is_the_product),
-        cmocka_unit_test(test_factor_add_row_is_the_sandwich),
-        cmocka_unit_test(test_factor_scale_is_the_sandwich),
-        cmocka_unit_test(test_factor_add_is_the_sum),
-        cmocka_unit_test(test_factor_add_much_keeps_what_is_across),
-        cmocka_unit_test(test_factor_add_nothing_changes_nothing),
-        cmocka_unit_test(test_factor_add_next_to_nothing_to_nothing_stays_finite),
-        cmocka_unit_test(test_factor_forget_leaves_the_others_as_they_were),
-        cmocka_unit_test(test_factor_remove_leaves_the_others_as_they_were),
-        cmocka_unit_test(test_factor_cut_leaves_the_others_as_they_were),
-        cmocka_unit_test(test_factor_cut_of_an_exact_tail_is_exact),
-        cmocka_unit_test(test_factor_widen_after_removal_adds_exact_values),
-        cmocka_unit_test(test_factor_append_is_the_textbooks),
-        cmocka_unit_test(test_factor_measure_is_the_textbooks),
-        cmocka_unit_test(test_factor_measure_where_values_are_exact_is_the_textbooks),
-        cmocka_unit_test(test_factor_measure_ever_more_precisely_leaves_a_covariance),
+        cmocka_unit_test(test_layout_every_element_has_its_own_place_within_its_array),
+        cmocka_unit_test(test_begin_has_no_variance_whatever_was_there),
+        cmocka_unit_test(test_get_is_the_product_from_both_sides),
+
+        cmocka_unit_test(test_add_row_adds_a_share_of_any_value_before),
+        cmocka_unit_test(test_scale_multiplies_any_value),
+
+        cmocka_unit_test(test_add_of_little_or_much_is_the_sum),
+        cmocka_unit_test(test_add_of_nothing_changes_no_bit),
+        cmocka_unit_test(test_add_of_much_to_what_is_known_keeps_what_is_beside),
+
+        cmocka_unit_test(test_forget_leaves_any_value_with_no_other_one),
+        cmocka_unit_test(test_remove_of_any_stretch_leaves_the_others),
+        cmocka_unit_test(test_cut_leaves_what_is_before_and_the_tail),
+        cmocka_unit_test(test_widen_puts_values_without_variance_at_the_bodys_end),
+        cmocka_unit_test(test_append_puts_values_made_of_others_and_of_noises_at_the_bodys_end),
+        cmocka_unit_test(test_append_of_a_copy_is_singular_and_goes_on),
+
+        cmocka_unit_test(test_settle_any_number_of_measurements_is_their_update),
+        cmocka_unit_test(test_settle_no_measurement_changes_no_bit),
+        cmocka_unit_test(test_settle_adds_its_change),
+        cmocka_unit_test(test_measure_never_takes_more_than_there_is),
+
+        cmocka_unit_test(test_any_row_of_operations_is_that_of_the_dense_matrix),
+        cmocka_unit_test(test_absurd_numbers_leave_a_covariance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

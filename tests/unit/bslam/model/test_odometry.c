@@ -92,41 +92,42 @@ static void assert_refused(const bslam_odometry_t *odometry, const bslam_setting
 
 // ---- tick differences -------------------------------------------------------------------------------------
 
-static void test_tick_difference_every_step_of_a_narrow_counter_is_found(void **state)
+static void test_tick_difference_every_step_of_a_small_modulus_is_found(void **state)
 {
-    for (int bits = 2; bits <= 7; bits++) {
-        const int32_t size = 1 << bits;
-        for (int32_t before = 0; before < size; before++) {
-            for (int32_t step = -size / 2; step < size / 2; step++) {
-                const uint32_t after = (uint32_t)(before + step) & (uint32_t)(size - 1);
-                assert_int_equal(bslam_odometry_tick_difference((uint32_t)before, after, bits), step);
+    for (int32_t modulus = 3; modulus <= 130; modulus++) {
+        for (int32_t before = 0; before < modulus; before++) {
+            for (int32_t step = -modulus / 2; 2 * step < modulus; step++) {
+                const uint32_t after = (uint32_t)((before + step + modulus) % modulus);
+                assert_int_equal(bslam_odometry_tick_difference((uint32_t)before, after, (uint32_t)modulus),
+                                 step);
             }
         }
     }
 }
 
-static void test_tick_difference_any_step_of_any_width_is_found(void **state)
+static void test_tick_difference_any_step_of_any_modulus_is_found(void **state)
 {
     unit_random_t random = {1};
-    for (int bits = 2; bits <= 32; bits++) {
-        const uint32_t mask = UINT32_MAX >> (32 - bits);
-        const double half = ldexp(1, bits - 1);
-        for (int i = 0; i < 500; i++) {
-            const uint32_t before = (uint32_t)unit_random(&random, 0, 4294967296.0) & mask;
-            const int64_t step = (int64_t)floor(unit_random(&random, -half, half));
-            const uint32_t after = (uint32_t)((int64_t)before + step) & mask;
-            assert_int_equal(bslam_odometry_tick_difference(before, after, bits), step);
-        }
+    for (int i = 0; i < 20000; i++) {
+        const double largest = i % 40 == 0 ? 4294967296.0 : floor(pow(2, unit_random(&random, 2, 32)));
+        const int64_t modulus = (int64_t)largest;
+        const int64_t before = (int64_t)floor(unit_random(&random, 0, largest));
+        const int64_t half = modulus / 2;
+        const int64_t step = (int64_t)floor(unit_random(&random, (double)-half, (double)(modulus - half)));
+        const int64_t after = (before + step + modulus) % modulus;
+        assert_int_equal(bslam_odometry_tick_difference((uint32_t)before, (uint32_t)after, (uint32_t)modulus),
+                         step);
     }
 }
 
 static void test_tick_difference_of_32_bits_at_its_extremes_is_exact(void **state)
 {
-    assert_int_equal(bslam_odometry_tick_difference(0, 0x7fffffffu, 32), INT32_MAX);
-    assert_int_equal(bslam_odometry_tick_difference(0, 0x80000000u, 32), INT32_MIN);
-    assert_int_equal(bslam_odometry_tick_difference(0x80000000u, 0, 32), INT32_MIN);
-    assert_int_equal(bslam_odometry_tick_difference(0xffffffffu, 0, 32), 1);
-    assert_int_equal(bslam_odometry_tick_difference(0, 0xffffffffu, 32), -1);
+    assert_int_equal(bslam_odometry_tick_difference(7, 7, 0), 0);
+    assert_int_equal(bslam_odometry_tick_difference(0, 0x7fffffffu, 0), INT32_MAX);
+    assert_int_equal(bslam_odometry_tick_difference(0, 0x80000000u, 0), INT32_MIN);
+    assert_int_equal(bslam_odometry_tick_difference(0x80000000u, 0, 0), INT32_MIN);
+    assert_int_equal(bslam_odometry_tick_difference(0xffffffffu, 0, 0), 1);
+    assert_int_equal(bslam_odometry_tick_difference(0, 0xffffffffu, 0), -1);
 }
 
 // ---- clock ------------------------------------------------------------------------------------------------
@@ -312,6 +313,29 @@ static void test_read_ticks_beyond_the_counters_width_are_refused(void **state)
     }
 }
 
+/// A counter that counts one turn of the wheel, whatever its width, driven both ways.
+static void test_read_ticks_across_any_modulus_go_on_both_ways(void **state)
+{
+    static const int32_t moduli[] = {7, 1000, 2400, 4096, 16000000};
+    for (int i = 0; i < COUNT_OF(moduli); i++) {
+        bslam_settings_t settings = unit_settings();
+        settings.counter_modulus = moduli[i];
+        settings.counter_bits = 2;  // which says nothing then
+        settings.ticks_per_revolution = moduli[i] < 10000000 ? moduli[i] : 10000000;
+        const uint32_t top = (uint32_t)moduli[i] - 1;
+        bslam_odometry_t odometry = started_at_ticks(&settings, top, 0);
+        const double per_tick = TURN / settings.ticks_per_revolution * 0.05;
+        const bslam_motion_t there = read_ok(&odometry, &settings, ticks(START_US + STEP_US, 1, top - 1));
+        assert_near(there.forward_m, 0, rounding_of(per_tick));
+        assert_near(there.turn_rad, -4 * per_tick / 0.4, rounding_of(10 * per_tick));
+        const bslam_motion_t back = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, top, 0));
+        assert_near(back.turn_rad, 4 * per_tick / 0.4, rounding_of(10 * per_tick));
+        const bslam_odometry_t before = odometry;
+        assert_refused(&before, &settings, ticks(START_US + 3 * STEP_US, top + 1, 0), BSLAM_E_RANGE);
+        assert_refused(&before, &settings, ticks(START_US + 3 * STEP_US, 0, top + 1), BSLAM_E_RANGE);
+    }
+}
+
 static void test_read_unknown_source_is_refused(void **state)
 {
     const bslam_settings_t settings = unit_settings();
@@ -419,22 +443,104 @@ static void test_read_gyro_noise_that_is_none_is_refused(void **state)
     }
 }
 
-static void test_read_after_an_encoder_reset_the_next_ticks_are_the_reference(void **state)
+/// The statuses of tick readings, one a step from START_US on, and the sum of the way they were taken for.
+static double way_of(bslam_odometry_t *odometry, const bslam_settings_t *settings,
+                     const uint32_t (*counts)[2], const bslam_status_t *expected, int count)
+{
+    double way_m = 0;
+    for (int i = 0; i < count; i++) {
+        const bslam_odometry_reading_t reading =
+            ticks(START_US + (i + 1) * STEP_US, counts[i][0], counts[i][1]);
+        bslam_motion_t motion;
+        assert_int_equal(bslam_odometry_read(odometry, settings, &reading, &motion), expected[i]);
+        way_m += expected[i] == BSLAM_OK ? (double)motion.forward_m : 0;
+    }
+    return way_m;
+}
+
+#define WAY_OF(odometry, settings, counts, expected) \
+    way_of(odometry, settings, counts, expected, COUNT_OF(counts))
+
+/// Of 10 ticks each.
+static double steps_m(int steps)
+{
+    return steps * 10 * TURN / 1000 * 0.05;
+}
+
+static bslam_settings_t slow_settings(void)
 {
     bslam_settings_t settings = unit_settings();
     settings.speed_max_mps = 2;
-    bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
-    bslam_motion_t untouched;
-    const bslam_odometry_reading_t reset = ticks(START_US + STEP_US, 0, 0);
-    assert_int_equal(bslam_odometry_read(&odometry, &settings, &reset, &untouched), BSLAM_E_JUMP);
+    return settings;
+}
 
-    // The jump is not waited out: the next reading is the new reference, and all the time is a gap.
-    const bslam_motion_t blind = read_ok(&odometry, &settings, ticks(START_US + 2 * STEP_US, 5, 5));
-    assert_near(blind.forward_m, 0, 0);
-    const double dt = 2 * STEP_S;
-    assert_near(blind.forward_var_m2, (0.09 + 0.04) * dt * dt / 4 + 0.04 * dt * dt, rounding_of(0.01));
-    const bslam_motion_t after = read_ok(&odometry, &settings, ticks(START_US + 3 * STEP_US, 15, 15));
-    assert_near(after.forward_m, 10 * TURN / 1000 * 0.05, rounding_of(0.01));
+static void test_read_one_odd_count_costs_no_way(void **state)
+{
+    const bslam_settings_t settings = slow_settings();
+    static const bslam_status_t expected[] = {BSLAM_OK, BSLAM_E_JUMP, BSLAM_OK, BSLAM_OK};
+    // Of the left wheel, of the right one, of both; far up, far down, and 0.
+    static const uint32_t odd[][2] = {{65535, 1020}, {1020, 30000}, {0, 0}, {1020, 0}, {65535, 65535}};
+    for (int i = 0; i < COUNT_OF(odd); i++) {
+        bslam_odometry_t odometry = started_at_ticks(&settings, 1000, 1000);
+        const uint32_t counts[][2] = {{1010, 1010}, {odd[i][0], odd[i][1]}, {1030, 1030}, {1040, 1040}};
+        assert_near(WAY_OF(&odometry, &settings, counts, expected), steps_m(4), rounding_of(0.1));
+    }
+}
+
+static void test_read_two_odd_counts_in_a_row_cost_no_way(void **state)
+{
+    const bslam_settings_t settings = slow_settings();
+    static const bslam_status_t expected[] = {BSLAM_OK, BSLAM_E_JUMP, BSLAM_E_JUMP, BSLAM_OK, BSLAM_OK};
+    static const uint32_t odd[][2] = {{65535, 65535}, {65535, 20000}, {20000, 65535}, {0, 65535}};
+    for (int i = 0; i < COUNT_OF(odd); i++) {  // the same twice, or another
+        bslam_odometry_t odometry = started_at_ticks(&settings, 1000, 1000);
+        const uint32_t counts[][2] = {
+            {1010, 1010}, {odd[i][0], 1020}, {odd[i][1], 1030}, {1040, 1040}, {1050, 1050}};
+        assert_near(WAY_OF(&odometry, &settings, counts, expected), steps_m(5), rounding_of(0.1));
+    }
+}
+
+/// A rate that a gyro tells beside it is that of the last interval only.
+static void test_read_gyro_after_an_odd_count_is_left_out(void **state)
+{
+    const bslam_settings_t settings = slow_settings();
+    bslam_odometry_t odometry = started_at_ticks(&settings, 1000, 1000);
+    const bslam_odometry_reading_t odd = with_gyro(ticks(START_US + STEP_US, 65535, 65535), 3);
+    bslam_motion_t motion;
+    assert_int_equal(bslam_odometry_read(&odometry, &settings, &odd, &motion), BSLAM_E_JUMP);
+    motion = read_ok(&odometry, &settings, with_gyro(ticks(START_US + 2 * STEP_US, 1020, 1020), 3));
+    assert_near(motion.turn_rad, 0, 0);
+    motion = read_ok(&odometry, &settings, with_gyro(ticks(START_US + 3 * STEP_US, 1030, 1030), 3));
+    assert_true(motion.turn_rad > BSLAM_R(0.05));
+}
+
+static void test_read_after_an_encoder_reset_three_readings_are_the_reference(void **state)
+{
+    const bslam_settings_t settings = slow_settings();
+    bslam_odometry_t odometry = started_at_ticks(&settings, 20000, 20000);
+    static const uint32_t reset[][2] = {{0, 0}, {10, 10}};
+    static const bslam_status_t refused[] = {BSLAM_E_JUMP, BSLAM_E_JUMP};
+    assert_near(WAY_OF(&odometry, &settings, reset, refused), 0, 0);
+    // The jump is not waited out: what the new counts tell is taken, and the time before them is a gap.
+    const bslam_motion_t third = read_ok(&odometry, &settings, ticks(START_US + 3 * STEP_US, 20, 20));
+    assert_near(third.forward_m, steps_m(2), rounding_of(0.01));
+    const double dt = 3 * STEP_S;
+    const double noise = (0.09 + 0.04) * dt * dt / 4 + 0.04 * STEP_S * STEP_S;
+    assert_near(third.forward_var_m2, noise, rounding_of(0.01));
+    const bslam_motion_t after = read_ok(&odometry, &settings, ticks(START_US + 4 * STEP_US, 30, 30));
+    assert_near(after.forward_m, steps_m(1), rounding_of(0.01));
+    assert_near(after.forward_var_m2, (0.09 + 0.04) * STEP_S * STEP_S / 4, rounding_of(0.01));
+}
+
+/// The more time goes by, the farther may a wheel have gone: a small reset must not become motion by that.
+static void test_read_reset_that_time_would_make_a_motion_is_none(void **state)
+{
+    const bslam_settings_t settings = slow_settings();
+    bslam_odometry_t odometry = started_at_ticks(&settings, 1000, 1000);
+    // 0.1 m back in 0.04 s is a jump; in 0.08 s and more it would not be one.
+    static const uint32_t counts[][2] = {{700, 700}, {710, 710}, {720, 720}, {730, 730}};
+    static const bslam_status_t expected[] = {BSLAM_E_JUMP, BSLAM_E_JUMP, BSLAM_OK, BSLAM_OK};
+    assert_near(WAY_OF(&odometry, &settings, counts, expected), steps_m(3), rounding_of(0.1));
 }
 
 static void test_read_jump_of_another_source_leaves_the_tick_reference(void **state)
@@ -578,8 +684,8 @@ static void test_read_gyro_beside_noiseless_wheels_changes_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tick_difference_every_step_of_a_narrow_counter_is_found),
-        cmocka_unit_test(test_tick_difference_any_step_of_any_width_is_found),
+        cmocka_unit_test(test_tick_difference_every_step_of_a_small_modulus_is_found),
+        cmocka_unit_test(test_tick_difference_any_step_of_any_modulus_is_found),
         cmocka_unit_test(test_tick_difference_of_32_bits_at_its_extremes_is_exact),
 
         cmocka_unit_test(test_read_first_reading_without_a_clock_has_no_interval),
@@ -595,6 +701,7 @@ int main(void)
         cmocka_unit_test(test_read_ticks_motion_is_that_of_the_wheels),
         cmocka_unit_test(test_read_ticks_across_the_roll_over_at_any_width_go_on),
         cmocka_unit_test(test_read_ticks_beyond_the_counters_width_are_refused),
+        cmocka_unit_test(test_read_ticks_across_any_modulus_go_on_both_ways),
         cmocka_unit_test(test_read_unknown_source_is_refused),
         cmocka_unit_test(test_read_value_that_is_no_number_is_refused),
         cmocka_unit_test(test_read_reads_only_its_sources_fields),
@@ -604,7 +711,11 @@ int main(void)
         cmocka_unit_test(test_read_turn_of_many_revolutions_is_a_jump),
         cmocka_unit_test(test_read_gyro_turn_of_many_revolutions_is_refused),
         cmocka_unit_test(test_read_gyro_noise_that_is_none_is_refused),
-        cmocka_unit_test(test_read_after_an_encoder_reset_the_next_ticks_are_the_reference),
+        cmocka_unit_test(test_read_one_odd_count_costs_no_way),
+        cmocka_unit_test(test_read_two_odd_counts_in_a_row_cost_no_way),
+        cmocka_unit_test(test_read_gyro_after_an_odd_count_is_left_out),
+        cmocka_unit_test(test_read_after_an_encoder_reset_three_readings_are_the_reference),
+        cmocka_unit_test(test_read_reset_that_time_would_make_a_motion_is_none),
         cmocka_unit_test(test_read_jump_of_another_source_leaves_the_tick_reference),
         cmocka_unit_test(test_restart_starts_clock_and_ticks_anew),
         cmocka_unit_test(test_read_first_ticks_after_the_clock_started_leave_the_interval_open),

@@ -129,13 +129,17 @@ static void test_look_back_from_the_filter_is_on_the_arc(void **state)
         take_until(&history, untils_us[i]);
         const int64_t reach_us = (int64_t)steps * STEP_US - untils_us[i];
         for (int64_t back_us = STEP_US / 8; back_us <= reach_us; back_us += STEP_US / 8) {
-            bslam_pose_t pose;
-            assert_int_equal(bslam_history_look_back(&history, &settings, back_us, &pose), BSLAM_OK);
-            assert_on_circle(&pose, -(double)back_us / STEP_US);
+            bslam_history_view_t view;
+            assert_int_equal(bslam_history_look_back(&history, &settings, back_us, &view), BSLAM_OK);
+            assert_on_circle(&view.robot, -(double)back_us / STEP_US);
+            // And as doubtful as so much of that many steps.
+            const double share = (double)back_us / STEP_US;
+            assert_near(view.forward_var_m2, share * (double)step.forward_var_m2, 1e-6 * share);
+            assert_near(view.turn_var_rad2, share * (double)step.turn_var_rad2, 1e-6 * share);
         }
-        bslam_pose_t pose = {1, 2, 3};
-        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &pose), BSLAM_E_TIME);
-        assert_true(pose.x_m == 1 && pose.y_m == 2 && pose.theta_rad == 3);
+        bslam_history_view_t view = {{1, 2, 3}, 4, 5};
+        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &view), BSLAM_E_TIME);
+        assert_true(view.robot.x_m == 1 && view.robot.theta_rad == 3 && view.turn_var_rad2 == 5);
     }
 }
 
@@ -149,14 +153,14 @@ static void test_look_back_follows_the_path_that_the_filter_took(void **state)
     bslam_history_place_t place = history.filter;
     (void)bslam_history_walk(&history, &place, STEP_US + 30000);
     bslam_history_take(&history, &place, &quarter);
-    bslam_pose_t pose;
-    assert_int_equal(bslam_history_look_back(&history, &settings, 5000, &pose), BSLAM_OK);
-    assert_near(pose.x_m, -0.005, WAY_ERROR);
+    bslam_history_view_t view;
+    assert_int_equal(bslam_history_look_back(&history, &settings, 5000, &view), BSLAM_OK);
+    assert_near(view.robot.x_m, -0.005, WAY_ERROR);
     (void)bslam_history_walk(&history, &place, 0);
     bslam_history_take(&history, &place, &rest);
-    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &pose), BSLAM_OK);
-    assert_near(pose.x_m, -0.06, WAY_ERROR);
-    assert_near(pose.theta_rad, 0, WAY_ERROR);
+    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &view), BSLAM_OK);
+    assert_near(view.robot.x_m, -0.06, WAY_ERROR);
+    assert_near(view.robot.theta_rad, 0, WAY_ERROR);
 }
 
 static void test_look_back_before_the_history_is_refused(void **state)
@@ -167,10 +171,10 @@ static void test_look_back_before_the_history_is_refused(void **state)
     bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     const bslam_settings_t settings = arc_params();
     const int64_t reach_us = (int64_t)(BSLAM_HISTORY_MAX - 1) * STEP_US;
-    bslam_pose_t pose;
-    assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &pose), BSLAM_E_TIME);
+    bslam_history_view_t view;
+    assert_int_equal(bslam_history_look_back(&history, &settings, reach_us + 1, &view), BSLAM_E_TIME);
     if (reach_us > 0) {
-        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us, &pose), BSLAM_OK);
+        assert_int_equal(bslam_history_look_back(&history, &settings, reach_us, &view), BSLAM_OK);
     }
 }
 
@@ -195,14 +199,14 @@ static void test_clear_forgets_all(void **state)
     take_until(&history, STEP_US / 2);
     bslam_history_clear(&history);
     const bslam_settings_t settings = arc_params();
-    bslam_pose_t pose;
+    bslam_history_view_t view;
     assert_int_equal(history.filter.behind_us, 0);
-    assert_int_equal(bslam_history_look_back(&history, &settings, 1, &pose), BSLAM_E_TIME);
+    assert_int_equal(bslam_history_look_back(&history, &settings, 1, &view), BSLAM_E_TIME);
     // Nothing of the step that was cut short is left in the next one.
     bslam_history_add(&history, BSLAM_HISTORY_MAX, STEP_US, &step);
     take_until(&history, 0);
-    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &pose), BSLAM_OK);
-    assert_on_circle(&pose, -1);
+    assert_int_equal(bslam_history_look_back(&history, &settings, STEP_US, &view), BSLAM_OK);
+    assert_on_circle(&view.robot, -1);
 }
 
 int main(void)

@@ -324,7 +324,7 @@ static void refuse_all(void)
     int index;
     refuse_frame(seen, BSLAM_SIGHTINGS_MAX + 1, now_us + 1, BSLAM_E_COUNT);
     refuse_frame(seen, -1, now_us + 1, BSLAM_E_COUNT);
-    refuse_frame(seen, 1, now_us, BSLAM_E_TIME);
+    refuse_frame(seen, 1, 0, BSLAM_E_TIME);
     refuse_frame(seen, 1, now_us + 10000000, BSLAM_E_TIME);
     seen[0].bearing_rad = real(NAN);
     refuse_frame(seen, 1, now_us + 1, BSLAM_E_NOT_FINITE);

@@ -353,6 +353,8 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
         {"scale NaN", first + 16, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
         {"scale negative", first + 16, 0xbf800000, BSLAM_MAP_CONTENT},
         {"position NaN", first + 20, 0x7fc00000, BSLAM_MAP_NOT_FINITE},
+        {"position far away", first + 20, 0x46a00000, BSLAM_MAP_CONTENT},
+        {"state far away", v + 4, 0xc6a00000, BSLAM_MAP_CONTENT},
         {"state infinite", v + 4, 0x7f800000, BSLAM_MAP_NOT_FINITE},
         {"state huge", v + 4, 0x7f000000, BSLAM_MAP_NOT_FINITE},
         {"D NaN", d_at(1), 0xffc00001, BSLAM_MAP_NOT_FINITE},
@@ -372,6 +374,33 @@ static void test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name(v
         seal();
         print_message("%s\n", cases[i].what);
         assert_refused(cases[i].fault);
+    }
+}
+
+/// A beacon that moved to where no load would take it.
+static void test_map_write_of_a_place_that_no_load_takes_says_so(void **state)
+{
+    setup(NULL);
+    slam.ekf.mean[slam.ekf.beacons[0].at] = BSLAM_R(20001.0);
+    map_memory_t memory = {bytes, KEPT_BYTES_MAX, 0};
+    const bslam_map_sink_t sink = map_to_memory(&memory);
+    bslam_map_fault_t fault;
+    assert_int_equal(bslam_map_write(&slam, &sink, &fault), BSLAM_E_MAP);
+    assert_int_equal(fault, BSLAM_MAP_CONTENT);
+}
+
+/// Neither what the map had nor what the robot had before it, whichever had more.
+static void test_map_load_gives_no_uid_again(void **state)
+{
+    setup(NULL);
+    const bslam_map_source_t source = map_from_memory(bytes, size);
+    const uint32_t own[] = {0, 3, slam.ekf.next_uid, 1000, UINT32_MAX};
+    for (int i = 0; i < COUNT_OF(own); i++) {
+        bslam_map_fault_t fault;
+        kept_empty(&other, &other_appearance);
+        other.ekf.next_uid = own[i];
+        assert_int_equal(bslam_map_load(&other, &source, BSLAM_MAP_LIVING, &fault), BSLAM_OK);
+        assert_int_equal(other.ekf.next_uid, own[i] > slam.ekf.next_uid ? own[i] : slam.ekf.next_uid);
     }
 }
 
@@ -777,6 +806,8 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_with_a_byte_too_many_is_refused, setup),
         cmocka_unit_test_setup(test_map_check_finds_every_flipped_bit, setup),
         cmocka_unit_test_setup(test_map_load_of_wrong_content_with_a_right_crc_is_refused_by_name, setup),
+        cmocka_unit_test(test_map_write_of_a_place_that_no_load_takes_says_so),
+        cmocka_unit_test(test_map_load_gives_no_uid_again),
         cmocka_unit_test_setup(test_map_load_with_a_negative_that_is_no_sample_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_of_a_variance_that_is_too_large_is_refused, setup),

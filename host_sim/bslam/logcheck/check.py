@@ -1,0 +1,76 @@
+"""A log tested before it is believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from bslam.errors import BslamError
+from bslam.log import Log, read_folder
+from bslam.logcheck import verdict
+from bslam.logcheck.drive import Drive, Factors, drive_of
+from bslam.logcheck.files import are_degrees, check_files, degrees_finding
+from bslam.logcheck.finding import Finding, Report
+from bslam.logcheck.flow import Flow, best_flow
+from bslam.logcheck.solution import solve
+from bslam.logcheck.units import sign_findings, signs, unit_slip
+
+_SLIPS_MAX: Final = 3
+_BLIND: Final = (
+    "all else: it takes a robot that moves and beacons with identities, seen again within a second"
+)
+_STRAIGHT: Final = "signs and scale of the turn: it hardly turns while beacons are seen"
+_NO_RANGES: Final = "scales, mount, noise, exchanged identities: no sighting has a distance"
+
+
+def check_folder(folder: Path) -> Report:
+    """A csv folder, its files first. Raises BslamError for what cannot be read even so."""
+    with TemporaryDirectory() as place:
+        copy = Path(place) / folder.resolve().name
+        found = check_files(folder, copy) if folder.is_dir() else []
+        try:
+            report = check_log(read_folder(copy if found else folder))
+        except BslamError as error:
+            raise BslamError(str(error).replace(str(copy), str(folder))) from error
+    return replace(report, findings=[*found, *report.findings])
+
+
+def check_log(log: Log) -> Report:
+    """Every test that the log's content allows."""
+    findings, factors = [*verdict.missing(log), *verdict.outside(log)], Factors()
+    if are_degrees(log.sightings.bearing_rad):
+        findings.append(degrees_finding(log.sightings.bearing_rad, "sightings"))
+        factors = Factors(bearing=findings[-1].figures["factor"])
+    drive, flow, factors = _in_si(log, factors, findings)
+    if flow is None:
+        return Report(log.name, findings, [_BLIND])
+    signed, shown = signs(flow), flow
+    untested = [] if abs(flow.turn) > 2.0 * flow.turn_error else [_STRAIGHT]
+    if signed != Factors():
+        drive = drive_of(log, factors * signed)
+        flow = best_flow(drive) or flow
+    if not drive.has_ranges:
+        return Report(log.name, [*findings, *sign_findings(log, signed, shown, [])], [*untested, _NO_RANGES])
+    solution = solve(log, drive, flow)
+    findings += sign_findings(log, signed, shown, solution.references)
+    findings += [*verdict.delay(solution, drive), *verdict.scales(solution, drive, flow)]
+    findings += [*verdict.mount(solution, drive), *verdict.noise(solution), *verdict.identities(solution)]
+    names = ("way", "turn", "bend", "yaw", "delay")
+    return Report(log.name, findings, untested, {name: vars(getattr(solution, name)) for name in names})
+
+
+def _in_si(log: Log, factors: Factors, findings: list[Finding]) -> tuple[Drive, Flow | None, Factors]:
+    """The drive after all slips of units are put right, its flow, and the factors that do it."""
+    drive = drive_of(log, factors)
+    flow = best_flow(drive) if drive.is_usable else None
+    for _ in range(_SLIPS_MAX):
+        slip = unit_slip(log, drive, flow) if flow is not None else None
+        if slip is None:
+            break
+        factors = factors * slip[0]
+        findings.append(slip[1])
+        drive = drive_of(log, factors)
+        flow = best_flow(drive)
+    return drive, flow, factors

@@ -1,0 +1,237 @@
+"""From figures to findings: what is wrong, how sure that is, and what mends it.
+
+Limits lie above what good logs have. A scale may be off by what is usual and, besides, by what the noise that
+is told covers: a run believes no more than that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from bslam.log import Log
+from bslam.logcheck.drive import Drive
+from bslam.logcheck.finding import Curve, Finding, Picture
+from bslam.logcheck.flow import Flow
+from bslam.logcheck.identity import Exchange, exchanges
+from bslam.logcheck.reference import Fitted
+from bslam.logcheck.solution import Estimate, Noise, Solution
+from bslam.logcheck.units import UNITS, is_gross
+
+_SURE: Final = 5.0  # standard errors
+_LIKELY: Final = 10.0  # gain of log-likelihood
+# Usual in good logs. Robots that follow commands slip: they drive and turn less than they are told.
+_WAY_OFF, _WAY_OFF_COMMANDED = 0.03, 0.085
+_TURN_OFF, _TURN_OFF_COMMANDED = 0.045, 0.135
+_WHEEL_OFF: Final = 0.03
+_YAW_OFF_RAD: Final = 0.08
+_SIZE_OFF: Final = 0.05  # of the map
+_SIZE_UNKNOWN: Final = 0.03  # where no beacons.csv tells it
+_WORTH_A_NOTE: Final = 0.02
+_AGREE: Final = 0.15  # flow and fit; else the wheels' noise hides the scale
+_DELAY_S: Final = 0.08
+_DELAY_ROWS: Final = 2.0
+_LEAD_S: Final = 0.3  # of commands before the motion
+_SINGLE, _BLOCK = 2.0, 2.5  # noise over what is told
+_CAUTIOUS: Final = 0.33
+_NAMELESS: Final = 0.05  # share of sightings
+_OUTSIDE: Final = 0.2
+
+
+def missing(log: Log) -> Iterator[Finding]:
+    """Sightings that do not say whose they are."""
+    nameless = log.sightings.beacon_id[log.sightings.mappable] < 0
+    if len(nameless) and nameless.mean() > _NAMELESS:
+        what = f"{int(nameless.sum())} of {len(nameless)} sightings have no identity"
+        mend = "--association mahalanobis, or svm where there are signatures"
+        yield Finding("identities", what, "beacon_id is empty", mend, {"share": float(nameless.mean())})
+
+
+def outside(log: Log) -> Iterator[Finding]:
+    """Sightings of which odometry knows nothing."""
+    seen_us, known_us = log.sightings.time_us, log.odometry.time_us
+    if len(seen_us) == 0:
+        return
+    out = (seen_us < known_us[0] - log.robot.step_us) | (seen_us > known_us[-1] + log.robot.step_us)
+    if out.mean() > _OUTSIDE:
+        what = f"{int(out.sum())} of {len(out)} sightings are before or after odometry"
+        sure = (
+            f"they run from {seen_us[0]} to {seen_us[-1]} us, odometry from {known_us[0]} to {known_us[-1]}"
+        )
+        yield Finding(
+            "stamps", what, sure, "let one clock stamp both, or shift time_us", {"share": float(out.mean())}
+        )
+
+
+def delay(solution: Solution, drive: Drive) -> Iterator[Finding]:
+    """Sightings that come late, or early, beyond what is told."""
+    found, gain = solution.delay, solution.delay_gain
+    is_untold_lead = drive.is_commanded and drive.delay_s == 0.0
+    limit_s = _LEAD_S if is_untold_lead else max(_DELAY_S, _DELAY_ROWS * drive.row_s)
+    if abs(found.value) < 0.25 * _DELAY_S or gain < _LIKELY:
+        return
+    told = f", besides the {1e3 * drive.delay_s:.0f} ms that are told" if drive.delay_s else ""
+    late = "late" if found.value > 0.0 else "early"
+    yield Finding(
+        "delay",
+        f"sightings come {1e3 * abs(found.value):.0f} ms {late} against odometry{told}",
+        f"+- {1e3 * found.error:.0f} ms; log-likelihood {gain:.0f} higher than as told; odometry's rows are "
+        f"{1e3 * drive.row_s:.0f} ms apart",
+        f"--set sighting_delay_us={round(1e6 * (found.value + drive.delay_s))}",
+        {"delay_s": found.value, "error": found.error, "log_likelihood_gain": gain},
+        is_note=abs(found.value) <= limit_s,
+    )
+
+
+def scales(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
+    """Way and turn against the sightings; the map's size against beacons.csv."""
+    placed = next((one for one in solution.references if one.what == "beacons.csv"), None)
+    unit = 1.0 if placed is None else _unit_of(placed.scale)
+    size, by = (1.0, "the ranges alone") if placed is None else (placed.scale / unit, placed.what)
+    usual = (_WAY_OFF_COMMANDED, _TURN_OFF_COMMANDED) if drive.is_commanded else (_WAY_OFF, _TURN_OFF)
+    way, turn = solution.way, solution.turn
+    if abs(way.value / flow.way - 1.0) < _AGREE:
+        limit = usual[0] + way.cover + (_SIZE_UNKNOWN if placed is None else 0.0)
+        yield from _scale("forward_scale", "way", Estimate(size * way.value, way.error), limit, by)
+    if abs(turn.value / flow.turn - 1.0) < _AGREE:
+        nearer = min((turn.value, flow.turn), key=lambda one: abs(one - 1.0))
+        yield from _scale(
+            "turn_scale", "turn", Estimate(nearer, turn.error), usual[1] + turn.cover, "bearings"
+        )
+    if placed is not None and abs(placed.scale - 1.0) > _SIZE_OFF:
+        factor = placed.scale if unit == 1.0 else unit
+        yield Finding(
+            "scale" if unit == 1.0 else "units",
+            f"beacons.csv is {placed.scale:.4g} times as large as the map that the ranges make",
+            f"by the places of {len(placed.names)} beacons",
+            f"multiply x_m and y_m of beacons.csv by {1.0 / factor:.4g}, or other lengths by {factor:.4g}",
+            {"scale": placed.scale},
+            _map_picture(placed),
+        )
+
+
+def _unit_of(scale: float) -> float:
+    """What beacons.csv is larger by if it is in another unit than the rest; 1 if not."""
+    if not is_gross(scale):
+        return 1.0
+    return min(
+        (*UNITS.values(), *(1.0 / one for one in UNITS.values())), key=lambda one: abs(math.log(scale / one))
+    )
+
+
+def _scale(setting: str, what: str, one: Estimate, limit: float, by: str) -> Iterator[Finding]:
+    off, error = abs(1.0 / one.value - 1.0), abs(one.value - 1.0)
+    if error > max(_WORTH_A_NOTE, _SURE * one.error):
+        yield Finding(
+            "scale",
+            f"odometry's {what} is {100.0 * off:.1f} % too {'long' if one.value < 1.0 else 'short'}",
+            f"{setting} {one.text} by {by}; {100.0 * limit:.1f} % are usual or covered by the told noise",
+            f"--set {setting}={one.value:.3f}",
+            {setting: one.value, "error": one.error, "limit": limit},
+            is_note=error <= limit,
+        )
+
+
+def mount(solution: Solution, drive: Drive) -> Iterator[Finding]:
+    """One wheel against the other, and the sensor's direction."""
+    bend, yaw, base_m = solution.bend, solution.yaw, drive.robot.wheelbase_m
+    wheel = bend.value * base_m
+    if abs(wheel) > max(_WHEEL_OFF + bend.cover * base_m, _SURE * bend.error * base_m):
+        more, less = ("right", "left") if wheel < 0.0 else ("left", "right")
+        yield Finding(
+            "scale",
+            f"odometry's {more} wheel goes {100.0 * abs(wheel):.1f} % too far against the {less} one",
+            f"each metre turns the robot by {bend.text} rad more than odometry has",
+            f"multiply {more}_radius_m of robot.toml, or the {more} column, by {1.0 - abs(wheel):.3f}",
+            {"wheel": wheel, "error": bend.error * base_m},
+        )
+    side = "left" if yaw.value > 0.0 else "right"
+    if abs(yaw.value) > max(_YAW_OFF_RAD + yaw.cover, _SURE * yaw.error):
+        yield Finding(
+            "mount",
+            f"the sensor looks {math.degrees(abs(yaw.value)):.1f} deg more to the {side}",
+            f"{yaw.text} rad beyond what is told",
+            f"sensor_yaw_rad = {drive.robot.sensor_yaw_rad + yaw.value:.3f} in robot.toml",
+            {"yaw_rad": yaw.value, "error": yaw.error},
+        )
+
+
+def noise(solution: Solution) -> Iterator[Finding]:
+    """Of sightings, against what is told."""
+    settings = ("bearing_sigma_rad", "range_sigma_fraction and range_sigma_floor_m")
+    for what, one, keys in zip(("bearings", "ranges"), solution.noise, settings, strict=True):
+        factor = max(one.single, one.block, 1e-3)
+        is_small = one.single > _SINGLE or one.block > _BLOCK
+        if is_small or factor < _CAUTIOUS:
+            times = f"{factor:.1f} times more" if is_small else f"{1.0 / factor:.0f} times less"
+            yield Finding(
+                "noise",
+                f"{what} scatter {times} than is told",
+                f"{one.single:.2f} of the told noise in single sightings, {one.block:.2f} in sums over 5 s; "
+                f"{len(one.errors)} sightings",
+                f"multiply {keys} of robot.toml, or the sd columns of sightings.csv, by {factor:.2g}",
+                {"single": one.single, "block": one.block},
+                _histogram(one),
+                is_note=not is_small,
+            )
+
+
+def _histogram(one: Noise) -> Picture:
+    widest = max(4.0, 4.0 * one.single)
+    found, edges = np.histogram(one.errors, 60, (-widest, widest), density=True)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    told = np.exp(-0.5 * middle**2) / math.sqrt(2.0 * math.pi)
+    curves = [Curve("found", middle, found, True), Curve("told", middle, told, True)]
+    return Picture("error over told noise", "density", curves)
+
+
+def identities(solution: Solution) -> Iterator[Finding]:
+    """Beacons named for each other, in a part of the log or against beacons.csv."""
+    found = exchanges(solution.problem, solution.state)
+    for pair in dict.fromkeys(frozenset((one.named, one.shown)) for one in found):
+        yield _exchange([one for one in found if {one.named, one.shown} == pair], solution)
+    for fitted in solution.references:
+        for a, b in fitted.exchanged():
+            what = f"beacons {a} and {b} are exchanged between sightings.csv and {fitted.what}"
+            sure, mend = (
+                "each stands where the other is told; the others fit",
+                f"exchange {a} and {b} in {fitted.what}",
+            )
+            yield Finding("identities", what, sure, mend, {"labels": [a, b]}, _map_picture(fitted))
+
+
+def _exchange(ways: list[Exchange], solution: Solution) -> Finding:
+    one, time_s = ways[0], solution.problem.drive.seen.time_s
+    start_s, end_s = (
+        float(of(time_s[np.concatenate([way.hits for way in ways])])) for of in (np.min, np.max)
+    )
+    own_m, other_m = (
+        float(np.median(np.concatenate([getattr(way, name)[np.isin(way.rows, way.hits)] for way in ways])))
+        for name in ("own_m", "other_m")
+    )
+    count, of = sum(len(way.hits) for way in ways), sum(way.inside for way in ways)
+    are = (
+        f"{one.named} and {one.shown} are exchanged"
+        if len(ways) > 1
+        else f"{one.shown} are named {one.named}"
+    )
+    curves = [
+        Curve(f"named {one.named}, from {label}", time_s[one.rows], off_m)
+        for label, off_m in ((one.named, one.own_m), (one.shown, one.other_m))
+    ]
+    return Finding(
+        "identities",
+        f"sightings of beacons {are} from {start_s:.1f} to {end_s:.1f} s after the first row of odometry",
+        f"{count} of {of} are off by {own_m:.2f} m as they are named, by {other_m:.2f} m if exchanged",
+        "exchange these beacon_id in sightings.csv",
+        {"labels": [one.named, one.shown], "from_s": start_s, "until_s": end_s, "sightings": count},
+        Picture("time, s", "distance from where the beacon is, m", curves),
+    )
+
+
+def _map_picture(fitted: Fitted) -> Picture:
+    pairs = (("map", fitted.estimate), (fitted.what, fitted.reference))
+    return Picture("x, m", "y, m", [Curve(label, points.real, points.imag) for label, points in pairs])
