@@ -133,6 +133,7 @@ def tests_for(layer: str) -> list[str]:
 def limit() -> None:
     """In a program that may never end."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
