@@ -36,7 +36,7 @@ $(error TARGET is $(TARGET); allowed: $(sort $(TARGETS)), and the boards $(sort 
 endif
 
 # A RISC-V core saves a few more registers.
-STACK_MAX_FOR = $(if $(filter rv%,$(1)),1152,1024)
+STACK_MAX_FOR = $(if $(filter rv%,$(1)),1280,1152)
 
 .PHONY: firmware
 ifeq ($(call CAN_BUILD,$(or $(BOARD_CORE_$(TARGET)),$(TARGET))),)

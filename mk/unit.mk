@@ -37,7 +37,8 @@ unit: $(UNIT_REALS:%=unit-%) ## the C unit tests, in float and in double, under 
 # The rules for one scalar type: $(1) is float or double.
 define unit_rules
 UNIT_DIR_$(1) := build/unit/$(1)
-UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(UNIT_SANITIZE_$(1)) -MMD -MP
+UNIT_COMPILE_$(1) = $$(CC) $$(C_STANDARD) $$(C_INCLUDES) $$(UNIT_FLAGS_$(1)) -O1 -g $$(UNIT_SANITIZE_$(1)) \
+    -MMD -MP
 
 UNIT_CORE_$(1) := $$(CORE_SOURCES:%.c=build/unit/$(1)/%.o)
 UNIT_ARCHIVES_$(1) := $$(LIBRARIES:%=build/unit/$(1)/lib%.a)

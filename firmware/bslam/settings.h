@@ -96,7 +96,7 @@ extern "C" {
          "noise of forward motion that grows with the time of moving") \
     REAL(turn_sd_per_sqrt_s, 0.0, 0.0, 10.0, "noise of the heading that grows with the time of moving") \
     REAL(sensor_doubt, 0.0, 0.0, 10.0, \
-         "sensor's place, yaw, range scale are states, as doubtful as this times 7 cm, 2 deg, 5 % (0: exact)") \
+         "sensor's place, yaw, range scale as states: this times 7 cm, 2 deg, 5 % doubtful (0: no)") \
     INTEGER(history_steps, 1024, 1, 1024, "readings that wait for a late sighting, to BSLAM_HISTORY_MAX") \
     REAL(bearing_only_variance_factor, 3.0, 1.0, 1000.0, \
          "bearing-only: the direction's variance times this") \

@@ -25,7 +25,7 @@ CALLED_BY_POINTER = (
     (r"(bslam_)?associate_", r"\w+_distance2"),
     (r"main", r"test_"),
     (r"read_head|kept_|port_(save|load)|read_slot|flush|read_map|bslam_slots_", r"(erase|write|read)$"),
-    (r"bslam_codec_|variance_at", r"take_piece|write_piece|read_bytes|read_map"),
+    (r"bslam_codec_|d_at|read_(factor|values|all)", r"take_piece|write_piece|read_bytes|read_map"),
 )
 """Callers, and whom they may call through a pointer."""
 

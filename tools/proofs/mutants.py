@@ -218,6 +218,18 @@ def count(layer: str, sample: int, jobs: int, results: Results, excused: set[str
     return counts
 
 
+def report(rows: dict[str, Counter[str]]) -> bool:
+    """Prints the table of layers. True: each reaches its goal."""
+    print(f"{'layer':<10}" + "".join(f"{kind:>18}" for kind in KINDS) + f"{'killed, %':>11}{'goal':>6}")
+    share = {name: row["killed"] / max(1, row["killed"] + row["survived"]) for name, row in rows.items()}
+    for name, row in rows.items():
+        cells = "".join(f"{row[kind]:>18}" for kind in KINDS)
+        print(f"{name:<10}{cells}{100 * share[name]:>11.1f}{100 * GOALS[name]:>6.0f}")
+    killed, survived = (sum(row[kind] for row in rows.values()) for kind in KINDS[:2])
+    print(f"mutants: {killed} of {killed + survived} killed: {killed / max(1, killed + survived):.1%}")
+    return all(share[name] >= GOALS[name] for name in rows)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Exit status as said above."""
     style = argparse.RawDescriptionHelpFormatter
@@ -237,14 +249,7 @@ def main(argv: list[str] | None = None) -> int:
     results, each = Results(), -(-options.sample // len(options.layers))
     jobs = 0 if options.list else options.jobs
     rows = {layer: count(layer, each, jobs, results, excused) for layer in options.layers}
-    print(f"{'layer':<10}" + "".join(f"{kind:>18}" for kind in KINDS) + f"{'killed, %':>11}{'goal':>6}")
-    share = {name: row["killed"] / max(1, row["killed"] + row["survived"]) for name, row in rows.items()}
-    for name, row in rows.items():
-        cells = "".join(f"{row[kind]:>18}" for kind in KINDS)
-        print(f"{name:<10}{cells}{100 * share[name]:>11.1f}{100 * GOALS[name]:>6.0f}")
-    killed, survived = (sum(row[kind] for row in rows.values()) for kind in KINDS[:2])
-    print(f"mutants: {killed} of {killed + survived} killed: {killed / max(1, killed + survived):.1%}")
-    return 0 if all(share[name] >= GOALS[name] for name in rows) else 1
+    return 0 if report(rows) else 1
 
 
 if __name__ == "__main__":

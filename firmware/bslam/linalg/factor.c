@@ -443,6 +443,18 @@ COPIED void settle_all(bslam_factor_t *factor, const bslam_waiting_t waiting[4],
     settle_rows(factor->tail, at + 4, waiting, count, change + at);
 }
 
+// Functions of their own: in one they would take the stack of all.
+#define SETTLE(count) \
+    __attribute__((noinline)) static void settle_##count(bslam_factor_t *factor, \
+                                                         const bslam_waiting_t *list, bslam_real_t *change) \
+    { \
+        settle_all(factor, list, count, change); \
+    }
+SETTLE(1)
+SETTLE(2)
+SETTLE(3)
+SETTLE(4)
+
 void bslam_factor_settle(bslam_factor_t *factor, const bslam_waiting_t *waiting, int count,
                          bslam_real_t *change)
 {
@@ -453,16 +465,16 @@ void bslam_factor_settle(bslam_factor_t *factor, const bslam_waiting_t *waiting,
     }
     switch (count) {
     case 1:
-        settle_all(factor, list, 1, change);
+        settle_1(factor, list, change);
         break;
     case 2:
-        settle_all(factor, list, 2, change);
+        settle_2(factor, list, change);
         break;
     case 3:
-        settle_all(factor, list, 3, change);
+        settle_3(factor, list, change);
         break;
     default:
-        settle_all(factor, list, 4, change);
+        settle_4(factor, list, change);
         break;
     }
 }
