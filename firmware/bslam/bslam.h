@@ -335,7 +335,7 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_CLASSIFIERS,  ///< classifiers, samples or negatives beyond what this build holds
     BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
     BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range: a place beyond 20 km
-    BSLAM_MAP_COVARIANCE,   ///< a D below 0 in its factor, or a variance beyond 1e30
+    BSLAM_MAP_COVARIANCE,   ///< a D below 0 in its factor, or a variance beyond 1e12
     BSLAM_MAP_UNREADABLE,   ///< the source cannot be read, or reads otherwise than before; the sink fails
     BSLAM_MAP_FAULT_COUNT
 } bslam_map_fault_t;

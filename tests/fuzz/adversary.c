@@ -355,6 +355,7 @@ static void require_unchanged(bslam_status_t status)
     bslam_instance_t *was = bslam_instance(&before), *is = bslam_instance(&robot);
     was->slam.counters = is->slam.counters;
     was->slam.bad_sighting = is->slam.bad_sighting;
+    was->slam.watch = is->slam.watch;
     if (status == BSLAM_E_JUMP) {
         was->slam.odometry = is->slam.odometry;
     }

@@ -19,13 +19,15 @@ static bslam_slam_t *slam_of(bslam_t *one)
     return &bslam_instance(one)->slam;
 }
 
-/// What a refused call may have touched: counters, the sighting at fault, after a jump the tick reference.
+/// What a refused call may have touched: counters, the sighting at fault, the stamps refused, after a jump the
+/// tick reference.
 /// And the seal over all of them.
 static void require_unchanged(bslam_status_t status)
 {
     bslam_slam_t *was = slam_of(&before);
     was->counters = slam_of(&robot)->counters;
     was->bad_sighting = slam_of(&robot)->bad_sighting;
+    was->watch = slam_of(&robot)->watch;
     if (status == BSLAM_E_JUMP) {
         was->odometry = slam_of(&robot)->odometry;
     }

@@ -79,6 +79,9 @@ void twin_randomise(bslam_ekf_t *ekf, const bslam_settings_t *settings, unit_ran
         ekf->mean[BSLAM_STATE_FORWARD] = real(unit_random(random, 0.3, 1.3));
         ekf->mean[BSLAM_STATE_TURN] = real(unit_random(random, 0.3, 1.3));
     }
+    for (int k = 0; k < ekf->sensor_dim; k++) {
+        ekf->mean[ekf->base_dim + k] += real(unit_random(random, -0.1, 0.1));
+    }
     for (int b = 0; b < ekf->beacon_count; b++) {
         randomise_beacon(ekf, random, &ekf->beacons[b], x, y);
         if (ekf->beacons[b].kind == BSLAM_BEACON_RAY) {
@@ -136,6 +139,20 @@ void twin_assert(const bslam_ekf_t *ekf, const twin_t *expected, double toleranc
 
 // ---- observation ------------------------------------------------------------------------------------------
 
+void twin_sensor(const bslam_ekf_t *ekf, const bslam_pose_t *mount, const double *state, double pose[3],
+                 double *scale)
+{
+    static const double as_told[BSLAM_SENSOR_DIM] = {0, 0, 0, 1};
+    const double *off = ekf->sensor_dim > 0 ? &state[ekf->base_dim] : as_told;
+    const double turn = (double)mount->theta_rad, theta = state[BSLAM_STATE_THETA];
+    const double x = (double)mount->x_m + cos(turn) * off[0] - sin(turn) * off[1];
+    const double y = (double)mount->y_m + sin(turn) * off[0] + cos(turn) * off[1];
+    pose[0] = state[BSLAM_STATE_X] + cos(theta) * x - sin(theta) * y;
+    pose[1] = state[BSLAM_STATE_Y] + sin(theta) * x + cos(theta) * y;
+    pose[2] = theta + turn + off[2];
+    *scale = off[3];
+}
+
 void twin_observe(const bslam_ekf_t *ekf, const bslam_pose_t *mount, int beacon, const double *state,
                   double *range_m, double *bearing_rad)
 {
@@ -150,12 +167,11 @@ void twin_observe(const bslam_ekf_t *ekf, const bslam_pose_t *mount, int beacon,
         px += cos(own[2]) / own[3];
         py += sin(own[2]) / own[3];
     }
-    const double s = sin(state[BSLAM_STATE_THETA]);
-    const double c = cos(state[BSLAM_STATE_THETA]);
-    const double dx = px - (state[BSLAM_STATE_X] + c * (double)mount->x_m - s * (double)mount->y_m);
-    const double dy = py - (state[BSLAM_STATE_Y] + s * (double)mount->x_m + c * (double)mount->y_m);
-    *range_m = hypot(dx, dy) * (b->kind == BSLAM_BEACON_SIZED ? own[2] : 1);
-    *bearing_rad = unit_angle_between(atan2(dy, dx), state[BSLAM_STATE_THETA] + (double)mount->theta_rad);
+    double sensor[3], scale;
+    twin_sensor(ekf, mount, state, sensor, &scale);
+    const double dx = px - sensor[0], dy = py - sensor[1];
+    *range_m = hypot(dx, dy) * scale * (b->kind == BSLAM_BEACON_SIZED ? own[2] : 1);
+    *bearing_rad = unit_angle_between(atan2(dy, dx), sensor[2]);
 }
 
 typedef struct observing {

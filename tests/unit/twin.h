@@ -30,6 +30,11 @@ void twin_assert(const bslam_ekf_t *ekf, const twin_t *expected, double toleranc
 /// Which state values are angles.
 bool twin_is_angle(const bslam_ekf_t *ekf, int at);
 
+/// Where the sensor is in the map, {x, y, direction}, and by how much its distances are too long, for a state
+/// given in double.
+void twin_sensor(const bslam_ekf_t *ekf, const bslam_pose_t *mount, const double *state, double pose[3],
+                 double *scale);
+
 /// Writes the distance and the direction in which the sensor sees a beacon, for a state given in double.
 void twin_observe(const bslam_ekf_t *ekf, const bslam_pose_t *mount, int beacon, const double *state,
                   double *range_m, double *bearing_rad);

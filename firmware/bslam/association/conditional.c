@@ -19,9 +19,12 @@ static bool push(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const
 {
     const int32_t n = conditional->count;
     bslam_real_t *l = &conditional->factor[row_at(n)];
-    bslam_real_t left = bslam_ekf_row_covariance(ekf, row, row) + variance;
+    bslam_real_t covariances[BSLAM_CONDITIONAL_SCALARS];
+    conditional->rows[n] = *row;
+    bslam_ekf_row_covariances(ekf, row, conditional->rows, n + 1, covariances);
+    bslam_real_t left = covariances[n] + variance;
     for (int32_t i = 0; i < n; i++) {
-        bslam_real_t sum = bslam_ekf_row_covariance(ekf, row, &conditional->rows[i]);
+        bslam_real_t sum = covariances[i];
         const bslam_real_t *other = &conditional->factor[row_at(i)];
         for (int32_t k = 0; k < i; k++) {
             sum -= l[k] * other[k];
@@ -35,7 +38,6 @@ static bool push(const bslam_ekf_t *ekf, bslam_conditional_t *conditional, const
     }
     l[n] = bslam_sqrt(left);
     conditional->white[n] = y / l[n];
-    conditional->rows[n] = *row;
     conditional->count = n + 1;
     return true;
 }

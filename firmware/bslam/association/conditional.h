@@ -32,7 +32,7 @@ static inline void bslam_conditional_init(bslam_conditional_t *conditional)
 }
 
 /// Weighs an innovation; *conditional is scratch meanwhile and comes back as it was. BSLAM_E_SINGULAR: S is
-/// not positive definite; *weight is unchanged then. O(count²).
+/// not positive definite; *weight is unchanged then. O(count² + n count), n the state.
 BSLAM_MUST_CHECK bslam_status_t bslam_conditional_weigh(const bslam_ekf_t *ekf,
                                                         bslam_conditional_t *conditional,
                                                         const bslam_innovation_t *innovation,

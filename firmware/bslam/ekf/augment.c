@@ -360,8 +360,9 @@ static bool place_on_ray(const bslam_ekf_t *ekf, const bslam_pose_t *mount, bsla
         .at = (uint16_t)at,
         .dim = BSLAM_RAY_DIM,
     };
+    const bslam_real_t by_scale = -range_m / bslam_ekf_range_scale(ekf);  // of the distance
     for (int k = 0; k < BSLAM_POINT_DIM; k++) {
-        bslam_ekf_fill_sensor(ekf, mount, 0, -range_m * by_range[k], &place->rows[k]);
+        bslam_ekf_fill_sensor(ekf, mount, 0, by_scale * by_range[k], &place->rows[k]);
     }
     return true;
 }

@@ -204,8 +204,9 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
                                           const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                           int index);
 
-/// a P bᵀ for two rows, from the covariance as it stands: how alike the errors of two predictions are. O(1).
-bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b);
+/// row P othersᵀ, from the covariance as it stands: how alike the errors of predictions are. O(n count).
+void bslam_ekf_row_covariances(const bslam_ekf_t *ekf, const bslam_row_t *row, const bslam_row_t *others,
+                               int count, bslam_real_t *covariances);
 
 typedef struct bslam_fusion {
     bslam_real_t

@@ -292,9 +292,75 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
                : -1;
 }
 
-bslam_real_t bslam_ekf_row_covariance(const bslam_ekf_t *ekf, const bslam_row_t *a, const bslam_row_t *b)
+/// The sum over a row of L, in the columns from `from` up to `to`, times h.
+static bslam_real_t along_row(const bslam_factor_t *factor, int place, const bslam_real_t *h, int from, int to)
 {
-    return quadratic(ekf, a, b).ab;
+    const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)from;
+    const int end = place + 1 < to ? place + 1 : to;
+    bslam_real_t sum = 0;
+    for (int j = 0; j < end - from; j++) {
+        sum += row[4 * j] * h[j];
+    }
+    return sum;
+}
+
+/// What some columns give of P aᵀ, with h the same columns of D Lᵀ aᵀ: at the robot's and the sensor's values,
+/// and at a beacon's.
+typedef struct column {
+    bslam_real_t base[POSE_DIM], sensor[BSLAM_SENSOR_DIM], other[BSLAM_RAY_DIM];
+} column_t;
+
+static void fill_column_base(const bslam_ekf_t *ekf, const bslam_row_t *row, const bslam_real_t *h, int from,
+                             int to, column_t *column)
+{
+    for (int k = 0; k < POSE_DIM; k++) {
+        column->base[k] = along_row(&ekf->factor, bslam_ekf_place(ekf, k), h, from, to);
+    }
+    for (int k = 0; k < row->sensor_dim; k++) {
+        column->sensor[k] =
+            along_row(&ekf->factor, bslam_ekf_place(ekf, row->sensor_at + k), h, from, to);
+    }
+}
+
+/// row · column.
+static bslam_real_t dot_column(const bslam_row_t *row, const column_t *column)
+{
+    bslam_real_t sum = 0;
+    for (int k = 0; k < POSE_DIM; k++) {
+        sum += row->base[k] * column->base[k];
+    }
+    for (int k = 0; k < row->sensor_dim; k++) {
+        sum += row->sensor[k] * column->sensor[k];
+    }
+    for (int k = 0; k < row->dim; k++) {
+        sum += row->other[k] * column->other[k];
+    }
+    return sum;
+}
+
+void bslam_ekf_row_covariances(const bslam_ekf_t *ekf, const bslam_row_t *row, const bslam_row_t *others,
+                               int count, bslam_real_t *covariances)
+{
+    const int places = bslam_factor_places(&ekf->factor);
+    memset(covariances, 0, (size_t)count * sizeof covariances[0]);
+    for (int from = 0; from < places; from += COLUMNS) {
+        const int to = from + COLUMNS < places ? from + COLUMNS : places;
+        bslam_real_t h[COLUMNS];
+        column_t column;
+        bslam_ekf_look(ekf, row, from, to, h);
+        for (int j = 0; j < to - from; j++) {
+            h[j] *= ekf->factor.d[from + j];
+        }
+        fill_column_base(ekf, row, h, from, to, &column);
+        for (int i = 0; i < count; i++) {
+            // Distance and direction of one beacon follow one another.
+            for (int k = 0; k < others[i].dim && (i == 0 || others[i].at != others[i - 1].at); k++) {
+                column.other[k] =
+                    along_row(&ekf->factor, bslam_ekf_place(ekf, others[i].at + k), h, from, to);
+            }
+            covariances[i] += dot_column(&others[i], &column);
+        }
+    }
 }
 
 // ---- gain and down-date -----------------------------------------------------------------------------------

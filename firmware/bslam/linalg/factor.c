@@ -7,8 +7,8 @@
 /// A function whose callers name constants: each has a copy without tests of them.
 #define COPIED __attribute__((always_inline)) static inline
 
-/// Variances below this are none: quotients by them would overflow.
-static const bslam_real_t VARIANCE_MIN = BSLAM_R(1e-30);
+/// Variances below this are none: L, which is a quotient by them, would have a square that overflows.
+static const bslam_real_t VARIANCE_MIN = BSLAM_R(1e-24);
 
 COPIED bslam_four_t load(const bslam_real_t *block, int j)
 {
@@ -119,20 +119,22 @@ typedef struct passing {
     int first;
     int grown;  ///< behind the last column that keeps less than all: there the usual way is a difference of
                 ///< large numbers
+    int end;    ///< behind the column that took all that was left
 } passing_t;
 
 /// Four rows through the columns before theirs. Returns what is left of w.
 COPIED bslam_four_t pass_before(const passing_t *passing, bslam_real_t *block, int at)
 {
     const bslam_real_t *w = passing->w, *by = passing->by;
+    const int end = passing->end < at ? passing->end : at;
     bslam_four_t rest = bslam_four(w + at);
     int j = passing->first;
-    for (; j < passing->grown && j < at; j++) {
+    for (; j < passing->grown && j < end; j++) {
         const bslam_four_t before = rest;
         rest -= w[j] * load(block, j);
         add_to_column(block + 4 * j, by[j], passing->keep[j], before, rest);
     }
-    for (; j < at; j++) {
+    for (; j < end; j++) {
         const bslam_four_t l = load(block, j);
         rest -= w[j] * l;
         store(block, j, l + by[j] * rest);
@@ -145,7 +147,7 @@ COPIED void pass_own(passing_t *passing, bslam_real_t *block, int at, const int 
 {
     const int j = at + lane;
     const bslam_real_t p = (*rest)[lane];
-    if (j < passing->first) {
+    if (j < passing->first || j >= passing->end) {
         return;
     }
     passing->w[j] = p;
@@ -162,12 +164,16 @@ COPIED void pass_own(passing_t *passing, bslam_real_t *block, int at, const int 
         passing->grown = j + 1;
         block[4 * j + lane] = 1;
     }
+    if (!(passing->share > 0)) {
+        passing->end = j + 1;
+    }
 }
 
 void bslam_factor_add(bslam_factor_t *factor, int first, bslam_real_t share, bslam_real_t *w,
                       bslam_real_t scratch[2][BSLAM_FACTOR_PLACES_MAX])
 {
-    passing_t passing = {w, scratch[0], scratch[1], factor->d, share, first, first};
+    passing_t passing = {w,     scratch[0], scratch[1], factor->d,
+                         share, first,      first,      bslam_factor_places(factor)};
     for (int at = first / 4 * 4; share > 0 && at < bslam_factor_places(factor); at += 4) {
         bslam_real_t *block = block_of(factor, at);
         bslam_four_t rest = pass_before(&passing, block, at);

@@ -16,7 +16,9 @@ enum { HEADER_BYTES = 28, REAL_BYTES = 4, CRC_BYTES = 4 };
 /// What the values of a full map may hang on: two of the robot's, the sensor's, and the beacons'.
 enum { COLUMNS_MAX = 2 + BSLAM_SENSOR_DIM + 2 * BSLAM_BEACONS_MAX + 2 * BSLAM_RAYS_MAX };
 
-static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e12);  // so that what it is made of can be written again
+static const bslam_real_t VARIANCE_MAX = BSLAM_R(1e12);
+// L may be large where a variance is small: what a load leaves of a map must be such that it can be saved.
+static const bslam_real_t FACTOR_MAX = BSLAM_R(1e18);
 static const bslam_real_t SCALE_MAX = BSLAM_R(100.0);
 // A beacon may have moved away from where it began; no other value is as large.
 static const bslam_real_t VALUE_MAX = 2 * BSLAM_PLACE_MAX_M;
@@ -76,6 +78,16 @@ static bslam_real_t move_value(bslam_codec_t *codec, bslam_real_t value)
 {
     const bslam_real_t moved = bslam_codec_real(codec, value);
     bslam_codec_require(codec, bslam_in_range(moved, -VALUE_MAX, VALUE_MAX), BSLAM_MAP_CONTENT);
+    return moved;
+}
+
+static bslam_real_t move_factor(bslam_codec_t *codec, bslam_real_t value)
+{
+    const float rounded = (float)value;
+    uint32_t bits;
+    memcpy(&bits, &rounded, sizeof bits);
+    const bslam_real_t moved = (bslam_real_t)bslam_codec_float_of(bslam_codec_whole(codec, bits, REAL_BYTES));
+    bslam_codec_require(codec, bslam_in_range(moved, -FACTOR_MAX, FACTOR_MAX), BSLAM_MAP_NOT_FINITE);
     return moved;
 }
 
@@ -212,16 +224,16 @@ static void read_factor(bslam_codec_t *codec, const header_t *header, const colu
     const uint32_t d_begins = codec->at;
     const int first = ekf != NULL ? bslam_ekf_map_at(ekf) - ekf->factor.tail_count : 0;
     for (uint32_t c = 0; c < header->columns; c++) {
-        const bslam_real_t d = bslam_codec_real(codec, 0);
+        const bslam_real_t d = move_factor(codec, 0);
         bslam_codec_require(codec, d >= 0, BSLAM_MAP_COVARIANCE);
         if (ekf != NULL) {
             ekf->factor.d[first + (int)c] = d;
         }
     }
     for (uint32_t i = 0; i < header->columns && codec->fault == BSLAM_MAP_FINE; i++) {
-        bslam_real_t variance = 0;
+        bslam_real_t variance = columns->are_values[i] ? d_at(codec, d_begins, i) : 0;
         for (uint32_t j = 0; columns->are_values[i] && j < i; j++) {
-            const bslam_real_t value = bslam_codec_real(codec, 0);
+            const bslam_real_t value = move_factor(codec, 0);
             variance += d_at(codec, d_begins, j) * value * value;
             if (ekf != NULL) {
                 *bslam_factor_element(&ekf->factor, first + (int)i, first + (int)j) = value;
@@ -273,13 +285,13 @@ static void write_values(bslam_codec_t *codec, const bslam_ekf_t *ekf, const hea
         }
     }
     for (int c = 0; c < (int)header->columns; c++) {
-        (void)bslam_codec_real(codec, factor->d[c]);
+        (void)move_factor(codec, factor->d[c]);
     }
     for (int i = 0; i < (int)header->columns; i++) {
         const bslam_real_t *row = bslam_factor_row(factor, i);
-        bslam_real_t variance = 0;
+        bslam_real_t variance = columns->are_values[i] ? (float)factor->d[i] : 0;
         for (int j = 0; columns->are_values[i] && j < i; j++) {
-            const bslam_real_t value = bslam_codec_real(codec, row[4 * j]);
+            const bslam_real_t value = move_factor(codec, row[4 * j]);
             variance += (float)factor->d[j] * value * value;
         }
         bslam_codec_require(codec, bslam_in_range(variance, 0, VARIANCE_MAX), BSLAM_MAP_COVARIANCE);

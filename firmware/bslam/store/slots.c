@@ -136,7 +136,10 @@ static bslam_map_fault_t write_map(const slot_t *slot, const bslam_slam_t *slam)
     writer_t writer = {.flash = slot->flash, .slot = slot->number, .at = MAP_AT};
     const bslam_map_sink_t sink = {write_piece, &writer};
     bslam_map_fault_t fault;
-    if (bslam_map_write(slam, &sink, &fault) != BSLAM_OK || (writer.waiting > 0 && !flush(&writer))) {
+    if (bslam_map_write(slam, &sink, &fault) != BSLAM_OK) {
+        return fault;
+    }
+    if (writer.waiting > 0 && !flush(&writer)) {
         return BSLAM_MAP_UNREADABLE;
     }
     const bslam_map_source_t source = source_of(slot);

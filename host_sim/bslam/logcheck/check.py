@@ -55,8 +55,12 @@ def check_log(log: Log) -> Report:
         return Report(log.name, [*findings, *sign_findings(log, signed, shown, [])], [*untested, _NO_RANGES])
     solution = solve(log, drive, flow)
     findings += sign_findings(log, signed, shown, solution.references)
-    findings += [*verdict.delay(solution, drive), *verdict.scales(solution, drive, flow)]
-    findings += [*verdict.mount(solution, drive), *verdict.noise(solution), *verdict.identities(solution)]
+    findings += [*verdict.delay(solution, drive, flow), *verdict.scales(solution, drive, flow)]
+    findings += [
+        *verdict.mount(solution, drive),
+        *verdict.noise(solution),
+        *verdict.identities(solution, log),
+    ]
     names = ("way", "turn", "bend", "yaw", "delay")
     return Report(log.name, findings, untested, {name: vars(getattr(solution, name)) for name in names})
 

@@ -6,7 +6,7 @@ bearing falls by the turn: two equations, linear in what way and turn are to be 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,7 @@ from bslam.logcheck.drive import Drive, Floats, Ints
 
 _LAGS_S: Final = (0.4, 1.2)
 _LONGEST: Final = 2.5  # of the lag
-_DELAYS_S: Final = np.arange(-0.6, 1.61, 0.05)
+DELAYS_S: Final = np.arange(-0.6, 1.61, 0.05)
 _ROUNDS: Final = 12
 _PAIRS_MIN, _PAIRS_MAX = 20, 6000
 _DELAY_GAIN: Final = 0.03  # a delay other than the told one must explain so much more
@@ -33,6 +33,7 @@ class Flow:
     turn_most: float  # if all were
     delay_s: float
     spread: float  # what is left of the changes of bearings and ranges, in no unit
+    spreads: Floats  # (d,) the same at other delays, DELAYS_S
     turned_rad: Floats  # (n,) by odometry, between the sightings of a pair
     shifted_rad: Floats  # (n,) of the bearing, less what the way explains
 
@@ -43,8 +44,10 @@ def best_flow(drive: Drive) -> Flow | None:
     if len(pairs) < _PAIRS_MIN or not np.any(np.diff(drive.odometry.sums(drive.seen.time_s), axis=0)):
         return None
     told = _flow_at(drive, pairs, drive.delay_s)
-    best = min((_flow_at(drive, pairs, delay_s) for delay_s in _DELAYS_S), key=lambda flow: flow.spread)
-    return best if best.spread < told.spread * (1.0 - _DELAY_GAIN) else told
+    flows = [_flow_at(drive, pairs, delay_s) for delay_s in DELAYS_S.tolist()]
+    best = min(flows, key=lambda flow: flow.spread)
+    best = best if best.spread < told.spread * (1.0 - _DELAY_GAIN) else told
+    return replace(best, spreads=np.array([flow.spread for flow in flows]))
 
 
 def _pairs(drive: Drive) -> Ints:
@@ -84,7 +87,7 @@ def _flow_at(drive: Drive, pairs: Ints, delay_s: float) -> Flow:
     weight = 1.0 / np.maximum(np.abs(left_rad), np.mean(np.abs(left_rad)) + 1e-12)
     most = float(weight @ left_rad**2 / (weight @ (by_turn * left_rad) or np.nan))
     (way, turn), (way_error, turn_error) = factors, errors
-    return Flow(way, turn, way_error, turn_error, most, delay_s, spread, turn_rad, left_rad)
+    return Flow(way, turn, way_error, turn_error, most, delay_s, spread, np.empty(0), turn_rad, left_rad)
 
 
 def _robust(groups: list[tuple[Floats, Floats]]) -> tuple[list[float], list[float], float]:

@@ -13,9 +13,10 @@ from typing import Final
 import numpy as np
 
 from bslam.log import Log
+from bslam.logcheck.batch import DELAY, relative
 from bslam.logcheck.drive import Drive
 from bslam.logcheck.finding import Curve, Finding, Picture
-from bslam.logcheck.flow import Flow
+from bslam.logcheck.flow import DELAYS_S, Flow
 from bslam.logcheck.identity import Exchange, exchanges
 from bslam.logcheck.reference import Fitted
 from bslam.logcheck.solution import Estimate, Noise, Solution
@@ -66,7 +67,7 @@ def outside(log: Log) -> Iterator[Finding]:
         )
 
 
-def delay(solution: Solution, drive: Drive) -> Iterator[Finding]:
+def delay(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     """Sightings that come late, or early, beyond what is told."""
     found, gain = solution.delay, solution.delay_gain
     is_untold_lead = drive.is_commanded and drive.delay_s == 0.0
@@ -82,6 +83,11 @@ def delay(solution: Solution, drive: Drive) -> Iterator[Finding]:
         f"{1e3 * drive.row_s:.0f} ms apart",
         f"--set sighting_delay_us={round(1e6 * (found.value + drive.delay_s))}",
         {"delay_s": found.value, "error": found.error, "log_likelihood_gain": gain},
+        Picture(
+            "delay, s",
+            "what odometry leaves unexplained",
+            [Curve("by moments", DELAYS_S, flow.spreads, True)],
+        ),
         is_note=abs(found.value) <= limit_s,
     )
 
@@ -95,12 +101,12 @@ def scales(solution: Solution, drive: Drive, flow: Flow) -> Iterator[Finding]:
     way, turn = solution.way, solution.turn
     if abs(way.value / flow.way - 1.0) < _AGREE:
         limit = usual[0] + way.cover + (_SIZE_UNKNOWN if placed is None else 0.0)
-        yield from _scale("forward_scale", "way", Estimate(size * way.value, way.error), limit, by)
+        own = Estimate(size * way.value, way.error)
+        yield from _scale("forward_scale", "way", own, limit, by, _sums_picture(solution, 0, "way, m"))
     if abs(turn.value / flow.turn - 1.0) < _AGREE:
         nearer = min((turn.value, flow.turn), key=lambda one: abs(one - 1.0))
-        yield from _scale(
-            "turn_scale", "turn", Estimate(nearer, turn.error), usual[1] + turn.cover, "bearings"
-        )
+        own, picture = Estimate(nearer, turn.error), _sums_picture(solution, 1, "turn, rad")
+        yield from _scale("turn_scale", "turn", own, usual[1] + turn.cover, "bearings", picture)
     if placed is not None and abs(placed.scale - 1.0) > _SIZE_OFF:
         factor = placed.scale if unit == 1.0 else unit
         yield Finding(
@@ -122,7 +128,22 @@ def _unit_of(scale: float) -> float:
     )
 
 
-def _scale(setting: str, what: str, one: Estimate, limit: float, by: str) -> Iterator[Finding]:
+def _sums_picture(solution: Solution, column: int, label: str) -> Picture:
+    """Way or turn by odometry, and as the fit has it, summed up without their signs."""
+    problem, state = solution.problem, solution.state
+    measured = np.diff(problem.drive.odometry.sums(problem.frame_s - state.parameters[DELAY]), axis=0)
+    fitted = relative(state.poses[:-1], state.poses[1:])[:, [0, 2]]
+    signs = np.sign(measured[:, column])
+    curves = [
+        Curve(name, problem.frame_s[1:], np.cumsum(signs * of[:, column]), True)
+        for name, of in (("odometry", measured), ("sightings", fitted))
+    ]
+    return Picture("time, s", label, curves)
+
+
+def _scale(
+    setting: str, what: str, one: Estimate, limit: float, by: str, picture: Picture
+) -> Iterator[Finding]:
     off, error = abs(1.0 / one.value - 1.0), abs(one.value - 1.0)
     if error > max(_WORTH_A_NOTE, _SURE * one.error):
         yield Finding(
@@ -131,6 +152,7 @@ def _scale(setting: str, what: str, one: Estimate, limit: float, by: str) -> Ite
             f"{setting} {one.text} by {by}; {100.0 * limit:.1f} % are usual or covered by the told noise",
             f"--set {setting}={one.value:.3f}",
             {setting: one.value, "error": one.error, "limit": limit},
+            picture,
             is_note=error <= limit,
         )
 
@@ -147,6 +169,7 @@ def mount(solution: Solution, drive: Drive) -> Iterator[Finding]:
             f"each metre turns the robot by {bend.text} rad more than odometry has",
             f"multiply {more}_radius_m of robot.toml, or the {more} column, by {1.0 - abs(wheel):.3f}",
             {"wheel": wheel, "error": bend.error * base_m},
+            _sums_picture(solution, 1, "turn, rad"),
         )
     side = "left" if yaw.value > 0.0 else "right"
     if abs(yaw.value) > max(_YAW_OFF_RAD + yaw.cover, _SURE * yaw.error):
@@ -188,47 +211,43 @@ def _histogram(one: Noise) -> Picture:
     return Picture("error over told noise", "density", curves)
 
 
-def identities(solution: Solution) -> Iterator[Finding]:
+def identities(solution: Solution, log: Log) -> Iterator[Finding]:
     """Beacons named for each other, in a part of the log or against beacons.csv."""
     found = exchanges(solution.problem, solution.state)
     for pair in dict.fromkeys(frozenset((one.named, one.shown)) for one in found):
-        yield _exchange([one for one in found if {one.named, one.shown} == pair], solution)
+        yield _exchange([one for one in found if {one.named, one.shown} == pair], solution, log)
     for fitted in solution.references:
-        for a, b in fitted.exchanged():
+        for a, b in (map(log.identity, pair) for pair in fitted.exchanged()):
             what = f"beacons {a} and {b} are exchanged between sightings.csv and {fitted.what}"
             sure, mend = (
-                "each stands where the other is told; the others fit",
+                "each stands where the other is told; others fit",
                 f"exchange {a} and {b} in {fitted.what}",
             )
             yield Finding("identities", what, sure, mend, {"labels": [a, b]}, _map_picture(fitted))
 
 
-def _exchange(ways: list[Exchange], solution: Solution) -> Finding:
-    one, time_s = ways[0], solution.problem.drive.seen.time_s
-    start_s, end_s = (
-        float(of(time_s[np.concatenate([way.hits for way in ways])])) for of in (np.min, np.max)
-    )
+def _exchange(both: list[Exchange], solution: Solution, log: Log) -> Finding:
+    """Of one pair: each for the other, or one for the other alone."""
+    one, time_s = both[0], solution.problem.drive.seen.time_s
+    hits_s = time_s[np.concatenate([each.hits for each in both])]
     own_m, other_m = (
-        float(np.median(np.concatenate([getattr(way, name)[np.isin(way.rows, way.hits)] for way in ways])))
-        for name in ("own_m", "other_m")
+        float(np.median(np.concatenate([off[np.isin(each.rows, each.hits)] for each, off in pairs])))
+        for pairs in ([(each, each.own_m) for each in both], [(each, each.other_m) for each in both])
     )
-    count, of = sum(len(way.hits) for way in ways), sum(way.inside for way in ways)
-    are = (
-        f"{one.named} and {one.shown} are exchanged"
-        if len(ways) > 1
-        else f"{one.shown} are named {one.named}"
-    )
+    count, of = sum(len(each.hits) for each in both), sum(each.inside for each in both)
+    a, b = log.identity(one.named), log.identity(one.shown)
+    are = f"{a} and {b} are exchanged" if len(both) > 1 else f"{b} are named {a}"
     curves = [
-        Curve(f"named {one.named}, from {label}", time_s[one.rows], off_m)
-        for label, off_m in ((one.named, one.own_m), (one.shown, one.other_m))
+        Curve(f"named {a}, from where {label} is", time_s[one.rows], off_m)
+        for label, off_m in ((a, one.own_m), (b, one.other_m))
     ]
     return Finding(
         "identities",
-        f"sightings of beacons {are} from {start_s:.1f} to {end_s:.1f} s after the first row of odometry",
+        f"sightings of beacons {are} from {hits_s.min():.1f} to {hits_s.max():.1f} s of odometry",
         f"{count} of {of} are off by {own_m:.2f} m as they are named, by {other_m:.2f} m if exchanged",
         "exchange these beacon_id in sightings.csv",
-        {"labels": [one.named, one.shown], "from_s": start_s, "until_s": end_s, "sightings": count},
-        Picture("time, s", "distance from where the beacon is, m", curves),
+        {"labels": [a, b], "from_s": hits_s.min(), "until_s": hits_s.max(), "sightings": count},
+        Picture("time, s", "distance, m", curves),
     )
 
 

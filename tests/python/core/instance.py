@@ -21,12 +21,12 @@ def dim(slam: Slam) -> int:
 
 
 def mean(slam: Slam) -> NDArray[np.float64]:
-    """(n,) the state: robot, then beacons. m, rad."""
-    return _array(slam, inside(slam).slam.ekf.mean)[: dim(slam)]
+    """(n,) the state: robot, then beacons in the order of the map. m, rad."""
+    return _array(slam, inside(slam).slam.ekf.mean)[_order(slam)]
 
 
 def covariance(slam: Slam) -> NDArray[np.float64]:
-    """(n, n) its covariance: L D Lᵀ of the factor (bslam/linalg/factor.h), in the state's order."""
+    """(n, n) its covariance: L D Lᵀ of the factor (bslam/linalg/factor.h)."""
     ekf = inside(slam).slam.ekf
     body, tail = int(ekf.factor.body_count), int(ekf.factor.tail_count)
     places = -(-body // 4) * 4 + 4
@@ -40,7 +40,32 @@ def covariance(slam: Slam) -> NDArray[np.float64]:
     heading = int(ekf.base_dim) - tail - 1
     robot = [places - 4 + tail - 2, places - 4 + tail - 1, heading, places - 4, 0][: int(ekf.base_dim)]
     order = [*robot, *range(heading + 1, body)]
+    order = np.array(order)[_order(slam)]
     return full[np.ix_(order, order)]
+
+
+def begins(slam: Slam) -> list[int]:
+    """Where each beacon's values begin in what `mean` returns."""
+    ends = np.cumsum([map_at(slam), *(_dim_of(slam, one) for one in beacons(slam))])
+    return [int(end) for end in ends[:-1]]
+
+
+def map_at(slam: Slam) -> int:
+    """Size of what stands before the beacons."""
+    ekf = inside(slam).slam.ekf
+    return int(ekf.base_dim + ekf.sensor_dim)
+
+
+def _dim_of(slam: Slam, beacon: Any) -> int:
+    lib = module_of(slam).lib
+    dims = {lib.BSLAM_BEACON_POINT: 2, lib.BSLAM_BEACON_SIZED: 3, lib.BSLAM_BEACON_RAY: 4}
+    return dims.get(beacon.kind, 0)
+
+
+def _order(slam: Slam) -> list[int]:
+    """Where each value stands in the core, whose beacons move to the end when they become points."""
+    places = [range(one.at, one.at + _dim_of(slam, one)) for one in beacons(slam)]
+    return [*range(map_at(slam)), *(at for own in places for at in own)]
 
 
 def beacons(slam: Slam) -> list[Any]:
@@ -52,7 +77,7 @@ def beacons(slam: Slam) -> list[Any]:
 def angles(slam: Slam) -> list[int]:
     """Which values of the state are angles: the heading, and rays' directions."""
     ray = module_of(slam).lib.BSLAM_BEACON_RAY
-    return [2, *(one.at + 2 for one in beacons(slam) if one.kind == ray)]
+    return [2, *(at + 2 for at, one in zip(begins(slam), beacons(slam), strict=True) if one.kind == ray)]
 
 
 def copy_of(slam: Slam) -> Slam:

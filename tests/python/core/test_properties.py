@@ -165,8 +165,8 @@ def mirror_signs(slam: Slam) -> NDArray[np.float64]:
     signs[[1, *instance.angles(slam)]] = -1
     if slam.params["velocity_states"]:
         signs[4] = -1
-    for beacon in instance.beacons(slam):
-        signs[beacon.at + 1] = -1
+    for at in instance.begins(slam):
+        signs[at + 1] = -1
     return signs
 
 

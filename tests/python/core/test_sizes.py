@@ -35,7 +35,7 @@ def compiled(program: Path, **sizes: int) -> subprocess.CompletedProcess[str]:
         (1, 1, 1, 2, 1, 300),
         (2, 1, 3, 1, 0, 300),
         (3, 0, 250, 16, 0, 100),
-        (250, 250, 250, 1024, 0, 6),
+        (250, 250, 40, 1024, 0, 6),
     ],
 )
 def test_limits_hold_in_any_size(

@@ -168,7 +168,7 @@ def test_check_noise_told_too_small_is_named_and_too_large_noted():
 def test_check_labels_exchanged_for_a_while_are_named_with_when(first_s, last_s):
     one = the_one(exchanged(made_up(), 1, 7, first_s, last_s))
     assert one.kind == "identities"
-    assert sorted(one.figures["labels"]) == [1, 7]
+    assert sorted(one.figures["labels"]) == ["1", "7"]
     row_s = 0.04  # times are from the first row of odometry
     assert first_s - row_s <= one.figures["from_s"] < one.figures["until_s"] <= last_s
     assert one.figures["until_s"] - one.figures["from_s"] > 0.6 * (last_s - first_s)
@@ -176,7 +176,7 @@ def test_check_labels_exchanged_for_a_while_are_named_with_when(first_s, last_s)
 
 def test_check_labels_exchanged_against_the_map_are_named():
     one = the_one(exchanged(made_up(), 2, 5, 0.0, 1e6))
-    assert one.kind == "identities" and one.figures["labels"] == [2, 5] and "beacons.csv" in one.mend
+    assert one.kind == "identities" and one.figures["labels"] == ["2", "5"] and "beacons.csv" in one.mend
 
 
 @pytest.mark.parametrize("share", [0.2, 1.0])

@@ -141,7 +141,7 @@ def own_eyes(request, film, camera, tmp_path, monkeypatch):
         camera = load_rig("three60").cameras[1]
         make_film(tmp_path / "large", "paper_room", ROOM, camera, 3, TURN)
         target, shots = f"{request.param}:{tmp_path}/large", shots_of(tmp_path / "large", camera, 3)
-    with RemoteSlam(open_line(target), None, 20) as robot:
+    with RemoteSlam(open_line(target), None, 14) as robot:
         yield robot, camera, shots
 
 

@@ -15,14 +15,20 @@
 static const bslam_pose_t mount = {BSLAM_R(0.2), BSLAM_R(-0.1), BSLAM_R(0.4)};
 
 /// A filter with two points and one ray, with velocity states so that more than the pose stands before the
-/// map.
-static bslam_ekf_t random_filter(bslam_settings_t *settings, unit_random_t *random)
+/// map; and sensor states, or not.
+static bslam_ekf_t filter_that_doubts(bslam_settings_t *settings, unit_random_t *random, bool doubts_sensor)
 {
     *settings = unit_settings();
     settings->velocity_states = 1;
+    settings->sensor_doubt = doubts_sensor ? 1 : 0;
     bslam_ekf_t ekf;
     twin_randomise(&ekf, settings, random, 2, 1);
     return ekf;
+}
+
+static bslam_ekf_t random_filter(bslam_settings_t *settings, unit_random_t *random)
+{
+    return filter_that_doubts(settings, random, false);
 }
 
 /// The state with `count` values appended that are functions of the state and of noise n (with covariance q)
@@ -62,52 +68,47 @@ static twin_t augmented(const bslam_ekf_t *ekf, unit_function_t function, int co
 // ---- adding -----------------------------------------------------------------------------------------------
 
 typedef struct adding {
+    const bslam_ekf_t *ekf;
     int dim;  // where the noise stands among the arguments
     double range_m;
     double bearing_rad;
 } adding_t;
 
-static void sensor_of(const double *in, double *x, double *y, double *theta)
+/// What a sensor at a pose measured, at its point.
+static void point_seen(const double pose[3], double range_m, double bearing_rad, double *out)
 {
-    const double s = sin(in[BSLAM_STATE_THETA]);
-    const double c = cos(in[BSLAM_STATE_THETA]);
-    *x = in[BSLAM_STATE_X] + c * (double)mount.x_m - s * (double)mount.y_m;
-    *y = in[BSLAM_STATE_Y] + s * (double)mount.x_m + c * (double)mount.y_m;
-    *theta = in[BSLAM_STATE_THETA] + (double)mount.theta_rad;
+    out[0] = pose[0] + range_m * cos(pose[2] + bearing_rad);
+    out[1] = pose[1] + range_m * sin(pose[2] + bearing_rad);
 }
 
 /// Noise: of the distance, of the direction.
 static void new_point(const double *in, double *out, const void *context)
 {
     const adding_t *a = context;
-    double x, y, theta;
-    sensor_of(in, &x, &y, &theta);
-    const double range_m = a->range_m + in[a->dim];
-    const double direction = theta + a->bearing_rad + in[a->dim + 1];
-    out[0] = x + range_m * cos(direction);
-    out[1] = y + range_m * sin(direction);
+    double pose[3], scale;
+    twin_sensor(a->ekf, &mount, in, pose, &scale);
+    point_seen(pose, (a->range_m + in[a->dim]) / scale, a->bearing_rad + in[a->dim + 1], out);
 }
 
 /// Noise: of the distance, of the direction, of the scale.
 static void new_sized(const double *in, double *out, const void *context)
 {
     const adding_t *a = context;
-    double x, y, theta;
-    sensor_of(in, &x, &y, &theta);
+    double pose[3], scale;
+    twin_sensor(a->ekf, &mount, in, pose, &scale);
     out[2] = 1 + in[a->dim + 2];
-    const double range_m = (a->range_m + in[a->dim]) / out[2];
-    const double direction = theta + a->bearing_rad + in[a->dim + 1];
-    out[0] = x + range_m * cos(direction);
-    out[1] = y + range_m * sin(direction);
+    point_seen(pose, (a->range_m + in[a->dim]) / scale / out[2], a->bearing_rad + in[a->dim + 1], out);
 }
 
 /// Noise: of the direction, of the inverse distance.
 static void new_ray(const double *in, double *out, const void *context)
 {
     const adding_t *a = context;
-    double theta;
-    sensor_of(in, &out[0], &out[1], &theta);
-    out[2] = theta + a->bearing_rad + in[a->dim];
+    double pose[3], scale;
+    twin_sensor(a->ekf, &mount, in, pose, &scale);
+    out[0] = pose[0];
+    out[1] = pose[1];
+    out[2] = pose[2] + a->bearing_rad + in[a->dim];
     out[3] = 0.2 + in[a->dim + 1];
 }
 
@@ -116,12 +117,12 @@ static void test_add_point_is_the_augment_step(void **state)
     unit_random_t random = {1};
     for (int i = 0; i < 20; i++) {
         bslam_settings_t settings;
-        bslam_ekf_t ekf = random_filter(&settings, &random);
+        bslam_ekf_t ekf = filter_that_doubts(&settings, &random, i % 2 == 1);
         const double range_m = unit_random(&random, 0.5, 8);
         const double bearing = unit_random(&random, -3.14, 3.14);
         const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
         const double noise_var[] = {range_sd2, 0.02 * 0.02};
-        const adding_t adding = {ekf.dim, range_m, bearing};
+        const adding_t adding = {&ekf, ekf.dim, range_m, bearing};
         const twin_t expected = augmented(&ekf, new_point, 2, noise_var, 2, &adding);
         const bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
         int index;
@@ -137,7 +138,7 @@ static void test_add_sized_is_the_augment_step(void **state)
     unit_random_t random = {15};
     for (int i = 0; i < 20; i++) {
         bslam_settings_t settings;
-        bslam_ekf_t ekf = random_filter(&settings, &random);
+        bslam_ekf_t ekf = filter_that_doubts(&settings, &random, i % 2 == 1);
         settings.range_scale_sd = i % 4 == 3 ? 0 : BSLAM_R(0.07);
         const double range_m = unit_random(&random, 0.5, 8);
         const double bearing = unit_random(&random, -3.14, 3.14);
@@ -145,7 +146,7 @@ static void test_add_sized_is_the_augment_step(void **state)
         const double own_sd = i % 2 == 0 ? 0 : 0.12;  // what the detector says goes before the parameter
         const double scale_sd = own_sd > 0 ? own_sd : 0.07;
         const double noise_var[] = {range_sd2, 0.02 * 0.02, scale_sd * scale_sd};
-        const adding_t adding = {ekf.dim, range_m, bearing};
+        const adding_t adding = {&ekf, ekf.dim, range_m, bearing};
         const twin_t expected = augmented(&ekf, new_sized, 3, noise_var, 3, &adding);
         bslam_sighting_t sighting = unit_polar(bearing, range_m, 7);
         sighting.range_scale_sd = (bslam_real_t)own_sd;
@@ -195,11 +196,11 @@ static void test_add_ray_is_the_augment_step(void **state)
     unit_random_t random = {2};
     for (int i = 0; i < 20; i++) {
         bslam_settings_t settings;
-        bslam_ekf_t ekf = random_filter(&settings, &random);
+        bslam_ekf_t ekf = filter_that_doubts(&settings, &random, i % 2 == 1);
         const double bearing = unit_random(&random, -3.14, 3.14);
         // Direction variance times 2 where no distance comes with it; inverse distance 0.2 with sd 0.1.
         const double noise_var[] = {2 * 0.02 * 0.02, 0.1 * 0.1};
-        const adding_t adding = {ekf.dim, 0, bearing};
+        const adding_t adding = {&ekf, ekf.dim, 0, bearing};
         const twin_t expected = augmented(&ekf, new_ray, 4, noise_var, 2, &adding);
         const bslam_sighting_t sighting = unit_direction(bearing, 7);
         int index;
@@ -411,8 +412,9 @@ static double linearity_index(const bslam_ekf_t *ekf)
     const int at = ekf->beacons[2].at;
     double point[2];
     point_of_ray(values, point, &at);
-    double x, y, theta;
-    sensor_of(values, &x, &y, &theta);
+    double pose[3], scale;
+    twin_sensor(ekf, &mount, values, pose, &scale);
+    const double x = pose[0], y = pose[1];
     const double distance = hypot(point[0] - x, point[1] - y);
     const double variance = (double)bslam_ekf_covariance(ekf, at + 3, at + 3);
     const double distance_sd = sqrt(variance) / (values[at + 3] * values[at + 3]);
@@ -479,6 +481,7 @@ static void test_settle_ray_without_a_positive_inverse_distance_stays(void **sta
 // ---- scales -----------------------------------------------------------------------------------------------
 
 typedef struct measuring {
+    const bslam_ekf_t *ekf;
     int dim;  // where the noise stands among the arguments
     int at;   // where the ray does
     double range_m;
@@ -489,30 +492,31 @@ typedef struct measuring {
 static void new_on_ray(const double *in, double *out, const void *context)
 {
     const measuring_t *m = context;
-    double x, y, theta;
-    sensor_of(in, &x, &y, &theta);
+    double pose[3], scale;
+    twin_sensor(m->ekf, &mount, in, pose, &scale);
     const double *ray = &in[m->at];
     out[2] = 1 + in[m->dim + 1];
-    const double range_m = (m->range_m + in[m->dim]) / out[2];
-    const double along = (x - ray[0]) * cos(ray[2]) + (y - ray[1]) * sin(ray[2]);
-    const double across = (x - ray[0]) * sin(ray[2]) - (y - ray[1]) * cos(ray[2]);
+    const double range_m = (m->range_m + in[m->dim]) / scale / out[2];
+    const double along = (pose[0] - ray[0]) * cos(ray[2]) + (pose[1] - ray[1]) * sin(ray[2]);
+    const double across = (pose[0] - ray[0]) * sin(ray[2]) - (pose[1] - ray[1]) * cos(ray[2]);
     const double length = along + sqrt(range_m * range_m - across * across);
     out[0] = ray[0] + length * cos(ray[2]);
     out[1] = ray[1] + length * sin(ray[2]);
 }
 
-/// A distance of the point that is so far along beacon 2, a ray; and how much of it lies along the ray.
+/// The distance as it is measured of the point that is so far along beacon 2, a ray; and how much of it lies
+/// along the ray.
 static double range_along_ray(const bslam_ekf_t *ekf, double length_m, double *cosine)
 {
     double in[UNIT_ARGUMENTS_MAX] = {0};
     twin_values(ekf, in);
-    double x, y, theta;
-    sensor_of(in, &x, &y, &theta);
+    double pose[3], scale;
+    twin_sensor(ekf, &mount, in, pose, &scale);
     const double *ray = &in[ekf->beacons[2].at];
-    const double dx = ray[0] + length_m * cos(ray[2]) - x;
-    const double dy = ray[1] + length_m * sin(ray[2]) - y;
+    const double dx = ray[0] + length_m * cos(ray[2]) - pose[0];
+    const double dy = ray[1] + length_m * sin(ray[2]) - pose[1];
     *cosine = (dx * cos(ray[2]) + dy * sin(ray[2])) / hypot(dx, dy);
-    return hypot(dx, dy);
+    return hypot(dx, dy) * scale;
 }
 
 static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
@@ -521,7 +525,7 @@ static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
     int measured = 0;
     for (int i = 0; i < 60; i++) {
         bslam_settings_t settings;
-        bslam_ekf_t ekf = random_filter(&settings, &random);
+        bslam_ekf_t ekf = filter_that_doubts(&settings, &random, i % 2 == 1);
         double cosine;
         const double range_m = range_along_ray(&ekf, unit_random(&random, 1, 8), &cosine);
         if (cosine < 0.55) {
@@ -531,7 +535,7 @@ static void test_measure_ray_is_the_place_where_the_distance_ends(void **state)
         const int at = ekf.beacons[2].at;
         const double range_sd2 = 0.01 * 0.01 + pow(0.02 * range_m, 2) + pow(0.01 * range_m * range_m, 2);
         const double noise_var[] = {range_sd2, 0.09 * 0.09};
-        const measuring_t measuring = {ekf.dim, at, range_m};
+        const measuring_t measuring = {&ekf, ekf.dim, at, range_m};
         const twin_t both = augmented(&ekf, new_on_ray, 3, noise_var, 2, &measuring);
         const twin_t expected = twin_without(&both, at, 4);
         const bslam_sighting_t sighting = unit_polar(3, range_m, 7);  // its direction is not asked for

@@ -207,6 +207,26 @@ static void test_fuse_sized_beacons_among_rays_is_the_batch_update(void **state)
     }
 }
 
+static void test_fuse_with_sensor_states_is_the_batch_update(void **state)
+{
+    unit_random_t random = {23};
+    for (int kind = 0; kind < 8; kind++) {
+        bslam_settings_t settings = params_of(kind % 2, kind / 2 % 2 != 0);
+        settings.sensor_doubt = 1;
+        settings.range_scale_sd = kind / 4 != 0 ? BSLAM_R(0.1) : 0;
+        bslam_ekf_t ekf = random_filter(&settings, &random);
+        int known;
+        assert_int_equal(ekf.sensor_dim, BSLAM_SENSOR_DIM);
+        assert_int_equal(bslam_ekf_add_known(&ekf, ekf.mean[0] + 3, ekf.mean[1] - 2, &known), BSLAM_OK);
+        for (int frame = 0; frame < 5; frame++) {
+            const plan_t plans[] = {random_plan(&random, 0, true), random_plan(&random, 1, false),
+                                    random_plan(&random, known, true), random_plan(&random, 3, true),
+                                    random_plan(&random, 4, false)};
+            assert_frame_is_the_textbooks(&ekf, &settings, plans, COUNT_OF(plans));
+        }
+    }
+}
+
 static void test_fuse_frames_in_a_row_are_the_textbooks(void **state)
 {
     for (int filter = 0; filter <= 1; filter++) {
@@ -326,9 +346,10 @@ static void test_distance2_is_the_textbooks(void **state)
     }
 }
 
-static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **state)
+static void test_row_covariances_of_any_two_sightings_is_the_textbooks(void **state)
 {
-    const bslam_settings_t settings = params_of(0, true);
+    bslam_settings_t settings = params_of(0, true);
+    settings.sensor_doubt = 1;
     unit_random_t random = {20};
     const bslam_ekf_t ekf = random_filter(&settings, &random);
     const twin_t twin = twin_of(&ekf);
@@ -341,10 +362,14 @@ static void test_row_covariance_of_any_two_sightings_is_the_textbooks(void **sta
             const dense_t rows = twin_rows(&ekf, &mount, i), others = twin_rows(&ekf, &mount, j);
             const dense_t columns = dense_transposed(&others);
             const dense_t p = dense_product(&rows, &twin.covariance), all = dense_product(&p, &columns);
-            assert_near(bslam_ekf_row_covariance(&ekf, &a.range_row, &b.bearing_row), all.at[0][1],
-                        TOLERANCE);
-            assert_near(bslam_ekf_row_covariance(&ekf, &a.bearing_row, &b.bearing_row), all.at[1][1],
-                        TOLERANCE);
+            const bslam_row_t of[] = {b.range_row, b.bearing_row, a.bearing_row};
+            bslam_real_t covariances[COUNT_OF(of)];
+            bslam_ekf_row_covariances(&ekf, &a.range_row, of, COUNT_OF(of), covariances);
+            assert_near(covariances[0], all.at[0][0], TOLERANCE);
+            assert_near(covariances[1], all.at[0][1], TOLERANCE);
+            bslam_ekf_row_covariances(&ekf, &a.bearing_row, of, COUNT_OF(of), covariances);
+            assert_near(covariances[0], all.at[1][0], TOLERANCE);
+            assert_near(covariances[1], all.at[1][1], TOLERANCE);
         }
     }
 }
@@ -790,6 +815,7 @@ int main(void)
         cmocka_unit_test(test_fuse_invariant_with_velocity_states_is_the_batch_update),
         cmocka_unit_test(test_fuse_distance_of_a_ray_is_the_batch_update),
         cmocka_unit_test(test_fuse_sized_beacons_among_rays_is_the_batch_update),
+        cmocka_unit_test(test_fuse_with_sensor_states_is_the_batch_update),
         cmocka_unit_test(test_fuse_frames_in_a_row_are_the_textbooks),
         cmocka_unit_test(test_fuse_order_within_a_frame_does_not_matter),
         cmocka_unit_test(test_fuse_known_beacon_corrects_the_robot_and_stays),
@@ -797,7 +823,7 @@ int main(void)
         cmocka_unit_test(test_correct_without_a_sighting_changes_no_bit),
 
         cmocka_unit_test(test_distance2_is_the_textbooks),
-        cmocka_unit_test(test_row_covariance_of_any_two_sightings_is_the_textbooks),
+        cmocka_unit_test(test_row_covariances_of_any_two_sightings_is_the_textbooks),
         cmocka_unit_test(test_fuse_distance2_is_conditional_on_what_was_fused_before),
         cmocka_unit_test(test_fuse_distance2_without_a_distance_is_that_of_the_direction),
         cmocka_unit_test(test_fuse_just_inside_and_outside_the_gate),

@@ -133,7 +133,7 @@ static void assert_same_map(const bslam_ekf_t *saved, const bslam_ekf_t *loaded)
     int from[DENSE_MAX], to[DENSE_MAX];
     const int count = saved_values(saved, from);
     assert_int_equal(saved_values(loaded, to), count);
-    assert_int_equal(loaded->dim, loaded->base_dim + count);
+    assert_int_equal(loaded->dim, bslam_ekf_map_at(loaded) + count);
     const dense_t was = covariance_of(saved), is = covariance_of(loaded);
     for (int i = 0; i < count; i++) {
         assert_true((float)loaded->mean[to[i]] == (float)saved->mean[from[i]]);
@@ -145,7 +145,7 @@ static void assert_same_map(const bslam_ekf_t *saved, const bslam_ekf_t *loaded)
             const double apart_now = is.at[to[i]][to[i]] - 2 * is.at[to[i]][to[j]] + is.at[to[j]][to[j]];
             assert_near(apart_now, apart, 1e-4 * apart + 1e-10 * (var + other_var));
         }
-        for (int k = 0; k < loaded->base_dim; k++) {
+        for (int k = 0; k < bslam_ekf_map_at(loaded); k++) {
             assert_true(is.at[to[i]][k] == 0);
         }
     }
@@ -434,24 +434,41 @@ static void test_map_load_by_a_robot_without_seeds_leaves_them_out(void **state)
 
 static void test_map_load_of_a_variance_that_is_too_large_is_refused(void **state)
 {
-    put_float(d_at(1), 1e12f);  // as much as a number may be
-    seal();
-    load(BSLAM_MAP_LIVING);
-    put_float(d_at(1), 1e6f);
-    put_float(l_at(2, 1), 999.0f);  // squared, times that
+    put_float(d_at(1), 1e10f);
+    put_float(l_at(2, 1), 9);  // 8.1e11, and 1e12 is allowed
     seal();
     load(BSLAM_MAP_LIVING);
     assert_true(bslam_ekf_is_sane(&other.ekf));
     assert_int_equal(kept_write(&other, bytes), size);
-    put_float(l_at(2, 1), 1001.0f);
+    put_float(l_at(2, 1), 11);
     seal();
     assert_refused(BSLAM_MAP_COVARIANCE);
+    put_float(l_at(2, 1), 0);
+    put_float(d_at(1), 1.1e12f);
+    seal();
+    assert_refused(BSLAM_MAP_COVARIANCE);
+}
+
+/// What a column that leaves had is the others' then: much of it, where they had hardly any.
+static void test_map_load_of_a_factor_with_large_numbers_can_be_saved(void **state)
+{
+    put_float(d_at(0), 1e10f);
+    put_float(d_at(1), 1e-24f);
+    put_float(l_at(1, 0), 1e-9f);
+    put_float(l_at(2, 0), 7);
+    seal();
+    load(BSLAM_MAP_LIVING);
+    covariance_assert_sound(&other.ekf.factor);
+    assert_near(bslam_ekf_covariance(&other.ekf, other.ekf.base_dim + 1, other.ekf.base_dim + 1), 49e10,
+                49e4);
+    size = kept_write(&other, bytes);
+    load(BSLAM_MAP_LIVING);
 }
 
 /// What would not be loaded is not saved, so that the map saved before is kept.
 static void test_map_write_of_a_variance_that_is_too_large_is_refused(void **state)
 {
-    static const double factors[][2] = {{1e6, 1001}, {1.1e12, 0}, {1e-20, 1.1e12}};
+    static const double factors[][2] = {{1e6, 1001}, {1.1e12, 0}, {1e-30, 1.1e18}};
     for (int k = 0; k < COUNT_OF(factors); k++) {
         map_memory_t memory = {bytes, sizeof bytes, 0};
         const bslam_map_sink_t sink = map_to_memory(&memory);
@@ -460,7 +477,7 @@ static void test_map_write_of_a_variance_that_is_too_large_is_refused(void **sta
         slam.ekf.factor.d[1] = real(factors[k][0]);
         *bslam_factor_element(&slam.ekf.factor, 2, 1) = real(factors[k][1]);
         assert_int_equal(bslam_map_write(&slam, &sink, &fault), BSLAM_E_MAP);
-        assert_int_equal(fault, k == 0 ? BSLAM_MAP_COVARIANCE : BSLAM_MAP_NOT_FINITE);
+        assert_int_equal(fault, k < 2 ? BSLAM_MAP_COVARIANCE : BSLAM_MAP_NOT_FINITE);
     }
 }
 
@@ -555,12 +572,14 @@ static void test_map_load_beside_beacons_that_are_not_saved_is_exact(void **stat
 }
 
 /// Robots may have further states before the beacons, of which the other one knows nothing.
-static void test_map_load_with_and_without_velocity_states_is_exact(void **state)
+static void test_map_load_with_and_without_further_states_is_exact(void **state)
 {
-    for (int kind = 0; kind < 4; kind++) {
+    for (int kind = 0; kind < 16; kind++) {
         bslam_settings_t saver = plain_map_settings(), loader = saver;
         saver.velocity_states = kind % 2;
-        loader.velocity_states = kind / 2;
+        loader.velocity_states = kind / 2 % 2;
+        saver.sensor_doubt = kind / 4 % 2 != 0 ? 1 : 0;
+        loader.sensor_doubt = kind / 8 != 0 ? 1 : 0;
         begin_plain(&saver, &loader);
         for (int step = 0; step < 60; step++) {
             const bslam_sighting_t seen = on_ring(step % 5, step % 3 != 0);
@@ -811,10 +830,11 @@ int main(void)
         cmocka_unit_test_setup(test_map_load_with_a_negative_that_is_no_sample_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_by_a_robot_without_seeds_leaves_them_out, setup),
         cmocka_unit_test_setup(test_map_load_of_a_variance_that_is_too_large_is_refused, setup),
+        cmocka_unit_test_setup(test_map_load_of_a_factor_with_large_numbers_can_be_saved, setup),
         cmocka_unit_test_setup(test_map_write_of_a_variance_that_is_too_large_is_refused, setup),
         cmocka_unit_test_setup(test_map_load_of_any_factor_gives_a_covariance, setup),
         cmocka_unit_test_setup(test_map_load_beside_beacons_that_are_not_saved_is_exact, setup),
-        cmocka_unit_test_setup(test_map_load_with_and_without_velocity_states_is_exact, setup),
+        cmocka_unit_test_setup(test_map_load_with_and_without_further_states_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_after_rays_settled_is_exact, setup),
         cmocka_unit_test_setup(test_map_load_of_a_doubt_of_30_m_keeps_the_centimetres, setup),
         cmocka_unit_test_setup(test_map_load_of_a_covariance_without_an_inverse_is_exact, setup),
