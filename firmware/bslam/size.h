@@ -26,7 +26,7 @@
 /// The pipeline: filter, waiting odometry, and for each sighting its record and its account.
 #define BSLAM_SIZE_PIPELINE \
     (BSLAM_SIZE_EKF + BSLAM_SIZE_SETTINGS + BSLAM_HISTORY_MAX * 6 * BSLAM_SIZE_REAL + \
-     BSLAM_SIGHTINGS_MAX * (24 + 5 * BSLAM_SIZE_ENUM + 37 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + \
+     BSLAM_SIGHTINGS_MAX * (28 + 5 * BSLAM_SIZE_ENUM + 37 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER) + \
      5 * BSLAM_SIZE_REAL + 2 * BSLAM_SIZE_POINTER + 208 + 4 * BSLAM_HISTORY_MAX)
 
 #define BSLAM_SIZE_RECOVERY \
