@@ -71,6 +71,7 @@ typedef struct bslam_beacon {
     bool has_scores;           ///< of its sightings
     bslam_real_t score_sum;    ///< what these say for its being a beacon at all
     bslam_real_t known_scale;  ///< a known beacon's distances come out too long by it; 0: nobody knows
+    bslam_real_t last_bearing, last_range;  ///< innovations, in standard deviations of their noise
 } bslam_beacon_t;
 
 typedef struct bslam_ekf {

@@ -381,6 +381,7 @@ __attribute__((noinline)) static void use_matches(bslam_slam_t *slam, const bsla
                                                   int count)
 {
     measure(slam, vantage, count);
+    bslam_slam_doubt_sightings(slam, count);
     fuse(slam, vantage, count);
     bslam_slam_note_misfit(slam, count);
     correct(slam, count);

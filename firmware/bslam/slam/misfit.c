@@ -1,5 +1,5 @@
-// A gate takes the pose for right. If few sightings pass it, the pose is wrong: wheels slipped, somebody pushed
-// the robot, or it was blind for long. MATH "Gate".
+// A gate takes the pose for right. If few sightings pass it, the pose is wrong: wheels slipped, somebody
+// pushed the robot, or it was blind for long. MATH "Gate".
 #include "bslam/slam/slam_internal.h"
 
 /// So many sightings the mean of how well they fit goes back.
@@ -7,9 +7,9 @@ static const bslam_real_t MEMORY = BSLAM_R(16.0);
 /// Where the noise is right the misfit is 0.15, where one sighting in ten means nothing 0.25.
 static const bslam_real_t DOUBTFUL = BSLAM_R(0.35);
 static const bslam_real_t WRONG = BSLAM_R(0.5);
-/// Times the misfit beyond DOUBTFUL, what the variance of a motion grows by: a wheel of an encoder that spins
-/// errs by ten times its noise and more.
-static const bslam_real_t SLIP_FACTOR = BSLAM_R(1000.0);
+/// Times the misfit beyond DOUBTFUL, what a second adds to the variances of a motion: of its way, m², and of
+/// its turn, rad². A wheel that spins errs by half a metre in a second.
+static const bslam_real_t SLIP_VAR_PER_S = BSLAM_R(2.0);
 /// A beacon is believed until it was rejected this much more often than matched.
 enum { REJECTED_MORE = 4 };
 
@@ -42,9 +42,8 @@ bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beaco
 void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion)
 {
     if (slam->misfit > DOUBTFUL) {
-        const bslam_real_t factor = 1 + SLIP_FACTOR * (slam->misfit - DOUBTFUL);
-        motion->forward_var_m2 *= factor;
-        motion->turn_var_rad2 *= factor;
-        motion->forward_turn_cov_mrad *= factor;
+        const bslam_real_t more = SLIP_VAR_PER_S * (slam->misfit - DOUBTFUL) * motion->dt_s;
+        motion->forward_var_m2 += more;
+        motion->turn_var_rad2 += more;
     }
 }

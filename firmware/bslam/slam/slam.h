@@ -14,6 +14,11 @@ typedef struct bslam_clock_watch {
     bool has_some;
 } bslam_clock_watch_t;
 
+/// Sums over innovations: times the one before it of the same beacon, and times itself.
+typedef struct bslam_autocorrelation {
+    bslam_real_t product, square;
+} bslam_autocorrelation_t;
+
 typedef struct bslam_slam {
     bslam_settings_t settings;
     bslam_ekf_t ekf;
@@ -21,8 +26,9 @@ typedef struct bslam_slam {
     bslam_history_t history;
     uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
     bslam_real_t misfit;    ///< of the newest sightings to the pose: 0 all fit, 1 none does
-    int64_t elapsed_us;     ///< of odometry: the pipeline's own time, which goes on whatever the clock does
-    int64_t moment_us;      ///< the newest frame's, in it
+    bslam_autocorrelation_t bearing_noise, range_noise;
+    int64_t elapsed_us;  ///< of odometry: the pipeline's own time, which goes on whatever the clock does
+    int64_t moment_us;   ///< the newest frame's, in it
     bslam_clock_watch_t watch;
     uint32_t frames[BSLAM_HISTORY_MAX];  ///< sums over the last ones, so that none is used twice
     int32_t next_frame;                  ///< where the next sum goes

@@ -47,7 +47,8 @@ void bslam_slam_mark_tentative(bslam_slam_t *slam, int count);
 
 // ---- misfit.c ---------------------------------------------------------------------------------------------
 
-/// How well the sightings of a frame fit that were just fused or rejected. Once a frame, before the mean moves.
+/// How well the sightings of a frame fit that were just fused or rejected. Once a frame, before the mean
+/// moves.
 void bslam_slam_note_misfit(bslam_slam_t *slam, int count);
 
 /// Whether a beacon's sightings are used beyond their gate: of late so much was beyond it that the pose errs.
@@ -55,6 +56,12 @@ bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beaco
 
 /// Raises the noise of a motion while sightings do not fit: wheels that slip say nothing of it.
 void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion);
+
+// ---- coloured_noise.c -------------------------------------------------------------------------------------
+
+/// Raises the noise of a frame's matches by how much errors of late were those of the sightings before,
+/// unless that is told. Once a frame, behind their innovations.
+void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count);
 
 // ---- beacon_scale.c ---------------------------------------------------------------------------------------
 

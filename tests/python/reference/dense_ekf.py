@@ -133,6 +133,10 @@ class DenseEkf:
         self.mean: Vector = np.array([0.0, 0.0, 0.0, *extra])
         self.own_covariance: Matrix = np.diag([0.0, 0.0, 0.0, *(sd**2 for sd in sds)])
         self.base = len(self.mean)
+        self.autocorrelation = np.zeros((2, 2))  # bearings, ranges: sums of products and of squares
+        self.last: dict[
+            int, list[float]
+        ] = {}  # label: innovations of bearing and range, in standard deviations of their noise
 
     # ---- places in the state -------------------------------------------------------------------------------
 
@@ -382,14 +386,31 @@ class DenseEkf:
             index = self.find(sighting.label)
             if index is not None:
                 parts = self.measurement(sighting, index, mount)
-                measurements.append(tuple(part[:1] for part in parts) if is_used else parts)
+                measurements.append((sighting.label, tuple(part[:1] for part in parts) if is_used else parts))
         if measurements:
+            measurements = self._coloured(measurements)
             self._move(self._update_all(measurements))
         for sighting in sightings:
             if self.find(sighting.label) is None:
                 self.add(sighting, mount)
         for index in reversed(range(len(self.beacons))):
             self._settle(index, mount)
+
+    def _coloured(self, measurements):  # type: ignore[no-untyped-def]
+        """Variances as large as the noise of late was like that before it: (1 + r) / (1 - r) times."""
+        product, square = self.autocorrelation.T
+        r = np.clip(product / (square + 30.0), 0.0, 0.98)
+        factor, counts, widened = (1 + r) / (1 - r), np.zeros(2), []
+        for label, (rows, innovations, variances) in measurements:
+            last = self.last.setdefault(label, [0.0, 0.0])
+            for k, (innovation, variance) in enumerate(zip(innovations, variances, strict=True)):
+                y = float(np.clip(innovation / np.sqrt(variance), -3.0, 3.0))
+                self.autocorrelation[k] += (last[k] * y, y * y)
+                last[k] = y
+                counts[k] += 1
+            widened.append((rows, innovations, [f * v for f, v in zip(factor, variances, strict=False)]))
+        self.autocorrelation *= (1 - counts / 2000.0)[:, None]
+        return widened
 
     def _update_all(self, measurements: Sequence[tuple[list[Vector], list[float], list[float]]]) -> Vector:
         rows = np.array([row for rows, _, _ in measurements for row in rows])
@@ -463,6 +484,7 @@ class DenseEkf:
     def remove(self, index: int) -> None:
         """Takes a beacon out: what is left of the state does not depend on it."""
         at, size = self.at(index), self.beacons[index].size
+        self.last.pop(self.beacons[index].label, None)
         others = [beacon for i, beacon in enumerate(self.beacons) if i != index]
         self._change(lambda state, noise: [*state[:at], *state[at + size :]], beacons=others)
 

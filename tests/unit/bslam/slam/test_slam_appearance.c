@@ -337,7 +337,7 @@ static void test_what_is_called_of_two_classes_in_one_place_is_one(void **state)
         see_as(0, view, 0, 1);
     }
     int view = 0;
-    while (appearance.counters.retired == 0 && view < 200) {
+    while (appearance.counters.retired == 0 && view < 1000) {
         assert_true(view < 10 || slam.ekf.beacon_count == 2);
         see_as(2, view, view < 10 ? 0.1 : 0.02, 6);
         view++;
