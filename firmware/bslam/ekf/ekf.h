@@ -254,6 +254,12 @@ void bslam_ekf_predict_about(bslam_ekf_t *ekf, const bslam_settings_t *settings,
 void bslam_ekf_measure_speeds(bslam_ekf_t *ekf, const bslam_settings_t *settings,
                               const bslam_motion_t *motion);
 
+/// An innovation becomes linear as it is for a robot that stands here, and turned as it is. What is predicted
+/// stays. BSLAM_E_SINGULAR: the beacon stands here.
+BSLAM_MUST_CHECK bslam_status_t bslam_ekf_look_from(const bslam_ekf_t *ekf, const bslam_pose_t *mount,
+                                                    bslam_real_t x_m, bslam_real_t y_m, int index,
+                                                    bslam_innovation_t *innovation);
+
 /// The state value at `at` is its mean and this much more, up to `variance`.
 void bslam_ekf_pin(bslam_ekf_t *ekf, int at, bslam_real_t innovation, bslam_real_t variance);
 

@@ -178,30 +178,29 @@ static bslam_real_t curvature_variance(const bslam_ekf_t *ekf, const bslam_beaco
     return p.aa * p.bb + p.ab * p.ab;
 }
 
-static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
-                              bslam_observation_t *seen)
+static bslam_status_t observe(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *pose,
+                              const bslam_pose_t *mount, bslam_observation_t *seen)
 {
-    const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_real_t *state = &ekf->mean[beacon->at];
     bslam_status_t status;
     switch (beacon->kind) {
     case BSLAM_BEACON_RAY:
-        return bslam_observe_ray(&pose, mount, state, seen);
+        return bslam_observe_ray(pose, mount, state, seen);
     case BSLAM_BEACON_KNOWN:
-        status = bslam_observe_point(&pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
+        status = bslam_observe_point(pose, mount, beacon->known_x_m, beacon->known_y_m, seen);
         if (status == BSLAM_OK && beacon->known_scale > 0) {
             bslam_observation_scale(seen, beacon->known_scale);
         }
         return status;
     case BSLAM_BEACON_SIZED:
-        status = bslam_observe_point(&pose, mount, state[0], state[1], seen);
+        status = bslam_observe_point(pose, mount, state[0], state[1], seen);
         if (status == BSLAM_OK) {
             bslam_observation_scale(seen, state[2]);
         }
         return status;
     case BSLAM_BEACON_POINT:
     default:
-        return bslam_observe_point(&pose, mount, state[0], state[1], seen);
+        return bslam_observe_point(pose, mount, state[0], state[1], seen);
     }
 }
 
@@ -228,15 +227,28 @@ bslam_sighting_t bslam_ekf_taken_as(const bslam_beacon_t *beacon, const bslam_si
     return taken;
 }
 
+/// Completes an innovation's rows. It is of the distance, too, if it says so.
+static void fill_rows(const bslam_ekf_t *ekf, const bslam_beacon_t *beacon, const bslam_pose_t *mount,
+                      const bslam_observation_t *seen, bslam_innovation_t *innovation)
+{
+    fill_row(beacon, seen->bearing_by_pose, seen->bearing_by_beacon, &innovation->bearing_row);
+    bslam_ekf_fill_sensor(ekf, mount, -1, 0, &innovation->bearing_row);
+    if (innovation->has_range) {
+        fill_row(beacon, seen->range_by_pose, seen->range_by_beacon, &innovation->range_row);
+        scale_row(&innovation->range_row, bslam_ekf_range_scale(ekf));
+        bslam_ekf_fill_sensor(ekf, mount, 0, seen->range_m, &innovation->range_row);
+    }
+}
+
 bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                     const bslam_pose_t *told, const bslam_sighting_t *sighting, int index,
                                     bslam_innovation_t *innovation)
 {
     const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const bslam_pose_t pose = bslam_ekf_pose(ekf);
     const bslam_pose_t mount = ekf->sensor_dim > 0 ? bslam_ekf_mount(ekf, told) : *told;
-    const bslam_real_t scale = bslam_ekf_range_scale(ekf);
     bslam_observation_t seen;
-    const bslam_status_t status = observe(ekf, beacon, &mount, &seen);
+    const bslam_status_t status = observe(ekf, beacon, &pose, &mount, &seen);
     if (status != BSLAM_OK) {
         return status;
     }
@@ -248,20 +260,34 @@ bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, const bslam_settings
     innovation->has_range = sighting->has_range;
     innovation->bearing_rad = bslam_angle_wrap(sighting->bearing_rad - seen.bearing_rad);
     innovation->bearing_var_rad2 = bslam_bearing_variance_rad2(settings, sighting);
-    fill_row(beacon, seen.bearing_by_pose, seen.bearing_by_beacon, &innovation->bearing_row);
-    bslam_ekf_fill_sensor(ekf, &mount, -1, 0, &innovation->bearing_row);
+    fill_rows(ekf, beacon, &mount, &seen, innovation);
     if (!sighting->has_range && settings->bearing_only_curvature_factor > 0) {
         innovation->bearing_var_rad2 += settings->bearing_only_curvature_factor *
                                         curvature_variance(ekf, beacon, &seen, &innovation->bearing_row);
     }
     if (sighting->has_range) {
-        innovation->range_m = sighting->range_m - scale * seen.range_m;
-        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, scale * seen.range_m);
-        fill_row(beacon, seen.range_by_pose, seen.range_by_beacon, &innovation->range_row);
-        scale_row(&innovation->range_row, scale);
-        bslam_ekf_fill_sensor(ekf, &mount, 0, seen.range_m, &innovation->range_row);
+        const bslam_real_t range_m = bslam_ekf_range_scale(ekf) * seen.range_m;
+        innovation->range_m = sighting->range_m - range_m;
+        innovation->range_var_m2 = range_variance_m2(settings, sighting, beacon, range_m);
     }
     return BSLAM_OK;
+}
+
+bslam_status_t bslam_ekf_look_from(const bslam_ekf_t *ekf, const bslam_pose_t *told, bslam_real_t x_m,
+                                   bslam_real_t y_m, int index, bslam_innovation_t *innovation)
+{
+    const bslam_beacon_t *beacon = &ekf->beacons[index];
+    const bslam_pose_t mount = bslam_ekf_mount(ekf, told);
+    const bslam_pose_t pose = {x_m, y_m, ekf->mean[BSLAM_STATE_THETA]};
+    if (x_m == ekf->mean[BSLAM_STATE_X] && y_m == ekf->mean[BSLAM_STATE_Y]) {
+        return BSLAM_OK;
+    }
+    bslam_observation_t seen;
+    const bslam_status_t status = observe(ekf, beacon, &pose, &mount, &seen);
+    if (status == BSLAM_OK) {
+        fill_rows(ekf, beacon, &mount, &seen, innovation);
+    }
+    return status;
 }
 
 bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf, const bslam_innovation_t *innovation,
@@ -293,7 +319,8 @@ bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_se
 }
 
 /// The sum over a row of L, in the columns from `from` up to `to`, times h.
-static bslam_real_t along_row(const bslam_factor_t *factor, int place, const bslam_real_t *h, int from, int to)
+static bslam_real_t along_row(const bslam_factor_t *factor, int place, const bslam_real_t *h, int from,
+                              int to)
 {
     const bslam_real_t *row = bslam_factor_row(factor, place) + 4 * (size_t)from;
     const int end = place + 1 < to ? place + 1 : to;
@@ -304,8 +331,8 @@ static bslam_real_t along_row(const bslam_factor_t *factor, int place, const bsl
     return sum;
 }
 
-/// What some columns give of P aᵀ, with h the same columns of D Lᵀ aᵀ: at the robot's and the sensor's values,
-/// and at a beacon's.
+/// What some columns give of P aᵀ, with h the same columns of D Lᵀ aᵀ: at the robot's and the sensor's
+/// values, and at a beacon's.
 typedef struct column {
     bslam_real_t base[POSE_DIM], sensor[BSLAM_SENSOR_DIM], other[BSLAM_RAY_DIM];
 } column_t;
@@ -317,8 +344,7 @@ static void fill_column_base(const bslam_ekf_t *ekf, const bslam_row_t *row, con
         column->base[k] = along_row(&ekf->factor, bslam_ekf_place(ekf, k), h, from, to);
     }
     for (int k = 0; k < row->sensor_dim; k++) {
-        column->sensor[k] =
-            along_row(&ekf->factor, bslam_ekf_place(ekf, row->sensor_at + k), h, from, to);
+        column->sensor[k] = along_row(&ekf->factor, bslam_ekf_place(ekf, row->sensor_at + k), h, from, to);
     }
 }
 

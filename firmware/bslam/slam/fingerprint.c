@@ -49,6 +49,7 @@ static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
 {
     hash = add_state(hash, &smoother->base);
     hash = add_words(hash, smoother->place, (size_t)smoother->base.dim * sizeof smoother->place[0]);
+    hash = add_words(hash, &smoother->base_stand, sizeof smoother->base_stand);
     for (int n = 0; n < smoother->node_count; n++) {
         const bslam_smoother_node_t *node =
             &smoother->nodes[(smoother->first_node + n) % BSLAM_SMOOTHER_NODES_MAX];
@@ -57,6 +58,7 @@ static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
         hash = add_word(hash, (uint32_t)node->seen);
         hash = add_word(hash, (uint32_t)node->turned);
         hash = add_word(hash, (uint32_t)node->stretched);
+        hash = add_word(hash, 2u * node->doubt + (node->stands ? 1u : 0u));
     }
     for (int s = 0; s < smoother->seen_count; s++) {
         const int at = (smoother->first_seen + s) % BSLAM_SMOOTHER_SEEN_MAX;

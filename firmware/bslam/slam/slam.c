@@ -1,5 +1,7 @@
 #include "bslam/slam/slam.h"
 
+#include <string.h>
+
 #include "base/trig.h"
 #include "bslam/model/pose.h"
 #include "bslam/slam/slam_internal.h"
@@ -64,6 +66,9 @@ void bslam_slam_lose_pose(bslam_slam_t *slam)
 void bslam_slam_attach_smoother(bslam_slam_t *slam, bslam_smoother_t *smoother)
 {
     slam->smoother = slam->settings.filter == BSLAM_FILTER_SMOOTHER ? smoother : NULL;
+    if (slam->smoother != NULL) {
+        memset(smoother, 0, sizeof *smoother);
+    }
     bslam_slam_restart_smoother(slam);
 }
 

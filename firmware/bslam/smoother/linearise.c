@@ -12,8 +12,8 @@ static const bslam_real_t STRETCH_MAX = BSLAM_R(4.0);
 /// A beacon more doubtful than this, both axes, has not been seen from within the base yet.
 static const bslam_real_t UNSEEN_VARIANCE_M2 = BSLAM_R(100.0);
 
-/// How a place, seen from the base's robot, turns and stretches to become another: a complex number, and its
-/// logarithm.
+/// How a place, seen from where the base's robot stands, turns and stretches to become another: a complex
+/// number, and its logarithm.
 typedef struct similarity {
     bslam_real_t re, im, log_re, log_im;
 } similarity_t;
@@ -53,7 +53,7 @@ static void move_to_end(bslam_real_t *values, int at, int length)
     values[length - 1] = second;
 }
 
-/// A point becomes p + g (it - p), with p the robot's place. Its values stand behind all others then.
+/// A point becomes p + g (it - p), with p where the robot stands. Its values stand behind all others then.
 static void transport(bslam_smoother_t *smoother, int beacon, const similarity_t *g)
 {
     bslam_ekf_t *base = &smoother->base;
@@ -80,7 +80,8 @@ static bool transport_point(bslam_smoother_t *smoother, int beacon)
 {
     bslam_ekf_t *base = &smoother->base;
     const int at = base->beacons[beacon].at;
-    const bslam_real_t *p = &base->mean[BSLAM_STATE_X], *place = &smoother->place[at];
+    const bslam_real_t p[2] = {smoother->base_stand.x_m, smoother->base_stand.y_m};
+    const bslam_real_t *place = &smoother->place[at];
     const bslam_real_t from[2] = {base->mean[at] - p[0], base->mean[at + 1] - p[1]};
     const bslam_real_t to[2] = {place[0] - p[0], place[1] - p[1]};
     similarity_t g;

@@ -28,15 +28,21 @@ int32_t bslam_smoother_units(bslam_real_t value)
                                : BSLAM_SMOOTHER_UNITS_MAX);
 }
 
-uint8_t bslam_smoother_weight(bslam_real_t sd_rad)
+uint8_t bslam_smoother_weight(bslam_real_t sd)
 {
-    bslam_real_t mantissa = sd_rad / BSLAM_SMOOTHER_SD_RAD;
+    bslam_real_t mantissa = sd / BSLAM_SMOOTHER_SD;
     int exponent = 0;
     for (; mantissa >= BSLAM_R(31.5) && exponent < 15; exponent++) {
         mantissa /= 2;
     }
     const int32_t low = bslam_smoother_units(mantissa) - 16;
     return (uint8_t)(exponent * 16 + (low < 0 ? 0 : (low > 15 ? 15 : low)));
+}
+
+uint8_t bslam_smoother_carried(bslam_real_t variance_rad2)
+{
+    return bslam_smoother_weight(
+        bslam_sqrt(variance_rad2 + BSLAM_SMOOTHER_CARRIED_SD_RAD * BSLAM_SMOOTHER_CARRIED_SD_RAD));
 }
 
 // ---- along the nodes --------------------------------------------------------------------------------------
@@ -72,21 +78,26 @@ static bslam_status_t guess_range(bslam_innovation_t *innovation)
 }
 
 /// What was seen of a beacon, into a filter, and how it fitted. False if it cannot be used.
-static bool take_seen(const bslam_settings_t *model, bslam_ekf_t *ekf, const bslam_smoother_seen_t *direction,
-                      const bslam_smoother_seen_t *range, bslam_fusion_t *fusion)
+static bool take_seen(const bslam_settings_t *model, bslam_ekf_t *ekf, const bslam_smoother_stand_t *stand,
+                      const bslam_smoother_seen_t *direction, const bslam_smoother_seen_t *range,
+                      bslam_fusion_t *fusion)
 {
     const bslam_pose_t mount = {model->mount_x_m, model->mount_y_m, model->mount_yaw_rad};
     const bslam_sighting_t sighting = sighting_of(model, direction, range);
     bslam_innovation_t innovation;
     bslam_status_t status =
         bslam_ekf_innovation(ekf, model, &mount, &sighting, direction->beacon, &innovation);
+    if (status == BSLAM_OK) {
+        status = bslam_ekf_look_from(ekf, &mount, stand->x_m, stand->y_m, direction->beacon, &innovation);
+    }
     if (status == BSLAM_OK && range != NULL && range->weight == BSLAM_SMOOTHER_FIRST) {
         status = guess_range(&innovation);
     }
     return status == BSLAM_OK && bslam_ekf_fuse(ekf, model, &innovation, fusion) == BSLAM_OK;
 }
 
-void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf,
+                              const bslam_smoother_stand_t *stand, const bslam_smoother_node_t *node,
                               int first_seen)
 {
     if (node->motion.dt_s > 0) {
@@ -101,7 +112,7 @@ void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, cons
             range = bslam_smoother_seen(smoother, first_seen + k);
         }
         bslam_fusion_t fusion;
-        if (take_seen(&smoother->model, ekf, direction, range, &fusion)) {
+        if (take_seen(&smoother->model, ekf, stand, direction, range, &fusion)) {
             smoother->misfit += fusion.weight * fusion.distance2;
             smoother->fitted++;
         } else {
@@ -111,12 +122,13 @@ void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, cons
     bslam_ekf_settle(ekf);
 }
 
-void bslam_smoother_pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
-                              int first_seen)
+void bslam_smoother_pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, bslam_smoother_stand_t *stand,
+                              const bslam_smoother_node_t *node, int first_seen)
 {
     const bslam_bend_t bend = bslam_smoother_bend(node);
     bslam_ekf_predict_about(ekf, &smoother->model, &node->motion, &bend, node->at, NULL);
-    bslam_smoother_take_node(smoother, ekf, node, first_seen);
+    bslam_smoother_follow(stand, node);
+    bslam_smoother_take_node(smoother, ekf, stand, node, first_seen);
 }
 
 void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
@@ -124,7 +136,7 @@ void bslam_smoother_drop_oldest(bslam_smoother_t *smoother)
     const bslam_smoother_node_t *node = bslam_smoother_node(smoother, 0);
     smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
     bslam_smoother_linearise_base(smoother);
-    bslam_smoother_pass_node(smoother, &smoother->base, node, 0);
+    bslam_smoother_pass_node(smoother, &smoother->base, &smoother->base_stand, node, 0);
     smoother->first_seen = (smoother->first_seen + node->seen) % BSLAM_SMOOTHER_SEEN_MAX;
     smoother->seen_count -= node->seen;
     smoother->first_node = (smoother->first_node + 1) % BSLAM_SMOOTHER_NODES_MAX;

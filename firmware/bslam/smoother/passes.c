@@ -43,7 +43,9 @@ void bslam_smoother_begin(bslam_smoother_t *smoother)
         bslam_smoother_drop_oldest(smoother);
     }
     bslam_smoother_linearise_base(smoother);
+    bslam_smoother_find_stands(smoother);
     smoother->run = smoother->base;
+    smoother->run_stand = smoother->base_stand;
     smoother->model.velocity_walk_mps_sqrt_s = smoother->free_walk;
     smoother->phase = BSLAM_SMOOTHER_FORTH;
     for (int b = 0; b < BSLAM_BEACONS_MAX; b++) {
@@ -200,6 +202,7 @@ static void begin_up(bslam_smoother_t *smoother)
 {
     bslam_smoother_linearise_base(smoother);
     smoother->run = smoother->base;
+    smoother->run_stand = smoother->base_stand;
     give_map(&smoother->run);
     smoother->model.velocity_walk_mps_sqrt_s = smoother->path_walk;
     smoother->phase = BSLAM_SMOOTHER_UP;
@@ -214,10 +217,12 @@ static int place_of(const bslam_factor_t *factor, int i)
     return i < factor->body_count ? i : bslam_factor_tail_at(factor) + i - factor->body_count;
 }
 
-static void note_mark(const bslam_ekf_t *run, bslam_smoother_mark_t *mark)
+static void note_mark(const bslam_smoother_t *smoother, bslam_smoother_mark_t *mark)
 {
+    const bslam_ekf_t *run = &smoother->run;
     const bslam_factor_t *factor = &run->factor;
     int k = 0;
+    mark->stand = smoother->run_stand;
     memcpy(mark->correction, run->correction, (size_t)run->base_dim * sizeof mark->correction[0]);
     for (int i = 0; i < run->base_dim; i++) {
         const int place = place_of(factor, i);
@@ -237,6 +242,7 @@ static void restore_mark(bslam_smoother_t *smoother, const bslam_smoother_mark_t
     bslam_factor_t *factor = &run->factor;
     const bslam_real_t *mean = first > 0 ? bslam_smoother_node(smoother, first - 1)->at : smoother->base.mean;
     int k = 0;
+    smoother->run_stand = mark->stand;
     memcpy(run->mean, mean, (size_t)run->base_dim * sizeof run->mean[0]);
     memcpy(run->correction, mark->correction, (size_t)run->base_dim * sizeof run->correction[0]);
     for (int i = 0; i < run->base_dim; i++) {
@@ -328,6 +334,13 @@ static int16_t note_moved(bslam_real_t moved)
     return (int16_t)(units < INT16_MAX && units > -INT16_MAX ? units : 0);
 }
 
+static void note_doubt(const bslam_ekf_t *run, bslam_smoother_node_t *node)
+{
+    const bslam_real_t variance_m2 = bslam_ekf_covariance(run, BSLAM_STATE_X, BSLAM_STATE_X) +
+                                     bslam_ekf_covariance(run, BSLAM_STATE_Y, BSLAM_STATE_Y);
+    node->doubt = bslam_smoother_weight(bslam_sqrt(variance_m2));
+}
+
 /// The nodes of a part, which begins at `first`, move to where they fit best.
 static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
 {
@@ -339,9 +352,11 @@ static void go_back(bslam_smoother_t *smoother, int first, int first_seen)
     const bslam_bend_t bend = bslam_smoother_bend(begin);
     bslam_ekf_predict_about(&smoother->run, &smoother->model, &begin->motion, &bend, begin->at, NULL);
     for (int k = first; k <= last; k++) {
-        const bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
-        bslam_smoother_take_node(smoother, &smoother->run, node, first_seen);
+        bslam_smoother_node_t *node = bslam_smoother_node(smoother, k);
+        bslam_smoother_follow(&smoother->run_stand, node);
+        bslam_smoother_take_node(smoother, &smoother->run, &smoother->run_stand, node, first_seen);
         first_seen += node->seen;
+        note_doubt(&smoother->run, node);
         if (k + 1 < smoother->top) {
             step_on(smoother, bslam_smoother_node(smoother, k + 1), &smoother->steps[k - first]);
         }
@@ -376,9 +391,9 @@ static void advance(bslam_smoother_t *smoother)
     if (smoother->phase == BSLAM_SMOOTHER_FORTH) {
         note_nearest(smoother, node, smoother->at_seen);
     } else if (smoother->at % BSLAM_SMOOTHER_PART == 0) {
-        note_mark(&smoother->run, &smoother->marks[smoother->at / BSLAM_SMOOTHER_PART]);
+        note_mark(smoother, &smoother->marks[smoother->at / BSLAM_SMOOTHER_PART]);
     }
-    bslam_smoother_pass_node(smoother, &smoother->run, node, smoother->at_seen);
+    bslam_smoother_pass_node(smoother, &smoother->run, &smoother->run_stand, node, smoother->at_seen);
     smoother->at++;
     smoother->at_seen += node->seen;
 }

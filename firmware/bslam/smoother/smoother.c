@@ -47,6 +47,7 @@ void bslam_smoother_restart(bslam_smoother_t *smoother, const bslam_settings_t *
     smoother->model.huber_d = settings->gate_d2 > 0 || settings->huber_d <= 0 ? HUBER_D : settings->huber_d;
     smoother->model.gate_d2 = 0;
     smoother->base = *ekf;
+    bslam_smoother_begin_stand(smoother);
     memset(smoother->base.correction, 0, sizeof smoother->base.correction);
     smoother->base.has_correction = true;
     memcpy(smoother->place, ekf->mean, sizeof smoother->place);
@@ -99,20 +100,15 @@ static bslam_smoother_seen_t range_of(const bslam_smoother_line_t *line)
 static bslam_smoother_seen_t fit(const bslam_smoother_t *smoother, int beacon)
 {
     const bslam_smoother_line_t *line = &smoother->lines[beacon];
-    const bslam_real_t slope = smoother->model.velocity_states != 0 ? -smoother->middle[BSLAM_STATE_TURN] : 0;
-    const bslam_real_t t = smoother->middle_s;
-    const bslam_real_t s0 = line->weight;
-    const bslam_real_t s1 = line->weight_t - t * s0;
-    const bslam_real_t s2 = line->weight_tt - t * (line->weight_t + s1);
-    const bslam_real_t y = line->weight_y - slope * s1;
-    const bslam_real_t ty = line->weight_ty - t * line->weight_y - slope * s2;
-    const bslam_real_t sloped = s2 + 1 / (SLOPE_SD_RADPS * SLOPE_SD_RADPS);
-    const bslam_real_t determinant = s0 * sloped - s1 * s1;
-    const bslam_real_t bearing_rad = line->first_rad + (sloped * y - s1 * ty) / determinant;
+    const bslam_real_t turn = smoother->model.velocity_states != 0 ? smoother->middle[BSLAM_STATE_TURN] : 0;
+    const bslam_real_t sloped = line->tt + 1 / (SLOPE_SD_RADPS * SLOPE_SD_RADPS);
+    const bslam_real_t t = smoother->middle_s - line->mean_s;
+    const bslam_real_t slope = (line->ty + turn * line->tt) / sloped - turn;
+    const bslam_real_t bearing_rad = line->first_rad + line->mean_y + slope * t;
     return (bslam_smoother_seen_t){
         // Half a turn to the left is half a turn to the right.
         .value = (uint16_t)bslam_smoother_units(bslam_angle_wrap(bearing_rad) / BSLAM_SMOOTHER_BEARING_RAD),
-        .weight = bslam_smoother_weight(bslam_sqrt(sloped / determinant)),
+        .weight = bslam_smoother_carried(1 / line->weight + t * t / sloped),
         .beacon = (uint8_t)beacon,
     };
 }
@@ -178,6 +174,8 @@ static void close_block(bslam_smoother_t *smoother)
     memset(node->moved, 0, sizeof node->moved);
     node->motion = smoother->to_middle;
     node->seen = (int16_t)seen;
+    node->doubt =
+        smoother->node_count > 0 ? bslam_smoother_node(smoother, smoother->node_count - 1)->doubt : 0;
     node->turned = 0;
     node->stretched = 0;
     for (int b = 0; b < smoother->base.beacon_count; b++) {
@@ -190,6 +188,7 @@ static void close_block(bslam_smoother_t *smoother)
         }
     }
     count_node(smoother);
+    bslam_smoother_reach_newest(smoother);
     smoother->to_middle = (bslam_motion_t){0};
     clear_block(smoother);
 }
@@ -211,16 +210,17 @@ void bslam_smoother_see(bslam_smoother_t *smoother, const bslam_sighting_t *sigh
     const bslam_real_t sd_rad =
         sighting->bearing_sd_rad > 0 ? sighting->bearing_sd_rad : smoother->model.bearing_sd_rad;
     const bslam_real_t weight = 1 / (sd_rad * sd_rad);
-    const bslam_real_t t = smoother->block_s;
     if (line->count == 0) {
         line->first_rad = sighting->bearing_rad;
     }
-    const bslam_real_t y = bslam_angle_wrap(sighting->bearing_rad - line->first_rad);
+    const bslam_real_t t = smoother->block_s - line->mean_s;
+    const bslam_real_t y = bslam_angle_wrap(sighting->bearing_rad - line->first_rad) - line->mean_y;
     line->weight += weight;
-    line->weight_t += weight * t;
-    line->weight_tt += weight * t * t;
-    line->weight_y += weight * y;
-    line->weight_ty += weight * y * t;
+    const bslam_real_t share = weight / line->weight;
+    line->mean_s += share * t;
+    line->mean_y += share * y;
+    line->tt += weight * t * (t - share * t);
+    line->ty += weight * t * (y - share * y);
     line->count++;
     if (sighting->has_range) {
         line->range_m += sighting->range_m;

@@ -32,6 +32,14 @@
 /// Two nodes of a level become one of the next: 1, 2, 4 and 8 times so many frames.
 #define BSLAM_SMOOTHER_LEVELS 4
 
+/// Where what is seen is linearised from. It stays as long as the robot stands, as far as one can tell.
+typedef struct bslam_smoother_stand {
+    bslam_real_t x_m, y_m;
+    bslam_real_t doubt_m2;       ///< of this place: variances of x and y
+    bslam_real_t travel_var_m2;  ///< of what odometry went since
+    bslam_real_t lasts_s;
+} bslam_smoother_stand_t;
+
 /// In place of a number of distances: none, and nothing was known of the beacon before.
 #define BSLAM_SMOOTHER_FIRST 255
 /// In place of a beacon: this is the distance that belongs to the direction before it.
@@ -55,14 +63,17 @@ typedef struct bslam_smoother_node {
     int16_t stretched;                     ///< BSLAM_SMOOTHER_BEND, the latter less 1
     int16_t
         moved[BSLAM_ROBOT_DIM_MAX];  ///< what the last pass back changed, in units of BSLAM_SMOOTHER_MOVED
+    uint8_t doubt;                   ///< of the position, as weights are: sqrt(sd² of x + sd² of y) in um
+    bool stands;                     ///< where the robot has stood since the node before, or longer
 } bslam_smoother_node_t;
 
-/// Sums over the sightings of a beacon in the open block, for a line of bearing over time.
+/// Sightings of a beacon in the open block, for a line of bearing over time.
 typedef struct bslam_smoother_line {
     bslam_real_t first_rad;
-    bslam_real_t weight;  ///< sums of w, w t, w t², w y, w y t
-    bslam_real_t weight_t, weight_tt, weight_y, weight_ty;
-    bslam_real_t range_m;  ///< sum
+    bslam_real_t weight;          ///< sum of w
+    bslam_real_t mean_s, mean_y;  ///< time and bearing, the latter less the first
+    bslam_real_t tt, ty;          ///< sums of w t² and w t y, with t and y less these means
+    bslam_real_t range_m;         ///< sum
     int32_t ranges, count;
     bool is_first;  ///< nothing was known of the beacon before
 } bslam_smoother_line_t;
@@ -76,6 +87,7 @@ typedef struct bslam_smoother_step {
 
 /// The robot on the pass up, where a part begins.
 typedef struct bslam_smoother_mark {
+    bslam_smoother_stand_t stand;
     bslam_real_t correction[BSLAM_ROBOT_DIM_MAX];
     bslam_real_t factor[BSLAM_ROBOT_DIM_MAX * (BSLAM_ROBOT_DIM_MAX + 1) / 2];  ///< rows of L, each with its D
 } bslam_smoother_mark_t;
@@ -92,6 +104,9 @@ typedef struct bslam_smoother {
     bslam_real_t path_walk;                        ///< of v: where the models are linearised
     bslam_ekf_t base;                              ///< before the first node, a correction about its mean
     bslam_ekf_t run;                               ///< the present phase's
+    bslam_smoother_stand_t base_stand;             ///< of the base
+    bslam_smoother_stand_t run_stand;              ///< of the present phase
+    bslam_smoother_stand_t last_stand;             ///< of the newest node
     bslam_real_t place[BSLAM_STATE_PADDED];        ///< the map's values that the models are linearised about
     bslam_real_t place_moved[BSLAM_STATE_PADDED];  ///< what the last cycle changed of them
     bslam_smoother_node_t nodes[BSLAM_SMOOTHER_NODES_MAX];

@@ -5,11 +5,15 @@
 #include "bslam/smoother/smoother.h"
 
 #define BSLAM_SMOOTHER_BEARING_RAD BSLAM_R(9.58737992e-5)  ///< of a bslam_smoother_seen_t's units
-#define BSLAM_SMOOTHER_SD_RAD BSLAM_R(1e-6)
+#define BSLAM_SMOOTHER_SD BSLAM_R(1e-6)  ///< of a standard deviation as it is held, rad or m
 #define BSLAM_SMOOTHER_RANGE_M BSLAM_R(5e-3)
 #define BSLAM_SMOOTHER_BEND BSLAM_R(5e-5)
 #define BSLAM_SMOOTHER_MOVED BSLAM_R(1e-3)
 #define BSLAM_SMOOTHER_UNITS_MAX BSLAM_R(65535.0)
+
+/// What a direction errs by besides, each time that it is brought to another moment or joined: by the unit of
+/// 0.1 mrad, and by a path that is not known to better than a millimetre.
+#define BSLAM_SMOOTHER_CARRIED_SD_RAD BSLAM_R(1e-3)
 
 /// Nearer than this a direction says nothing of a distance, nor a distance of a direction.
 #define BSLAM_SMOOTHER_RANGE_MIN_M BSLAM_R(1e-3)
@@ -49,10 +53,15 @@ static inline bslam_bend_t bslam_smoother_bend(const bslam_smoother_node_t *node
     };
 }
 
+/// A standard deviation as a node has it.
+static inline bslam_real_t bslam_smoother_sd(uint8_t weight)
+{
+    return (bslam_real_t)((16 + (weight & 15)) << (weight >> 4)) * BSLAM_SMOOTHER_SD;
+}
+
 static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *direction)
 {
-    return (bslam_real_t)((16 + (direction->weight & 15)) << (direction->weight >> 4)) *
-           BSLAM_SMOOTHER_SD_RAD;
+    return bslam_smoother_sd(direction->weight);
 }
 
 // ---- linearise.c
@@ -60,6 +69,20 @@ static inline bslam_real_t bslam_smoother_sd_rad(const bslam_smoother_seen_t *di
 /// The base is linear about the map's places of now, in each beacon's bearing and the logarithm of its
 /// distance from the base's robot, which is what directions are nearly linear in. O(n²).
 void bslam_smoother_linearise_base(bslam_smoother_t *smoother);
+
+// ---- stand.c
+
+/// The base's robot stands where the newest node's did if it is still there, else where it is.
+void bslam_smoother_begin_stand(bslam_smoother_t *smoother);
+
+/// Along a pass or into the base: where what a node sees is linearised from.
+void bslam_smoother_follow(bslam_smoother_stand_t *stand, const bslam_smoother_node_t *node);
+
+/// Whether the newest node, which has just come, is where the robot stood before.
+void bslam_smoother_reach_newest(bslam_smoother_t *smoother);
+
+/// Where the robot stood, by the path of now. O(what is kept).
+void bslam_smoother_find_stands(bslam_smoother_t *smoother);
 
 // ---- nodes.c
 
@@ -69,16 +92,21 @@ void bslam_smoother_add_motion(bslam_motion_t *sum, const bslam_motion_t *motion
 /// The nearest whole number, 65535 at most.
 int32_t bslam_smoother_units(bslam_real_t value);
 
-/// A standard deviation as a bslam_smoother_seen_t has it.
-uint8_t bslam_smoother_weight(bslam_real_t sd_rad);
+/// A standard deviation as a node has it.
+uint8_t bslam_smoother_weight(bslam_real_t sd);
 
-/// What was read and seen at a node, into a filter that stands there. What does not fit is left out.
-void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
+/// That of a direction brought to a node, whose variance is this where it comes from.
+uint8_t bslam_smoother_carried(bslam_real_t variance_rad2);
+
+/// What was read and seen at a node, into a filter that stands there, linear as from a stand. What does not
+/// fit is left out.
+void bslam_smoother_take_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf,
+                              const bslam_smoother_stand_t *stand, const bslam_smoother_node_t *node,
                               int first_seen);
 
 /// A filter that stands at the node before goes on to this one.
-void bslam_smoother_pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, const bslam_smoother_node_t *node,
-                              int first_seen);
+void bslam_smoother_pass_node(bslam_smoother_t *smoother, bslam_ekf_t *ekf, bslam_smoother_stand_t *stand,
+                              const bslam_smoother_node_t *node, int first_seen);
 
 /// The oldest node leaves, into the base. The cycle must be begun anew.
 void bslam_smoother_drop_oldest(bslam_smoother_t *smoother);

@@ -13,7 +13,7 @@ static const bslam_real_t STRETCHED_MAX = BSLAM_R(0.3);
 /// A chord shorter than this has no direction.
 static const bslam_real_t CHORD_MIN_M = BSLAM_R(0.01);
 /// Seen from one of two nodes alone, it is seen from their mean but for the difference of what they err by.
-static const bslam_real_t LONE_SD_FACTOR = BSLAM_R(1.25);
+static const bslam_real_t LONE_VAR_FACTOR = BSLAM_R(1.5625);
 /// As many distances as a bslam_smoother_seen_t may be the mean of.
 enum { RANGES_MAX = BSLAM_SMOOTHER_FIRST - 1 };
 
@@ -140,7 +140,7 @@ static void join_directions(const bslam_smoother_seen_t *one, bslam_smoother_see
     const bslam_real_t apart_rad = bslam_angle_wrap(bslam_smoother_bearing_rad(one) - mean_rad);
     const bslam_real_t bearing_rad = bslam_angle_wrap(mean_rad + share * apart_rad);
     mean->value = (uint16_t)bslam_smoother_units(bearing_rad / BSLAM_SMOOTHER_BEARING_RAD);
-    mean->weight = bslam_smoother_weight(1 / bslam_sqrt(weight[0] + weight[1]));
+    mean->weight = bslam_smoother_carried(1 / (weight[0] + weight[1]));
 }
 
 /// Both distances as one, in `mean`. A measured one says more than a guess.
@@ -192,7 +192,8 @@ static int join_seen(bslam_smoother_t *smoother, const pair_t *pair, int beacon,
     if (older && newer) {
         join_directions(&seen[0][0], &joined[0]);
     } else {
-        joined[0].weight = bslam_smoother_weight(bslam_smoother_sd_rad(&joined[0]) * LONE_SD_FACTOR);
+        const bslam_real_t sd_rad = bslam_smoother_sd_rad(&joined[0]);
+        joined[0].weight = bslam_smoother_carried(LONE_VAR_FACTOR * sd_rad * sd_rad);
     }
     join_ranges(&seen[0][1], &seen[1][1]);
     joined[1] = seen[1][1];
@@ -270,6 +271,7 @@ static void join_nodes(bslam_smoother_t *smoother, closing_t *at)
     lengthen(&joined, &older.motion, &older.at[BSLAM_STATE_FORWARD]);
     bend_path(&smoother->model, at->from, &joined);
     joined.seen = (int16_t)count;
+    joined.doubt = older.doubt > joined.doubt ? older.doubt : joined.doubt;
     write_node(smoother, at, &joined);
 }
 
