@@ -55,7 +55,7 @@ $$(BOARD_ALL_$(1):%=build/$(1)/%.elf): $$(BOARD_OBJECTS_$(1)) firmware/port/$(1)
 image-$(1): $$(BOARD_ALL_$(1):%=build/$(1)/%.elf)
 
 -include $$(BOARD_OBJECTS_$(1):.o=.d) build/$(1)/firmware/robot/main.d \
-    $$(PROGRAMS:%=build/$(1)/firmware/bench/%.d)
+    $$(BOARD_ALL_$(1):%=build/$(1)/firmware/bench/%.d)
 endef
 $(foreach board,$(BOARDS),$(eval $(call board_rules,$(board))))
 

@@ -372,7 +372,7 @@ void bslam_ekf_row_covariances(const bslam_ekf_t *ekf, const bslam_row_t *row, c
     for (int from = 0; from < places; from += COLUMNS) {
         const int to = from + COLUMNS < places ? from + COLUMNS : places;
         bslam_real_t h[COLUMNS];
-        column_t column;
+        column_t column = {.other = {0}};
         bslam_ekf_look(ekf, row, from, to, h);
         for (int j = 0; j < to - from; j++) {
             h[j] *= ekf->factor.d[from + j];

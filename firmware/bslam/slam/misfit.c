@@ -1,5 +1,5 @@
 // A gate takes the pose for right. If few sightings pass it, the pose is wrong: wheels slipped, somebody
-// pushed the robot, or it was blind for long. MATH "Gate".
+// pushed the robot, or it was blind for long. MATH "Sightings that do not fit".
 #include "bslam/slam/slam_internal.h"
 
 /// So many sightings the mean of how well they fit goes back.
