@@ -333,7 +333,7 @@ typedef enum bslam_map_fault {
     BSLAM_MAP_BAD_CRC,
     BSLAM_MAP_BEACONS,      ///< more beacons, or rays, than this build holds
     BSLAM_MAP_CLASSIFIERS,  ///< classifiers, samples or negatives beyond what this build holds
-    BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12
+    BSLAM_MAP_NOT_FINITE,   ///< a NaN, an infinity, or beyond 1e12; 1e18 in a factor
     BSLAM_MAP_CONTENT,      ///< a field that contradicts others, or outside its range: a place beyond 20 km
     BSLAM_MAP_COVARIANCE,   ///< a D below 0 in its factor, or a variance beyond 1e12
     BSLAM_MAP_UNREADABLE,   ///< the source cannot be read, or reads otherwise than before; the sink fails

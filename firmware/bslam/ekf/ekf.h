@@ -195,12 +195,12 @@ BSLAM_MUST_CHECK bslam_status_t bslam_ekf_innovation(const bslam_ekf_t *ekf, con
                                                      bslam_innovation_t *innovation);
 
 /// Squared Mahalanobis distance of an innovation, by equation (8)'s S, from the covariance as it stands.
-/// BSLAM_E_SINGULAR: S is not positive definite. O(1).
+/// BSLAM_E_SINGULAR: S is not positive definite. O(n).
 BSLAM_MUST_CHECK bslam_status_t bslam_ekf_distance2(const bslam_ekf_t *ekf,
                                                     const bslam_innovation_t *innovation,
                                                     bslam_real_t *distance2);
 
-/// The same of a sighting if it shows beacon `index`; negative: it has none. O(1).
+/// The same of a sighting if it shows beacon `index`; negative: it has none. O(n).
 bslam_real_t bslam_ekf_sighting_distance2(const bslam_ekf_t *ekf, const bslam_settings_t *settings,
                                           const bslam_pose_t *mount, const bslam_sighting_t *sighting,
                                           int index);

@@ -10,17 +10,16 @@ static const bslam_real_t PRIOR = BSLAM_R(30.0);
 /// A hundred sightings tell what one does.
 static const bslam_real_t CORRELATION_MAX = BSLAM_R(0.98);
 /// Standard deviations. What is farther off is an outlier, and tells nothing of the noise.
-static const bslam_real_t INNOVATION_MAX = BSLAM_R(3.0);
-
-static bslam_real_t clamped(bslam_real_t value, bslam_real_t low, bslam_real_t high)
-{
-    return value < low ? low : (value > high ? high : value);
-}
+static const bslam_real_t INNOVATION_MAX = BSLAM_R(5.0);
 
 static void note(bslam_autocorrelation_t *noise, bslam_real_t *last, bslam_real_t innovation,
                  bslam_real_t variance)
 {
-    const bslam_real_t y = clamped(innovation / bslam_sqrt(variance), -INNOVATION_MAX, INNOVATION_MAX);
+    const bslam_real_t y = innovation / bslam_sqrt(variance);
+    if (y > INNOVATION_MAX || y < -INNOVATION_MAX) {
+        *last = 0;
+        return;
+    }
     noise->product += *last * y;
     noise->square += y * y;
     *last = y;
@@ -35,8 +34,10 @@ static void forget(bslam_autocorrelation_t *noise, bslam_real_t count)
 /// How many times the variance of white noise is that which in the mean of many tells as little.
 static bslam_real_t factor_of(const bslam_autocorrelation_t *noise)
 {
-    const bslam_real_t r = clamped(noise->product / (noise->square + PRIOR), 0, CORRELATION_MAX);
-    return (1 + r) / (1 - r);
+    const bslam_real_t r = noise->product / (noise->square + PRIOR);
+    return r > CORRELATION_MAX ? (1 + CORRELATION_MAX) / (1 - CORRELATION_MAX)
+           : r > 0             ? (1 + r) / (1 - r)
+                               : 1;
 }
 
 void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count)

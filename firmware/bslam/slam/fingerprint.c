@@ -70,6 +70,9 @@ static uint64_t add_smoother(uint64_t hash, const bslam_smoother_t *smoother)
 uint64_t bslam_slam_fingerprint(const bslam_slam_t *slam, uint64_t before)
 {
     uint64_t hash = add_state(before, &slam->ekf);
+    hash = add_words(hash, &slam->misfit, sizeof slam->misfit);
+    hash = add_words(hash, &slam->bearing_noise, sizeof slam->bearing_noise);
+    hash = add_words(hash, &slam->range_noise, sizeof slam->range_noise);
     if (bslam_slam_smooths(slam)) {
         hash = add_smoother(hash, slam->smoother);
     }

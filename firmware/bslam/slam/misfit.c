@@ -10,6 +10,8 @@ static const bslam_real_t WRONG = BSLAM_R(0.5);
 /// Times the misfit beyond DOUBTFUL, what a second adds to the variances of a motion: of its way, m², and of
 /// its turn, rad². A wheel that spins errs by half a metre in a second.
 static const bslam_real_t SLIP_VAR_PER_S = BSLAM_R(2.0);
+/// Where nothing is seen the misfit says no more of what the wheels do.
+static const bslam_real_t UNSEEN_MAX_S = BSLAM_R(2.0);
 /// A beacon is believed until it was rejected this much more often than matched.
 enum { REJECTED_MORE = 4 };
 
@@ -31,6 +33,7 @@ void bslam_slam_note_misfit(bslam_slam_t *slam, int count)
             weight++;
         }
     }
+    slam->unseen_s = weight > 0 ? 0 : slam->unseen_s;
     slam->misfit += (sum - weight * slam->misfit) / (MEMORY + weight);
 }
 
@@ -41,7 +44,7 @@ bool bslam_slam_opens_gate(const bslam_slam_t *slam, const bslam_beacon_t *beaco
 
 void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion)
 {
-    if (slam->misfit > DOUBTFUL) {
+    if (slam->misfit > DOUBTFUL && slam->unseen_s < UNSEEN_MAX_S && !slam->is_lost) {
         const bslam_real_t more = SLIP_VAR_PER_S * (slam->misfit - DOUBTFUL) * motion->dt_s;
         motion->forward_var_m2 += more;
         motion->turn_var_rad2 += more;

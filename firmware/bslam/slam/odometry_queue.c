@@ -20,6 +20,7 @@ static void predict_step(bslam_slam_t *slam, int64_t until_us)
     bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
     bslam_motion_t moved;
     bslam_slam_doubt_motion(slam, &motion);
+    slam->unseen_s += motion.dt_s;
     bslam_ekf_predict(&slam->ekf, &slam->settings, &motion, &moved);
     if (bslam_slam_smooths(slam)) {
         bslam_smoother_move(slam->smoother, &slam->ekf, &motion);
@@ -84,7 +85,8 @@ bslam_robot_t bslam_slam_robot_at(const bslam_slam_t *slam, int64_t behind_us, b
     bslam_motion_t moved = bslam_history_newest(&slam->history);
     const int64_t until_us = behind_us > 0 ? behind_us : 0;
     while (place.behind_us > until_us) {
-        const bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+        bslam_motion_t motion = bslam_history_walk(&slam->history, &place, until_us);
+        bslam_slam_doubt_motion(slam, &motion);
         bslam_robot_predict(&robot, &slam->settings, &motion, &moved);
     }
     *pose = bslam_pose_of(robot.mean);

@@ -38,6 +38,16 @@ bool bslam_slam_are_doubts(bslam_real_t position_sd_m, bslam_real_t heading_sd_r
            bslam_in_range(heading_sd_rad, 0, BSLAM_HEADING_SD_MAX_RAD);
 }
 
+/// The pose, or the map, is another one than before.
+static void begin_elsewhere(bslam_slam_t *slam)
+{
+    slam->misfit = 0;
+    if (bslam_slam_smooths(slam)) {
+        bslam_smoother_leave_stand(slam->smoother);
+    }
+    bslam_slam_restart_smoother(slam);
+}
+
 bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose, bslam_real_t position_sd_m,
                                    bslam_real_t heading_sd_rad)
 {
@@ -48,7 +58,7 @@ bslam_status_t bslam_slam_set_pose(bslam_slam_t *slam, const bslam_pose_t *pose,
         return BSLAM_E_RANGE;
     }
     bslam_ekf_set_pose(&slam->ekf, pose, position_sd_m * position_sd_m, heading_sd_rad * heading_sd_rad);
-    bslam_slam_restart_smoother(slam);
+    begin_elsewhere(slam);
     slam->is_lost = false;
     return BSLAM_OK;
 }
@@ -57,7 +67,7 @@ void bslam_slam_lose_pose(bslam_slam_t *slam)
 {
     const bslam_pose_t pose = bslam_ekf_pose(&slam->ekf);
     bslam_ekf_set_pose(&slam->ekf, &pose, 0, 0);
-    bslam_slam_restart_smoother(slam);
+    begin_elsewhere(slam);
     slam->is_lost = true;
 }
 
@@ -133,7 +143,7 @@ void bslam_slam_forget_map(bslam_slam_t *slam)
         bslam_appearance_clear(slam->appearance);
     }
     bslam_ekf_forget_map(&slam->ekf);
-    bslam_slam_restart_smoother(slam);
+    begin_elsewhere(slam);
     slam->is_frozen = false;
 }
 

@@ -26,6 +26,7 @@ typedef struct bslam_slam {
     bslam_history_t history;
     uint32_t travelled_um;  ///< that the filter has gone, modulo 4.3 km
     bslam_real_t misfit;    ///< of the newest sightings to the pose: 0 all fit, 1 none does
+    bslam_real_t unseen_s;  ///< of odometry since a sighting that counts in it
     bslam_autocorrelation_t bearing_noise, range_noise;
     int64_t elapsed_us;  ///< of odometry: the pipeline's own time, which goes on whatever the clock does
     int64_t moment_us;   ///< the newest frame's, in it

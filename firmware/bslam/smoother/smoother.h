@@ -169,6 +169,9 @@ BSLAM_MUST_CHECK bslam_status_t bslam_smoother_add(bslam_smoother_t *smoother, b
                                                    const bslam_pose_t *mount,
                                                    const bslam_sighting_t *sighting, int *index);
 
+/// The robot is elsewhere: no stand of before goes on.
+void bslam_smoother_leave_stand(bslam_smoother_t *smoother);
+
 /// Beacon `index` of the filter is about to be taken out. O(n² + what is kept).
 void bslam_smoother_remove(bslam_smoother_t *smoother, int index);
 

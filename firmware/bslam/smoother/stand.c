@@ -76,6 +76,11 @@ void bslam_smoother_begin_stand(bslam_smoother_t *smoother)
     smoother->last_stand = smoother->base_stand;
 }
 
+void bslam_smoother_leave_stand(bslam_smoother_t *smoother)
+{
+    smoother->last_stand = (bslam_smoother_stand_t){0};
+}
+
 void bslam_smoother_follow(bslam_smoother_stand_t *stand, const bslam_smoother_node_t *node)
 {
     if (node->stands) {

@@ -404,9 +404,9 @@ class DenseEkf:
         for label, (rows, innovations, variances) in measurements:
             last = self.last.setdefault(label, [0.0, 0.0])
             for k, (innovation, variance) in enumerate(zip(innovations, variances, strict=True)):
-                y = float(np.clip(innovation / np.sqrt(variance), -3.0, 3.0))
-                self.autocorrelation[k] += (last[k] * y, y * y)
-                last[k] = y
+                y = float(innovation / np.sqrt(variance))
+                self.autocorrelation[k] += (last[k] * y, y * y) if abs(y) <= 5.0 else (0.0, 0.0)
+                last[k] = y if abs(y) <= 5.0 else 0.0
                 counts[k] += 1
             widened.append((rows, innovations, [f * v for f, v in zip(factor, variances, strict=False)]))
         self.autocorrelation *= (1 - counts / 2000.0)[:, None]
