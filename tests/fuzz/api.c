@@ -19,8 +19,8 @@ static bslam_slam_t *slam_of(bslam_t *one)
     return &bslam_instance(one)->slam;
 }
 
-/// What a refused call may have touched: counters, the sighting at fault, stamps that were refused, after a jump
-/// the tick reference. And the seal over all of them.
+/// What a refused call may have touched: counters, the sighting at fault, stamps that were refused, after a
+/// jump the tick reference. And the seal over all of them.
 static void require_unchanged(bslam_status_t status)
 {
     bslam_slam_t *was = slam_of(&before);
