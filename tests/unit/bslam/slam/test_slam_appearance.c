@@ -457,7 +457,8 @@ static void test_the_gate_opens_where_nothing_was_where_it_should_be_for_a_while
     see_object(0, 52, off_rad);
     assert_int_equal(slam.accounts[0].outcome, BSLAM_OUTCOME_MATCHED);
     assert_true(slam.accounts[0].test_ratio < 1);
-    see_object(1, 53, 1 - 1.2 * off_rad);  // and is closed again
+    slam.bearing_noise = (bslam_autocorrelation_t){0, 0};  // which these few have widened
+    see_object(1, 53, 1 - off_rad);                        // and is closed again
     assert_int_equal(slam.accounts[0].reason, BSLAM_REASON_GATE);
 }
 
