@@ -88,6 +88,7 @@ static void set_paper(bslam_settings_t *settings)
     settings->velocity_states = 1;
     settings->left_speed_sd_mps = BSLAM_R(0.3);
     settings->right_speed_sd_mps = BSLAM_R(0.3);
+    settings->correlation_m = -1;  // as they show
 }
 
 /// A command leads the motion, and is not the driven speed: the scales are estimated, and the error grows

@@ -54,8 +54,8 @@ extern "C" {
     REAL(range_sd_fraction, 0.02, 0.0, 10.0, "noise of the distance in proportion to it") \
     REAL(range_sd_per_m, 0.009, 0.0, 10.0, "noise of the distance from apparent size: proportional to r^2") \
     REAL(range_scale_sd, 0.0, 0.0, 1.0, "all distances of a beacon err alike by this part of them (0: no)") \
-    REAL(correlation_m, 0.0, 0.0, 100.0, \
-         "a beacon's errors are alike until the robot has gone this far (0: as they show)") \
+    REAL(correlation_m, 0.0, -1.0, 100.0, \
+         "a beacon's errors are alike until the robot has gone this far (0: no, below: as they show)") \
     INTEGER(sighting_delay_us, 0, -1000000, 10000000, "a sighting stamped t shows odometry's t - delay") \
     INTEGER(ahead_max_us, 200000, 0, 10000000, "a sighting may be this much newer than the last odometry") \
     /* map */ \

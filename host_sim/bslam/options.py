@@ -203,13 +203,14 @@ def _robot_params(robot: Robot, kind: str) -> dict[str, Number]:
         "mount_y_m": robot.sensor_y_m,
         "mount_yaw_rad": robot.sensor_yaw_rad,
         "sighting_delay_us": robot.sighting_delay_us,
-        "correlation_m": robot.sighting_correlation_m,
         "range_scale_sd": robot.sighting_scale_sd,
         "bearing_sd_rad": max(robot.bearing_sigma_rad, LEAST_BEARING_SD_RAD),
         "range_sd_floor_m": robot.range_sigma_floor_m if range_errs else LEAST_RANGE_SD_M,
         "range_sd_fraction": robot.range_sigma_fraction,
         "range_sd_per_m": range_sd_per_m,
     }
+    if robot.sighting_correlation_m > 0.0:
+        params["correlation_m"] = robot.sighting_correlation_m
     if kind == "ticks":
         assert robot.left_radius_m is not None and robot.right_radius_m is not None
         assert robot.ticks_per_revolution is not None and robot.counter_bits is not None

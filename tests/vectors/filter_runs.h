@@ -5,6 +5,7 @@ static void standard_params(bslam_settings_t *p)
 {
     bslam_settings_preset(p, BSLAM_PRESET_PAPER);
     p->filter = 0;
+    p->correlation_m = BSLAM_R(-1.0);
     p->motion = 0;
     p->velocity_states = 0;
     p->scale_states = 0;
@@ -431,6 +432,7 @@ static void invariant_params(bslam_settings_t *p)
 {
     bslam_settings_preset(p, BSLAM_PRESET_PAPER);
     p->filter = 1;
+    p->correlation_m = BSLAM_R(-1.0);
     p->motion = 1;
     p->velocity_states = 1;
     p->scale_states = 0;

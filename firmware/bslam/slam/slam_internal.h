@@ -60,7 +60,7 @@ void bslam_slam_doubt_motion(const bslam_slam_t *slam, bslam_motion_t *motion);
 // ---- coloured_noise.c -------------------------------------------------------------------------------------
 
 /// Raises the noise of a frame's matches by how much errors of late were those of the sightings before,
-/// unless that is told. Once a frame, behind their innovations.
+/// if `correlation_m` asks for it. Once a frame, behind their innovations.
 void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count);
 
 // ---- beacon_scale.c ---------------------------------------------------------------------------------------

@@ -145,7 +145,7 @@ def _robot(start: Start, odometry: Odometry) -> Robot:
         sensor_y_m=params["mount_y_m"],
         sensor_yaw_rad=params["mount_yaw_rad"],
         sighting_delay_us=int(params["sighting_delay_us"]),
-        sighting_correlation_m=params["correlation_m"],
+        sighting_correlation_m=max(params["correlation_m"], 0.0),
         wheel_noise="speedometer" if params["velocity_states"] else "actuation",
         **ticks,
     )

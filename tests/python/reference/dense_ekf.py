@@ -398,6 +398,8 @@ class DenseEkf:
 
     def _coloured(self, measurements):  # type: ignore[no-untyped-def]
         """Variances as large as the noise of late was like that before it: (1 + r) / (1 - r) times."""
+        if self.params["correlation_m"] >= 0:
+            return [parts for _, parts in measurements]
         product, square = self.autocorrelation.T
         r = np.clip(product / (square + 30.0), 0.0, 0.98)
         factor, counts, widened = (1 + r) / (1 - r), np.zeros(2), []

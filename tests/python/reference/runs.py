@@ -15,6 +15,7 @@ STEP_S = STEP_US * 1e-6
 
 PARAMS: dict[str, float] = {
     "filter": 0,
+    "correlation_m": -1.0,
     "motion": 1,
     "velocity_states": 0,
     "scale_states": 0,

@@ -22,6 +22,7 @@ static double normal(void)
 static int setup(void **state)
 {
     memset(&slam, 0, sizeof slam);
+    slam.settings.correlation_m = -1;
     noise.state = 3;
     return 0;
 }
