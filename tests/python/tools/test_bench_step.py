@@ -8,7 +8,7 @@ from tools.bench import bench
 
 BEACONS = 20
 RATIO_MAX = 1.5
-"""1.44 with gcc 12, of code that keeps the covariance itself and not its factor."""
+"""1.46 with gcc 12. The near-optimal code keeps the covariance itself, not its factor."""
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the near-optimal count is an x86-64's")
