@@ -42,10 +42,13 @@ static bslam_real_t factor_of(const bslam_autocorrelation_t *noise)
 
 void bslam_slam_doubt_sightings(bslam_slam_t *slam, int count)
 {
+    if (slam->settings.correlation_m >= 0) {
+        return;
+    }
     // Those of now, so that the order within a frame does not matter.
     const bslam_real_t by_bearing = factor_of(&slam->bearing_noise), by_range = factor_of(&slam->range_noise);
     bslam_real_t bearings = 0, ranges = 0;
-    for (int i = 0; i < count && slam->settings.correlation_m < 0; i++) {
+    for (int i = 0; i < count; i++) {
         const bslam_match_t *match = &slam->records[i].match;
         bslam_innovation_t *innovation = &slam->records[i].innovation;
         if (match->verdict != BSLAM_VERDICT_MATCH) {

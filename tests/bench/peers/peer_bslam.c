@@ -68,7 +68,7 @@ void peer_begin(const bench_model_t *model, const bench_step_t *steps, int count
 {
     bslam_settings_t settings;
     int bad_id = -1;
-    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
+    bslam_settings_preset(&settings, BSLAM_PRESET_REAL_WHEELS);
     const double step_s = (double)(steps[count - 1].time_us) * 1e-6 / (count - 1);
     settings.wheelbase_m = (bslam_real_t)model->wheelbase_m;
     settings.left_speed_sd_mps = settings.right_speed_sd_mps = (bslam_real_t)(model->wheel_sd_m / step_s);

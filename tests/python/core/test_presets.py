@@ -30,8 +30,8 @@ def test_defaults_are_for_real_wheels():
 
 
 def test_paper_lets_the_reading_of_a_wheel_err():
-    speed = {"left_speed_sd_mps": 0.3, "right_speed_sd_mps": 0.3}
-    assert changes("paper") == {"velocity_states": 1} | speed
+    speeds = {"velocity_states": 1, "left_speed_sd_mps": 0.3, "right_speed_sd_mps": 0.3}
+    assert changes("paper") == speeds | {"correlation_m": -1}
     assert changes("paper", "real-wheels") == {}
 
 

@@ -112,7 +112,7 @@ def _has_eigen() -> bool:
     return (INCLUDE / "eigen3").is_dir()
 
 
-CORE = Program("bslam", None, lambda: True, core, ("velocity_states=0",), ("association=2",))
+CORE = Program("bslam", None, lambda: True, core, (), ("association=2",))
 PEERS = (
     Program("MRPT, Davison", "libmrpt-slam-dev", _has_mrpt, mrpt, ("davison",), ()),
     Program("MRPT, default", "libmrpt-slam-dev", _has_mrpt, mrpt, ("naive",), ()),
