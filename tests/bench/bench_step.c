@@ -56,8 +56,8 @@ int main(int argc, char **argv)
 {
     bslam_settings_t settings;
     int bad_id = -1;
-    bslam_settings_preset(&settings, BSLAM_PRESET_PAPER);
-    settings.velocity_states = argc > 1 && strcmp(argv[1], "velocity") == 0 ? 1 : 0;
+    const bool with_speeds = argc > 1 && strcmp(argv[1], "velocity") == 0;
+    bslam_settings_preset(&settings, with_speeds ? BSLAM_PRESET_PAPER : BSLAM_PRESET_REAL_WHEELS);
     if (bslam_init(&slam, &settings, &bad_id) != BSLAM_OK) {
         return 1;
     }
