@@ -5,6 +5,8 @@
 /// of what odometry went since, and of the path.
 static const bslam_real_t TRAVEL_D2 = BSLAM_R(9.0);
 static const bslam_real_t PATH_D2 = BSLAM_R(16.0);
+/// Odometry is never exact: a command at rest has no noise, and points move by what is rounded, (1 mm)².
+static const bslam_real_t TRAVEL_VAR_MIN_M2 = BSLAM_R(1e-6);
 /// And no farther than this share of the distance of what it sees: one place is to do for both.
 static const bslam_real_t SHARE_MAX = BSLAM_R(0.05);
 /// It takes a while to tell. Driving, it would be taken to stand now and then; and till then it invents
@@ -34,7 +36,7 @@ static bslam_real_t square_between(const bslam_smoother_stand_t *stand, bslam_re
 static bool is_near(const bslam_smoother_stand_t *stand, const bslam_smoother_stand_t *here)
 {
     const bslam_real_t apart2 = square_between(stand, here->x_m, here->y_m);
-    return apart2 <= TRAVEL_D2 * stand->travel_var_m2 &&
+    return apart2 <= TRAVEL_D2 * (stand->travel_var_m2 + TRAVEL_VAR_MIN_M2) &&
            apart2 <= PATH_D2 * (stand->doubt_m2 + here->doubt_m2);
 }
 
