@@ -5,5 +5,6 @@
 #include "vision/classifiers/recogniser.h"
 #include "vision/gyro/visual_gyro.h"
 #include "vision/instance.h"
+#include "vision/scan/scanner.h"
 
 #endif

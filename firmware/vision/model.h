@@ -98,6 +98,50 @@ typedef struct bslam_hinged {
     const float *bias;        ///< rows values
 } bslam_hinged_t;
 
+// ---- the scanner ------------------------------------------------------------------------------------------
+
+/// Values of a cell of 4x4 pixels; cells of a window's side at most; of a kind's windows, and kinds, at most.
+enum { BSLAM_CHANNELS = 8, BSLAM_WINDOW_SIDE_MAX = 20, BSLAM_WINDOWS_MAX = 32, BSLAM_KINDS_MAX = 16 };
+
+/// Bytes of the weights that say where the edges are: of blocks of 2x2 cells, for left, top, right, bottom.
+#define BSLAM_EDGE_BYTES(columns, rows) (4 * ((columns) / 2) * ((rows) / 2) * BSLAM_CHANNELS)
+
+/// A window of cells that slides over all sizes of a picture, and its linear SVM: f = scale * (bias + sum of
+/// weight * cell). Row after row is added, and what is below a row's floor then is given up.
+typedef struct bslam_window {
+    uint8_t kind;     ///< index in the model's kinds
+    uint8_t columns;  ///< of cells
+    uint8_t rows;
+    float box_columns;  ///< of the box that it frames, in its middle
+    float box_rows;
+    const int8_t *weights;  ///< [rows][columns][BSLAM_CHANNELS]
+    float scale;            ///< above 0
+    int32_t bias;
+    const uint8_t *order;     ///< [rows]: which row is added first, and so on
+    const int32_t *floors;    ///< [rows], of the sum so far, bias included
+    const int8_t *edges;      ///< BSLAM_EDGE_BYTES
+    const float *edge_scale;  ///< [4]: an edge is so far from the box's, of its width or height,
+    const float *edge_bias;   ///< [4]: edge_scale * sum of weight * block's sum + edge_bias
+} bslam_window_t;
+
+/// A kind of thing that a scanner finds.
+typedef struct bslam_scan_kind {
+    const char *name;
+    float height_m;   ///< of all of them; 0: not known, direction only
+    float threshold;  ///< what is below it is not reported
+    float slope;      ///< logarithm of the odds that what is reported is one: slope * f + offset
+    float offset;
+    float middle_sd;  ///< standard deviation of the box's middle, of its width,
+    float height_sd;  ///< and of its height, of itself
+} bslam_scan_kind_t;
+
+typedef struct bslam_scanner_model {
+    int32_t kind_count;
+    const bslam_scan_kind_t *kinds;
+    int32_t window_count;
+    const bslam_window_t *windows;  ///< of all kinds
+} bslam_scanner_model_t;
+
 // ---- the detector -----------------------------------------------------------------------------------------
 
 /// A kind of beacon.

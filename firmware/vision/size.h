@@ -67,6 +67,17 @@
       BSLAM_VISION_SIZE_REAL * (BSLAM_VISION_SIZE_STATES * (BSLAM_VISION_SIZE_STATES + 1) + 4) + 8 + 7) / \
      8 * 8)
 
+/// The scanner: cells of four sizes of the picture with what makes them, rows of the size in between, boxes.
+#define BSLAM_VISION_SIZE_OCTAVE \
+    (32 + BSLAM_VISION_SIZE_POINTER + 3 * (BSLAM_IMAGE_WIDTH_MAX + 8) + 18 * BSLAM_VISION_SIZE_COLUMNS)
+#define BSLAM_VISION_SIZE_LEVEL_ROW (8 * (BSLAM_VISION_SIZE_COLUMNS + 4))
+#define BSLAM_SCANNER_BYTES \
+    ((4 * BSLAM_VISION_SIZE_OCTAVE + 8 + 4 * BSLAM_VISION_SIZE_COLUMNS + 2 * BSLAM_IMAGE_WIDTH_MAX + \
+      8 * ((BSLAM_VISION_SIZE_COLUMNS * (BSLAM_IMAGE_HEIGHT_MAX / 4) * 4 + 2) / 3) + \
+      20 * BSLAM_VISION_SIZE_LEVEL_ROW + 128 * 24 + 36 * BSLAM_CANDIDATES_MAX + BSLAM_VISION_SIZE_POINTER + \
+      64 + 7) / \
+     8 * 8)
+
 /// Differs where sizes do, so that library and application notice: bslam_vision_init.
 #define BSLAM_VISION_MIX(hash, value) ((hash) * 16777619u + (uint32_t)(value))
 #define BSLAM_VISION_HASH_OF_IMAGE \

@@ -207,6 +207,76 @@ typedef struct bslam_vision_counters {
 
 bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision);
 
+// ---- your own kinds: a scanner
+// -----------------------------------------------------------------------------
+//
+//     static bslam_scanner_t scanner;
+//     bslam_scanner_init(&scanner, &bslam_my_things);      the header that `bslam detect train` wrote
+//     bslam_scanner_begin(&scanner, BSLAM_PIXELS_RGB565, 320, 240);
+//     bslam_scanner_row(&scanner, pixels);                 every row, as it comes
+//     found = bslam_scanner_end(&scanner);
+//     bslam_scanner_sighting(&scanner, &camera, &found->items[0], &seen);
+//
+// It needs no horizon, no colour of the walls and no camera, and remembers nothing from picture to picture.
+// MATH-CAMERA "Scanner".
+
+/// A scanner. What stands in it is the library's own.
+typedef union bslam_scanner {
+    unsigned char bytes[BSLAM_SCANNER_BYTES];
+    void *alignment_of_pointers;
+    uint32_t alignment_of_words;
+} bslam_scanner_t;
+
+/// A thing that was found.
+typedef struct bslam_detection {
+    bslam_box_t box;  ///< within the picture
+    int32_t kind;     ///< index in the model's kinds
+    float score;      ///< the SVM's value
+    float log_odds;   ///< that it is one of the kind
+    uint16_t marks;   ///< BSLAM_MARK_CUT_LEFT and so on: the box reaches the picture's edge
+} bslam_detection_t;
+
+/// What came of a picture. Surest first; good until the next picture begins.
+typedef struct bslam_detections {
+    bslam_vision_reason_t reason;
+    int32_t count;
+    int32_t dropped;  ///< boxes for which there was no room
+    bslam_detection_t items[BSLAM_CANDIDATES_MAX];
+} bslam_detections_t;
+
+/// Makes a scanner ready. The model must outlive it. BSLAM_E_SIZE: as bslam_vision_init. BSLAM_E_COUNT: a
+/// count of the model is not as model.h has it, or a window has a kind or an order that is none.
+/// BSLAM_E_NOT_FINITE; BSLAM_E_PARAMETER: a number of the model that cannot be. Nothing was written then.
+#define bslam_scanner_init(scanner, model) \
+    bslam_scanner_init_sized((scanner), sizeof *(scanner), BSLAM_VISION_HASH, (model))
+#if BSLAM_REAL_DOUBLE
+#define bslam_scanner_init_sized bslam_scanner_init_double
+#endif
+BSLAM_MUST_CHECK bslam_status_t bslam_scanner_init_sized(bslam_scanner_t *scanner, size_t scanner_bytes,
+                                                         uint32_t sizes_hash,
+                                                         const bslam_scanner_model_t *model);
+
+/// Starts a picture; one before it that is unfinished is given up. BSLAM_E_RANGE: another format than there
+/// is, or a side that is not 32 to BSLAM_IMAGE_WIDTH_MAX in steps of 8, or to BSLAM_IMAGE_HEIGHT_MAX in steps
+/// of 4.
+BSLAM_MUST_CHECK bslam_status_t bslam_scanner_begin(bslam_scanner_t *scanner, bslam_pixel_format_t format,
+                                                    int32_t width_px, int32_t height_px);
+
+/// The next row, uppermost first. BSLAM_E_COUNT: the picture has all its rows already, or none has begun.
+BSLAM_MUST_CHECK bslam_status_t bslam_scanner_row(bslam_scanner_t *scanner, const void *pixels);
+
+/// Looks at the picture: windows of all sizes, of boxes that overlap by .4 or more the best. Where rows are
+/// missing nothing is found, and the reason says so. docs/SIZES.md has the cost.
+const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner);
+
+/// What was found as a sighting, without identity or signature: direction, distance where the kind's height
+/// is known and nothing cuts it off, both with their noise. BSLAM_E_RANGE: a kind that is none, or the camera
+/// has no direction there; *sighting is unchanged then.
+BSLAM_MUST_CHECK bslam_status_t bslam_scanner_sighting(const bslam_scanner_t *scanner,
+                                                       const bslam_camera_t *camera,
+                                                       const bslam_detection_t *found,
+                                                       bslam_sighting_t *sighting);
+
 // ---- the visual gyro: how the robot turned ----------------------------------------------------------------
 //
 //     bslam_visual_gyro_init(&gyro, BSLAM_VISUAL_GYRO_SD_RADPS);

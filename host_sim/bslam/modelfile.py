@@ -161,7 +161,7 @@ def read_recogniser(path: Path, features: int) -> Recogniser:
 
     Raises BslamError that names file, key, value and what is allowed.
     """
-    document = _Document(path, _load(path))
+    document = Document(path, load_document(path))
     document.equal("format", FORMAT)
     document.equal("version", VERSION)
     document.equal("features", features)
@@ -190,7 +190,7 @@ def _rounded(value: float) -> float:
     return float(f"{float(np.float32(value)):.9g}")
 
 
-def _load(path: Path) -> Mapping[str, Any]:
+def load_document(path: Path) -> Mapping[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -206,7 +206,7 @@ def _load(path: Path) -> Mapping[str, Any]:
 
 
 @dataclass(frozen=True)
-class _Document:
+class Document:
     """A JSON table that is asked for its keys one by one, each with what it may hold."""
 
     path: Path
@@ -246,7 +246,7 @@ class _Document:
             raise self._error(key, value, "a table")
         return value
 
-    def children(self, key: str, most: int) -> list[_Document]:
+    def children(self, key: str, most: int) -> list[Document]:
         allowed = f"a list of 1 to {most} tables"
         value = self._get(key, allowed)
         if not isinstance(value, list) or not 1 <= len(value) <= most:
@@ -254,13 +254,28 @@ class _Document:
         for index, one in enumerate(value):
             if not isinstance(one, dict):
                 raise self._error(f"{key}[{index}]", one, "a table")
-        return [_Document(self.path, one, f"{self.prefix}{key}[{i}].") for i, one in enumerate(value)]
+        return [Document(self.path, one, f"{self.prefix}{key}[{i}].") for i, one in enumerate(value)]
 
     def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
         """Finite float32 numbers of a shape of one or two dimensions."""
         value = self._get(key, f"{shape[0]} entries")
         self._check_nested(key, value, shape)
         return np.array(value, dtype=np.float32)
+
+    def integers(
+        self, key: str, count: int, dtype: type[np.signedinteger[Any] | np.unsignedinteger[Any]]
+    ) -> NDArray[Any]:
+        """So many whole numbers that the dtype holds."""
+        value = self._get(key, f"a list of {count}")
+        limits = np.iinfo(dtype)
+        low, high = int(limits.min), int(limits.max)
+        if not isinstance(value, list) or len(value) != count:
+            shown = f"{len(value)} entries" if isinstance(value, list) else value
+            raise self._error(key, shown, f"a list of {count}")
+        for index, one in enumerate(value):
+            if type(one) is not int or not low <= one <= high:
+                raise self._error(f"{key}[{index}]", one, f"a whole number from {low} to {high}")
+        return np.array(value, dtype=dtype)
 
     def _check_nested(self, key: str, value: object, shape: tuple[int, ...]) -> None:
         if not shape:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from bslam.cheader import Header, c_float, named_initialiser
 from bslam.core.vision import BeaconModel, DetectorModel
-from tools.training.export import Header, c_float, named_initialiser
 
 
 def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from bslam.datasets.labels import COLUMNS
 from bslam.rig import load_rig
 from bslam.world.camera import Renderer, Scene, Seen, free_pose, make_world
-from tools.training.folder import COLUMNS
 
 BETWEEN_S = 10.0  # light and white balance change from picture to picture
 SLANT_RAD_MAX = math.radians(75.0)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from bslam.core.appearance import rendered_seeds
 from bslam.core.vision import BeaconModel, Candidate
+from bslam.datasets.labels import FILE, Folder, Label
 from bslam.datasets.pictures import Box, Scaled, camera_for, load_picture
 from bslam.errors import BslamError
 from bslam.rig import Camera
-from tools.training.folder import FILE, Folder, Label
 from tools.training.front_end import FrontEnd
 from tools.training.truth import areas, intersections, overlaps
 

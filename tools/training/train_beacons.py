@@ -4,7 +4,7 @@
 
 Writes the C header, the same as a model file for `bslam look --model` (.json), and the confusion matrix as a
 picture (.png); prints it too. The figures are of pictures that a machine was not trained on, by
-cross-validation. docs/RETRAIN.md is the guide, tools/training/folder.py describes labels.csv.
+cross-validation. docs/RETRAIN.md is the guide, bslam/datasets/labels.py describes labels.csv.
 """
 
 import argparse
@@ -18,12 +18,13 @@ import sklearn
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bslam import cheader as export
+from bslam.datasets.labels import Folder, read_folder
 from bslam.errors import BslamError
 from bslam.modelfile import Recogniser, write_recogniser
 from bslam.rig import load_rig
-from tools.training import export, fit
+from tools.training import fit
 from tools.training.compiled import TOLERANCE, CompiledSvm, worst_difference
-from tools.training.folder import Folder, read_folder
 from tools.training.samples import NONE, Samples, collect, folder_sha256
 
 NO_RIG = """no --rig: taken for pictures of a camera 60 degrees wide that looks straight ahead. One that does

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from bslam.cheader import write_header
 from bslam.core.vision import BeaconModel, DetectorModel
 from tools.training.built_in import built_in_detector
 from tools.training.closer import choose_fusion_threshold, fit_close, fit_verdict, gather_close
@@ -30,7 +31,6 @@ from tools.training.detector_fit import (
 )
 from tools.training.detector_samples import CLASSES, blank_detector, gather_boxes, gather_cells
 from tools.training.detector_score import look_at_worlds, score
-from tools.training.export import write_header
 from tools.training.render_set import FRAMES_A_WORLD, RIGS, render_set
 
 ROOT = Path(__file__).resolve().parents[2]

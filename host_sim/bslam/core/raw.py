@@ -13,6 +13,7 @@ from bslam.core.builds import REALS, SIZE_CLASSES, VISION_EXTENSION, extension_n
 from bslam.core.errors import CoreError
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, HingedSvm, Svm
+from bslam.rig import Camera
 
 
 class Library:
@@ -220,6 +221,24 @@ class VisionLibrary:
         )
         keep.append(made)
         return made[0]
+
+    def camera(self, camera: Camera) -> Any:
+        """A bslam_camera_t."""
+        lens = camera.lens
+        kinds = {
+            "pinhole": self.lib.BSLAM_LENS_PINHOLE,
+            "equidistant": self.lib.BSLAM_LENS_EQUIDISTANT,
+        }
+        same = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2")
+        return self.new_filled(
+            "bslam_camera_t",
+            lens=kinds[lens.kind],
+            yaw_rad=camera.yaw_rad,
+            pitch_rad=camera.pitch_rad,
+            z_m=camera.z_m,
+            zoom=camera.zoom,
+            **{name: getattr(lens, name) for name in same},
+        )
 
     def pixels(self, rgb: NDArray[Any]) -> Any:
         """The bytes of a C-contiguous picture, good as long as the array is."""

@@ -143,7 +143,7 @@ class FrontEnd:
         if threshold is not None:
             self._model.pinhole.threshold = self._model.wide.threshold = threshold
         self._vision = ffi.new("bslam_vision_t *")
-        array = ffi.new("bslam_camera_t[]", [self._camera(camera)[0] for camera in cameras])
+        array = ffi.new("bslam_camera_t[]", [self._library.camera(camera)[0] for camera in cameras])
         self._library.ensure(
             lib.bslam_vision_init_sized(
                 self._vision,
@@ -267,23 +267,6 @@ class FrontEnd:
     def _told(self, found: Any) -> Told:
         sighting = self._library.lib.bslam_sighting_of(self._library.ffi.addressof(found))
         return Told(sighting.bearing_sd_rad, sighting.range_sd_m, sighting.range_scale_sd)
-
-    def _camera(self, camera: Camera) -> Any:
-        lens = camera.lens
-        kinds = {
-            "pinhole": self._library.lib.BSLAM_LENS_PINHOLE,
-            "equidistant": self._library.lib.BSLAM_LENS_EQUIDISTANT,
-        }
-        same = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2")
-        return self._library.new_filled(
-            "bslam_camera_t",
-            lens=kinds[lens.kind],
-            yaw_rad=camera.yaw_rad,
-            pitch_rad=camera.pitch_rad,
-            z_m=camera.z_m,
-            zoom=camera.zoom,
-            **{name: getattr(lens, name) for name in same},
-        )
 
     def _new_model(self, model: BeaconModel) -> Any:
         return self._library.new_filled(

@@ -17,7 +17,9 @@ from bslam.rig import Camera, Lens
 SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".bmp", ".ppm")
 _TRAINED_PX: Final = (320, 240)
 """The detector was trained on frames of this size: a larger picture of no known camera is made as small."""
-_CELL_PX: Final = 4
+_STEP_PX: Final = (8, 4)
+"""A frame's sides are multiples of these."""
+_SIDE_MIN_PX: Final = 32
 _FIELD_OF_VIEW_RAD: Final = math.radians(60.0)
 _SAME_SHAPE: Final = 0.01  # width to height of a picture and of its camera's frame may differ by this share
 
@@ -52,8 +54,8 @@ class Scaled:
 def load_picture(path: Path, camera: Camera | None = None) -> Scaled:
     """A picture, upright, scaled to the frame of `camera`, or else to the largest that the front end takes.
 
-    It is not enlarged. Without a camera its sides become multiples of a cell: up to three pixels of the frame
-    are cut off, half on each side. BslamError if it cannot be read, or is not of the camera's shape.
+    It is not enlarged. Without a camera its width becomes a multiple of 8, its height of 4: up to seven pixels of the
+    frame are cut off, half on each side. BslamError if it cannot be read, or is not of the camera's shape.
     """
     try:
         with Image.open(path) as opened:
@@ -86,9 +88,11 @@ def camera_for(width_px: int, height_px: int) -> Camera:
 
 def _natural_size(size: tuple[int, int], where: str) -> tuple[float, int, int]:
     scale = min(1.0, *(most / side for most, side in zip(_TRAINED_PX, size, strict=True)))
-    width_px, height_px = (_CELL_PX * int(side * scale / _CELL_PX) for side in size)
-    if min(width_px, height_px) < 4 * _CELL_PX:
-        allowed = f"sides from {4 * _CELL_PX} px, not longer than 20:1"
+    width_px, height_px = (
+        step * int(side * scale / step + 1e-6) for side, step in zip(size, _STEP_PX, strict=True)
+    )
+    if min(width_px, height_px) < _SIDE_MIN_PX:
+        allowed = f"sides from {_SIDE_MIN_PX} px, not longer than 7:1"
         raise BslamError(f"{where}: is {size[0]}x{size[1]}; allowed: {allowed}")
     return scale, width_px, height_px
 

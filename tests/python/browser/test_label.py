@@ -8,7 +8,7 @@ from PIL import Image
 from playwright.sync_api import Page, expect
 
 from bslam.modelfile import BeaconClass
-from tools.training.folder import Label, read_folder
+from bslam.datasets.labels import Label, read_folder
 
 PAGE = Path(__file__).parents[3] / "tools/label.html"
 LARGE = (2000, 1500)  # more than the window has, so it is shown reduced

@@ -20,7 +20,7 @@ from tools.training.additive import (
 )
 from tools.training.compiled import compile_library
 from tools.training.detector_samples import recoloured
-from tools.training.export import Header
+from bslam.cheader import Header
 from tools.training.front_end import open_library
 
 CROSSED = np.array([0, 1, 4], np.uint8)

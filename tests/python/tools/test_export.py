@@ -1,4 +1,4 @@
-"""tools/training/export.py: headers that compile and decide as scikit-learn does."""
+"""bslam/cheader.py: headers that compile and decide as scikit-learn does."""
 
 import ctypes
 from dataclasses import replace
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from bslam.core.vision import BeaconModel
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
-from tools.training import export, fit
+from bslam import cheader as export
+from tools.training import fit
 from tools.training.built_in import built_in_detector
 from tools.training.compiled import (
     TOLERANCE,

@@ -12,7 +12,7 @@ from sklearn.svm import LinearSVC
 from bslam.modelfile import HingedSvm
 from tools.training.closer import mirrored
 from tools.training.compiled import compile_library
-from tools.training.export import Header
+from bslam.cheader import Header
 from tools.training.front_end import open_library
 from tools.training.hinged import DEVIATION_MIN, decide_hinged, expand_hinges, fit_hinged
 

@@ -10,7 +10,7 @@ import quickjs
 from PIL import Image
 
 from bslam.modelfile import BeaconClass
-from tools.training.folder import COLUMNS, Label, read_folder
+from bslam.datasets.labels import COLUMNS, Label, read_folder
 
 PAGE = (Path(__file__).parents[3] / "tools/label.html").read_text(encoding="utf-8")
 

@@ -8,7 +8,7 @@ import pytest
 
 from bslam.cli import main
 from tools.training import example_pictures, train_beacons
-from tools.training.folder import read_folder
+from bslam.datasets.labels import read_folder
 
 WORLD = 3
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
+from bslam import cheader as export
 from tools.bench.peers.programs import BUILD, INCLUDE, OPTIMISED, ROOT, SOURCES
-from tools.training import export, fit
+from tools.training import fit
 from tools.training.looks import Views, rendered
 
 SCENARIO, WORLD, FRAMES = "building20", 11, 1500

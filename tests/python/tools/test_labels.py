@@ -1,4 +1,4 @@
-"""tools/training/folder.py: a labels file is read, or refused with line, column and what is allowed."""
+"""bslam/datasets/labels.py: a labels file is read, or refused with line, column and what is allowed."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from PIL import ExifTags, Image
 
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
-from tools.training.folder import COLUMNS, Label, read_folder
+from bslam.datasets.labels import COLUMNS, Label, read_folder
 
 HEADER = ",".join(COLUMNS)
 HEIGHTS = HEADER.removesuffix(",depth_m")

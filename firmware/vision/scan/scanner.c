@@ -1,0 +1,415 @@
+// Windows slide over all sizes of a picture. MATH-CAMERA "Scanner".
+#include "vision/scan/scanner.h"
+
+#include <string.h>
+
+#include "base/scalar.h"
+#include "vision/pixels/bytes.h"
+
+_Static_assert(sizeof(bslam_scanner_instance_t) <= sizeof(bslam_scanner_t), "size.h: the scanner");
+
+enum { SIDE_MIN = 32, WIDTH_STEP = 8, EDGES = 4, BLOCK = 2 };
+/// Boxes of one kind that overlap as much, of both together, are one thing's.
+static const float OVERLAP_MAX = 0.4f;
+/// An edge is no farther from its window's box than this, of width or height.
+static const float EDGE_MAX = 0.4f;
+/// A box that ends so near to the picture's edge may go on outside.
+static const float CUT_PX = 1.0f;
+/// Luma of cells, 0 to 242, and shares of them, percent: as of the front end.
+enum { BLACK_BELOW = 15, SATURATED_FROM = 232, BLACK_PERCENT = 95, SATURATED_PERCENT = 60, FLAT_RANGE = 11 };
+
+// ---- the model --------------------------------------------------------------------------------------------
+
+static bool is_side(int32_t cells)
+{
+    return cells >= BLOCK && cells <= BSLAM_WINDOW_SIDE_MAX;
+}
+
+static bool is_share(float box, int32_t cells)
+{
+    return box > 0 && box <= (float)cells;
+}
+
+static bslam_status_t check_window(const bslam_scanner_model_t *model, const bslam_window_t *window)
+{
+    if (window->kind >= model->kind_count || !is_side(window->columns) || !is_side(window->rows)) {
+        return BSLAM_E_COUNT;
+    }
+    for (int32_t i = 0; i < window->rows; i++) {
+        if (window->order[i] >= window->rows) {
+            return BSLAM_E_COUNT;
+        }
+    }
+    for (int32_t i = 0; i < EDGES; i++) {
+        if (!bslam_is_number(window->edge_scale[i]) || !bslam_is_number(window->edge_bias[i])) {
+            return BSLAM_E_NOT_FINITE;
+        }
+    }
+    if (!bslam_is_number(window->scale)) {
+        return BSLAM_E_NOT_FINITE;
+    }
+    const bool is_good = window->scale > 0 && is_share(window->box_columns, window->columns) &&
+                         is_share(window->box_rows, window->rows);
+    return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
+}
+
+static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
+{
+    const float values[] = {kind->height_m, kind->threshold, kind->slope,
+                            kind->offset,   kind->middle_sd, kind->height_sd};
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+        if (!bslam_is_number(values[i])) {
+            return BSLAM_E_NOT_FINITE;
+        }
+    }
+    const bool is_good = kind->name != NULL && kind->height_m >= 0 && kind->height_m <= 10 &&
+                         kind->middle_sd > 0 && kind->height_sd > 0;
+    return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
+}
+
+static bslam_status_t check_model(const bslam_scanner_model_t *model)
+{
+    if (model->kind_count < 1 || model->kind_count > BSLAM_KINDS_MAX || model->window_count < 1 ||
+        model->window_count > BSLAM_WINDOWS_MAX) {
+        return BSLAM_E_COUNT;
+    }
+    bslam_status_t status = BSLAM_OK;
+    for (int32_t i = 0; i < model->kind_count && status == BSLAM_OK; i++) {
+        status = check_kind(&model->kinds[i]);
+    }
+    for (int32_t i = 0; i < model->window_count && status == BSLAM_OK; i++) {
+        status = check_window(model, &model->windows[i]);
+    }
+    return status;
+}
+
+bslam_status_t bslam_scanner_init_sized(bslam_scanner_t *scanner, size_t scanner_bytes, uint32_t sizes_hash,
+                                        const bslam_scanner_model_t *model)
+{
+    if (scanner_bytes != sizeof *scanner || sizes_hash != BSLAM_VISION_HASH) {
+        return BSLAM_E_SIZE;
+    }
+    const bslam_status_t status = check_model(model);
+    if (status == BSLAM_OK) {
+        memset(scanner, 0, sizeof *scanner);
+        bslam_scanner_instance(scanner)->model = model;
+    }
+    return status;
+}
+
+// ---- rows come in -----------------------------------------------------------------------------------------
+
+static bool is_size(int32_t size_px, int32_t size_max_px, int32_t step_px)
+{
+    return size_px >= SIDE_MIN && size_px <= size_max_px && size_px % step_px == 0;
+}
+
+bslam_status_t bslam_scanner_begin(bslam_scanner_t *scanner, bslam_pixel_format_t format, int32_t width_px,
+                                   int32_t height_px)
+{
+    if ((format != BSLAM_PIXELS_RGB565 && format != BSLAM_PIXELS_RGB888) ||
+        !is_size(width_px, BSLAM_IMAGE_WIDTH_MAX, WIDTH_STEP) ||
+        !is_size(height_px, BSLAM_IMAGE_HEIGHT_MAX, BSLAM_CELL_PX)) {
+        return BSLAM_E_RANGE;
+    }
+    bslam_scanner_instance_t *instance = bslam_scanner_instance(scanner);
+    instance->format = format;
+    instance->width_px = width_px;
+    instance->height_px = height_px;
+    instance->rows_seen = 0;
+    bslam_channels_begin(&instance->channels, width_px, height_px);
+    return BSLAM_OK;
+}
+
+bslam_status_t bslam_scanner_row(bslam_scanner_t *scanner, const void *pixels)
+{
+    bslam_scanner_instance_t *instance = bslam_scanner_instance(scanner);
+    if (instance->rows_seen >= instance->height_px) {
+        return BSLAM_E_COUNT;
+    }
+    uint16_t *packed = instance->channels.packed;
+    if (instance->format == BSLAM_PIXELS_RGB565) {
+        memcpy(packed, pixels, (size_t)instance->width_px * sizeof *packed);
+    } else {
+        const uint8_t *rgb = pixels;
+        for (int32_t x = 0; x < instance->width_px; x++, rgb += 3) {
+            packed[x] = (uint16_t)(rgb[0] >> 3 << 11 | rgb[1] >> 2 << 5 | rgb[2] >> 3);
+        }
+    }
+    bslam_channels_row(&instance->channels, packed);
+    instance->rows_seen++;
+    return BSLAM_OK;
+}
+
+/// Whether the light lets anything be seen.
+static bslam_vision_reason_t judge_light(const bslam_octave_t *octave)
+{
+    const int32_t count = octave->rows * octave->columns;
+    int32_t black = 0, saturated = 0, low = 255, high = 0;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t luma = octave->cells[i * BSLAM_CHANNELS];
+        black += luma < BLACK_BELOW ? 1 : 0;
+        saturated += luma >= SATURATED_FROM ? 1 : 0;
+        low = luma < low ? luma : low;
+        high = luma > high ? luma : high;
+    }
+    if (100 * black > BLACK_PERCENT * count) {
+        return BSLAM_VISION_BLACK;
+    }
+    if (100 * saturated > SATURATED_PERCENT * count) {
+        return BSLAM_VISION_OVEREXPOSED;
+    }
+    return high - low > FLAT_RANGE ? BSLAM_VISION_NOTHING : BSLAM_VISION_FLAT;
+}
+
+// ---- windows ----------------------------------------------------------------------------------------------
+
+/// A window at a place, for what looks at its cells.
+typedef struct view {
+    const bslam_window_t *window;
+    const uint8_t *rows[BSLAM_WINDOW_SIDE_MAX];
+} view_t;
+
+/// The sum of products of bytes, in words.
+static inline int32_t add_products(const int8_t *weights, const uint8_t *cells, int32_t count, int32_t sum)
+{
+#ifdef __ARM_FEATURE_SIMD32
+    for (int32_t i = 0; i < count; i += BSLAM_WORD_BYTES) {
+        const uint32_t w = bslam_word_at(weights + i), c = bslam_word_at(cells + i);
+        sum = bslam_halves_dot(bslam_bytes_signed_even(w), bslam_bytes_even(c), sum);
+        sum = bslam_halves_dot(bslam_bytes_signed_odd(w), bslam_bytes_odd(c), sum);
+    }
+#else
+    for (int32_t i = 0; i < count; i++) {
+        sum += weights[i] * cells[i];
+    }
+#endif
+    return sum;
+}
+
+/// The window's sum with its upper left cell in a column; false once it is below a row's floor.
+static bool value_at(const view_t *view, int32_t column, int32_t *sum)
+{
+    const bslam_window_t *window = view->window;
+    const int32_t bytes = window->columns * BSLAM_CHANNELS, at = column * BSLAM_CHANNELS;
+    *sum = window->bias;
+    for (int32_t i = 0; i < window->rows; i++) {
+        const int32_t row = window->order[i];
+        *sum = add_products(window->weights + row * bytes, view->rows[row] + at, bytes, *sum);
+        if (*sum < window->floors[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// By how much the box's edges differ from the window's, of its width and height.
+static void edges_at(const view_t *view, int32_t column, float edges[EDGES])
+{
+    const bslam_window_t *window = view->window;
+    const int32_t across = window->columns / BLOCK, down = window->rows / BLOCK;
+    const int8_t *weights = window->edges;
+    for (int32_t e = 0; e < EDGES; e++) {
+        int32_t sum = 0;
+        for (int32_t r = 0; r < down; r++) {
+            const uint8_t *above = view->rows[BLOCK * r] + column * BSLAM_CHANNELS;
+            const uint8_t *below = view->rows[BLOCK * r + 1] + column * BSLAM_CHANNELS;
+            for (int32_t c = 0; c < across; c++) {
+                for (int32_t k = 0; k < BSLAM_CHANNELS; k++) {
+                    sum += *weights++ *
+                           (above[k] + above[k + BSLAM_CHANNELS] + below[k] + below[k + BSLAM_CHANNELS]);
+                }
+                above += BLOCK * BSLAM_CHANNELS;
+                below += BLOCK * BSLAM_CHANNELS;
+            }
+        }
+        const float edge = window->edge_scale[e] * (float)sum + window->edge_bias[e];
+        edges[e] = edge > EDGE_MAX ? EDGE_MAX : edge < -EDGE_MAX ? -EDGE_MAX : edge;
+    }
+}
+
+static float within(float value, float most)
+{
+    return value < 0 ? 0 : value > most ? most : value;
+}
+
+/// Where the weakest of all hits stands.
+static bslam_hit_t *weakest(bslam_scanner_instance_t *instance)
+{
+    bslam_hit_t *least = &instance->hits[0];
+    for (int32_t i = 1; i < BSLAM_HITS_MAX; i++) {
+        least = instance->hits[i].score < least->score ? &instance->hits[i] : least;
+    }
+    return least;
+}
+
+static void note_hit(bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
+{
+    if (instance->hit_count < BSLAM_HITS_MAX) {
+        instance->hits[instance->hit_count] = *hit;
+        instance->hit_count++;
+        return;
+    }
+    bslam_hit_t *least = weakest(instance);
+    instance->found.dropped++;
+    if (hit->score > least->score) {
+        *least = *hit;
+    }
+}
+
+static void take_window(bslam_scanner_instance_t *instance, const bslam_level_t *level, const view_t *view,
+                        int32_t column, int32_t top, int32_t sum)
+{
+    const bslam_window_t *window = view->window;
+    const float score = window->scale * (float)sum;
+    if (score < instance->model->kinds[window->kind].threshold) {
+        return;
+    }
+    float edges[EDGES];
+    edges_at(view, column, edges);
+    const float middle_x = (float)(2 * (column - BSLAM_LEVEL_PAD) + window->columns) / 2 * level->cell_px;
+    const float middle_y = (float)(2 * (top - BSLAM_LEVEL_PAD) + window->rows) / 2 * level->cell_px;
+    const float width = window->box_columns * level->cell_px, height = window->box_rows * level->cell_px;
+    const float most_x = (float)instance->width_px, most_y = (float)instance->height_px;
+    const bslam_hit_t hit = {
+        .left_px = within(middle_x + (edges[0] - 0.5f) * width, most_x),
+        .top_px = within(middle_y + (edges[1] - 0.5f) * height, most_y),
+        .right_px = within(middle_x + (edges[2] + 0.5f) * width, most_x),
+        .bottom_px = within(middle_y + (edges[3] + 0.5f) * height, most_y),
+        .score = score,
+        .kind = window->kind,
+    };
+    if (hit.right_px > hit.left_px && hit.bottom_px > hit.top_px) {
+        note_hit(instance, &hit);
+    }
+}
+
+static void scan_row(bslam_scanner_instance_t *instance, const bslam_level_t *level,
+                     const bslam_window_t *window, int32_t top)
+{
+    view_t view = {.window = window};
+    for (int32_t i = 0; i < window->rows; i++) {
+        view.rows[i] = instance->rows[(top + i) % BSLAM_WINDOW_SIDE_MAX];
+    }
+    for (int32_t column = 0; column + window->columns <= level->columns; column++) {
+        int32_t sum;
+        if (value_at(&view, column, &sum)) {
+            take_window(instance, level, &view, column, top, sum);
+        }
+    }
+}
+
+static void scan_level(bslam_scanner_instance_t *instance, const bslam_level_t *level)
+{
+    for (int32_t row = 0; row < level->rows; row++) {
+        bslam_level_row(level, row, instance->rows[row % BSLAM_WINDOW_SIDE_MAX]);
+        for (int32_t i = 0; i < instance->model->window_count; i++) {
+            const bslam_window_t *window = &instance->model->windows[i];
+            if (row + 1 >= window->rows) {
+                scan_row(instance, level, window, row + 1 - window->rows);
+            }
+        }
+    }
+}
+
+// ---- boxes ------------------------------------------------------------------------------------------------
+
+static float overlap(float low_a, float high_a, float low_b, float high_b)
+{
+    const float low = low_a > low_b ? low_a : low_b, high = high_a < high_b ? high_a : high_b;
+    return high > low ? high - low : 0;
+}
+
+static float area(const bslam_hit_t *hit)
+{
+    return (hit->right_px - hit->left_px) * (hit->bottom_px - hit->top_px);
+}
+
+static bool is_same_thing(const bslam_hit_t *a, const bslam_hit_t *b)
+{
+    const float both = overlap(a->left_px, a->right_px, b->left_px, b->right_px) *
+                       overlap(a->top_px, a->bottom_px, b->top_px, b->bottom_px);
+    return a->kind == b->kind && both >= OVERLAP_MAX * (area(a) + area(b) - both);
+}
+
+static bslam_hit_t *best_left(bslam_scanner_instance_t *instance)
+{
+    bslam_hit_t *best = NULL;
+    for (int32_t i = 0; i < instance->hit_count; i++) {
+        bslam_hit_t *hit = &instance->hits[i];
+        if (hit->kind >= 0 && (best == NULL || hit->score > best->score)) {
+            best = hit;
+        }
+    }
+    return best;
+}
+
+static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
+{
+    const bslam_scan_kind_t *kind = &instance->model->kinds[hit->kind];
+    const float right = (float)instance->width_px - CUT_PX, bottom = (float)instance->height_px - CUT_PX;
+    const int32_t marks = (hit->left_px < CUT_PX ? BSLAM_MARK_CUT_LEFT : 0) |
+                          (hit->right_px > right ? BSLAM_MARK_CUT_RIGHT : 0) |
+                          (hit->top_px < CUT_PX ? BSLAM_MARK_CUT_TOP : 0) |
+                          (hit->bottom_px > bottom ? BSLAM_MARK_CUT_BOTTOM : 0);
+    return (bslam_detection_t){
+        .box = {hit->left_px - 0.5f, hit->top_px - 0.5f, hit->right_px - 0.5f, hit->bottom_px - 0.5f},
+        .kind = hit->kind,
+        .score = hit->score,
+        .log_odds = kind->slope * hit->score + kind->offset,
+        .marks = (uint16_t)marks,
+    };
+}
+
+/// Of boxes that overlap the best remain.
+static void report_best(bslam_scanner_instance_t *instance)
+{
+    bslam_detections_t *found = &instance->found;
+    for (bslam_hit_t *best = best_left(instance); best != NULL; best = best_left(instance)) {
+        if (found->count == BSLAM_CANDIDATES_MAX) {
+            found->dropped++;
+            return;
+        }
+        found->items[found->count] = detection_of(instance, best);
+        found->count++;
+        const bslam_hit_t taken = *best;
+        for (int32_t i = 0; i < instance->hit_count; i++) {
+            bslam_hit_t *hit = &instance->hits[i];
+            hit->kind = is_same_thing(hit, &taken) ? -1 : hit->kind;
+        }
+    }
+}
+
+const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner)
+{
+    bslam_scanner_instance_t *instance = bslam_scanner_instance(scanner);
+    bslam_detections_t *found = &instance->found;
+    found->count = 0;
+    found->dropped = 0;
+    instance->hit_count = 0;
+    if (instance->rows_seen < instance->height_px || instance->height_px == 0) {
+        found->reason = BSLAM_VISION_UNFINISHED;
+        return found;
+    }
+    instance->rows_seen = 0;
+    bslam_channels_end(&instance->channels);
+    found->reason = judge_light(&instance->channels.octaves[0]);
+    if (found->reason == BSLAM_VISION_NOTHING) {
+        const int32_t levels = instance->channels.octave_count * BSLAM_LEVELS_AN_OCTAVE;
+        for (int32_t i = 0; i < levels; i++) {
+            const bslam_level_t level = bslam_level(&instance->channels, i);
+            scan_level(instance, &level);
+        }
+        report_best(instance);
+        found->reason = found->count > 0 ? BSLAM_VISION_SEEN : BSLAM_VISION_NOTHING;
+    }
+    instance->height_px = 0;
+    return found;
+}
+
+bslam_level_t bslam_scanner_level(const bslam_scanner_t *scanner, int32_t index)
+{
+    const void *memory = scanner;
+    const bslam_scanner_instance_t *instance = memory;
+    return bslam_level(&instance->channels, index);
+}

@@ -1,0 +1,41 @@
+/// What stands in a bslam_scanner_t. Internal.
+#ifndef BSLAM_VISION_SCAN_SCANNER_H
+#define BSLAM_VISION_SCAN_SCANNER_H
+
+#include "vision/scan/levels.h"
+
+/// Boxes of a picture before those are dropped that overlap a better one.
+enum { BSLAM_HITS_MAX = 128 };
+
+typedef struct bslam_hit {
+    float left_px;  ///< edges from the picture's own
+    float top_px;
+    float right_px;
+    float bottom_px;
+    float score;
+    int32_t kind;  ///< -1: dropped
+} bslam_hit_t;
+
+typedef struct bslam_scanner_instance {
+    const bslam_scanner_model_t *model;
+    bslam_channels_t channels;
+    bslam_pixel_format_t format;
+    int32_t width_px;
+    int32_t height_px;
+    int32_t rows_seen;
+    int32_t hit_count;
+    bslam_detections_t found;
+    bslam_hit_t hits[BSLAM_HITS_MAX];
+    uint8_t rows[BSLAM_WINDOW_SIDE_MAX][BSLAM_LEVEL_ROOM];  ///< of the level that is looked at, the newest
+} bslam_scanner_instance_t;
+
+static inline bslam_scanner_instance_t *bslam_scanner_instance(bslam_scanner_t *scanner)
+{
+    void *memory = scanner;
+    return memory;
+}
+
+/// For training: the cells of a level (bslam_level) of the picture that was finished last.
+bslam_level_t bslam_scanner_level(const bslam_scanner_t *scanner, int32_t index);
+
+#endif

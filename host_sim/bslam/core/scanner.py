@@ -1,0 +1,203 @@
+"""The scanner of the C core: pictures in, boxes of a user's own kinds of things out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.raw import vision_library
+from bslam.core.vision import MARKS
+from bslam.errors import BslamError
+from bslam.rig import Camera
+from bslam.scannerfile import BLOCK, CHANNELS, Kind, ScannerModel, Window
+
+FRAME_STEP_PX = (8, 4)
+"""A frame's width and height are multiples of these."""
+LEVEL_PAD = 2
+"""Cells by which a level goes on beyond the picture on every side."""
+
+
+@dataclass(frozen=True)
+class Detection:
+    """A thing that was found, as bslam_detection_t describes it."""
+
+    kind: str
+    box: tuple[
+        float, float, float, float
+    ]  # left, top, right, bottom, px of the frame; its edges are 0 and its sides
+    score: float
+    log_odds: float
+    marks: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Detections:
+    """What came of a picture: surest first; "seen", or why there is none ("black" say)."""
+
+    items: tuple[Detection, ...]
+    reason: str
+    dropped: int
+
+
+@dataclass(frozen=True)
+class ScanSighting:
+    """Where a thing is, in the robot's frame; range_m None: not measured."""
+
+    bearing_rad: float
+    bearing_sd_rad: float
+    range_m: float | None
+    range_sd_m: float | None
+
+
+@dataclass(frozen=True)
+class Level:
+    """A picture at one size: cells (rows, columns, CHANNELS) uint8, padded by LEVEL_PAD."""
+
+    cells: NDArray[np.uint8]
+    cell_px: float  # side of a cell in the picture
+
+
+class Scanner:
+    """One scanner: it keeps nothing from picture to picture. Without a model it finds nothing, for training."""
+
+    def __init__(self, model: ScannerModel | None = None) -> None:
+        """BslamError if the library refuses the model."""
+        self._library = vision_library()
+        self._keep: list[Any] = []
+        self._model = model or _NOTHING
+        self._scanner = self._library.ffi.new("bslam_scanner_t *")
+        self._library.ensure(
+            self._library.lib.bslam_scanner_init_sized(
+                self._scanner, *self._library.size_of("bslam_scanner_t"), self._new_model(self._model)
+            ),
+            "the scanner refuses its model",
+        )
+
+    def see(self, rgb: NDArray[np.uint8]) -> Detections:
+        """Looks at a picture (height, width, 3) uint8, C-contiguous. BslamError for a size that is not allowed."""
+        found = self._look(rgb)
+        lib, ffi = self._library.lib, self._library.ffi
+        return Detections(
+            items=tuple(self._detection(found.items[i]) for i in range(found.count)),
+            reason=ffi.string(lib.bslam_vision_reason_name(found.reason)).decode(),
+            dropped=found.dropped,
+        )
+
+    def levels(self, rgb: NDArray[np.uint8]) -> list[Level]:
+        """The cells that windows slide over, of all sizes, largest first."""
+        self._look(rgb)
+        return [self._level(i) for i in range(self._library.lib.scanner_levels(self._scanner))]
+
+    def first_level(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The cells of the picture at its own size."""
+        self._look(rgb)
+        return self._level(0).cells
+
+    def sightings(
+        self, rgb: NDArray[np.uint8], camera: Camera
+    ) -> list[tuple[Detection, ScanSighting | None]]:
+        """What is in a picture of a camera, and where; None: the camera has no direction there."""
+        found = self._look(rgb)
+        its = self._library.camera(camera)
+        sighting = self._library.ffi.new("bslam_sighting_t *")
+        both = []
+        for i in range(found.count):
+            one = self._library.ffi.addressof(found.items[i])
+            status = self._library.lib.bslam_scanner_sighting(self._scanner, its, one, sighting)
+            where = None
+            if status == self._library.lib.BSLAM_OK:
+                distance = (sighting.range_m, sighting.range_sd_m) if sighting.has_range else (None, None)
+                where = ScanSighting(sighting.bearing_rad, sighting.bearing_sd_rad, *distance)
+            both.append((self._detection(found.items[i]), where))
+        return both
+
+    def _look(self, rgb: NDArray[np.uint8]) -> Any:
+        lib = self._library.lib
+        if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or not rgb.flags.c_contiguous:
+            raise BslamError(
+                f"a picture of shape {rgb.shape}, {rgb.dtype}: allowed: (height, width, 3) uint8, C-contiguous"
+            )
+        height, width = rgb.shape[:2]
+        begun = lib.bslam_scanner_begin(self._scanner, lib.BSLAM_PIXELS_RGB888, width, height)
+        self._library.ensure(begun, f"a frame of {width}x{height}")
+        pixels = self._library.pixels(rgb)
+        for row in range(height):
+            self._library.ensure(
+                lib.bslam_scanner_row(self._scanner, pixels + row * rgb.strides[0]), f"row {row}"
+            )
+        return lib.bslam_scanner_end(self._scanner)
+
+    def _level(self, index: int) -> Level:
+        ffi, lib = self._library.ffi, self._library.lib
+        rows, columns, side = ffi.new("int32_t *"), ffi.new("int32_t *"), ffi.new("float *")
+        lib.scanner_level(self._scanner, index, rows, columns, side, ffi.NULL)
+        cells = np.empty((rows[0], columns[0], CHANNELS), dtype=np.uint8)
+        lib.scanner_level(self._scanner, index, rows, columns, side, self._library.bytes(cells))
+        return Level(cells, side[0])
+
+    def _detection(self, found: Any) -> Detection:
+        box = found.box
+        edges = (box.left_px + 0.5, box.top_px + 0.5, box.right_px + 0.5, box.bottom_px + 0.5)
+        marks = frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1)
+        return Detection(self._model.kinds[found.kind].name, edges, found.score, found.log_odds, marks)
+
+    def _new_model(self, model: ScannerModel) -> Any:
+        made = self._library.new_filled(
+            "bslam_scanner_model_t",
+            kind_count=len(model.kinds),
+            kinds=self._kinds(model.kinds),
+            window_count=len(model.windows),
+            windows=self._windows(model.windows),
+        )
+        self._keep.append(made)
+        return made
+
+    def _kinds(self, kinds: Sequence[Kind]) -> Any:
+        ffi = self._library.ffi
+        names = [ffi.new("char[]", one.name.encode()) for one in kinds]
+        made = ffi.new(
+            "bslam_scan_kind_t[]", [(name, *astuple(one)[1:]) for name, one in zip(names, kinds, strict=True)]
+        )
+        self._keep += [names, made]
+        return made
+
+    def _windows(self, windows: Sequence[Window]) -> Any:
+        library, keep = self._library, self._keep
+        made = library.ffi.new("bslam_window_t[]", len(windows))
+        for view, one in zip(made, windows, strict=True):
+            view.kind, view.columns, view.rows = one.kind, one.columns, one.rows
+            view.box_columns, view.box_rows = one.box_columns, one.box_rows
+            view.scale, view.bias = one.scale, one.bias
+            view.weights = library.table("int8_t", one.weights, keep)
+            view.order = library.table("uint8_t", one.order, keep)
+            view.floors = library.table("int32_t", one.floors, keep)
+            view.edges = library.table("int8_t", one.edges, keep)
+            view.edge_scale = library.table("float", one.edge_scale, keep)
+            view.edge_bias = library.table("float", one.edge_bias, keep)
+        keep.append(made)
+        return made
+
+
+_NOTHING = ScannerModel(
+    kinds=(Kind("nothing", 0.0, 0.0, 1.0, 0.0, 1.0, 1.0),),
+    windows=(
+        Window(
+            kind=0,
+            box_columns=1.0,
+            box_rows=1.0,
+            weights=np.zeros((BLOCK, BLOCK, CHANNELS), np.int8),
+            scale=1.0,
+            bias=0,
+            order=np.arange(BLOCK, dtype=np.uint8),
+            floors=np.full(BLOCK, 2**31 - 1, np.int32),
+            edges=np.zeros((4, 1, 1, CHANNELS), np.int8),
+            edge_scale=np.zeros(4, np.float32),
+            edge_bias=np.zeros(4, np.float32),
+        ),
+    ),
+)
+"""A window that is given up in its first row everywhere."""

@@ -1,0 +1,299 @@
+"""One window's linear SVM, from pictures: examples, hard negatives over rounds, int8 weights, floors, edges.
+
+scikit-learn fits; the cells come from the scanner in C, so that what was trained is what runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.core.scanner import Level, Scanner
+from bslam.detect.boxes import Floats, overlaps
+from bslam.detect.examples import Example
+from bslam.detect.windows import (
+    Change,
+    Shape,
+    blocks,
+    cropped,
+    shape_for,
+    window_boxes,
+    window_features,
+    window_values,
+)
+from bslam.errors import BslamError
+from bslam.scannerfile import LOWEST, Window
+
+try:
+    from sklearn.cluster import KMeans
+    from sklearn.model_selection import GroupKFold
+    from sklearn.svm import LinearSVC
+except ImportError:  # an extra
+    LinearSVC = None
+
+_COSTS: Final = (0.003, 0.01, 0.03)
+_UNIT: Final = 128.0  # of a cell's values
+_CHANGES: Final = 8  # of an example
+_MOVED: Final = 0.05
+_SCALED: Final = 0.09
+_ROUNDS: Final = 3
+_HARD: Final = -1.0  # score from which on a window that shows something else is an example
+_NEGATIVE_OVERLAP: Final = 0.3  # at most, with any box of the class
+_EDGE_OVERLAP: Final = 0.4  # at least, of windows that edges are learned from
+_EDGE_WINDOWS: Final = 40  # a picture and level
+_EDGE_RIDGE: Final = 200.0
+_EDGE_UNIT: Final = 512.0
+_ASPECT_SD: Final = 0.35  # of the logarithm: beyond, one window is not for all
+_ASPECTS_MAX: Final = 3
+_BOXES_A_SHAPE: Final = 6
+_NEGATIVES_MAX: Final = 16_000
+_TO_COME: Final = 0.96  # of hard windows get no more from the rows that are left
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An example and its cells of all sizes."""
+
+    example: Example
+    levels: tuple[Level, ...]
+
+
+def look_at(examples: Sequence[Example]) -> list[Seen]:
+    """The cells of all pictures."""
+    scanner = Scanner()
+    return [Seen(one, tuple(scanner.levels(one.frame))) for one in examples]
+
+
+def shapes_of(boxes: Floats) -> list[tuple[Shape, NDArray[np.bool_]]]:
+    """Windows for boxes (n, 4) of one class, and which boxes each is for: as few as their aspects allow."""
+    aspects = np.log((boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1]))
+    count = 1
+    groups = np.zeros(len(aspects), int)
+    while _spread(aspects, groups) > _ASPECT_SD and count < min(_ASPECTS_MAX, len(aspects) // _BOXES_A_SHAPE):
+        count += 1
+        groups = KMeans(count, n_init=5, random_state=0).fit(aspects[:, None]).labels_
+    found = []
+    for group in range(count):
+        middle = float(np.median(aspects[groups == group]))
+        found.append((shape_for(np.exp(middle)), (groups == group) | (np.abs(aspects - middle) < _ASPECT_SD)))
+    return found
+
+
+def _spread(aspects: Floats, groups: NDArray[np.int64]) -> float:
+    return max(float(aspects[groups == group].std()) for group in np.unique(groups))
+
+
+def fit_windows(kind: int, name: str, seen: Sequence[Seen], rng: np.random.Generator) -> list[Window]:
+    """The windows of a class. BslamError if scikit-learn is missing."""
+    if LinearSVC is None:
+        raise BslamError("training needs scikit-learn; allowed: pip install 'bslam[detect]'")
+    where = [(i, box) for i, one in enumerate(seen) for box in one.example.of(name)]
+    boxes = np.array([box for _, box in where])
+    return [
+        _Fit(kind, name, shape, seen, rng).window(
+            [pair for pair, its in zip(where, chosen, strict=True) if its]
+        )
+        for shape, chosen in shapes_of(boxes)
+    ]
+
+
+class _Fit:
+    """The work on one window."""
+
+    def __init__(
+        self, kind: int, name: str, shape: Shape, seen: Sequence[Seen], rng: np.random.Generator
+    ) -> None:
+        self._kind, self._name, self._shape, self._seen, self._rng = kind, name, shape, seen, rng
+
+    def window(self, where: Sequence[tuple[int, Floats]]) -> Window:
+        """From which boxes of which pictures."""
+        examples, groups = self._examples(where)
+        negatives, negative_groups = self._random_windows()
+        usual = negatives
+        for _ in range(_ROUNDS):
+            weights, bias = _fit(examples, groups, negatives, negative_groups)
+            hard, hard_groups = self._hard_windows(weights, bias)
+            negatives = np.concatenate([negatives, hard])
+            negative_groups = np.concatenate([negative_groups, hard_groups])
+            negatives, first = np.unique(negatives, axis=0, return_index=True)
+            negative_groups = negative_groups[first]
+        weights, bias = _fit(examples, groups, negatives, negative_groups)
+        return self._quantised(weights, bias, np.concatenate([examples, negatives]), usual)
+
+    def _examples(self, where: Sequence[tuple[int, Floats]]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        scanner = Scanner()
+        cells, groups = [], []
+        for index, box in where:
+            for number in range(_CHANGES):
+                cells.append(
+                    cropped(scanner, self._seen[index].example.frame, box, self._shape, self._change(number))
+                )
+                groups.append(index)
+        return np.array(cells), np.array(groups)
+
+    def _change(self, number: int) -> Change:
+        if number == 0:
+            return Change()
+        x, y = self._rng.uniform(-_MOVED, _MOVED, 2)
+        return Change(x, y, float(np.exp(self._rng.uniform(-_SCALED, _SCALED))), number % 2 == 1)
+
+    def _places(self, one: Seen, level: Level) -> NDArray[np.int64]:
+        """Windows that show something else."""
+        boxes, its = window_boxes(level, self._shape), one.example.of(self._name)
+        shared = overlaps(boxes, its).max(axis=1, initial=0.0)
+        return np.flatnonzero(shared < _NEGATIVE_OVERLAP)
+
+    def _random_windows(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        found, groups = [], []
+        for index, one in enumerate(self._seen):
+            for level in one.levels:
+                places = self._places(one, level)
+                chosen = self._rng.choice(places, min(len(places), 6), replace=False)
+                found.append(window_features(level, self._shape, chosen) if len(chosen) else self._none())
+                groups += [index] * len(chosen)
+        return np.concatenate(found), np.array(groups)
+
+    def _hard_windows(
+        self, weights: NDArray[np.float32], bias: float
+    ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        most = max(8, min(60, _NEGATIVES_MAX // len(self._seen) // _ROUNDS))
+        found, groups = [self._none()], []
+        for index, one in enumerate(self._seen):
+            scored: list[tuple[float, Level, int]] = []
+            for level in one.levels:
+                values = window_values(level, self._shape, weights) + bias
+                places = self._places(one, level)
+                hard = places[values[places] > _HARD]
+                best = hard[np.argsort(-values[hard], kind="stable")[:most]]
+                scored += [(float(values[place]), level, int(place)) for place in best]
+            scored.sort(key=lambda each: -each[0])
+            for _, level, place in scored[:most]:
+                found.append(window_features(level, self._shape, [place]))
+                groups.append(index)
+        return np.concatenate(found), np.array(groups, dtype=np.int64)
+
+    def _none(self) -> NDArray[np.uint8]:
+        return np.empty((0, self._shape.rows, self._shape.columns, 8), np.uint8)
+
+    def _quantised(
+        self, weights: NDArray[np.float32], bias: float, hard: NDArray[np.uint8], usual: NDArray[np.uint8]
+    ) -> Window:
+        scale = float(np.float32(np.abs(weights).max() / 127.0))
+        whole = np.rint(weights / scale).astype(np.int8)
+        whole_bias = round(bias / scale)
+        order, floors = _order_of(whole, whole_bias, scale, hard, usual)
+        edges, edge_scale, edge_bias = self._edges()
+        return Window(
+            kind=self._kind,
+            box_columns=float(np.float32(self._shape.box_columns)),
+            box_rows=float(np.float32(self._shape.box_rows)),
+            weights=whole,
+            scale=scale,
+            bias=whole_bias,
+            order=order,
+            floors=floors,
+            edges=edges,
+            edge_scale=edge_scale,
+            edge_bias=edge_bias,
+        )
+
+    def _edges(self) -> tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.float32]]:
+        """Ridge regression of where the box's edges are, from windows near labelled ones."""
+        features, targets = [], []
+        for one in self._seen:
+            its = one.example.of(self._name)
+            for level in one.levels if len(its) else ():
+                boxes = window_boxes(level, self._shape)
+                shared = overlaps(boxes, its)
+                near = np.flatnonzero(shared.max(axis=1, initial=0.0) > _EDGE_OVERLAP)
+                if len(near) > _EDGE_WINDOWS:
+                    near = self._rng.choice(near, _EDGE_WINDOWS, replace=False)
+                if len(near):
+                    features.append(blocks(window_features(level, self._shape, near)))
+                    targets.append(_edge_shares(boxes[near], its[shared[near].argmax(axis=1)]))
+        x = np.concatenate(features).astype(np.float64) / _EDGE_UNIT
+        y = np.concatenate(targets)
+        shape = x.shape[1:]
+        x = x.reshape(len(x), -1)
+        mean_x, mean_y = x.mean(axis=0), y.mean(axis=0)
+        gram = (x - mean_x).T @ (x - mean_x) + _EDGE_RIDGE * np.eye(x.shape[1])
+        slopes = np.linalg.solve(gram, (x - mean_x).T @ (y - mean_y)).T / _EDGE_UNIT  # (4, features)
+        scale = np.maximum(np.abs(slopes).max(axis=1) / 127.0, 1e-12)
+        whole = np.rint(slopes / scale[:, None]).astype(np.int8)
+        bias = mean_y - scale * (whole @ (mean_x * _EDGE_UNIT))
+        return whole.reshape(4, *shape), scale.astype(np.float32), bias.astype(np.float32)
+
+
+def _edge_shares(boxes: Floats, labelled: Floats) -> Floats:
+    """How far labelled boxes' edges are from those of boxes, of their widths and heights."""
+    sides = boxes[:, 2:] - boxes[:, :2]
+    return (labelled - boxes) / np.concatenate([sides, sides], axis=1)
+
+
+def _fit(
+    examples: NDArray[np.uint8],
+    groups: NDArray[np.int64],
+    negatives: NDArray[np.uint8],
+    negative_groups: NDArray[np.int64],
+) -> tuple[NDArray[np.float32], float]:
+    """Weights (rows, columns, CHANNELS) for cells, and bias; the cost by cross-validation by picture."""
+    x = (
+        np.concatenate([examples, negatives]).reshape(len(examples) + len(negatives), -1).astype(np.float32)
+        / _UNIT
+    )
+    y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])
+    by = np.concatenate([groups, negative_groups])
+    mean = x.mean(axis=0)
+    x -= mean
+    weight = max(1.0, len(negatives) / len(examples) / 3.0)
+    cost = _best_cost(x, y, by, weight)
+    machine = _machine(cost, weight).fit(x, y)
+    weights = machine.coef_[0]
+    bias = float(machine.intercept_[0] - weights @ mean)
+    return (weights / _UNIT).reshape(examples.shape[1:]).astype(np.float32), bias
+
+
+def _machine(cost: float, weight: float) -> LinearSVC:
+    return LinearSVC(C=cost, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
+
+
+def _best_cost(x: NDArray[np.float32], y: Floats, groups: NDArray[np.int64], weight: float) -> float:
+    return 0.01
+
+
+def _order_of(
+    weights: NDArray[np.int8], bias: int, scale: float, hard: NDArray[np.uint8], usual: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+    """In which order rows are added, and below which sum a window is given up after each.
+
+    It is given up if the rows to come would have to add more than they do in nearly all of the windows that are
+    hard to tell. Each time the row is next that gives up most of what usually is seen.
+    """
+    its, others = (_row_sums(weights, cells) for cells in (hard, usual))
+    to_come = its.sum(axis=1)
+    left = list(range(len(weights)))
+    sums = np.full(len(others), bias)
+    order, floors = [], []
+    while left:
+        chosen: list[tuple[int, int, int]] = []
+        for row in left:
+            floor = int(LOWEST / scale - np.quantile(to_come - its[:, row], _TO_COME))
+            kept = int(np.count_nonzero(sums + others[:, row] >= floor))
+            chosen.append((kept, row, floor))
+        _, row, floor = min(chosen)
+        to_come = to_come - its[:, row]
+        sums = sums + others[:, row]
+        sums, others = sums[sums >= floor], others[sums >= floor]
+        left.remove(row)
+        order.append(row)
+        floors.append(floor)
+    return np.array(order, np.uint8), np.array(floors, np.int32)
+
+
+def _row_sums(weights: NDArray[np.int8], cells: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """(n, rows): products of cells and weights, added within rows."""
+    return np.einsum("nrck,rck->nr", cells.astype(np.int64), weights.astype(np.int64))

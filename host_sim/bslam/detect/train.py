@@ -1,0 +1,161 @@
+"""Trains a scanner from labelled pictures, and tells how good it is on pictures that were left out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from bslam.core.scanner import Scanner
+from bslam.detect.boxes import Curve, Found, curve, overlaps
+from bslam.detect.examples import Collection, Example
+from bslam.detect.fit import fit_windows, look_at
+from bslam.errors import BslamError
+from bslam.scannerfile import LOWEST, Kind, ScannerModel, Window
+
+FOLDS: Final = 4
+PICTURES_MIN: Final = 2 * FOLDS
+"""With a class in them: each part must show it, more or less."""
+HIT: Final = 0.5
+"""Overlap from which on a detection is of the thing."""
+_SD_MIN: Final = 0.01
+
+
+@dataclass(frozen=True)
+class Left:
+    """What was found of each class in pictures that were left out of the training."""
+
+    found: Mapping[str, tuple[Found, ...]]
+
+    def curve(self, kind: str, overlap: float = HIT) -> Curve:
+        return curve(self.found[kind], overlap)
+
+    def without(self, kind: str) -> Curve:
+        """The same on pictures that show none of the class."""
+        return curve([one for one in self.found[kind] if not len(one.labelled)], HIT)
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A model, and what it found in pictures that were left out."""
+
+    model: ScannerModel
+    left: Left
+
+
+def check_collection(collection: Collection) -> None:
+    """BslamError if a class is in too few pictures to be trained and tried."""
+    for kind in collection.kinds:
+        count = sum(len(one.of(kind)) > 0 for one in collection.examples)
+        if count < PICTURES_MIN:
+            raise BslamError(
+                f"class {kind!r} is in {count} pictures; allowed: {PICTURES_MIN} at least, twenty are better"
+            )
+
+
+def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iterator[str | Trained]:
+    """What is being done, step by step, and at last the model.
+
+    false_a_picture: thresholds allow so many false detections in a picture that was left out.
+    """
+    check_collection(collection)
+    examples = collection.examples
+    parts = [[i * FOLDS // len(examples) for i in range(len(examples))]]
+    jobs = []
+    for part in (*range(FOLDS), None):
+        chosen = [one for one, its in zip(examples, parts[0], strict=True) if its != part]
+        jobs += [(part, kind, chosen) for kind in range(len(collection.kinds))]
+    names = collection.kinds
+    work = (delayed(_fit_one)(names[kind], kind, chosen, seed) for _, kind, chosen in jobs)
+    windows: dict[int | None, list[Window]] = {}
+    done = Parallel(n_jobs=min(len(jobs), os.cpu_count() or 1), return_as="generator")(work)
+    for (part, kind, chosen), its in zip(jobs, done, strict=True):
+        windows.setdefault(part, []).extend(its)
+        what = "all pictures" if part is None else f"without part {part + 1} of {FOLDS}"
+        yield f"{names[kind]}: trained on {len(chosen)} pictures, {what}: {len(its)} windows"
+    left = _look_at_left(collection, parts[0], windows)
+    kinds = tuple(_kind(name, collection.heights_m[name], left, false_a_picture) for name in names)
+    yield Trained(ScannerModel(kinds, tuple(windows[None])), left)
+
+
+def _fit_one(name: str, kind: int, examples: Sequence[Example], seed: int) -> list[Window]:
+    return fit_windows(kind, name, look_at(examples), np.random.default_rng([seed, kind]))
+
+
+def lowest_kinds(names: Sequence[str]) -> tuple[Kind, ...]:
+    """Kinds that report all that is kept."""
+    return tuple(Kind(name, 0.0, LOWEST, 1.0, 0.0, 1.0, 1.0) for name in names)
+
+
+def _look_at_left(
+    collection: Collection, parts: Sequence[int], windows: Mapping[int | None, Sequence[Window]]
+) -> Left:
+    found: dict[str, list[Found]] = {kind: [] for kind in collection.kinds}
+    for part in range(FOLDS):
+        scanner = Scanner(ScannerModel(lowest_kinds(collection.kinds), tuple(windows[part])))
+        for one, its in zip(collection.examples, parts, strict=True):
+            if its == part:
+                for kind, what in find(scanner, one, collection.kinds).items():
+                    found[kind].append(what)
+    return Left({kind: tuple(its) for kind, its in found.items()})
+
+
+def find(scanner: Scanner, example: Example, kinds: Sequence[str]) -> dict[str, Found]:
+    """What a scanner finds of each class in a picture, beside what is there."""
+    seen = scanner.see(example.frame).items
+    return {
+        kind: Found(
+            np.array([one.box for one in seen if one.kind == kind]).reshape(-1, 4),
+            np.array([one.score for one in seen if one.kind == kind]),
+            example.of(kind),
+        )
+        for kind in kinds
+    }
+
+
+def _kind(name: str, height_m: float, left: Left, false_a_picture: float) -> Kind:
+    its = left.curve(name)
+    slope, offset = _odds(its)
+    middle_sd, height_sd = _box_noise(left.found[name])
+    threshold = its.threshold_at(false_a_picture)
+    return Kind(
+        name, height_m, threshold if np.isfinite(threshold) else 1.0, slope, offset, middle_sd, height_sd
+    )
+
+
+def _odds(its: Curve) -> tuple[float, float]:
+    """Slope and offset of the logarithm of the odds that a detection of a score is a hit."""
+    from sklearn.linear_model import LogisticRegression
+
+    if its.hits.all() or not its.hits.any():
+        return 1.0, 0.0
+    fit = LogisticRegression(C=1.0).fit(its.scores[:, None], its.hits)
+    return max(0.0, float(fit.coef_[0, 0])), float(fit.intercept_[0])
+
+
+def _box_noise(found: Sequence[Found]) -> tuple[float, float]:
+    """Standard deviations of the middle of a box across, of its width, and of its height, of itself."""
+    middles, heights = [], []
+    for one in found:
+        shared = overlaps(one.boxes, one.labelled)
+        for box, its in zip(one.boxes, shared, strict=True):
+            if len(its) and its.max() >= HIT:
+                real = one.labelled[its.argmax()]
+                width, height = real[2] - real[0], real[3] - real[1]
+                middles.append((box[0] + box[2] - real[0] - real[2]) / 2 / width)
+                heights.append(np.log((box[3] - box[1]) / height))
+    return _robust_sd(middles), _robust_sd(heights)
+
+
+def _robust_sd(values: Sequence[float]) -> float:
+    """By the share of normal values within a deviation; 0.2 where there are too few to tell."""
+    return max(_SD_MIN, float(np.quantile(np.abs(values), 0.683))) if len(values) >= 5 else 0.2
+
+
+def with_threshold(model: ScannerModel, threshold: float) -> ScannerModel:
+    """The same model with one threshold for all kinds."""
+    return replace(model, kinds=tuple(replace(one, threshold=threshold) for one in model.kinds))
