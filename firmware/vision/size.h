@@ -74,8 +74,8 @@
 #define BSLAM_SCANNER_BYTES \
     ((4 * BSLAM_VISION_SIZE_OCTAVE + 8 + 4 * BSLAM_VISION_SIZE_COLUMNS + 2 * BSLAM_IMAGE_WIDTH_MAX + \
       8 * ((BSLAM_VISION_SIZE_COLUMNS * (BSLAM_IMAGE_HEIGHT_MAX / 4) * 4 + 2) / 3) + \
-      20 * BSLAM_VISION_SIZE_LEVEL_ROW + 128 * 24 + 36 * BSLAM_CANDIDATES_MAX + BSLAM_VISION_SIZE_POINTER + \
-      64 + 7) / \
+      20 * BSLAM_VISION_SIZE_LEVEL_ROW + 128 * 24 + (BSLAM_REAL_DOUBLE ? 48 : 32) * BSLAM_CANDIDATES_MAX + \
+      BSLAM_VISION_SIZE_POINTER + 64 + 7) / \
      8 * 8)
 
 /// Differs where sizes do, so that library and application notice: bslam_vision_init.

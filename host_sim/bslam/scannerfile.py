@@ -149,7 +149,7 @@ def _window(table: Document, kinds: int) -> Window:
 
 def _window_table(window: Window) -> dict[str, Any]:
     sides = {"columns": window.columns, "rows": window.rows}
-    values = {}
+    values: dict[str, Any] = {}
     for key, value in vars(window).items():
         if isinstance(value, np.ndarray):
             flat = value.ravel().tolist()

@@ -86,15 +86,17 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "moment": frozenset(),
     "rig": frozenset({"errors", "parsing"}),
     "modelfile": frozenset({"errors"}),
+    "scannerfile": frozenset({"errors", "modelfile"}),
+    "cheader": frozenset({"errors", "modelfile", "scannerfile"}),
     "motion": frozenset(),
     "maps": frozenset({"errors"}),
-    "core": frozenset({"errors", "modelfile", "rig"}),
+    "core": frozenset({"errors", "modelfile", "rig", "scannerfile"}),
     "world": LOG | {"rig", "motion"},
     "algorithms": LOG | {"core", "motion"},
     "link": frozenset({"errors"}),
     "target": frozenset({"errors", "core", "link"}),
     "recording": LOG | {"core"},
-    "datasets": LOG | {"rig"},
+    "datasets": LOG | {"modelfile", "rig"},
     "options": OPTIONS,
     "evaluation": EVALUATION,
     "calibration": EVALUATION | {"rig", "world"},
@@ -102,6 +104,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "runs": RUNS,
     "faults": RUNS | {"link", "modelfile"},
     "view": LOG | {"moment"},
+    "detect": LOG | {"core", "datasets", "rig", "scannerfile", "view"},
 }
 # The command line ties the parts together and may import them all; so does what the package offers its users.
 PYTHON_TOP = frozenset({"cli", "commands", "__main__", "__init__"})

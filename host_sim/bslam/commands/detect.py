@@ -42,8 +42,8 @@ EXAMPLES = """examples:
   bslam detect import yolo labels --pictures photographs --names classes.txt
 
 train and test take folders of pictures with labels.csv, as tools/label.html writes it; import makes one from
-COCO's json or YOLO's text files. train says how many labelled objects the model finds by itself in pictures that
-were left out, writes MODEL.json, the C header MODEL.h and a page MODEL.html. run writes boxes.csv and
+COCO's json or YOLO's text files. train says how many labelled objects the model finds by itself in pictures
+that were left out, writes MODEL.json, the C header MODEL.h and a page MODEL.html. run writes boxes.csv and
 contact_sheet.png; where there is a labels.csv, green boxes are right and red ones wrong. docs/RETRAIN.md."""
 _ACTIONS = ("train", "run", "test", "import")
 _SHARE_MIN = 0.5
@@ -125,8 +125,8 @@ def _train(arguments: argparse.Namespace) -> int:
     poor = [one for one in figures if one.share < _SHARE_MIN]
     if poor and not arguments.anyway:
         print(
-            f"nothing written: {poor[0].kind.name!r} is found by itself in less than half; allowed: more pictures of "
-            "it, --classes without it, or --anyway"
+            f"nothing written: {poor[0].kind.name!r} is found by itself in less than half; allowed: "
+            "more pictures of it, --classes without it, or --anyway"
         )
         return 1
     _write_model(out, trained.model, figures, arguments)
@@ -148,8 +148,8 @@ def _write_model(
     write_atomically(out, scanner_text(model))
     write_atomically(header, text)
     words = (
-        "What the model finds in labelled pictures that were left out of its training, part by part. The model "
-        "itself is trained on all of them."
+        "What the model finds in labelled pictures that were left out of its training, part by part. The "
+        "model itself is trained on all of them."
     )
     write_atomically(html, page(out.stem, words, figures, [command]))
     print(f"files: {out}, {header}, {html}")
@@ -164,8 +164,8 @@ def _test(arguments: argparse.Namespace) -> int:
     collection = read_collection([Path(one) for one in arguments.sources])
     if not set(kinds) & set(collection.kinds):
         raise BslamError(
-            f"{arguments.sources[0]}: labels {', '.join(collection.kinds)}; the model finds {', '.join(kinds)}; "
-            "allowed: pictures with labels of its classes"
+            f"{arguments.sources[0]}: labels {', '.join(collection.kinds)}; the model finds "
+            f"{', '.join(kinds)}; allowed: pictures with labels of its classes"
         )
     scanner = Scanner(with_threshold(model, LOWEST))
     found = [find(scanner, one, kinds) for one in collection.examples]

@@ -48,10 +48,11 @@ void scanner_level(const bslam_scanner_t *, int, int32_t *, int32_t *, float *, 
 #include "vision/scan/scanner.h"
 static int scanner_levels(const bslam_scanner_t *scanner)
 {
-    return ((const bslam_scanner_instance_t *)(const void *)scanner)->channels.octave_count * BSLAM_LEVELS_AN_OCTAVE;
+    const bslam_scanner_instance_t *instance = (const void *)scanner;
+    return instance->channels.octave_count * BSLAM_LEVELS_AN_OCTAVE;
 }
-static void scanner_level(const bslam_scanner_t *scanner, int index, int32_t *rows, int32_t *columns, float *cell_px,
-                          uint8_t *cells)
+static void scanner_level(const bslam_scanner_t *scanner, int index, int32_t *rows, int32_t *columns,
+                          float *cell_px, uint8_t *cells)
 {
     const bslam_level_t level = bslam_scanner_level(scanner, index);
     uint8_t row[BSLAM_LEVEL_ROOM];

@@ -62,7 +62,7 @@ class Level:
 
 
 class Scanner:
-    """One scanner: it keeps nothing from picture to picture. Without a model it finds nothing, for training."""
+    """One scanner: it keeps nothing between pictures. Without a model it finds nothing: for training."""
 
     def __init__(self, model: ScannerModel | None = None) -> None:
         """BslamError if the library refuses the model."""
@@ -78,7 +78,7 @@ class Scanner:
         )
 
     def see(self, rgb: NDArray[np.uint8]) -> Detections:
-        """Looks at a picture (height, width, 3) uint8, C-contiguous. BslamError for a size that is not allowed."""
+        """Looks at a picture (height, width, 3) uint8, C-contiguous. BslamError for another shape or size."""
         found = self._look(rgb)
         lib, ffi = self._library.lib, self._library.ffi
         return Detections(
@@ -119,7 +119,7 @@ class Scanner:
         lib = self._library.lib
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or not rgb.flags.c_contiguous:
             raise BslamError(
-                f"a picture of shape {rgb.shape}, {rgb.dtype}: allowed: (height, width, 3) uint8, C-contiguous"
+                f"a picture of shape {rgb.shape}, {rgb.dtype}: allowed: (height, width, 3) uint8, contiguous"
             )
         height, width = rgb.shape[:2]
         begun = lib.bslam_scanner_begin(self._scanner, lib.BSLAM_PIXELS_RGB888, width, height)

@@ -54,8 +54,9 @@ class Scaled:
 def load_picture(path: Path, camera: Camera | None = None) -> Scaled:
     """A picture, upright, scaled to the frame of `camera`, or else to the largest that the front end takes.
 
-    It is not enlarged. Without a camera its width becomes a multiple of 8, its height of 4: up to seven pixels of the
-    frame are cut off, half on each side. BslamError if it cannot be read, or is not of the camera's shape.
+    It is not enlarged. Without a camera its width becomes a multiple of 8, its height of 4: some pixels
+    of the frame are cut off, half on each side. BslamError if it cannot be read, or is not of the camera's
+    shape.
     """
     try:
         with Image.open(path) as opened:

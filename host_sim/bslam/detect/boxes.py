@@ -69,9 +69,14 @@ class Curve:
         return float(self.recall[allowed].max(initial=0.0))
 
     def threshold_at(self, false_a_picture: float) -> float:
-        """Lowest score with at most so many false detections a picture; infinite where there is none."""
+        """The score for the most hits with at most so many false detections a picture: halfway between the
+        last of these hits and what comes below; infinite where there is none.
+        """
         allowed = np.cumsum(~self.hits) <= false_a_picture * self.pictures
-        return float(self.scores[allowed].min(initial=np.inf))
+        last = np.flatnonzero(allowed & self.hits)
+        if not len(last):
+            return float("inf")
+        return float(self.scores[last[-1] : last[-1] + 2].mean())
 
 
 def curve(found: Sequence[Found], overlap: float) -> Curve:

@@ -50,8 +50,8 @@ class Collection:
 def read_collection(paths: Sequence[Path], wanted: Sequence[str] = ()) -> Collection:
     """The pictures of folders with labels.csv; of the wanted classes, all unless given.
 
-    Boxes of other classes are no examples: what is in them is none of the wanted. BslamError names folder, file,
-    line, and what is allowed.
+    Boxes of other classes are no examples: what is in them is none of the wanted. BslamError names folder,
+    file, line, and what is allowed.
     """
     examples: list[Example] = []
     heights_m: dict[str, float] = {}
@@ -75,7 +75,7 @@ def read_collection(paths: Sequence[Path], wanted: Sequence[str] = ()) -> Collec
 def _example(folder: Folder, picture: Picture) -> Example:
     scaled = load_picture(picture.path)
     height, width = scaled.rgb.shape[:2]
-    boxes: dict[str, list[Sequence[float]]] = {}
+    boxes: dict[str, list[Floats]] = {}
     for label in picture.labels:
         edges = scaled.box(label.left_px, label.top_px, label.right_px, label.bottom_px)
         clipped = np.clip(np.array(edges) + 0.5, 0.0, [width, height, width, height])

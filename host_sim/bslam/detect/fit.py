@@ -5,6 +5,7 @@ scikit-learn fits; the cells come from the scanner in C, so that what was traine
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from bslam.core.scanner import Level, Scanner
 from bslam.detect.boxes import Floats, overlaps
+from bslam.detect.clutter import clutter
 from bslam.detect.examples import Example
 from bslam.detect.windows import (
     Change,
@@ -26,21 +28,22 @@ from bslam.detect.windows import (
     window_values,
 )
 from bslam.errors import BslamError
-from bslam.scannerfile import LOWEST, Window
+from bslam.scannerfile import CHANNELS, LOWEST, Window
 
 try:
     from sklearn.cluster import KMeans
-    from sklearn.model_selection import GroupKFold
     from sklearn.svm import LinearSVC
 except ImportError:  # an extra
     LinearSVC = None
 
-_COSTS: Final = (0.003, 0.01, 0.03)
+_COST: Final = 0.01
 _UNIT: Final = 128.0  # of a cell's values
 _CHANGES: Final = 8  # of an example
 _MOVED: Final = 0.05
 _SCALED: Final = 0.09
 _ROUNDS: Final = 3
+_CLUTTER: Final = 40  # pictures made of what is around
+_RANDOM: Final = 6  # windows of each picture and size, to begin with
 _HARD: Final = -1.0  # score from which on a window that shows something else is an example
 _NEGATIVE_OVERLAP: Final = 0.3  # at most, with any box of the class
 _EDGE_OVERLAP: Final = 0.4  # at least, of windows that edges are learned from
@@ -51,7 +54,7 @@ _ASPECT_SD: Final = 0.35  # of the logarithm: beyond, one window is not for all
 _ASPECTS_MAX: Final = 3
 _BOXES_A_SHAPE: Final = 6
 _NEGATIVES_MAX: Final = 16_000
-_TO_COME: Final = 0.96  # of hard windows get no more from the rows that are left
+_TO_COME: Final = 0.5  # of examples get no more from the rows that are left
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ def fit_windows(kind: int, name: str, seen: Sequence[Seen], rng: np.random.Gener
     """The windows of a class. BslamError if scikit-learn is missing."""
     if LinearSVC is None:
         raise BslamError("training needs scikit-learn; allowed: pip install 'bslam[detect]'")
+    seen = [*seen, *look_at(clutter([one.example for one in seen], name, _CLUTTER, rng))]
     where = [(i, box) for i, one in enumerate(seen) for box in one.example.of(name)]
     boxes = np.array([box for _, box in where])
     return [
@@ -108,32 +112,27 @@ class _Fit:
         self, kind: int, name: str, shape: Shape, seen: Sequence[Seen], rng: np.random.Generator
     ) -> None:
         self._kind, self._name, self._shape, self._seen, self._rng = kind, name, shape, seen, rng
+        self._others = [[(level, self._places(one, level)) for level in one.levels] for one in seen]
 
     def window(self, where: Sequence[tuple[int, Floats]]) -> Window:
         """From which boxes of which pictures."""
-        examples, groups = self._examples(where)
-        negatives, negative_groups = self._random_windows()
-        usual = negatives
+        examples = self._examples(where)
+        negatives = usual = self._random_windows()
         for _ in range(_ROUNDS):
-            weights, bias = _fit(examples, groups, negatives, negative_groups)
-            hard, hard_groups = self._hard_windows(weights, bias)
-            negatives = np.concatenate([negatives, hard])
-            negative_groups = np.concatenate([negative_groups, hard_groups])
-            negatives, first = np.unique(negatives, axis=0, return_index=True)
-            negative_groups = negative_groups[first]
-        weights, bias = _fit(examples, groups, negatives, negative_groups)
-        return self._quantised(weights, bias, np.concatenate([examples, negatives]), usual)
+            weights, bias = _fit(examples, negatives)
+            negatives = np.unique(np.concatenate([negatives, self._hard_windows(weights, bias)]), axis=0)
+        weights, bias = _fit(examples, negatives)
+        return self._quantised(weights, bias, examples, usual)
 
-    def _examples(self, where: Sequence[tuple[int, Floats]]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    def _examples(self, where: Sequence[tuple[int, Floats]]) -> NDArray[np.uint8]:
         scanner = Scanner()
-        cells, groups = [], []
-        for index, box in where:
-            for number in range(_CHANGES):
-                cells.append(
-                    cropped(scanner, self._seen[index].example.frame, box, self._shape, self._change(number))
-                )
-                groups.append(index)
-        return np.array(cells), np.array(groups)
+        return np.array(
+            [
+                cropped(scanner, self._seen[index].example.frame, box, self._shape, self._change(number))
+                for index, box in where
+                for number in range(_CHANGES)
+            ]
+        )
 
     def _change(self, number: int) -> Change:
         if number == 0:
@@ -144,48 +143,39 @@ class _Fit:
     def _places(self, one: Seen, level: Level) -> NDArray[np.int64]:
         """Windows that show something else."""
         boxes, its = window_boxes(level, self._shape), one.example.of(self._name)
-        shared = overlaps(boxes, its).max(axis=1, initial=0.0)
-        return np.flatnonzero(shared < _NEGATIVE_OVERLAP)
+        return np.flatnonzero(overlaps(boxes, its).max(axis=1, initial=0.0) < _NEGATIVE_OVERLAP)
 
-    def _random_windows(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        found, groups = [], []
-        for index, one in enumerate(self._seen):
-            for level in one.levels:
-                places = self._places(one, level)
-                chosen = self._rng.choice(places, min(len(places), 6), replace=False)
-                found.append(window_features(level, self._shape, chosen) if len(chosen) else self._none())
-                groups += [index] * len(chosen)
-        return np.concatenate(found), np.array(groups)
+    def _random_windows(self) -> NDArray[np.uint8]:
+        found = [self._none()]
+        for level, places in itertools.chain(*self._others):
+            if len(places):
+                chosen = self._rng.choice(places, min(len(places), _RANDOM), replace=False)
+                found.append(window_features(level, self._shape, chosen))
+        return np.concatenate(found)
 
-    def _hard_windows(
-        self, weights: NDArray[np.float32], bias: float
-    ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    def _hard_windows(self, weights: NDArray[np.float32], bias: float) -> NDArray[np.uint8]:
         most = max(8, min(60, _NEGATIVES_MAX // len(self._seen) // _ROUNDS))
-        found, groups = [self._none()], []
-        for index, one in enumerate(self._seen):
-            scored: list[tuple[float, Level, int]] = []
-            for level in one.levels:
-                values = window_values(level, self._shape, weights) + bias
-                places = self._places(one, level)
-                hard = places[values[places] > _HARD]
-                best = hard[np.argsort(-values[hard], kind="stable")[:most]]
-                scored += [(float(values[place]), level, int(place)) for place in best]
-            scored.sort(key=lambda each: -each[0])
-            for _, level, place in scored[:most]:
-                found.append(window_features(level, self._shape, [place]))
-                groups.append(index)
-        return np.concatenate(found), np.array(groups, dtype=np.int64)
+        found = [self._none()]
+        for others in self._others:
+            scored: list[tuple[float, int, int]] = []
+            for number, (level, places) in enumerate(others):
+                values = window_values(level, self._shape, weights)[places] + bias
+                best = np.argsort(-values, kind="stable")[:most]
+                scored += [(-float(values[i]), number, int(places[i])) for i in best if values[i] > _HARD]
+            for _, number, place in sorted(scored)[:most]:
+                found.append(window_features(others[number][0], self._shape, [place]))
+        return np.concatenate(found)
 
     def _none(self) -> NDArray[np.uint8]:
-        return np.empty((0, self._shape.rows, self._shape.columns, 8), np.uint8)
+        return np.empty((0, self._shape.rows, self._shape.columns, CHANNELS), np.uint8)
 
     def _quantised(
-        self, weights: NDArray[np.float32], bias: float, hard: NDArray[np.uint8], usual: NDArray[np.uint8]
+        self, weights: NDArray[np.float32], bias: float, examples: NDArray[np.uint8], usual: NDArray[np.uint8]
     ) -> Window:
         scale = float(np.float32(np.abs(weights).max() / 127.0))
         whole = np.rint(weights / scale).astype(np.int8)
         whole_bias = round(bias / scale)
-        order, floors = _order_of(whole, whole_bias, scale, hard, usual)
+        order, floors = _order_of(whole, whole_bias, scale, examples, usual)
         edges, edge_scale, edge_bias = self._edges()
         return Window(
             kind=self._kind,
@@ -234,46 +224,28 @@ def _edge_shares(boxes: Floats, labelled: Floats) -> Floats:
     return (labelled - boxes) / np.concatenate([sides, sides], axis=1)
 
 
-def _fit(
-    examples: NDArray[np.uint8],
-    groups: NDArray[np.int64],
-    negatives: NDArray[np.uint8],
-    negative_groups: NDArray[np.int64],
-) -> tuple[NDArray[np.float32], float]:
-    """Weights (rows, columns, CHANNELS) for cells, and bias; the cost by cross-validation by picture."""
-    x = (
-        np.concatenate([examples, negatives]).reshape(len(examples) + len(negatives), -1).astype(np.float32)
-        / _UNIT
-    )
+def _fit(examples: NDArray[np.uint8], negatives: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
+    """Weights (rows, columns, CHANNELS) for cells, and bias."""
+    both = np.concatenate([examples, negatives])
+    x = both.reshape(len(both), -1).astype(np.float32) / _UNIT
     y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])
-    by = np.concatenate([groups, negative_groups])
     mean = x.mean(axis=0)
-    x -= mean
     weight = max(1.0, len(negatives) / len(examples) / 3.0)
-    cost = _best_cost(x, y, by, weight)
-    machine = _machine(cost, weight).fit(x, y)
-    weights = machine.coef_[0]
+    machine = LinearSVC(C=_COST, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
+    weights = machine.fit(x - mean, y).coef_[0]
     bias = float(machine.intercept_[0] - weights @ mean)
     return (weights / _UNIT).reshape(examples.shape[1:]).astype(np.float32), bias
 
 
-def _machine(cost: float, weight: float) -> LinearSVC:
-    return LinearSVC(C=cost, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
-
-
-def _best_cost(x: NDArray[np.float32], y: Floats, groups: NDArray[np.int64], weight: float) -> float:
-    return 0.01
-
-
 def _order_of(
-    weights: NDArray[np.int8], bias: int, scale: float, hard: NDArray[np.uint8], usual: NDArray[np.uint8]
+    weights: NDArray[np.int8], bias: int, scale: float, examples: NDArray[np.uint8], usual: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
     """In which order rows are added, and below which sum a window is given up after each.
 
-    It is given up if the rows to come would have to add more than they do in nearly all of the windows that are
-    hard to tell. Each time the row is next that gives up most of what usually is seen.
+    It is given up if the rows to come would have to add more than they do in most examples. Each time the row
+    is next that gives up most of what usually is seen.
     """
-    its, others = (_row_sums(weights, cells) for cells in (hard, usual))
+    its, others = (_row_sums(weights, cells) for cells in (examples, usual))
     to_come = its.sum(axis=1)
     left = list(range(len(weights)))
     sums = np.full(len(others), bias)

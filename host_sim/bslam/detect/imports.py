@@ -21,7 +21,7 @@ Row = tuple[str, str, str, str, str, str]
 def import_labels(kind: str, source: Path, pictures: Path, names: Path | None) -> tuple[Path, int]:
     """Writes labels.csv into the folder of pictures; where, and how many boxes.
 
-    BslamError: an unknown format, a file that cannot be read, a label that is not allowed, or labels.csv is there.
+    BslamError: an unknown format, a file that cannot be read, a bad label, labels.csv is there.
     """
     if not pictures.is_dir():
         raise BslamError(f"{pictures}: is no folder; allowed: the folder of the pictures")

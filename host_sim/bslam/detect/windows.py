@@ -39,8 +39,8 @@ def shape_for(aspect: float) -> Shape:
     longest = (SIDE_MAX - 2 * _MARGIN) ** 2
     area = min(_AREA, longest * min(aspect, 1.0 / aspect))
     columns, rows = (area * aspect) ** 0.5, (area / aspect) ** 0.5
-    sides = (min(SIDE_MAX, max(BLOCK, round(side + 2 * _MARGIN))) for side in (columns, rows))
-    return Shape(*sides, columns, rows)
+    across, down = (min(SIDE_MAX, max(BLOCK, round(side + 2 * _MARGIN))) for side in (columns, rows))
+    return Shape(across, down, columns, rows)
 
 
 def window_boxes(level: Level, shape: Shape) -> Floats:
@@ -78,13 +78,13 @@ def window_features(
 ) -> NDArray[np.uint8]:
     """The cells (n, rows, columns, CHANNELS) of chosen windows, by their places row by row."""
     columns = level.cells.shape[1] - shape.columns + 1
-    views = sliding_window_view(level.cells, (shape.rows, shape.columns), axis=(0, 1))  # type: ignore[call-overload]
+    views = sliding_window_view(level.cells, (shape.rows, shape.columns), axis=(0, 1))
     row, column = np.divmod(np.asarray(chosen, dtype=np.int64), max(columns, 1))
     return np.ascontiguousarray(views[row, column].transpose(0, 2, 3, 1))
 
 
 def blocks(features: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """Sums of blocks of cells (n, rows // BLOCK, columns // BLOCK, CHANNELS), which the edges are read from."""
+    """Sums of blocks of cells (n, rows // BLOCK, columns // BLOCK, CHANNELS), that edges are read from."""
     n, rows, columns, _ = features.shape
     rows, columns = rows // BLOCK, columns // BLOCK
     whole = features[:, : rows * BLOCK, : columns * BLOCK].astype(np.int32)
@@ -102,7 +102,7 @@ class Change:
 
 
 def cropped(
-    scanner: Scanner, frame: NDArray[np.uint8], box: Sequence[float], shape: Shape, change: Change
+    scanner: Scanner, frame: NDArray[np.uint8], box: Floats, shape: Shape, change: Change
 ) -> NDArray[np.uint8]:
     """The cells (rows, columns, CHANNELS) of a window that frames a box of a picture just so.
 

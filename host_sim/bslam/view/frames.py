@@ -55,15 +55,18 @@ def annotate(rgb: NDArray[np.uint8], marks: Sequence[Mark], caption: str) -> Ima
 
 
 def contact_sheet(pictures: Sequence[Image.Image], columns: int = 4, width_px: int = 480) -> Image.Image:
-    """The pictures, all of one size, reduced, in rows of `columns`."""
+    """The pictures, of any shapes, reduced to fit as wide and as high as the widest is then, in rows."""
     columns = min(columns, len(pictures))
-    height_px = round(width_px * pictures[0].height / pictures[0].width)
+    scale = width_px / max(picture.width for picture in pictures)
+    height_px = round(scale * max(picture.height for picture in pictures))
     rows = math.ceil(len(pictures) / columns)
     size = (columns * (width_px + _GAP_PX) - _GAP_PX, rows * (height_px + _GAP_PX) - _GAP_PX)
     sheet = Image.new("RGB", size, _INK)
     for index, picture in enumerate(pictures):
         row, column = divmod(index, columns)
-        small = picture.resize((width_px, height_px), Image.Resampling.LANCZOS)
+        small = picture.resize(
+            (round(scale * picture.width), round(scale * picture.height)), Image.Resampling.LANCZOS
+        )
         sheet.paste(small, (column * (width_px + _GAP_PX), row * (height_px + _GAP_PX)))
     return sheet
 

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page, expect
 
-from bslam.modelfile import BeaconClass
 from bslam.datasets.labels import Label, read_folder
+from bslam.modelfile import BeaconClass
 
 PAGE = Path(__file__).parents[3] / "tools/label.html"
 LARGE = (2000, 1500)  # more than the window has, so it is shown reduced

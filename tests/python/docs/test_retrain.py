@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from bslam.modelfile import BeaconClass, Recogniser, Svm
 from bslam.cheader import recogniser_header, write_header
 from bslam.datasets.labels import COLUMNS, FILE, read_folder
+from bslam.modelfile import BeaconClass, Recogniser, Svm
 
 ROOT = Path(__file__).resolve().parents[3]
 TEXT = (ROOT / "docs/RETRAIN.md").read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
+from bslam.cheader import Header
 from bslam.modelfile import AdditiveSvm
 from tools.training.additive import (
     DEVIATION_MIN,
@@ -20,7 +21,6 @@ from tools.training.additive import (
 )
 from tools.training.compiled import compile_library
 from tools.training.detector_samples import recoloured
-from bslam.cheader import Header
 from tools.training.front_end import open_library
 
 CROSSED = np.array([0, 1, 4], np.uint8)

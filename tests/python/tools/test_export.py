@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bslam import cheader as export
 from bslam.core.vision import BeaconModel
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass, Recogniser
-from bslam import cheader as export
 from tools.training import fit
 from tools.training.built_in import built_in_detector
 from tools.training.compiled import (

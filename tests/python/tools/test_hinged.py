@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from sklearn.svm import LinearSVC
 
+from bslam.cheader import Header
 from bslam.modelfile import HingedSvm
 from tools.training.closer import mirrored
 from tools.training.compiled import compile_library
-from bslam.cheader import Header
 from tools.training.front_end import open_library
 from tools.training.hinged import DEVIATION_MIN, decide_hinged, expand_hinges, fit_hinged
 

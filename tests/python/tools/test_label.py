@@ -9,8 +9,8 @@ import pytest
 import quickjs
 from PIL import Image
 
-from bslam.modelfile import BeaconClass
 from bslam.datasets.labels import COLUMNS, Label, read_folder
+from bslam.modelfile import BeaconClass
 
 PAGE = (Path(__file__).parents[3] / "tools/label.html").read_text(encoding="utf-8")
 

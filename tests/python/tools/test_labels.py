@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from PIL import ExifTags, Image
 
+from bslam.datasets.labels import COLUMNS, Label, read_folder
 from bslam.errors import BslamError
 from bslam.modelfile import BeaconClass
-from bslam.datasets.labels import COLUMNS, Label, read_folder
 
 HEADER = ",".join(COLUMNS)
 HEIGHTS = HEADER.removesuffix(",depth_m")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bslam.cli import main
-from tools.training import example_pictures, train_beacons
 from bslam.datasets.labels import read_folder
+from tools.training import example_pictures, train_beacons
 
 WORLD = 3
 

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bslam.datasets.labels import COLUMNS, read_folder
 from bslam.datasets.pictures import camera_for, load_picture
 from bslam.modelfile import read_recogniser
 from tools.blind import blind_model
 from tools.training import example_pictures, samples, train_beacons
 from tools.training.compiled import FIRMWARE, CompiledSvm
-from bslam.datasets.labels import COLUMNS, read_folder
 from tools.training.front_end import FrontEnd
 from tools.training.truth import overlaps
 
