@@ -68,7 +68,7 @@ class Scanner:
         """BslamError if the library refuses the model."""
         self._library = vision_library()
         self._keep: list[Any] = []
-        self._model = model or _NOTHING
+        self._model = model or NOTHING
         self._scanner = self._library.ffi.new("bslam_scanner_t *")
         self._library.ensure(
             self._library.lib.bslam_scanner_init_sized(
@@ -182,7 +182,7 @@ class Scanner:
         return made
 
 
-_NOTHING = ScannerModel(
+NOTHING = ScannerModel(
     kinds=(Kind("nothing", 0.0, 0.0, 1.0, 0.0, 1.0, 1.0),),
     windows=(
         Window(

@@ -5,24 +5,23 @@ import re
 import subprocess
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 
-from bslam.cheader import recogniser_header, write_header
+from bslam.cheader import scanner_header, write_header
+from bslam.core.scanner import NOTHING
 from bslam.datasets.labels import COLUMNS, FILE, read_folder
-from bslam.modelfile import BeaconClass, Recogniser, Svm
+from bslam.modelfile import BeaconClass
+from bslam.scannerfile import ScannerModel
 
 ROOT = Path(__file__).resolve().parents[3]
 TEXT = (ROOT / "docs/RETRAIN.md").read_text(encoding="utf-8")
 
 
 def test_example_compiles_with_a_generated_header(tmp_path):
-    random = np.random.default_rng(1)
-    svm = Svm(71, False, random.standard_normal((2, 71)).astype(np.float32), np.zeros(2, np.float32))
-    recogniser = Recogniser(svm, (BeaconClass("red box", 0.3), BeaconClass("door", 2.0)), 0.1)
-    write_header(tmp_path / "models/my_beacons.h", recogniser_header(recogniser, "my_beacons"))
+    model = ScannerModel(NOTHING.kinds, NOTHING.windows, {})
+    write_header(tmp_path / "models/my_things.h", scanner_header(model, "my_things"))
     (code,) = re.findall(r"```c\n(.*?)```", TEXT, re.DOTALL)
-    (tmp_path / "main.c").write_text(code.replace("bslam_status_t start", "static bslam_status_t start"))
+    (tmp_path / "main.c").write_text(re.sub(r"^int ", "static int ", code, flags=re.MULTILINE))
     flags = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-function"]
     command = [os.environ.get("CC", "cc"), *flags, f"-I{ROOT / 'firmware'}", f"-I{tmp_path}"]
     built = subprocess.run(
