@@ -224,6 +224,7 @@ bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision);
 typedef union bslam_scanner {
     unsigned char bytes[BSLAM_SCANNER_BYTES];
     void *alignment_of_pointers;
+    bslam_real_t alignment_of_numbers;
     uint32_t alignment_of_words;
 } bslam_scanner_t;
 
@@ -236,11 +237,11 @@ typedef struct bslam_detection {
     uint16_t marks;   ///< BSLAM_MARK_CUT_LEFT and so on: the box reaches the picture's edge
 } bslam_detection_t;
 
-/// What came of a picture. Surest first; good until the next picture begins.
+/// What came of a picture, surest first by log_odds. Good until the next call.
 typedef struct bslam_detections {
     bslam_vision_reason_t reason;
     int32_t count;
-    int32_t dropped;  ///< boxes for which there was no room
+    int32_t dropped;  ///< boxes on other things: there was no room
     bslam_detection_t items[BSLAM_CANDIDATES_MAX];
 } bslam_detections_t;
 
@@ -271,7 +272,8 @@ const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner);
 
 /// What was found as a sighting, without identity or signature: direction, distance where the kind's height
 /// is known and nothing cuts it off, both with their noise. BSLAM_E_RANGE: a kind that is none, or the camera
-/// has no direction there; *sighting is unchanged then.
+/// has no direction there; BSLAM_E_NOT_FINITE: the box.
+/// *sighting is unchanged then.
 BSLAM_MUST_CHECK bslam_status_t bslam_scanner_sighting(const bslam_scanner_t *scanner,
                                                        const bslam_camera_t *camera,
                                                        const bslam_detection_t *found,

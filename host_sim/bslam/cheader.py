@@ -157,7 +157,8 @@ def c_string(text: str) -> str:
     return '"' + "".join(plain.get(byte, f"\\{byte:03o}") for byte in text.encode()) + '"'
 
 
-def _check_name(name: str) -> None:
+def check_name(name: str) -> None:
+    """BslamError unless a header may be called so."""
     if not NAME.fullmatch(name):
         allowed = "small letters, digits and _, a letter first: it becomes a name in C"
         raise BslamError(f"header {name}.h: the name is not allowed; allowed: {allowed}")
@@ -165,7 +166,7 @@ def _check_name(name: str) -> None:
 
 def recogniser_header(recogniser: Recogniser, name: str) -> str:
     """The header of a user's recogniser: `static const bslam_recogniser_t bslam_<name>`."""
-    _check_name(name)
+    check_name(name)
     header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/vision.h"], recogniser.notes)
     svm = header.svm(name, recogniser.svm)
     objects = header.classes(f"{name}_objects", recogniser.objects)
@@ -176,7 +177,7 @@ def recogniser_header(recogniser: Recogniser, name: str) -> str:
 
 def scanner_header(model: ScannerModel, name: str) -> str:
     """The header of a scanner: `static const bslam_scanner_model_t bslam_<name>`."""
-    _check_name(name)
+    check_name(name)
     header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/vision.h"], model.notes)
     windows = []
     for index, window in enumerate(model.windows):

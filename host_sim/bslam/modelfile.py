@@ -240,6 +240,13 @@ class Document:
             raise self._error(key, value, allowed)
         return float(value)
 
+    def whole(self, key: str, low: int, high: int) -> int:
+        allowed = f"a whole number from {low} to {high}"
+        value = self._get(key, allowed)
+        if type(value) is not int or not low <= value <= high:
+            raise self._error(key, value, allowed)
+        return value
+
     def mapping(self, key: str) -> Mapping[str, Any]:
         value = self._get(key, "a table")
         if not isinstance(value, dict):

@@ -125,20 +125,20 @@ def _kind(table: Document) -> Kind:
 
 
 def _window(table: Document, kinds: int) -> Window:
-    columns, rows = (int(table.number(key, BLOCK, SIDE_MAX)) for key in ("columns", "rows"))
+    columns, rows = (table.whole(key, BLOCK, SIDE_MAX) for key in ("columns", "rows"))
     blocks = (4, rows // BLOCK, columns // BLOCK, CHANNELS)
     order = table.integers("order", rows, np.uint8)
     if sorted(order.tolist()) != list(range(rows)):
         raise BslamError(f"{table.path}, key {table.prefix}order: allowed: each row once")
     return Window(
-        kind=int(table.number("kind", 0, kinds - 1)),
+        kind=table.whole("kind", 0, kinds - 1),
         box_columns=table.number("box_columns", 0.1, columns),
         box_rows=table.number("box_rows", 0.1, rows),
         weights=table.integers("weights", rows * columns * CHANNELS, np.int8).reshape(
             rows, columns, CHANNELS
         ),
         scale=table.number("scale", 1e-12, 1e6),
-        bias=int(table.number("bias", -(2**31), 2**31 - 1)),
+        bias=table.whole("bias", -(2**30), 2**30),
         order=order,
         floors=table.integers("floors", rows, np.int32),
         edges=table.integers("edges", int(np.prod(blocks)), np.int8).reshape(blocks),

@@ -180,6 +180,8 @@ def report(samples: Samples, counts: NDArray[np.int64], names: list[str]) -> str
 def run(folder_path: Path, out: Path, precision: float, rig: str | None) -> None:
     """From pictures to header, model file and matrix."""
     folder = read_folder(folder_path)
+    if not folder.objects:
+        raise BslamError(f"{folder_path}: no box in it; allowed: a box of each of one or more classes")
     samples = collect(folder, None if rig is None else load_rig(rig).cameras[0])
     recogniser, machine, counts = train(folder, samples, precision)
     header = export.recogniser_header(recogniser, out.stem)

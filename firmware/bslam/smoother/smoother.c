@@ -25,8 +25,6 @@ static const bslam_real_t UNSEEN_SD_M = BSLAM_R(20.0);
 /// many nodes.
 enum { UNITS_FIRST = 64, NODES_A_UNIT_LESS = BSLAM_SMOOTHER_NODES_MAX / 15 + 1 };
 static const bslam_real_t HUBER_D = BSLAM_R(3.0);
-/// What a cycle makes and the filter of now are no farther apart than so many standard deviations, squared.
-static const bslam_real_t AGREE_D2 = BSLAM_R(9.0);
 
 static void clear_block(bslam_smoother_t *smoother)
 {
@@ -332,19 +330,12 @@ static bslam_real_t unseen_max_s(const bslam_smoother_t *smoother)
     return smoother->model.velocity_states != 0 ? BSLAM_SMOOTHER_BLOCK_MAX_S : UNSEEN_MAX_S;
 }
 
-/// Whether what a cycle has made agrees with where the filter is. After a long way in doubt a cycle may begin
-/// about points so far off that it ends anywhere.
-static bool agrees(const bslam_smoother_t *smoother, const bslam_ekf_t *ekf)
+/// Whether what a cycle has made can be. After a long way in doubt one may begin about points so far off that
+/// it ends anywhere.
+static bool can_be(const bslam_ekf_t *run)
 {
-    const bslam_ekf_t *run = &smoother->run;
-    for (int i = 0; i < BSLAM_STATE_THETA; i++) {
-        const bslam_real_t apart = run->mean[i] - ekf->mean[i];
-        const bslam_real_t variance = bslam_ekf_covariance(run, i, i) + bslam_ekf_covariance(ekf, i, i);
-        if (apart * apart > AGREE_D2 * variance) {
-            return false;
-        }
-    }
-    return true;
+    return bslam_ekf_is_sane(run) && bslam_abs(run->mean[BSLAM_STATE_X]) <= BSLAM_PLACE_MAX_M &&
+           bslam_abs(run->mean[BSLAM_STATE_Y]) <= BSLAM_PLACE_MAX_M;
 }
 
 /// Does a bounded piece of work. Where a cycle ends, the filter is replaced by what came of it.
@@ -355,7 +346,7 @@ static void work(bslam_smoother_t *smoother, const bslam_settings_t *settings, b
     if (!bslam_smoother_work(smoother, units, is_whole)) {
         return;
     }
-    if (bslam_ekf_is_sane(&smoother->run) && agrees(smoother, ekf)) {
+    if (can_be(&smoother->run)) {
         take_over(smoother, settings, ekf);
         bslam_smoother_turn(smoother);
     } else {

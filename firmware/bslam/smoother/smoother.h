@@ -143,7 +143,7 @@ typedef struct bslam_smoother {
     bslam_real_t idle_s;  ///< odometry since the last frame, or since it worked without one
     bool rested;          ///< it worked at the latest odometry
     uint32_t cycles;      ///< that took the filter's place
-    uint32_t insane;      ///< that did not, because they came out not finite
+    uint32_t insane;      ///< that did not: not finite, or beyond BSLAM_PLACE_MAX_M
     uint32_t halved;      ///< passes forth that were gone again, about points half as far from the old ones
     uint32_t left_out;    ///< sightings that a phase could not use, each time it met them
 } bslam_smoother_t;

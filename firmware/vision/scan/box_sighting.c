@@ -41,7 +41,7 @@ static void measure_range(const bslam_scan_kind_t *kind, const bslam_box_t *box,
                           bslam_sighting_t *sighting)
 {
     const bslam_real_t steeper = slope_of(&sides->top) - slope_of(&sides->bottom);
-    sighting->has_range = kind->height_m > 0 && steeper > 0;
+    sighting->has_range = kind->height_m > 0 && steeper > 0 && bslam_is_number(steeper);
     if (sighting->has_range) {
         const bslam_real_t pixel = PIXEL_SD / (box->bottom_px - box->top_px);
         sighting->range_m = kind->height_m / steeper;
@@ -76,7 +76,7 @@ bslam_status_t bslam_scanner_sighting(const bslam_scanner_t *scanner, const bsla
     const bslam_real_t pixel = PIXEL_SD / (box->right_px - box->left_px);
     *sighting = (bslam_sighting_t){
         .bearing_rad = bslam_direction_bearing_rad(&middle),
-        .bearing_sd_rad = width_rad * bslam_sqrt(sum_of_squares(share, pixel)),
+        .bearing_sd_rad = bslam_abs(width_rad) * bslam_sqrt(sum_of_squares(share, pixel)),
         .label = BSLAM_LABEL_NONE,
         .beacon_class = (uint8_t)(found->kind + 1),
         .score = found->log_odds,

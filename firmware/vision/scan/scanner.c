@@ -7,8 +7,11 @@
 #include "vision/pixels/bytes.h"
 
 _Static_assert(sizeof(bslam_scanner_instance_t) <= sizeof(bslam_scanner_t), "size.h: the scanner");
+_Static_assert(_Alignof(bslam_scanner_instance_t) <= _Alignof(bslam_scanner_t), "vision.h: the scanner");
 
 enum { SIDE_MIN = 32, WIDTH_STEP = 8, EDGES = 4, BLOCK = 2 };
+/// With all products of a window still a number of 32 bits.
+enum { BIAS_MAX = 1 << 30 };
 /// Boxes of one kind that overlap as much, of both together, are one thing's.
 static const float OVERLAP_MAX = 0.4f;
 /// An edge is no farther from its window's box than this, of width or height.
@@ -30,15 +33,32 @@ static bool is_share(float box, int32_t cells)
     return box > 0 && box <= (float)cells;
 }
 
+static bool has_tables(const bslam_window_t *window)
+{
+    return window->weights != NULL && window->order != NULL && window->floors != NULL &&
+           window->edges != NULL && window->edge_scale != NULL && window->edge_bias != NULL;
+}
+
+/// Each row is added once.
+static bool is_order(const uint8_t *order, int32_t rows)
+{
+    uint32_t seen = 0;
+    for (int32_t i = 0; i < rows; i++) {
+        seen |= order[i] < rows ? 1U << order[i] : 0U;
+    }
+    return seen == (1U << rows) - 1U;
+}
+
 static bslam_status_t check_window(const bslam_scanner_model_t *model, const bslam_window_t *window)
 {
     if (window->kind >= model->kind_count || !is_side(window->columns) || !is_side(window->rows)) {
         return BSLAM_E_COUNT;
     }
-    for (int32_t i = 0; i < window->rows; i++) {
-        if (window->order[i] >= window->rows) {
-            return BSLAM_E_COUNT;
-        }
+    if (!has_tables(window)) {
+        return BSLAM_E_PARAMETER;
+    }
+    if (!is_order(window->order, window->rows)) {
+        return BSLAM_E_COUNT;
     }
     for (int32_t i = 0; i < EDGES; i++) {
         if (!bslam_is_number(window->edge_scale[i]) || !bslam_is_number(window->edge_bias[i])) {
@@ -48,7 +68,8 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
     if (!bslam_is_number(window->scale)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bool is_good = window->scale > 0 && is_share(window->box_columns, window->columns) &&
+    const bool is_good = window->scale > 0 && window->bias >= -BIAS_MAX && window->bias <= BIAS_MAX &&
+                         is_share(window->box_columns, window->columns) &&
                          is_share(window->box_rows, window->rows);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
 }
@@ -72,6 +93,9 @@ static bslam_status_t check_model(const bslam_scanner_model_t *model)
     if (model->kind_count < 1 || model->kind_count > BSLAM_KINDS_MAX || model->window_count < 1 ||
         model->window_count > BSLAM_WINDOWS_MAX) {
         return BSLAM_E_COUNT;
+    }
+    if (model->kinds == NULL || model->windows == NULL) {
+        return BSLAM_E_PARAMETER;
     }
     bslam_status_t status = BSLAM_OK;
     for (int32_t i = 0; i < model->kind_count && status == BSLAM_OK; i++) {
@@ -251,7 +275,6 @@ static void note_hit(bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
         return;
     }
     bslam_hit_t *least = weakest(instance);
-    instance->found.dropped++;
     if (hit->score > least->score) {
         *least = *hit;
     }
@@ -332,13 +355,23 @@ static bool is_same_thing(const bslam_hit_t *a, const bslam_hit_t *b)
     return a->kind == b->kind && both >= OVERLAP_MAX * (area(a) + area(b) - both);
 }
 
+static float log_odds(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
+{
+    const bslam_scan_kind_t *kind = &instance->model->kinds[hit->kind];
+    return kind->slope * hit->score + kind->offset;
+}
+
+/// By odds, which kinds can be compared by.
 static bslam_hit_t *best_left(bslam_scanner_instance_t *instance)
 {
     bslam_hit_t *best = NULL;
+    float most = 0;
     for (int32_t i = 0; i < instance->hit_count; i++) {
         bslam_hit_t *hit = &instance->hits[i];
-        if (hit->kind >= 0 && (best == NULL || hit->score > best->score)) {
+        const float odds = hit->kind >= 0 ? log_odds(instance, hit) : 0;
+        if (hit->kind >= 0 && (best == NULL || odds > most)) {
             best = hit;
+            most = odds;
         }
     }
     return best;
@@ -346,7 +379,6 @@ static bslam_hit_t *best_left(bslam_scanner_instance_t *instance)
 
 static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
 {
-    const bslam_scan_kind_t *kind = &instance->model->kinds[hit->kind];
     const float right = (float)instance->width_px - CUT_PX, bottom = (float)instance->height_px - CUT_PX;
     const int32_t marks = (hit->left_px < CUT_PX ? BSLAM_MARK_CUT_LEFT : 0) |
                           (hit->right_px > right ? BSLAM_MARK_CUT_RIGHT : 0) |
@@ -356,7 +388,7 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
         .box = {hit->left_px - 0.5f, hit->top_px - 0.5f, hit->right_px - 0.5f, hit->bottom_px - 0.5f},
         .kind = hit->kind,
         .score = hit->score,
-        .log_odds = kind->slope * hit->score + kind->offset,
+        .log_odds = log_odds(instance, hit),
         .marks = (uint16_t)marks,
     };
 }
@@ -366,12 +398,12 @@ static void report_best(bslam_scanner_instance_t *instance)
 {
     bslam_detections_t *found = &instance->found;
     for (bslam_hit_t *best = best_left(instance); best != NULL; best = best_left(instance)) {
-        if (found->count == BSLAM_CANDIDATES_MAX) {
+        if (found->count < BSLAM_CANDIDATES_MAX) {
+            found->items[found->count] = detection_of(instance, best);
+            found->count++;
+        } else {
             found->dropped++;
-            return;
         }
-        found->items[found->count] = detection_of(instance, best);
-        found->count++;
         const bslam_hit_t taken = *best;
         for (int32_t i = 0; i < instance->hit_count; i++) {
             bslam_hit_t *hit = &instance->hits[i];

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bslam.cheader import scanner_header
+from bslam.cheader import check_name, scanner_header
 from bslam.commands.arguments import positive_count
 from bslam.core.scanner import Detection, Scanner
 from bslam.datasets.labels import FILE
@@ -100,6 +100,7 @@ def _train(arguments: argparse.Namespace) -> int:
     out = arguments.out
     if out is None or out.suffix != ".json":
         raise BslamError(f"--out {out}: allowed: a file to be written, MODEL.json")
+    check_name(out.stem)
     wanted = [one for one in (arguments.classes or "").split(",") if one]
     collection = read_collection([Path(one) for one in arguments.sources], wanted)
     print(f"{len(collection.examples)} pictures, classes: {', '.join(collection.kinds)}", flush=True)
@@ -251,7 +252,8 @@ def _folder_looks(path: Path) -> Iterator[_Look]:
     examples = {}
     if (path / FILE).is_file():
         examples = {one.name: one for one in read_collection([path]).examples}
-    files = sorted(one for one in path.rglob("*") if one.suffix.lower() in SUFFIXES)
+    files = sorted(one for one in path.iterdir() if one.suffix.lower() in SUFFIXES)
+    files = sorted({*files, *(path / name for name in examples)})
     if not files:
         raise BslamError(f"{path}: no picture in it; allowed: files named {', '.join(SUFFIXES)}")
     for file in files:

@@ -15,8 +15,6 @@ from bslam.errors import BslamError
 from bslam.rig import Camera
 from bslam.scannerfile import BLOCK, CHANNELS, Kind, ScannerModel, Window
 
-FRAME_STEP_PX = (8, 4)
-"""A frame's width and height are multiples of these."""
 LEVEL_PAD = 2
 """Cells by which a level goes on beyond the picture on every side."""
 
@@ -123,7 +121,9 @@ class Scanner:
             )
         height, width = rgb.shape[:2]
         begun = lib.bslam_scanner_begin(self._scanner, lib.BSLAM_PIXELS_RGB888, width, height)
-        self._library.ensure(begun, f"a frame of {width}x{height}")
+        self._library.ensure(
+            begun, f"a frame of {width}x{height}: allowed: 32 to 640 wide, by 8, and 32 to 480 high, by 4"
+        )
         pixels = self._library.pixels(rgb)
         for row in range(height):
             self._library.ensure(

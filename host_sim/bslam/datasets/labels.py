@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL import ExifTags, Image
 
 from bslam.errors import BslamError
 from bslam.modelfile import SIZE_MAX_M, BeaconClass
@@ -86,8 +86,6 @@ def read_folder(path: Path) -> Folder:
             if size[column] != getattr(known, column):
                 allowed = f"{getattr(known, column):g}, as on other lines of {label.name!r}"
                 raise row.error(column, allowed)
-    if not objects:
-        raise BslamError(f"{file}: no box in it; allowed: at least one box of each of one or more classes")
     pictures = tuple(Picture(path / name, *sizes[name], tuple(labels[name])) for name in sorted(sizes))
     return Folder(path, pictures, tuple(objects[name] for name in sorted(objects)))
 
@@ -152,11 +150,14 @@ def _row(file: Path, line: int, names: Sequence[str], fields: Sequence[str]) -> 
 def _picture_size(folder: Path, row: _Row) -> tuple[int, int]:
     """Width and height once upright; opening the picture is also the proof that it is there."""
     try:
-        with Image.open(folder / row.fields["picture"].strip()) as picture:
+        name = Path(row.fields["picture"].strip())
+        if name.is_absolute() or ".." in name.parts:
+            raise row.error("picture", f"a path below {folder}")
+        with Image.open(folder / name) as picture:
             # EXIF orientations from 5 on lie on their side.
             lies = picture.getexif().get(ExifTags.Base.Orientation, 1) >= 5
             return picture.size[::-1] if lies else picture.size
-    except (OSError, UnidentifiedImageError):
+    except (OSError, SyntaxError, Image.DecompressionBombError):
         raise row.error("picture", f"a picture in {folder} that can be read (PNG, JPEG)") from None
 
 

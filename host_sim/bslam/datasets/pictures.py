@@ -61,7 +61,7 @@ def load_picture(path: Path, camera: Camera | None = None) -> Scaled:
     try:
         with Image.open(path) as opened:
             picture = ImageOps.exif_transpose(opened).convert("RGB")
-    except (OSError, SyntaxError) as error:
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BslamError(f"{path}: cannot be read: {error}; allowed: a picture (PNG, JPEG)") from error
     return scale_picture(picture, str(path), camera)
 

@@ -65,6 +65,8 @@ def read_collection(paths: Sequence[Path], wanted: Sequence[str] = ()) -> Collec
                     "allowed: one height a class, or two names"
                 )
         examples += [_example(folder, one) for one in folder.pictures]
+    if not heights_m:
+        raise BslamError(f"{paths[0]}: no box in it; allowed: a box in one of the folders at least")
     missing = sorted(set(wanted) - set(heights_m))
     if missing:
         raise BslamError(f"class {missing[0]!r} is in no folder; allowed: {', '.join(sorted(heights_m))}")

@@ -28,7 +28,7 @@ from bslam.detect.windows import (
     window_values,
 )
 from bslam.errors import BslamError
-from bslam.scannerfile import CHANNELS, LOWEST, Window
+from bslam.scannerfile import BLOCK, CHANNELS, LOWEST, Window
 
 try:
     from sklearn.cluster import KMeans
@@ -205,6 +205,9 @@ class _Fit:
                 if len(near):
                     features.append(blocks(window_features(level, self._shape, near)))
                     targets.append(_edge_shares(boxes[near], its[shared[near].argmax(axis=1)]))
+        if not features:  # none fits: edges are the window's
+            none = np.zeros((4, self._shape.rows // BLOCK, self._shape.columns // BLOCK, CHANNELS), np.int8)
+            return none, np.zeros(4, np.float32), np.zeros(4, np.float32)
         x = np.concatenate(features).astype(np.float64) / _EDGE_UNIT
         y = np.concatenate(targets)
         shape = x.shape[1:]

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageOps
 
 from bslam.datasets.labels import FILE, REQUIRED
 from bslam.datasets.pictures import SUFFIXES
@@ -36,15 +36,24 @@ def import_labels(kind: str, source: Path, pictures: Path, names: Path | None) -
         raise BslamError(f"detect import {kind}: is not allowed; allowed: coco, yolo")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([REQUIRED, *rows])
-    target.write_text(text.getvalue(), encoding="utf-8")
+    part = target.with_suffix(".part")
+    part.write_text(text.getvalue(), encoding="utf-8")
+    part.replace(target)  # a file cut short would stand in the way of the next try
     return target, sum(bool(row[1]) for row in rows)
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BslamError(f"{file}: cannot be read: {error}; allowed: a UTF-8 text file") from error
 
 
 def _size(picture: Path) -> tuple[int, int]:
     try:
         with Image.open(picture) as opened:
             return ImageOps.exif_transpose(opened).size
-    except (OSError, UnidentifiedImageError) as error:
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BslamError(f"{picture}: cannot be read: {error}; allowed: a picture (PNG, JPEG)") from error
 
 
@@ -54,14 +63,8 @@ def _row(
     """Boxes that reach over the edge by what was rounded end there; what is farther out is refused."""
     left, top, right, bottom = box
     width, height = size
-    if (
-        left < -1.0
-        or top < -1.0
-        or right > width + 1.0
-        or bottom > height + 1.0
-        or right <= left
-        or bottom <= top
-    ):
+    is_inside = left >= -1.0 and top >= -1.0 and right <= width + 1.0 and bottom <= height + 1.0
+    if not (is_inside and right > left and bottom > top):
         raise BslamError(
             f"{where}: the box {left:g},{top:g},{right:g},{bottom:g} is not in {name}, {width}x{height}"
         )
@@ -100,16 +103,17 @@ def _coco(source: Path, pictures: Path) -> Iterator[Row]:
 def _yolo(source: Path, pictures: Path, names: Path | None) -> Iterator[Row]:
     if names is None or not names.is_file():
         raise BslamError(f"--names {names}: allowed: a text file with the classes' names, a line each")
-    kinds = [one.strip() for one in names.read_text(encoding="utf-8").splitlines() if one.strip()]
+    kinds = [one.strip() for one in _text(names).splitlines()]
     files = sorted(one for one in pictures.iterdir() if one.suffix.lower() in SUFFIXES)
     if not files:
         raise BslamError(f"{pictures}: no picture in it; allowed: files named {', '.join(SUFFIXES)}")
-    for picture in files:
-        labels = source / f"{picture.stem}.txt"
-        if not labels.is_file():
-            continue  # nobody looked at it
+    # Of a picture without a file nobody said what is in it.
+    pairs = [(one, source / f"{one.stem}.txt") for one in files if (source / f"{one.stem}.txt").is_file()]
+    if not pairs:
+        raise BslamError(f"{source}: has a file for none of the pictures; allowed: NAME.txt beside NAME.jpg")
+    for picture, labels in pairs:
         size = _size(picture)
-        lines = [line for line in labels.read_text(encoding="utf-8").splitlines() if line.strip()]
+        lines = [line for line in _text(labels).splitlines() if line.strip()]
         if not lines:
             yield picture.name, "", "", "", "", ""
         for number, line in enumerate(lines):
@@ -121,6 +125,8 @@ def _yolo_row(line: str, where: str, kinds: list[str], name: str, size: tuple[in
         index, *values = line.split()
         kind = kinds[int(index)] if int(index) >= 0 else ""
         x, y, width, height = (float(value) for value in values)
+        if not kind:
+            raise ValueError
     except (ValueError, IndexError):
         allowed = f"class 0 to {len(kinds) - 1}, then x, y, width, height as shares of the picture"
         raise BslamError(f"{where}: {line!r} is not allowed; allowed: {allowed}") from None

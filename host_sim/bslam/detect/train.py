@@ -15,11 +15,13 @@ from bslam.detect.boxes import Curve, Found, curve, overlaps
 from bslam.detect.examples import Collection, Example
 from bslam.detect.fit import fit_windows, look_at
 from bslam.errors import BslamError
-from bslam.scannerfile import LOWEST, Kind, ScannerModel, Window
+from bslam.scannerfile import KINDS_MAX, LOWEST, WINDOWS_MAX, Kind, ScannerModel, Window
 
 FOLDS: Final = 4
 PICTURES_MIN: Final = 2 * FOLDS
-"""With a class in them: each part must show it, more or less."""
+"""With a class in them: each part shows it."""
+AREA_MIN_PX2: Final = 400
+"""Smaller things fill a few cells of the picture."""
 HIT: Final = 0.5
 """Overlap from which on a detection is of the thing."""
 _SD_MIN: Final = 0.01
@@ -48,13 +50,37 @@ class Trained:
 
 
 def check_collection(collection: Collection) -> None:
-    """BslamError if a class is in too few pictures to be trained and tried."""
+    """BslamError if there are more classes than a model holds, or one cannot be trained and tried."""
+    if len(collection.kinds) > KINDS_MAX:
+        raise BslamError(
+            f"{len(collection.kinds)} classes; allowed: {KINDS_MAX}, chosen by --classes, or more models"
+        )
     for kind in collection.kinds:
         count = sum(len(one.of(kind)) > 0 for one in collection.examples)
         if count < PICTURES_MIN:
             raise BslamError(
                 f"class {kind!r} is in {count} pictures; allowed: {PICTURES_MIN} at least, twenty are better"
             )
+        sides = np.concatenate([one.of(kind)[:, 2:] - one.of(kind)[:, :2] for one in collection.examples])
+        large = int((np.prod(sides, axis=1) >= AREA_MIN_PX2).sum())
+        if large < len(sides) / 2:
+            raise BslamError(
+                f"class {kind!r}: {len(sides) - large} of {len(sides)} boxes have less than {AREA_MIN_PX2} "
+                "square pixels in a frame of 320x240; allowed: less than half, take pictures from nearer"
+            )
+
+
+def parts_of(collection: Collection) -> list[int]:
+    """Which part each picture is in: of pictures that show the same classes those that stand together."""
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for index, one in enumerate(collection.examples):
+        shown = tuple(kind for kind in collection.kinds if len(one.of(kind)))
+        groups.setdefault(shown, []).append(index)
+    parts = [0] * len(collection.examples)
+    for its in groups.values():
+        for place, index in enumerate(its):
+            parts[index] = place * FOLDS // len(its)
+    return parts
 
 
 def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iterator[str | Trained]:
@@ -64,10 +90,10 @@ def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iter
     """
     check_collection(collection)
     examples = collection.examples
-    parts = [[i * FOLDS // len(examples) for i in range(len(examples))]]
+    parts = parts_of(collection)
     jobs = []
     for part in (*range(FOLDS), None):
-        chosen = [one for one, its in zip(examples, parts[0], strict=True) if its != part]
+        chosen = [one for one, its in zip(examples, parts, strict=True) if its != part]
         jobs += [(part, kind, chosen) for kind in range(len(collection.kinds))]
     names = collection.kinds
     work = (delayed(_fit_one)(names[kind], kind, chosen, seed) for _, kind, chosen in jobs)
@@ -77,7 +103,12 @@ def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iter
         windows.setdefault(part, []).extend(its)
         what = "all pictures" if part is None else f"without part {part + 1} of {FOLDS}"
         yield f"{names[kind]}: trained on {len(chosen)} pictures, {what}: {len(its)} windows"
-    left = _look_at_left(collection, parts[0], windows)
+    count = max(len(its) for its in windows.values())
+    if count > WINDOWS_MAX:
+        raise BslamError(
+            f"{count} windows; allowed: {WINDOWS_MAX}, so fewer classes, or boxes of fewer shapes"
+        )
+    left = _look_at_left(collection, parts, windows)
     kinds = tuple(_kind(name, collection.heights_m[name], left, false_a_picture) for name in names)
     yield Trained(ScannerModel(kinds, tuple(windows[None])), left)
 

@@ -12,8 +12,9 @@ from bslam.core.scanner import Scanner
 from bslam.detect import fit
 from bslam.detect.boxes import overlaps
 from bslam.detect.examples import read_collection
-from bslam.detect.train import with_threshold
+from bslam.detect.train import parts_of, with_threshold
 from bslam.detect.windows import Shape, blocks, row_values, window_boxes, window_features
+from bslam.errors import BslamError
 from bslam.scannerfile import LOWEST, read_scanner
 
 from .pictures import picture, write_folder
@@ -181,6 +182,33 @@ def test_whole_weights_decide_as_scikit_learn_does(monkeypatch):
     whole = np.einsum("nrck,rck->n", both.astype(np.int64), np.rint(weights / scale).astype(np.int64))
     steps = both.reshape(len(both), -1).sum(axis=1) + 1
     assert np.all(np.abs(scale * (whole + round(bias / scale)) - ours) <= scale * steps / 2)
+
+
+def test_each_part_shows_the_class_whatever_the_pictures_are_called(tmp_path):
+    write_folder(tmp_path / "all", 12, 1, empty=20)  # the empty ones stand behind the others
+    collection = read_collection([tmp_path / "all"])
+    parts = parts_of(collection)
+    shown = [part for part, one in zip(parts, collection.examples, strict=True) if len(one.of("panel"))]
+    assert sorted(shown) == sorted([0, 1, 2, 3] * 3) and sorted(parts) == sorted([0, 1, 2, 3] * 8)
+
+
+def test_folder_without_any_box_is_an_example_of_none(tmp_path):
+    write_folder(tmp_path / "with", 8, 1)
+    write_folder(tmp_path / "without", 0, 2, empty=3)
+    assert len(read_collection([tmp_path / "with", tmp_path / "without"]).examples) == 11
+    with pytest.raises(BslamError, match="no box in it"):
+        read_collection([tmp_path / "without"])
+
+
+def test_things_too_small_and_names_that_are_none_in_c_are_refused_before_training(tmp_path, capsys):
+    folder = write_folder(tmp_path / "small", 8, 1)
+    text = (folder / "labels.csv").read_text().splitlines()
+    small = [f"{line.split(',')[0]},panel,10,10,22,30,," for line in text[1:]]
+    (folder / "labels.csv").write_text("\n".join([text[0], *small]) + "\n")
+    assert main(["detect", "train", str(folder), "--out", str(tmp_path / "m.json")]) == 2
+    assert "8 of 8 boxes have less than 400 square pixels" in capsys.readouterr().err
+    assert main(["detect", "train", str(folder), "--out", str(tmp_path / "My-Things.json")]) == 2
+    assert "the name is not allowed" in capsys.readouterr().err
 
 
 def test_class_in_too_few_pictures_is_refused(tmp_path, capsys):

@@ -108,9 +108,15 @@ def test_read_folder_bad_header_is_refused(folder: Path, header: str, complaint:
         read_folder(write_labels(folder, header=header))
 
 
-def test_read_folder_without_any_box_is_refused(folder: Path) -> None:
-    with pytest.raises(BslamError, match="no box in it"):
-        read_folder(write_labels(folder, "a.png,,,,,,,"))
+def test_read_folder_without_any_box_shows_none(folder: Path) -> None:
+    found = read_folder(write_labels(folder, "a.png,,,,,,,"))
+    assert found.objects == () and [one.labels for one in found.pictures] == [()]
+
+
+def test_read_folder_takes_no_picture_from_elsewhere(folder: Path) -> None:
+    for name in (folder / "a.png", "../a.png"):
+        with pytest.raises(BslamError, match="column picture"):
+            read_folder(write_labels(folder, f"{name},,,,,,,"))
 
 
 def test_read_folder_without_labels_file_is_refused(folder: Path) -> None:

@@ -214,7 +214,7 @@ static void test_more_boxes_than_there_is_room_for_are_counted(void **state)
     draw(64, 40, 16);
     const bslam_detections_t *found = see();
     assert_int_equal(found->count, BSLAM_CANDIDATES_MAX);
-    assert_true(found->dropped > 100);
+    assert_true(found->dropped > 0);
     assert_near(found->items[0].box.left_px, 63.5, 4);  // the best remains
 }
 
@@ -265,6 +265,16 @@ static void test_model_that_cannot_be_is_refused_and_nothing_changes(void **stat
     WITH(window.rows, 1, BSLAM_E_COUNT);
     WITH(window.rows, BSLAM_WINDOW_SIDE_MAX + 1, BSLAM_E_COUNT);
     WITH(order[2], ROWS, BSLAM_E_COUNT);
+    WITH(order[2], order[3], BSLAM_E_COUNT);
+    WITH(window.weights, NULL, BSLAM_E_PARAMETER);
+    WITH(window.order, NULL, BSLAM_E_PARAMETER);
+    WITH(window.floors, NULL, BSLAM_E_PARAMETER);
+    WITH(window.edges, NULL, BSLAM_E_PARAMETER);
+    WITH(window.edge_scale, NULL, BSLAM_E_PARAMETER);
+    WITH(window.edge_bias, NULL, BSLAM_E_PARAMETER);
+    WITH(window.bias, INT32_MAX, BSLAM_E_PARAMETER);
+    WITH(model.kinds, NULL, BSLAM_E_PARAMETER);
+    WITH(model.windows, NULL, BSLAM_E_PARAMETER);
     WITH(window.scale, NAN, BSLAM_E_NOT_FINITE);
     WITH(window.scale, 0.0f, BSLAM_E_PARAMETER);
     WITH(window.box_columns, 0.0f, BSLAM_E_PARAMETER);
