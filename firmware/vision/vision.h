@@ -279,6 +279,18 @@ BSLAM_MUST_CHECK bslam_status_t bslam_scanner_sighting(const bslam_scanner_t *sc
                                                        const bslam_detection_t *found,
                                                        bslam_sighting_t *sighting);
 
+/// One size of the picture that was ended last.
+typedef struct bslam_scanner_level {
+    int32_t rows;  ///< of cells, with two beyond the picture on every side
+    int32_t columns;
+    float cell_px;  ///< side of a cell in the picture
+} bslam_scanner_level_t;
+
+/// For training: what windows slide over. Size `index`, 0 the largest, and the cells of one of its rows,
+/// columns * BSLAM_CHANNELS bytes; NULL: the size alone. False, nothing written: no such size or row.
+bool bslam_scanner_cells(const bslam_scanner_t *scanner, int32_t index, bslam_scanner_level_t *size,
+                         int32_t row, uint8_t *cells);
+
 // ---- the visual gyro: how the robot turned ----------------------------------------------------------------
 //
 //     bslam_visual_gyro_init(&gyro, BSLAM_VISUAL_GYRO_SD_RADPS);

@@ -439,9 +439,21 @@ const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner)
     return found;
 }
 
-bslam_level_t bslam_scanner_level(const bslam_scanner_t *scanner, int32_t index)
+bool bslam_scanner_cells(const bslam_scanner_t *scanner, int32_t index, bslam_scanner_level_t *size,
+                         int32_t row, uint8_t *cells)
 {
     const void *memory = scanner;
     const bslam_scanner_instance_t *instance = memory;
-    return bslam_level(&instance->channels, index);
+    if (index < 0 || index >= instance->channels.octave_count * BSLAM_LEVELS_AN_OCTAVE) {
+        return false;
+    }
+    const bslam_level_t level = bslam_level(&instance->channels, index);
+    if (row < 0 || row >= level.rows) {
+        return false;
+    }
+    *size = (bslam_scanner_level_t){level.rows, level.columns, level.cell_px};
+    if (cells != NULL) {
+        bslam_level_row(&level, row, cells);
+    }
+    return true;
 }

@@ -35,7 +35,4 @@ static inline bslam_scanner_instance_t *bslam_scanner_instance(bslam_scanner_t *
     return memory;
 }
 
-/// For training: the cells of a level (bslam_level) of the picture that was finished last.
-bslam_level_t bslam_scanner_level(const bslam_scanner_t *scanner, int32_t index);
-
 #endif

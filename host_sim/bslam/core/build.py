@@ -39,35 +39,6 @@ extern "Python" bool flash_read(void *, int, uint32_t, void *, uint32_t);
 """What bslam_map_sink_t, bslam_map_source_t and bslam_flash_t call: raw.py."""
 BEACONS_HEADER = FIRMWARE_DIR / "models" / "beacons.h"
 
-SCANNER_LEVELS = (
-    """
-int scanner_levels(const bslam_scanner_t *);
-void scanner_level(const bslam_scanner_t *, int, int32_t *, int32_t *, float *, uint8_t *);
-""",
-    """
-#include "vision/scan/scanner.h"
-static int scanner_levels(const bslam_scanner_t *scanner)
-{
-    const bslam_scanner_instance_t *instance = (const void *)scanner;
-    return instance->channels.octave_count * BSLAM_LEVELS_AN_OCTAVE;
-}
-static void scanner_level(const bslam_scanner_t *scanner, int index, int32_t *rows, int32_t *columns,
-                          float *cell_px, uint8_t *cells)
-{
-    const bslam_level_t level = bslam_scanner_level(scanner, index);
-    uint8_t row[BSLAM_LEVEL_ROOM];
-    *rows = level.rows;
-    *columns = level.columns;
-    *cell_px = level.cell_px;
-    for (int32_t i = 0; cells != NULL && i < level.rows; i++) {
-        bslam_level_row(&level, i, row);
-        memcpy(cells + i * level.columns * BSLAM_CHANNELS, row, level.columns * BSLAM_CHANNELS);
-    }
-}
-""",
-)
-"""Declared and defined: the cells that a scanner's windows slide over, for training."""
-
 LIBC_HEADERS = ("stdint.h", "stdbool.h", "stddef.h", "string.h", "math.h", "limits.h", "float.h")
 
 
@@ -137,13 +108,12 @@ def build(real: str, beacons_max: int) -> Path:
 def build_vision(name: str = VISION_EXTENSION, header: str = VISION_HEADER, folder: Path = CORE_DIR) -> Path:
     """Builds the vision library, in float as on the target, with its model where there is one yet."""
     text = declarations(VISION_MACROS, header) + "#define BSLAM_VISION_HASH ...\n"
-    text += "const bslam_beacon_model_t *built_in_model(void);\n" + SCANNER_LEVELS[0]
-    includes, model = f'#include <string.h>\n#include "{header}"\n', "NULL"
+    text += "const bslam_beacon_model_t *built_in_model(void);\n"
+    includes, model = f'#include "{header}"\n', "NULL"
     if BEACONS_HEADER.is_file():
         includes += f'#include "{BEACONS_HEADER.relative_to(FIRMWARE_DIR)}"\n'
         model = "&bslam_beacons_model"
     function = f"static const bslam_beacon_model_t *built_in_model(void) {{ return {model}; }}\n"
-    function += SCANNER_LEVELS[1]
     return compile_extension(name, text, includes + function, VISION_MACROS, "vision", folder)
 
 

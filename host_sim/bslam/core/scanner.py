@@ -88,12 +88,17 @@ class Scanner:
     def levels(self, rgb: NDArray[np.uint8]) -> list[Level]:
         """The cells that windows slide over, of all sizes, largest first."""
         self._look(rgb)
-        return [self._level(i) for i in range(self._library.lib.scanner_levels(self._scanner))]
+        found: list[Level] = []
+        while (level := self._level(len(found))) is not None:
+            found.append(level)
+        return found
 
     def first_level(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The cells of the picture at its own size."""
         self._look(rgb)
-        return self._level(0).cells
+        level = self._level(0)
+        assert level is not None  # every picture has one
+        return level.cells
 
     def sightings(
         self, rgb: NDArray[np.uint8], camera: Camera
@@ -131,13 +136,15 @@ class Scanner:
             )
         return lib.bslam_scanner_end(self._scanner)
 
-    def _level(self, index: int) -> Level:
-        ffi, lib = self._library.ffi, self._library.lib
-        rows, columns, side = ffi.new("int32_t *"), ffi.new("int32_t *"), ffi.new("float *")
-        lib.scanner_level(self._scanner, index, rows, columns, side, ffi.NULL)
-        cells = np.empty((rows[0], columns[0], CHANNELS), dtype=np.uint8)
-        lib.scanner_level(self._scanner, index, rows, columns, side, self._library.bytes(cells))
-        return Level(cells, side[0])
+    def _level(self, index: int) -> Level | None:
+        ffi, cells_of = self._library.ffi, self._library.lib.bslam_scanner_cells
+        size = ffi.new("bslam_scanner_level_t *")
+        if not cells_of(self._scanner, index, size, 0, ffi.NULL):
+            return None
+        cells = np.empty((size.rows, size.columns, CHANNELS), dtype=np.uint8)
+        for row in range(size.rows):
+            cells_of(self._scanner, index, size, row, self._library.bytes(cells[row]))
+        return Level(cells, size.cell_px)
 
     def _detection(self, found: Any) -> Detection:
         box = found.box

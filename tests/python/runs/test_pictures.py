@@ -40,7 +40,7 @@ def test_load_picture_turns_a_picture_upright(tmp_path):
 @pytest.mark.parametrize("size", [(12, 12), (4000, 16)])
 def test_load_picture_picture_of_no_use_is_refused(tmp_path, size):
     Image.new("RGB", size).save(tmp_path / "a.png")
-    with pytest.raises(BslamError, match=rf"a\.png: is {size[0]}x{size[1]}; allowed: sides from 16 px"):
+    with pytest.raises(BslamError, match=rf"a\.png: is {size[0]}x{size[1]}; allowed: sides from 32 px"):
         load_picture(tmp_path / "a.png")
 
 

@@ -349,6 +349,27 @@ static void test_sighting_of_no_kind_or_direction_is_refused_and_nothing_changes
     assert_memory_equal(&seen, &before, sizeof seen);
 }
 
+static void test_cells_are_given_row_by_row_for_training(void **state)
+{
+    (void)state;
+    static uint8_t cells[BSLAM_LEVEL_ROOM];
+    bslam_scanner_level_t size = {7, 7, 7};
+    draw(64, 40, 16);
+    (void)see();
+    assert_true(bslam_scanner_cells(&scanner, 0, &size, 2, cells));
+    assert_int_equal(size.rows, HEIGHT / 4 + 4);
+    assert_int_equal(size.columns, WIDTH / 4 + 4);
+    assert_near(size.cell_px, 4, 0);
+    assert_int_equal(cells[1], 128);  // grey
+    assert_true(bslam_scanner_cells(&scanner, 0, &size, 2 + 11, cells));
+    assert_true(cells[(2 + 17) * BSLAM_CHANNELS + 1] > 200);  // red
+    assert_false(bslam_scanner_cells(&scanner, 0, &size, size.rows, cells));
+    assert_false(bslam_scanner_cells(&scanner, -1, &size, 0, cells));
+    assert_false(bslam_scanner_cells(&scanner, 99, &size, 0, cells));
+    assert_true(bslam_scanner_cells(&scanner, 4, &size, 0, NULL));
+    assert_near(size.cell_px, 8, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -363,6 +384,7 @@ int main(void)
         cmocka_unit_test_setup(test_more_boxes_than_there_is_room_for_are_counted, make_model),
         cmocka_unit_test_setup(test_size_or_format_not_allowed_is_refused_and_nothing_changes, make_model),
         cmocka_unit_test_setup(test_model_that_cannot_be_is_refused_and_nothing_changes, make_model),
+        cmocka_unit_test_setup(test_cells_are_given_row_by_row_for_training, make_model),
         cmocka_unit_test_setup(test_sighting_is_where_the_thing_is, make_model),
         cmocka_unit_test_setup(test_sighting_of_no_kind_or_direction_is_refused_and_nothing_changes,
                                make_model),
