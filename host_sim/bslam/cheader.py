@@ -93,23 +93,18 @@ class Header:
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
         """Add a table of kinds or objects; its name."""
-        rows = "".join(
-            textwrap.fill(
-                ", ".join(map(c_float, astuple(one)[1:])) + "},",
-                COLUMNS,
-                initial_indent=f"    {{{c_string(one.name)}, ",
-                subsequent_indent="     ",
-            )
-            + "\n"
-            for one in classes
-        )
-        self._body.append(f"static const bslam_beacon_class_t {name}[{len(classes)}] = {{\n{rows}}};")
-        return name
+        rows = [[c_string(one.name), *map(c_float, astuple(one)[1:])] for one in classes]
+        return self.rows("bslam_beacon_class_t", name, rows)
 
     def rows(self, kind: str, name: str, rows: Sequence[Sequence[str]]) -> str:
         """Add a table of structs of a type of the library, a row of members each; its name."""
         lines = "".join(
-            textwrap.fill(", ".join(row) + "},", COLUMNS, initial_indent="    {", subsequent_indent="     ")
+            textwrap.fill(
+                ", ".join(row[1:]) + "},",
+                COLUMNS,
+                initial_indent=f"    {{{row[0]}, ",  # a name, which is not to be broken
+                subsequent_indent="     ",
+            )
             + "\n"
             for row in rows
         )
