@@ -4,6 +4,9 @@
 
 BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board.mk))
 
+# Of a board that scans: the header that `bslam detect train` wrote.
+KINDS ?= firmware/models/rooms.h
+
 # What boards may use.
 PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)
 RISCV_PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/riscv/*.c)

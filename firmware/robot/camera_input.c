@@ -2,7 +2,20 @@
 
 #if ROBOT_VISION
 
+#ifdef ROBOT_KINDS
+#include ROBOT_KINDS_HEADER
+#else
 #include "models/beacons.h"
+#endif
+
+static bslam_status_t init_vision(camera_input_t *input, int32_t camera_count)
+{
+#ifdef ROBOT_KINDS
+    return bslam_vision_init_scanner(&input->vision, &ROBOT_KINDS, input->cameras, camera_count);
+#else
+    return bslam_vision_init(&input->vision, &bslam_beacons_model, input->cameras, camera_count);
+#endif
+}
 
 /// No frame streams in, and none has been looked at.
 static void clear(camera_input_t *input)
@@ -20,8 +33,7 @@ bslam_status_t camera_input_set_camera(camera_input_t *input, int index, const b
         return BSLAM_E_COUNT;
     }
     input->cameras[index] = *camera;
-    const bslam_status_t status =
-        bslam_vision_init(&input->vision, &bslam_beacons_model, input->cameras, index + 1);
+    const bslam_status_t status = init_vision(input, index + 1);
     if (status == BSLAM_OK) {
         input->camera_count = index + 1;
     }

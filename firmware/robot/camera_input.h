@@ -1,5 +1,6 @@
 /// Pictures that come as pieces of rows, and what is seen in them as sightings: the vision library behind the
-/// link or a board's camera. Only in an application that is built with ROBOT_VISION.
+/// link or a board's camera. Only in an application that is built with ROBOT_VISION. It finds the built-in
+/// kinds, or those of ROBOT_KINDS, a scanner's model in the header ROBOT_KINDS_HEADER.
 #ifndef ROBOT_CAMERA_INPUT_H
 #define ROBOT_CAMERA_INPUT_H
 

@@ -5,7 +5,8 @@
 
 #include "link/crc16.h"
 #include "robot/param_store.h"
-#if ROBOT_VISION && BSLAM_APPEARANCE
+#define HAS_SEEDS (ROBOT_VISION && BSLAM_APPEARANCE && BSLAM_VISION_BUILT_IN)
+#if HAS_SEEDS
 #include "models/seeds.h"
 #endif
 
@@ -120,10 +121,10 @@ static void set_for_cameras(bslam_settings_t *settings)
     bslam_settings_preset(settings, BSLAM_PRESET_CAMERA);
 }
 
-/// What classifiers of a robot with cameras start from.
+/// What classifiers of a robot with cameras start from; of a user's own kinds there is nothing.
 static void name_seeds(bslam_settings_t *settings)
 {
-#if ROBOT_VISION && BSLAM_APPEARANCE
+#if HAS_SEEDS
     settings->seeds = bslam_rendered_seeds;
     settings->seed_count = BSLAM_RENDERED_SEEDS;
 #else

@@ -8,13 +8,12 @@
 #include "vision/pixels/bytes.h"
 #include "base/logarithm.h"
 #include "base/trig.h"
+#include "vision/camera/zoom.h"
 #include "vision/detection/features.h"
 #include "vision/detection/prefilter.h"
 #include "vision/detection/vertical_edges.h"
 #include "vision/classifiers/recogniser.h"
 #include "base/scalar.h"
-
-_Static_assert(BSLAM_ZOOM_MAX == 2, "rows are doubled, or are not");
 
 /// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
 /// than these shares of its cells are, in percent.
@@ -54,58 +53,15 @@ static const bslam_detector_model_t *detector_for(const bslam_beacon_model_t *mo
     return camera->lens == BSLAM_LENS_PINHOLE ? &model->pinhole : &model->wide;
 }
 
-/// What becomes of a place along a side when each pixel becomes `zoom`: centres at whole numbers, as before.
-static bslam_real_t zoomed(bslam_real_t px, int32_t zoom)
-{
-    return px * (bslam_real_t)zoom + (bslam_real_t)(zoom - 1) / 2;
-}
-
-static bslam_real_t unzoomed(bslam_real_t px, int32_t zoom)
-{
-    return (px - (bslam_real_t)(zoom - 1) / 2) / (bslam_real_t)zoom;
-}
-
-static bslam_box_t unzoomed_box(bslam_box_t box, int32_t zoom)
-{
-    return (bslam_box_t){unzoomed(box.left_px, zoom), unzoomed(box.top_px, zoom),
-                         unzoomed(box.right_px, zoom), unzoomed(box.bottom_px, zoom)};
-}
-
-/// The camera whose pixels are those that the front end looks at; its zoom is 1 at least.
-static bslam_camera_t zoomed_camera(bslam_camera_t camera)
-{
-    camera.zoom = camera.zoom > 1 ? camera.zoom : 1;
-    camera.width_px *= camera.zoom;
-    camera.height_px *= camera.zoom;
-    camera.fx_px *= (bslam_real_t)camera.zoom;
-    camera.fy_px *= (bslam_real_t)camera.zoom;
-    camera.cx_px = zoomed(camera.cx_px, camera.zoom);
-    camera.cy_px = zoomed(camera.cy_px, camera.zoom);
-    return camera;
-}
-
-static bool has_room(const bslam_camera_t *camera)
-{
-    const int32_t zoom = camera->zoom > 1 ? camera->zoom : 1;
-    return zoom * camera->width_px <= BSLAM_IMAGE_WIDTH_MAX &&
-           zoom * camera->height_px <= BSLAM_IMAGE_HEIGHT_MAX;
-}
-
 bslam_status_t bslam_front_end_init(bslam_front_end_t *vision, const bslam_beacon_model_t *model,
                                     const bslam_camera_t *cameras, int32_t camera_count)
 {
-    if (camera_count < 1 || camera_count > BSLAM_CAMERAS_MAX) {
-        return BSLAM_E_COUNT;
-    }
     bslam_status_t status = bslam_beacon_model_check(model);
     if (status == BSLAM_OK && model->recogniser != NULL) {
         status = bslam_recogniser_check(model->recogniser);
     }
-    for (int32_t i = 0; i < camera_count && status == BSLAM_OK; i++) {
-        status = bslam_camera_check(&cameras[i]);
-        if (status == BSLAM_OK && !has_room(&cameras[i])) {
-            status = BSLAM_E_RANGE;
-        }
+    if (status == BSLAM_OK) {
+        status = bslam_zoom_check(cameras, camera_count);
     }
     if (status != BSLAM_OK) {
         return status;
@@ -115,7 +71,7 @@ bslam_status_t bslam_front_end_init(bslam_front_end_t *vision, const bslam_beaco
     vision->camera_count = camera_count;
     vision->reason = BSLAM_VISION_UNFINISHED;
     for (int32_t i = 0; i < camera_count; i++) {
-        vision->cameras[i] = zoomed_camera(cameras[i]);
+        vision->cameras[i] = bslam_zoom_camera(cameras[i]);
         vision->machines[i] = bslam_cell_machine(&detector_for(model, &cameras[i])->cell);
         bslam_background_init(&vision->backgrounds[i]);
     }
@@ -455,7 +411,8 @@ __attribute__((noinline)) static void measure(bslam_front_end_t *vision, const b
             const bslam_beacon_class_t *kind = &vision->model->classes[candidate.beacon_class - 1];
             candidate.score -= smallness(view, kind, &candidate);
             if (candidate.score >= threshold) {
-                candidate.outline = unzoomed_box(candidate.outline, vision->cameras[vision->camera].zoom);
+                candidate.outline =
+                    bslam_zoom_out_box(candidate.outline, vision->cameras[vision->camera].zoom);
                 kept = insert(vision->candidates, kept, &candidate);
             }
         }
@@ -505,7 +462,7 @@ bslam_status_t bslam_front_end_end(bslam_front_end_t *vision, bool robot_moved)
 
 bslam_box_t bslam_front_end_proposal_box(const bslam_front_end_t *vision, int32_t index)
 {
-    return unzoomed_box(vision->proposals.items[index].box, vision->cameras[vision->camera].zoom);
+    return bslam_zoom_out_box(vision->proposals.items[index].box, vision->cameras[vision->camera].zoom);
 }
 
 void bslam_front_end_blob_features(const bslam_front_end_t *vision, int32_t index,
@@ -548,11 +505,10 @@ bslam_status_t bslam_front_end_measure(const bslam_front_end_t *vision, const bs
 {
     const bslam_frame_t frame = finished_frame(vision);
     const bslam_camera_t *camera = &vision->cameras[vision->camera];
-    const bslam_box_t box = {zoomed(rough->left_px, camera->zoom), zoomed(rough->top_px, camera->zoom),
-                             zoomed(rough->right_px, camera->zoom), zoomed(rough->bottom_px, camera->zoom)};
+    const bslam_box_t box = bslam_zoom_in_box(*rough, camera->zoom);
     const bslam_status_t status = bslam_measure(&frame, camera, &box, size, candidate);
     if (status == BSLAM_OK) {
-        candidate->outline = unzoomed_box(candidate->outline, camera->zoom);
+        candidate->outline = bslam_zoom_out_box(candidate->outline, camera->zoom);
     }
     return status;
 }

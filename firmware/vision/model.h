@@ -103,22 +103,27 @@ typedef struct bslam_hinged {
 /// Values of a cell of 4x4 pixels; cells of a window's side at most; of a kind's windows, and kinds, at most.
 enum { BSLAM_CHANNELS = 8, BSLAM_WINDOW_SIDE_MAX = 20, BSLAM_WINDOWS_MAX = 32, BSLAM_KINDS_MAX = 16 };
 
-/// Bytes of the weights that say where the edges are: of blocks of 2x2 cells, for left, top, right, bottom.
-#define BSLAM_EDGE_BYTES(columns, rows) (4 * ((columns) / 2) * ((rows) / 2) * BSLAM_CHANNELS)
+/// Bytes of a window's weights for means of 2x2 cells; and of those that say where the edges are: left, top,
+/// right, bottom.
+#define BSLAM_COARSE_BYTES(columns, rows) ((columns) / 2 * ((rows) / 2) * BSLAM_CHANNELS)
+#define BSLAM_EDGE_BYTES(columns, rows) (4 * BSLAM_COARSE_BYTES(columns, rows))
 
 /// A window of cells that slides over all sizes of a picture, and its linear SVM: f = scale * (bias + sum of
-/// weight * cell). Row after row is added, and what is below a row's floor then is given up.
+/// weight * cell). A coarse one decides first, of means of 2x2 cells and so at a quarter of all places: row
+/// after row is added, and what is below a row's floor then is given up.
 typedef struct bslam_window {
     uint8_t kind;     ///< index in the model's kinds
-    uint8_t columns;  ///< of cells
+    uint8_t columns;  ///< of cells; even, as are the rows
     uint8_t rows;
     float box_columns;  ///< of the box that it frames, in its middle
     float box_rows;
     const int8_t *weights;  ///< [rows][columns][BSLAM_CHANNELS]
     float scale;            ///< above 0
     int32_t bias;
-    const uint8_t *order;     ///< [rows]: which row is added first, and so on
-    const int32_t *floors;    ///< [rows], of the sum so far, bias included
+    const int8_t *coarse;  ///< [rows / 2][columns / 2][BSLAM_CHANNELS]
+    int32_t coarse_bias;
+    const uint8_t *order;     ///< [rows / 2]: which row is added first, and so on
+    const int32_t *floors;    ///< [rows / 2], of the sum so far, bias included
     const int8_t *edges;      ///< BSLAM_EDGE_BYTES
     const float *edge_scale;  ///< [4]: an edge is so far from the box's, of its width or height,
     const float *edge_bias;   ///< [4]: edge_scale * sum of weight * block's sum + edge_bias

@@ -47,6 +47,23 @@
      BSLAM_VISION_SIZE_COLUMNS * (4 + BSLAM_VISION_SIZE_REAL) + 6 * BSLAM_VISION_SIZE_CELLS + \
      BSLAM_VISION_SIZE_POINTER + 72)
 
+/// The scanner: cells of four sizes of the picture with what makes them, rows of the size in between, boxes.
+#define BSLAM_VISION_SIZE_OCTAVE \
+    (32 + BSLAM_VISION_SIZE_POINTER + 3 * (BSLAM_IMAGE_WIDTH_MAX + 8) + 18 * BSLAM_VISION_SIZE_COLUMNS)
+#define BSLAM_VISION_SIZE_LEVEL_ROW (8 * (BSLAM_VISION_SIZE_COLUMNS + 4))
+#define BSLAM_SCANNER_BYTES \
+    ((4 * BSLAM_VISION_SIZE_OCTAVE + 8 + 4 * BSLAM_VISION_SIZE_COLUMNS + 2 * BSLAM_IMAGE_WIDTH_MAX + \
+      8 * ((BSLAM_VISION_SIZE_COLUMNS * (BSLAM_IMAGE_HEIGHT_MAX / 4) * 4 + 2) / 3) + \
+      27 * BSLAM_VISION_SIZE_LEVEL_ROW + 128 * 24 + (BSLAM_REAL_DOUBLE ? 48 : 32) * BSLAM_CANDIDATES_MAX + \
+      BSLAM_VISION_SIZE_POINTER + 64 + 7) / \
+     8 * 8)
+/// With the cameras of a robot, and what it sees.
+#define BSLAM_VISION_SIZE_RIG_SCANNER \
+    (BSLAM_SCANNER_BYTES + BSLAM_CAMERAS_MAX * (BSLAM_REAL_DOUBLE ? 96 : 52) + \
+     BSLAM_VISION_SIZE_LARGER(3 * BSLAM_IMAGE_WIDTH_MAX, \
+                              BSLAM_CANDIDATES_MAX * BSLAM_VISION_SIZE_CANDIDATE) + \
+     2 * BSLAM_VISION_SIZE_POINTER + 72)
+
 /// Turns between pictures: for each camera where its columns are and what it saw last; and scratch.
 #define BSLAM_VISION_SIZE_TURN_COLUMNS (BSLAM_IMAGE_WIDTH_MAX / 2)
 #define BSLAM_VISION_SIZE_PATTERN (6 * BSLAM_VISION_SIZE_TURN_COLUMNS + 3 * BSLAM_VISION_SIZE_REAL)
@@ -58,24 +75,18 @@
      (BSLAM_CAMERAS_MAX * (BSLAM_VISION_SIZE_GRID + BSLAM_VISION_SIZE_PATTERN) + BSLAM_VISION_SIZE_PATTERN + \
       2 * BSLAM_VISION_SIZE_REAL + BSLAM_VISION_SIZE_TURN_COLUMNS * 2 * BSLAM_VISION_SIZE_REAL + 16))
 
-#define BSLAM_VISION_BYTES ((BSLAM_VISION_SIZE_FRONT_END + BSLAM_VISION_SIZE_TURNS + 7) / 8 * 8)
+#define BSLAM_VISION_BYTES \
+    ((8 + \
+      BSLAM_VISION_SIZE_LARGER(BSLAM_VISION_BUILT_IN * BSLAM_VISION_SIZE_FRONT_END, \
+                               BSLAM_VISION_SIZE_RIG_SCANNER) + \
+      BSLAM_VISION_SIZE_TURNS + 7) / \
+     8 * 8)
 
 /// The visual gyro: a state, its covariance, and each camera's last picture.
 #define BSLAM_VISION_SIZE_STATES (3 + 2 * BSLAM_CAMERAS_MAX)
 #define BSLAM_VISUAL_GYRO_BYTES \
     ((8 * BSLAM_CAMERAS_MAX + \
       BSLAM_VISION_SIZE_REAL * (BSLAM_VISION_SIZE_STATES * (BSLAM_VISION_SIZE_STATES + 1) + 4) + 8 + 7) / \
-     8 * 8)
-
-/// The scanner: cells of four sizes of the picture with what makes them, rows of the size in between, boxes.
-#define BSLAM_VISION_SIZE_OCTAVE \
-    (32 + BSLAM_VISION_SIZE_POINTER + 3 * (BSLAM_IMAGE_WIDTH_MAX + 8) + 18 * BSLAM_VISION_SIZE_COLUMNS)
-#define BSLAM_VISION_SIZE_LEVEL_ROW (8 * (BSLAM_VISION_SIZE_COLUMNS + 4))
-#define BSLAM_SCANNER_BYTES \
-    ((4 * BSLAM_VISION_SIZE_OCTAVE + 8 + 4 * BSLAM_VISION_SIZE_COLUMNS + 2 * BSLAM_IMAGE_WIDTH_MAX + \
-      8 * ((BSLAM_VISION_SIZE_COLUMNS * (BSLAM_IMAGE_HEIGHT_MAX / 4) * 4 + 2) / 3) + \
-      20 * BSLAM_VISION_SIZE_LEVEL_ROW + 128 * 24 + (BSLAM_REAL_DOUBLE ? 48 : 32) * BSLAM_CANDIDATES_MAX + \
-      BSLAM_VISION_SIZE_POINTER + 64 + 7) / \
      8 * 8)
 
 /// Differs where sizes do, so that library and application notice: bslam_vision_init.
@@ -89,6 +100,6 @@
         BSLAM_VISION_MIX(BSLAM_VISION_MIX(BSLAM_VISION_MIX(BSLAM_VISION_HASH_OF_IMAGE, BSLAM_CAMERAS_MAX), \
                                           BSLAM_PROPOSALS_MAX), \
                          BSLAM_CANDIDATES_MAX), \
-        BSLAM_VISION_TURNS)
+        2 * BSLAM_VISION_BUILT_IN + BSLAM_VISION_TURNS)
 
 #endif

@@ -10,8 +10,10 @@ _Static_assert(sizeof(bslam_run_t) * BSLAM_RUNS_MAX <= BSLAM_VISION_SIZE_RUNS, "
 _Static_assert(sizeof(bslam_thumbnail_t) <= BSLAM_VISION_SIZE_THUMBNAIL, "size.h: the picture");
 _Static_assert(sizeof(bslam_proposals_t) <= BSLAM_VISION_SIZE_PROPOSALS, "size.h: boxes");
 _Static_assert(sizeof(bslam_front_end_t) <= BSLAM_VISION_SIZE_FRONT_END, "size.h: the front end");
+_Static_assert(sizeof(bslam_rig_scanner_t) <= BSLAM_VISION_SIZE_RIG_SCANNER, "size.h: the scanner of a rig");
 _Static_assert(sizeof(bslam_vision_instance_t) <= sizeof(bslam_vision_t), "size.h: the sum");
 
+#if BSLAM_VISION_BUILT_IN
 bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, size_t vision_bytes, uint32_t sizes_hash,
                                        const bslam_beacon_model_t *model, const bslam_camera_t *cameras,
                                        int32_t camera_count)
@@ -21,41 +23,71 @@ bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, size_t vision_byt
     }
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
     const bslam_status_t status = bslam_front_end_init(&instance->front_end, model, cameras, camera_count);
-#if BSLAM_VISION_TURNS
     if (status == BSLAM_OK) {
+        instance->scans = false;
+#if BSLAM_VISION_TURNS
         bslam_turns_init(&instance->turns, &instance->front_end);
-    }
 #endif
+    }
+    return status;
+}
+#endif
+
+bslam_status_t bslam_vision_init_scanner_sized(bslam_vision_t *vision, size_t vision_bytes,
+                                               uint32_t sizes_hash, const bslam_scanner_model_t *model,
+                                               const bslam_camera_t *cameras, int32_t camera_count)
+{
+    if (vision_bytes != sizeof *vision || sizes_hash != BSLAM_VISION_HASH) {
+        return BSLAM_E_SIZE;
+    }
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    const bslam_status_t status = bslam_rig_scanner_init(&instance->scanner, model, cameras, camera_count);
+    instance->scans = instance->scans || status == BSLAM_OK;
     return status;
 }
 
 bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_pixel_format_t format,
                                   int32_t width_px, int32_t height_px)
 {
-    return bslam_front_end_begin(&bslam_vision_instance(vision)->front_end, camera, format, width_px,
-                                 height_px);
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    return bslam_vision_scans(instance)
+               ? bslam_rig_scanner_begin(&instance->scanner, camera, format, width_px, height_px)
+               : bslam_front_end_begin(bslam_vision_front_end(instance), camera, format, width_px, height_px);
 }
 
 bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
 {
-    return bslam_front_end_row(&bslam_vision_instance(vision)->front_end, pixels);
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    return bslam_vision_scans(instance) ? bslam_rig_scanner_row(&instance->scanner, pixels)
+                                        : bslam_front_end_row(bslam_vision_front_end(instance), pixels);
 }
 
 bslam_status_t bslam_vision_end(bslam_vision_t *vision, bool robot_moved)
 {
-    return bslam_front_end_end(&bslam_vision_instance(vision)->front_end, robot_moved);
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    return bslam_vision_scans(instance) ? bslam_rig_scanner_end(&instance->scanner)
+                                        : bslam_front_end_end(bslam_vision_front_end(instance), robot_moved);
 }
 
 bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)
 {
-    return bslam_front_end_point(&bslam_vision_instance(vision)->front_end, camera, yaw_rad);
+    bslam_vision_instance_t *instance = bslam_vision_instance(vision);
+    return bslam_vision_scans(instance)
+               ? bslam_rig_scanner_point(&instance->scanner, camera, yaw_rad)
+               : bslam_front_end_point(bslam_vision_front_end(instance), camera, yaw_rad);
 }
 
 // ---- what is seen -----------------------------------------------------------------------------------------
 
 bslam_vision_reason_t bslam_vision_reason(const bslam_vision_t *vision)
 {
-    return bslam_const_vision_instance(vision)->front_end.reason;
+    const bslam_vision_instance_t *instance = bslam_const_vision_instance(vision);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        return instance->front_end.reason;
+    }
+#endif
+    return instance->scanner.reason;
 }
 
 static const char *const reason_names[BSLAM_VISION_REASON_COUNT] = {
@@ -75,8 +107,15 @@ const char *bslam_vision_reason_name(bslam_vision_reason_t reason)
 
 const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, int32_t *count)
 {
-    *count = bslam_const_vision_instance(vision)->front_end.candidate_count;
-    return bslam_const_vision_instance(vision)->front_end.candidates;
+    const bslam_vision_instance_t *instance = bslam_const_vision_instance(vision);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        *count = instance->front_end.candidate_count;
+        return instance->front_end.candidates;
+    }
+#endif
+    *count = instance->scanner.candidate_count;
+    return instance->scanner.candidates;
 }
 
 int32_t bslam_vision_sightings(const bslam_vision_t *vision, bslam_sighting_t sightings[BSLAM_CANDIDATES_MAX])
@@ -93,11 +132,20 @@ int32_t bslam_vision_sightings(const bslam_vision_t *vision, bslam_sighting_t si
 
 bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision)
 {
-    const bslam_front_end_t *front_end = &bslam_const_vision_instance(vision)->front_end;
-    bslam_vision_counters_t counters = {.candidates_dropped = front_end->candidates_dropped,
-                                        .boxes_dropped = front_end->proposals.boxes_dropped,
-                                        .runs_dropped = front_end->proposals.runs_dropped};
-    memcpy(counters.frames, front_end->frames, sizeof counters.frames);
+    const bslam_vision_instance_t *instance = bslam_const_vision_instance(vision);
+    bslam_vision_counters_t counters = {0};
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        const bslam_front_end_t *front_end = &instance->front_end;
+        counters.candidates_dropped = front_end->candidates_dropped;
+        counters.boxes_dropped = front_end->proposals.boxes_dropped;
+        counters.runs_dropped = front_end->proposals.runs_dropped;
+        memcpy(counters.frames, front_end->frames, sizeof counters.frames);
+        return counters;
+    }
+#endif
+    counters.candidates_dropped = instance->scanner.candidates_dropped;
+    memcpy(counters.frames, instance->scanner.frames, sizeof counters.frames);
     return counters;
 }
 
@@ -105,12 +153,14 @@ bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision)
 bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return bslam_turns_see(&instance->turns, &instance->front_end, turn);
+    return !bslam_vision_scans(instance) && bslam_turns_see(&instance->turns, &instance->front_end, turn);
 }
 
 void bslam_vision_forget_turns(bslam_vision_t *vision)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    bslam_turns_init(&instance->turns, &instance->front_end);
+    if (!bslam_vision_scans(instance)) {
+        bslam_turns_init(&instance->turns, &instance->front_end);
+    }
 }
 #endif

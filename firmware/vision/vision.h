@@ -96,6 +96,21 @@ BSLAM_MUST_CHECK bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, 
                                                         const bslam_beacon_model_t *model,
                                                         const bslam_camera_t *cameras, int32_t camera_count);
 
+/// The same for a user's own kinds, which `bslam detect train` wrote: MODEL.h. It needs no horizon and no
+/// colour of the walls, and remembers nothing from picture to picture. BSLAM_E_COUNT, BSLAM_E_NOT_FINITE,
+/// BSLAM_E_PARAMETER: as bslam_scanner_init, too.
+#define bslam_vision_init_scanner(vision, model, cameras, camera_count) \
+    bslam_vision_init_scanner_sized((vision), sizeof *(vision), BSLAM_VISION_HASH, (model), (cameras), \
+                                    (camera_count))
+#if BSLAM_REAL_DOUBLE
+#define bslam_vision_init_scanner_sized bslam_vision_init_scanner_double
+#endif
+BSLAM_MUST_CHECK bslam_status_t bslam_vision_init_scanner_sized(bslam_vision_t *vision, size_t vision_bytes,
+                                                                uint32_t sizes_hash,
+                                                                const bslam_scanner_model_t *model,
+                                                                const bslam_camera_t *cameras,
+                                                                int32_t camera_count);
+
 typedef enum bslam_pixel_format {
     BSLAM_PIXELS_RGB565 = 0,  ///< 2 bytes, in the machine's byte order; red in the upper bits
     BSLAM_PIXELS_RGB888 = 1   ///< 3 bytes: red, green, blue
@@ -207,18 +222,15 @@ typedef struct bslam_vision_counters {
 
 bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision);
 
-// ---- your own kinds: a scanner
-// -----------------------------------------------------------------------------
+// ---- your own kinds in any picture: a scanner -------------------------------------------------------------
 //
 //     static bslam_scanner_t scanner;
-//     bslam_scanner_init(&scanner, &bslam_my_things);      the header that `bslam detect train` wrote
+//     bslam_scanner_init(&scanner, &bslam_my_things);      what bslam_vision_init_scanner looks with
 //     bslam_scanner_begin(&scanner, BSLAM_PIXELS_RGB565, 320, 240);
 //     bslam_scanner_row(&scanner, pixels);                 every row, as it comes
 //     found = bslam_scanner_end(&scanner);
-//     bslam_scanner_sighting(&scanner, &camera, &found->items[0], &seen);
 //
-// It needs no horizon, no colour of the walls and no camera, and remembers nothing from picture to picture.
-// MATH-CAMERA "Scanner".
+// It needs no camera: boxes are all it tells. MATH-CAMERA "Scanner".
 
 /// A scanner. What stands in it is the library's own.
 typedef union bslam_scanner {
@@ -269,15 +281,6 @@ BSLAM_MUST_CHECK bslam_status_t bslam_scanner_row(bslam_scanner_t *scanner, cons
 /// Looks at the picture: windows of all sizes, of boxes that overlap by .4 or more the best. Where rows are
 /// missing nothing is found, and the reason says so. docs/SIZES.md has the cost.
 const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner);
-
-/// What was found as a sighting, without identity or signature: direction, distance where the kind's height
-/// is known and nothing cuts it off, both with their noise. BSLAM_E_RANGE: a kind that is none, or the camera
-/// has no direction there; BSLAM_E_NOT_FINITE: the box.
-/// *sighting is unchanged then.
-BSLAM_MUST_CHECK bslam_status_t bslam_scanner_sighting(const bslam_scanner_t *scanner,
-                                                       const bslam_camera_t *camera,
-                                                       const bslam_detection_t *found,
-                                                       bslam_sighting_t *sighting);
 
 /// One size of the picture that was ended last.
 typedef struct bslam_scanner_level {

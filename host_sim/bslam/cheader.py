@@ -187,6 +187,8 @@ def scanner_header(model: ScannerModel, name: str) -> str:
                 header.array(f"{its}_weights", window.weights),
                 c_float(window.scale),
                 str(window.bias),
+                header.array(f"{its}_coarse", window.coarse),
+                str(window.coarse_bias),
                 header.array(f"{its}_order", window.order),
                 header.array(f"{its}_floors", window.floors),
                 header.array(f"{its}_edges", window.edges),

@@ -18,7 +18,7 @@ from bslam.errors import BslamError
 from bslam.modelfile import SIZE_MAX_M, Document, load_document
 
 FORMAT = "bslam scanner"
-VERSION = 1
+VERSION = 2
 CHANNELS = 8
 """Values of a cell, as BSLAM_CHANNELS in firmware/vision/model.h."""
 LOWEST = -0.6
@@ -27,7 +27,7 @@ SIDE_MAX = 20
 WINDOWS_MAX = 32
 KINDS_MAX = 16
 BLOCK = 2
-"""Cells across and down of what the edges are read from."""
+"""Cells across and down of what the coarse SVM and the edges are read from."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,10 @@ class Window:
     weights: NDArray[np.int8]  # (rows, columns, CHANNELS)
     scale: float
     bias: int
-    order: NDArray[np.uint8]  # (rows,)
-    floors: NDArray[np.int32]  # (rows,)
+    coarse: NDArray[np.int8]  # (rows // BLOCK, columns // BLOCK, CHANNELS)
+    coarse_bias: int
+    order: NDArray[np.uint8]  # (rows // BLOCK,)
+    floors: NDArray[np.int32]  # (rows // BLOCK,)
     edges: NDArray[np.int8]  # (4, rows // BLOCK, columns // BLOCK, CHANNELS)
     edge_scale: NDArray[np.float32]  # (4,)
     edge_bias: NDArray[np.float32]  # (4,)
@@ -125,10 +127,10 @@ def _kind(table: Document) -> Kind:
 
 
 def _window(table: Document, kinds: int) -> Window:
-    columns, rows = (table.whole(key, BLOCK, SIDE_MAX) for key in ("columns", "rows"))
-    blocks = (4, rows // BLOCK, columns // BLOCK, CHANNELS)
-    order = table.integers("order", rows, np.uint8)
-    if sorted(order.tolist()) != list(range(rows)):
+    columns, rows = (_side(table, key) for key in ("columns", "rows"))
+    blocks = (rows // BLOCK, columns // BLOCK, CHANNELS)
+    order = table.integers("order", rows // BLOCK, np.uint8)
+    if sorted(order.tolist()) != list(range(rows // BLOCK)):
         raise BslamError(f"{table.path}, key {table.prefix}order: allowed: each row once")
     return Window(
         kind=table.whole("kind", 0, kinds - 1),
@@ -139,12 +141,21 @@ def _window(table: Document, kinds: int) -> Window:
         ),
         scale=table.number("scale", 1e-12, 1e6),
         bias=table.whole("bias", -(2**30), 2**30),
+        coarse=table.integers("coarse", int(np.prod(blocks)), np.int8).reshape(blocks),
+        coarse_bias=table.whole("coarse_bias", -(2**30), 2**30),
         order=order,
-        floors=table.integers("floors", rows, np.int32),
-        edges=table.integers("edges", int(np.prod(blocks)), np.int8).reshape(blocks),
+        floors=table.integers("floors", rows // BLOCK, np.int32),
+        edges=table.integers("edges", 4 * int(np.prod(blocks)), np.int8).reshape(4, *blocks),
         edge_scale=table.array("edge_scale", (4,)),
         edge_bias=table.array("edge_bias", (4,)),
     )
+
+
+def _side(table: Document, key: str) -> int:
+    side = table.whole(key, BLOCK, SIDE_MAX)
+    if side % BLOCK != 0:
+        raise BslamError(f"{table.path}, key {table.prefix}{key}: {side}; allowed: an even number")
+    return side
 
 
 def _window_table(window: Window) -> dict[str, Any]:

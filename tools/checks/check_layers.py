@@ -76,6 +76,7 @@ RUNS = EVALUATION | {
     "recording",
     "rig",
     "runs",
+    "scannerfile",
     "target",
     "world",
 }

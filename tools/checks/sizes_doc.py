@@ -38,6 +38,12 @@ COMPILER = f"arm-none-eabi-gcc -std=c11 -ffp-contract=off -I{ROOT / 'firmware'} 
 NM = "arm-none-eabi-nm"
 STEP_FUNCTIONS = ("bslam_slam_odometry", "bslam_slam_sightings")
 VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
+VISION_PARTS = {
+    "frame": "built-in kinds",
+    "rows": "a scanner's channels, as rows come",
+    "scan": "a scanner's windows: three kinds",
+}
+"""What firmware/bench/cost_vision.c prints, and what it is."""
 PARTS = {
     "predict": "odometry and an empty frame",
     "step": "odometry and a frame of 3 sightings with distance, known association",
@@ -120,18 +126,19 @@ def picture_loader(lens: str, folder: Path, seed: int = WORLD_SEED, count: int =
     return "-device", f"loader,file={path},addr={PICTURES_AT:#x},force-raw=on"
 
 
-def vision_costs() -> dict[tuple[str, str], int]:
-    """Instructions of a frame, mean, by core and lens."""
+def vision_costs() -> dict[tuple[str, str, str], int]:
+    """Instructions of a frame, mean, by core, lens and part: VISION_PARTS."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         for lens in RIGS:
             loader = picture_loader(lens, Path(folder))
             for core, board in COST_BOARDS.items():
                 ended = run_image(board, "cost_vision", *loader)
-                ticks = [int(one) for one in re.findall(r"^frame \d+ (\d+) ", ended.output, re.MULTILINE)]
-                if ended.status != 0 or len(ticks) != FRAMES:
-                    raise SystemExit(f"cost_vision on {board}: status {ended.status}: {ended.output}")
-                found[core, lens] = round(sum(ticks) / FRAMES * INSTRUCTIONS_A_TICK)
+                for part in VISION_PARTS:
+                    lines = re.findall(rf"^{part} \d+ (\d+) ", ended.output, re.MULTILINE)
+                    if ended.status != 0 or len(lines) != FRAMES:
+                        raise SystemExit(f"cost_vision on {board}: status {ended.status}: {ended.output}")
+                    found[core, lens, part] = round(sum(map(int, lines)) / FRAMES * INSTRUCTIONS_A_TICK)
     return found
 
 
@@ -163,8 +170,11 @@ def flash_rows() -> list[Row]:
 def ram_rows() -> Iterator[Row]:
     for members, flags in MEMBERS.items():
         yield (f"`bslam_t`, {members}", *(instance_bytes(COMPILER + flags, NM, n) for n in BEACONS))
-    sizes = (instance_bytes(COMPILER, NM, n, "bslam_vision_t", "vision/vision.h") for n in BEACONS)
-    yield ("`bslam_vision_t`, QVGA, four cameras", *sizes)
+    for what, name in (
+        ("`bslam_vision_t`, QVGA, four cameras", "bslam_vision_t"),
+        ("`bslam_scanner_t`", "bslam_scanner_t"),
+    ):
+        yield (what, *(instance_bytes(COMPILER, NM, n, name, "vision/vision.h") for n in BEACONS))
 
 
 def image_rows() -> Iterator[Row]:
@@ -195,9 +205,10 @@ def cost_rows(measured: dict[str, dict[tuple[str, int], int]]) -> Iterator[Row]:
                 yield (f"`{part}`", beacons, *(measured[core][part, beacons] for core in COST_BOARDS))
 
 
-def vision_rows(measured: dict[tuple[str, str], int]) -> Iterator[Row]:
-    for lens in RIGS:
-        yield (lens, *(f"{measured[core, lens] / PIXELS:.0f}" for core in COST_BOARDS))
+def vision_rows(measured: dict[tuple[str, str, str], int]) -> Iterator[Row]:
+    for part, what in VISION_PARTS.items():
+        for lens in RIGS:
+            yield (what, lens, *(f"{measured[core, lens, part] / PIXELS:.0f}" for core in COST_BOARDS))
 
 
 def code_heads(names: Sequence[str]) -> Row:
@@ -209,7 +220,7 @@ def document() -> str:
     measured = {core: costs(board) for core, board in COST_BOARDS.items()}
     parts = "".join(f"- `{name}`: {what}.\n" for name, what in PARTS.items())
     seeing = vision_costs()
-    frames = {lens: seeing["Cortex-M4F", lens] for lens in RIGS}
+    frames = {lens: seeing["Cortex-M4F", lens, "frame"] for lens in RIGS}
     return f"""# What bslam costs on a microcontroller
 
 Written by `make sizes-doc`; `make test` fails if a figure is more than 2 % off. No board has run this yet: \
@@ -234,7 +245,8 @@ prints them for the host, too.
 ## Images
 
 `robot.elf`, `-O2`, bytes; RAM without stack. MPS2 boards have room for 80 beacons, microbit for 6. \
-stm32f405 learns appearance, stm32f405_seeing has the front end for one QVGA camera; both have room for 20.
+stm32f405 learns appearance, stm32f405_seeing sees the built-in kinds by one QVGA camera, stm32f405_scanning \
+a user's own; they have room for 20, 14 and 20.
 
 {table(("image", "ROM", "RAM"), image_rows())}
 ## Stack
@@ -262,7 +274,7 @@ The camera front end, instructions a pixel, mean of {FRAMES} frames of 320x240 o
 {WORLD_SEED}; firmware/bench/cost_vision.c). By function, and in other worlds: \
 `.venv/bin/python -m tools.bench.profile_image cost_vision --worlds 7000:7020 --frames 8`.
 
-{table(("lens", *COST_BOARDS), vision_rows(seeing))}
+{table(("part", "lens", *COST_BOARDS), vision_rows(seeing))}
 ## A second on a Cortex-M4F
 
 {STEPS_A_SECOND} steps a second with 20 beacons: instructions a step, and their share of \

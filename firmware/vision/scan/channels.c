@@ -40,11 +40,21 @@ void bslam_channels_begin(bslam_channels_t *channels, int32_t width_px, int32_t 
 
 // ---- colours ----------------------------------------------------------------------------------------------
 
-/// About .3, .59 and .11 of red, green and blue, from how many bits RGB565 has of each: 0 to 242.
-static inline uint8_t luma_of(uint32_t pixel)
+/// About .3, .59 and .11 of red, green and blue, from how many bits RGB565 has of each: 0 to 242. Of two
+/// pixels in a word.
+static inline uint32_t luma_of_pair(uint32_t word)
 {
-    const uint32_t red = pixel >> 11, green = pixel >> 5 & 63, blue = pixel & 31;
-    return (uint8_t)((9 * (red + green) + 4 * blue) >> 2);
+    const uint32_t red = word >> 11 & 0x001F001FU, green = word >> 5 & 0x003F003FU, blue = word & 0x001F001FU;
+    return (9 * (red + green) + 4 * blue) >> 2 & BSLAM_EVEN_BYTES;
+}
+
+static void fill_luma(uint8_t *luma, const uint16_t *pixels, int32_t count)
+{
+    for (int32_t x = 0; x < count; x += 2) {
+        const uint32_t pair = luma_of_pair(bslam_halves(pixels[x], pixels[x + 1]));
+        luma[x] = (uint8_t)pair;
+        luma[x + 1] = (uint8_t)(pair >> 16);
+    }
 }
 
 static void note_colours(bslam_channels_t *channels, const uint16_t *pixels)
@@ -95,30 +105,55 @@ static void halve_colours(const bslam_octave_t *from, const bslam_octave_t *to)
 
 // ---- edges ------------------------------------------------------------------------------------------------
 
-/// Which direction a gradient has. By tangents of 22.5 and 67.5 degrees.
-static inline int32_t direction_of(int32_t across, int32_t down, bool is_alike)
+/// The top bit of each byte that is not 0.
+static inline uint32_t bytes_set(uint32_t bytes)
 {
-    const int32_t sector = (256 * down >= 106 * across ? 1 : 0) + (256 * down >= 618 * across ? 1 : 0);
-    return sector == 1 && !is_alike ? BSLAM_EDGE_DIRECTIONS - 1 : sector;
+    return bslam_bytes_mean(bytes, UINT32_MAX);
+}
+
+/// Seven sixteenths of each byte: the tangent of 23.6 degrees.
+static inline uint32_t flat_of(uint32_t bytes)
+{
+    const uint32_t half = bslam_bytes_mean(bytes, 0), quarter = bslam_bytes_mean(half, 0);
+    return bslam_bytes_mean(half, bslam_bytes_mean(half, quarter));
+}
+
+/// Adds the edges of four pixels to their cell's sums. Luma of the neighbours of each.
+static inline void sum_four(uint16_t *sums, uint32_t left, uint32_t right, uint32_t above, uint32_t below)
+{
+    const uint32_t leftward = bslam_bytes_less(left, right), upward = bslam_bytes_less(above, below);
+    const uint32_t across = bslam_bytes_less(right, left) | leftward;
+    const uint32_t down = bslam_bytes_less(below, above) | upward;
+    const uint32_t more = bslam_bytes_less(down, across);  // larger + half of the smaller
+    const uint32_t length = bslam_bytes_plus(across + more, bslam_bytes_mean(down - more, 0));
+    const uint32_t is_across = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_of(across), down)));
+    const uint32_t is_down = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_of(down), across)));
+    const uint32_t rises = bslam_bytes_filled(bytes_set(leftward) ^ bytes_set(upward));
+    const uint32_t slanted = length & ~(is_across | is_down);
+    sums[0] = (uint16_t)bslam_bytes_sum(length & is_across, sums[0]);
+    sums[1] = (uint16_t)bslam_bytes_sum(slanted & ~rises, sums[1]);
+    sums[2] = (uint16_t)bslam_bytes_sum(length & is_down, sums[2]);
+    sums[3] = (uint16_t)bslam_bytes_sum(slanted & rises, sums[3]);
 }
 
 /// Adds the edges of a row of pixels to the cells' sums. Luma of the rows above, of it and below.
 static void sum_edges(bslam_octave_t *octave, const uint8_t *above, const uint8_t *row, const uint8_t *below)
 {
     for (int32_t c = 0; c < octave->columns; c++) {
-        uint16_t *sums = octave->sums[c];
-        for (int32_t k = 0; k < BSLAM_CELL_PX; k++) {
-            const int32_t x = c * BSLAM_CELL_PX + k;
-            const int32_t dx = row[x + 1] - row[x - 1], dy = below[x] - above[x];
-            const int32_t across = dx < 0 ? -dx : dx, down = dy < 0 ? -dy : dy;
-            const int32_t length = across > down ? across + down / 2 : down + across / 2;
-            sums[direction_of(across, down, (dx ^ dy) >= 0)] += (uint16_t)length;
-        }
+        const int32_t x = c * BSLAM_CELL_PX;
+        sum_four(octave->sums[c], bslam_word_at(row + x - 1), bslam_word_at(row + x + 1),
+                 bslam_word_at(above + x), bslam_word_at(below + x));
     }
 }
 
-/// What edges add up to around each cell of a row, and the row's cells in proportion. Beyond the picture it
-/// goes on as at its edge.
+/// What edges add up to in a column of the rows around; beyond the picture it goes on as at its edge.
+static inline uint32_t column_sum(const uint16_t *const rows[BSLAM_AROUND], int32_t column, int32_t columns)
+{
+    const int32_t at = column < 0 ? 0 : column > columns - 1 ? columns - 1 : column;
+    return (uint32_t)rows[0][at] + rows[1][at] + rows[2][at] + rows[3][at] + rows[4][at];
+}
+
+/// The row's cells in proportion to what edges add up to around each.
 static void end_edges(bslam_octave_t *octave, int32_t row)
 {
     const int32_t columns = octave->columns, last_row = octave->rows - 1;
@@ -128,17 +163,18 @@ static void end_edges(bslam_octave_t *octave, int32_t row)
         rows[i] = octave->strengths[(at < 0 ? 0 : at > last_row ? last_row : at) % BSLAM_AROUND];
     }
     uint8_t *cell = octave->cells + row * columns * BSLAM_CHANNELS + BSLAM_EDGES;
+    uint32_t around = EDGES_FLOOR;
+    for (int32_t k = -HALF_AROUND; k < HALF_AROUND; k++) {
+        around += column_sum(rows, k, columns);
+    }
     for (int32_t c = 0; c < columns; c++) {
-        uint32_t around = EDGES_FLOOR;
-        for (int32_t k = c - HALF_AROUND; k <= c + HALF_AROUND; k++) {
-            const int32_t at = k < 0 ? 0 : k > columns - 1 ? columns - 1 : k;
-            around += (uint32_t)rows[0][at] + rows[1][at] + rows[2][at] + rows[3][at] + rows[4][at];
-        }
+        around += column_sum(rows, c + HALF_AROUND, columns);
         const uint32_t factor = (USUAL_EDGES * BSLAM_AROUND * BSLAM_AROUND << 8) / around;
         for (int32_t k = 0; k < BSLAM_EDGE_DIRECTIONS; k++) {
             const uint32_t value = cell[k] * factor >> 8;
             cell[k] = (uint8_t)(value < UINT8_MAX ? value : UINT8_MAX);
         }
+        around -= column_sum(rows, c - HALF_AROUND, columns);
         cell += BSLAM_CHANNELS;
     }
 }
@@ -212,10 +248,7 @@ static void take_luma(bslam_octave_t *octave)
 void bslam_channels_row(bslam_channels_t *channels, const uint16_t *pixels)
 {
     bslam_octave_t *octave = &channels->octaves[0];
-    uint8_t *luma = next_luma(octave);
-    for (int32_t x = 0; x < octave->width_px; x++) {
-        luma[x] = luma_of(pixels[x]);
-    }
+    fill_luma(next_luma(octave), pixels, octave->width_px);
     note_colours(channels, pixels);
     take_luma(octave);
     if (octave->luma_count % BSLAM_CELL_PX == 0) {

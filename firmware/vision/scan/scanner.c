@@ -25,7 +25,7 @@ enum { BLACK_BELOW = 15, SATURATED_FROM = 232, BLACK_PERCENT = 95, SATURATED_PER
 
 static bool is_side(int32_t cells)
 {
-    return cells >= BLOCK && cells <= BSLAM_WINDOW_SIDE_MAX;
+    return cells >= BLOCK && cells <= BSLAM_WINDOW_SIDE_MAX && cells % BLOCK == 0;
 }
 
 static bool is_share(float box, int32_t cells)
@@ -33,10 +33,16 @@ static bool is_share(float box, int32_t cells)
     return box > 0 && box <= (float)cells;
 }
 
+static bool is_bias(int32_t bias)
+{
+    return bias >= -BIAS_MAX && bias <= BIAS_MAX;
+}
+
 static bool has_tables(const bslam_window_t *window)
 {
-    return window->weights != NULL && window->order != NULL && window->floors != NULL &&
-           window->edges != NULL && window->edge_scale != NULL && window->edge_bias != NULL;
+    return window->weights != NULL && window->coarse != NULL && window->order != NULL &&
+           window->floors != NULL && window->edges != NULL && window->edge_scale != NULL &&
+           window->edge_bias != NULL;
 }
 
 /// Each row is added once.
@@ -57,7 +63,7 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
     if (!has_tables(window)) {
         return BSLAM_E_PARAMETER;
     }
-    if (!is_order(window->order, window->rows)) {
+    if (!is_order(window->order, window->rows / BLOCK)) {
         return BSLAM_E_COUNT;
     }
     for (int32_t i = 0; i < EDGES; i++) {
@@ -68,7 +74,7 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
     if (!bslam_is_number(window->scale)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bool is_good = window->scale > 0 && window->bias >= -BIAS_MAX && window->bias <= BIAS_MAX &&
+    const bool is_good = window->scale > 0 && is_bias(window->bias) && is_bias(window->coarse_bias) &&
                          is_share(window->box_columns, window->columns) &&
                          is_share(window->box_rows, window->rows);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
@@ -88,7 +94,7 @@ static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
 }
 
-static bslam_status_t check_model(const bslam_scanner_model_t *model)
+bslam_status_t bslam_scanner_model_check(const bslam_scanner_model_t *model)
 {
     if (model->kind_count < 1 || model->kind_count > BSLAM_KINDS_MAX || model->window_count < 1 ||
         model->window_count > BSLAM_WINDOWS_MAX) {
@@ -113,7 +119,7 @@ bslam_status_t bslam_scanner_init_sized(bslam_scanner_t *scanner, size_t scanner
     if (scanner_bytes != sizeof *scanner || sizes_hash != BSLAM_VISION_HASH) {
         return BSLAM_E_SIZE;
     }
-    const bslam_status_t status = check_model(model);
+    const bslam_status_t status = bslam_scanner_model_check(model);
     if (status == BSLAM_OK) {
         memset(scanner, 0, sizeof *scanner);
         bslam_scanner_instance(scanner)->model = model;
@@ -188,7 +194,7 @@ static bslam_vision_reason_t judge_light(const bslam_octave_t *octave)
 
 // ---- windows ----------------------------------------------------------------------------------------------
 
-/// A window at a place, for what looks at its cells.
+/// Rows of cells that a window covers, for what looks at them.
 typedef struct view {
     const bslam_window_t *window;
     const uint8_t *rows[BSLAM_WINDOW_SIDE_MAX];
@@ -211,20 +217,32 @@ static inline int32_t add_products(const int8_t *weights, const uint8_t *cells, 
     return sum;
 }
 
-/// The window's sum with its upper left cell in a column; false once it is below a row's floor.
-static bool value_at(const view_t *view, int32_t column, int32_t *sum)
+/// Whether the coarse window with its upper left cell in a column passes all floors.
+static bool is_likely(const view_t *view, int32_t column)
 {
     const bslam_window_t *window = view->window;
-    const int32_t bytes = window->columns * BSLAM_CHANNELS, at = column * BSLAM_CHANNELS;
-    *sum = window->bias;
-    for (int32_t i = 0; i < window->rows; i++) {
+    const int32_t bytes = window->columns / BLOCK * BSLAM_CHANNELS, at = column * BSLAM_CHANNELS;
+    int32_t sum = window->coarse_bias;
+    for (int32_t i = 0; i < window->rows / BLOCK; i++) {
         const int32_t row = window->order[i];
-        *sum = add_products(window->weights + row * bytes, view->rows[row] + at, bytes, *sum);
-        if (*sum < window->floors[i]) {
+        sum = add_products(window->coarse + row * bytes, view->rows[row] + at, bytes, sum);
+        if (sum < window->floors[i]) {
             return false;
         }
     }
     return true;
+}
+
+/// The window's sum with its upper left cell in a column.
+static int32_t value_at(const view_t *view, int32_t column)
+{
+    const bslam_window_t *window = view->window;
+    const int32_t bytes = window->columns * BSLAM_CHANNELS, at = column * BSLAM_CHANNELS;
+    int32_t sum = window->bias;
+    for (int32_t i = 0; i < window->rows; i++) {
+        sum = add_products(window->weights + i * bytes, view->rows[i] + at, bytes, sum);
+    }
+    return sum;
 }
 
 /// By how much the box's edges differ from the window's, of its width and height.
@@ -281,10 +299,10 @@ static void note_hit(bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
 }
 
 static void take_window(bslam_scanner_instance_t *instance, const bslam_level_t *level, const view_t *view,
-                        int32_t column, int32_t top, int32_t sum)
+                        int32_t column, int32_t top)
 {
     const bslam_window_t *window = view->window;
-    const float score = window->scale * (float)sum;
+    const float score = window->scale * (float)value_at(view, column);
     if (score < instance->model->kinds[window->kind].threshold) {
         return;
     }
@@ -307,17 +325,54 @@ static void take_window(bslam_scanner_instance_t *instance, const bslam_level_t 
     }
 }
 
-static void scan_row(bslam_scanner_instance_t *instance, const bslam_level_t *level,
-                     const bslam_window_t *window, int32_t top)
+/// Windows of an upper row, and of the one below it if `both`: those where the coarse one is likely.
+static void scan_rows(bslam_scanner_instance_t *instance, const bslam_level_t *level,
+                      const bslam_window_t *window, int32_t top, bool both)
 {
-    view_t view = {.window = window};
+    view_t coarse = {.window = window}, fine[BLOCK] = {{.window = window}, {.window = window}};
     for (int32_t i = 0; i < window->rows; i++) {
-        view.rows[i] = instance->rows[(top + i) % BSLAM_WINDOW_SIDE_MAX];
+        fine[0].rows[i] = instance->rows[(top + i) % BSLAM_FINE_ROWS];
+        fine[1].rows[i] = instance->rows[(top + i + 1) % BSLAM_FINE_ROWS];
+        coarse.rows[i / BLOCK] = instance->coarse[(top + i) / BLOCK % BSLAM_COARSE_ROWS];
     }
-    for (int32_t column = 0; column + window->columns <= level->columns; column++) {
-        int32_t sum;
-        if (value_at(&view, column, &sum)) {
-            take_window(instance, level, &view, column, top, sum);
+    const int32_t last = level->columns - window->columns;
+    for (int32_t column = 0; column <= last; column += BLOCK) {
+        if (is_likely(&coarse, column / BLOCK)) {
+            for (int32_t down = 0; down <= (both ? 1 : 0); down++) {
+                take_window(instance, level, &fine[down], column, top + down);
+                if (column < last) {
+                    take_window(instance, level, &fine[down], column + 1, top + down);
+                }
+            }
+        }
+    }
+}
+
+/// Means of 2x2 cells of two rows.
+static void halve_rows(const uint8_t *above, const uint8_t *below, uint8_t *half, int32_t columns)
+{
+    for (int32_t c = 0; c + 1 < columns; c += BLOCK) {
+        for (int32_t k = 0; k < BSLAM_CHANNELS; k += BSLAM_WORD_BYTES) {
+            const uint32_t upper =
+                bslam_bytes_mean(bslam_word_at(above + k), bslam_word_at(above + k + BSLAM_CHANNELS));
+            const uint32_t lower =
+                bslam_bytes_mean(bslam_word_at(below + k), bslam_word_at(below + k + BSLAM_CHANNELS));
+            bslam_word_put(half + k, bslam_bytes_mean(upper, lower));
+        }
+        above += BLOCK * BSLAM_CHANNELS;
+        below += BLOCK * BSLAM_CHANNELS;
+        half += BSLAM_CHANNELS;
+    }
+}
+
+/// Windows whose last row but one has come, and so both places of theirs; where none comes any more, the
+/// upper.
+static void scan_windows(bslam_scanner_instance_t *instance, const bslam_level_t *level, int32_t row)
+{
+    for (int32_t i = 0; i < instance->model->window_count; i++) {
+        const bslam_window_t *window = &instance->model->windows[i];
+        if (row >= window->rows) {
+            scan_rows(instance, level, window, row - window->rows, row < level->rows);
         }
     }
 }
@@ -325,13 +380,17 @@ static void scan_row(bslam_scanner_instance_t *instance, const bslam_level_t *le
 static void scan_level(bslam_scanner_instance_t *instance, const bslam_level_t *level)
 {
     for (int32_t row = 0; row < level->rows; row++) {
-        bslam_level_row(level, row, instance->rows[row % BSLAM_WINDOW_SIDE_MAX]);
-        for (int32_t i = 0; i < instance->model->window_count; i++) {
-            const bslam_window_t *window = &instance->model->windows[i];
-            if (row + 1 >= window->rows) {
-                scan_row(instance, level, window, row + 1 - window->rows);
-            }
+        uint8_t *newest = instance->rows[row % BSLAM_FINE_ROWS];
+        bslam_level_row(level, row, newest);
+        if (row % BLOCK == 0) {
+            scan_windows(instance, level, row);
+        } else {
+            halve_rows(instance->rows[(row - 1) % BSLAM_FINE_ROWS], newest,
+                       instance->coarse[row / BLOCK % BSLAM_COARSE_ROWS], level->columns);
         }
+    }
+    if (level->rows % BLOCK == 0) {
+        scan_windows(instance, level, level->rows);
     }
 }
 

@@ -31,7 +31,7 @@ from bslam.options import (
     parse_association,
     usual_filter,
 )
-from bslam.runs.camera import TOLD_THRESHOLD, UNTOLD_THRESHOLD
+from bslam.runs.camera import SCANNER_THRESHOLD, TOLD_THRESHOLD, UNTOLD_THRESHOLD
 from bslam.runs.sources import CameraSource, Says, ScenarioSource
 from bslam.target.lines import TARGET_KINDS, allowed_targets, qemu_machines
 from bslam.world.scenario import load_scenario
@@ -160,6 +160,12 @@ def add_sensor_options(parser: argparse.ArgumentParser) -> None:
         help="the cameras: three60, wide180, pan60, or the path of a TOML file "
         f"(default: the scenario's, or {DEFAULT_RIG})",
     )
+    group.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="camera: your own kinds, the .json of `bslam detect train` (default: the built-in kinds)",
+    )
 
 
 def scenario_source(
@@ -168,8 +174,11 @@ def scenario_source(
     """The simulated drive that the options ask for."""
     if arguments.sensor == "camera":
         threshold = TOLD_THRESHOLD if _is_told(arguments.association) else UNTOLD_THRESHOLD
-        rig = _rig(arguments)
-        return CameraSource(arguments.scenario, seed, sigma_mps, noise, rig, CAMERA_STORE, threshold)
+        threshold = threshold if arguments.model is None else SCANNER_THRESHOLD
+        seen = (_rig(arguments), CAMERA_STORE, threshold, arguments.model)
+        return CameraSource(arguments.scenario, seed, sigma_mps, noise, *seen)
+    if arguments.model is not None:
+        raise BslamError(f"--model {arguments.model}: cameras look by it; allowed: with --sensor camera")
     return ScenarioSource(arguments.scenario, seed, sigma_mps, noise)
 
 

@@ -137,7 +137,10 @@ def _train(arguments: argparse.Namespace) -> int:
 def _write_model(
     out: Path, bare: ScannerModel, figures: Sequence[Figures], arguments: argparse.Namespace
 ) -> None:
-    command = f"bslam detect train {' '.join(arguments.sources)} --out {out}"
+    asked = f" --classes {arguments.classes}" if arguments.classes else ""
+    asked += f" --false {arguments.false:g}" if arguments.false != _FALSE else ""
+    asked += " --anyway" if arguments.anyway else ""
+    command = f"bslam detect train {' '.join(arguments.sources)}{asked} --out {out}"
     notes = {
         "trained by": command,
         "figures": "in pictures that were left out: "

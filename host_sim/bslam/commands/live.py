@@ -186,7 +186,8 @@ def _open(job: Job) -> tuple[Log, Eye | None]:
     if not isinstance(source, CameraSource):
         return source.load(), None
     scenario, rig = load_scenario(source.scenario), load_rig(source.rig)
-    log, glances = unseen_log(scenario, source.seed, source.sigma_mps, source.noise, rig, source.threshold)
+    chosen = source.threshold, source.scanner()
+    log, glances = unseen_log(scenario, source.seed, source.sigma_mps, source.noise, rig, *chosen)
     return log, Eye(log, job.options, glances)
 
 

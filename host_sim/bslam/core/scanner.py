@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bslam.core.raw import vision_library
+from bslam.core.scanner_tables import ScannerTables
 from bslam.core.vision import MARKS
 from bslam.errors import BslamError
-from bslam.rig import Camera
 from bslam.scannerfile import BLOCK, CHANNELS, Kind, ScannerModel, Window
 
 LEVEL_PAD = 2
@@ -42,16 +41,6 @@ class Detections:
 
 
 @dataclass(frozen=True)
-class ScanSighting:
-    """Where a thing is, in the robot's frame; range_m None: not measured."""
-
-    bearing_rad: float
-    bearing_sd_rad: float
-    range_m: float | None
-    range_sd_m: float | None
-
-
-@dataclass(frozen=True)
 class Level:
     """A picture at one size: cells (rows, columns, CHANNELS) uint8, padded by LEVEL_PAD."""
 
@@ -65,12 +54,11 @@ class Scanner:
     def __init__(self, model: ScannerModel | None = None) -> None:
         """BslamError if the library refuses the model."""
         self._library = vision_library()
-        self._keep: list[Any] = []
-        self._model = model or NOTHING
+        self._tables = ScannerTables(self._library, model or NOTHING)
         self._scanner = self._library.ffi.new("bslam_scanner_t *")
         self._library.ensure(
             self._library.lib.bslam_scanner_init_sized(
-                self._scanner, *self._library.size_of("bslam_scanner_t"), self._new_model(self._model)
+                self._scanner, *self._library.size_of("bslam_scanner_t"), self._tables.model
             ),
             "the scanner refuses its model",
         )
@@ -99,24 +87,6 @@ class Scanner:
         level = self._level(0)
         assert level is not None  # every picture has one
         return level.cells
-
-    def sightings(
-        self, rgb: NDArray[np.uint8], camera: Camera
-    ) -> list[tuple[Detection, ScanSighting | None]]:
-        """What is in a picture of a camera, and where; None: the camera has no direction there."""
-        found = self._look(rgb)
-        its = self._library.camera(camera)
-        sighting = self._library.ffi.new("bslam_sighting_t *")
-        both = []
-        for i in range(found.count):
-            one = self._library.ffi.addressof(found.items[i])
-            status = self._library.lib.bslam_scanner_sighting(self._scanner, its, one, sighting)
-            where = None
-            if status == self._library.lib.BSLAM_OK:
-                distance = (sighting.range_m, sighting.range_sd_m) if sighting.has_range else (None, None)
-                where = ScanSighting(sighting.bearing_rad, sighting.bearing_sd_rad, *distance)
-            both.append((self._detection(found.items[i]), where))
-        return both
 
     def _look(self, rgb: NDArray[np.uint8]) -> Any:
         lib = self._library.lib
@@ -150,43 +120,7 @@ class Scanner:
         box = found.box
         edges = (box.left_px + 0.5, box.top_px + 0.5, box.right_px + 0.5, box.bottom_px + 0.5)
         marks = frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1)
-        return Detection(self._model.kinds[found.kind].name, edges, found.score, found.log_odds, marks)
-
-    def _new_model(self, model: ScannerModel) -> Any:
-        made = self._library.new_filled(
-            "bslam_scanner_model_t",
-            kind_count=len(model.kinds),
-            kinds=self._kinds(model.kinds),
-            window_count=len(model.windows),
-            windows=self._windows(model.windows),
-        )
-        self._keep.append(made)
-        return made
-
-    def _kinds(self, kinds: Sequence[Kind]) -> Any:
-        ffi = self._library.ffi
-        names = [ffi.new("char[]", one.name.encode()) for one in kinds]
-        made = ffi.new(
-            "bslam_scan_kind_t[]", [(name, *astuple(one)[1:]) for name, one in zip(names, kinds, strict=True)]
-        )
-        self._keep += [names, made]
-        return made
-
-    def _windows(self, windows: Sequence[Window]) -> Any:
-        library, keep = self._library, self._keep
-        made = library.ffi.new("bslam_window_t[]", len(windows))
-        for view, one in zip(made, windows, strict=True):
-            view.kind, view.columns, view.rows = one.kind, one.columns, one.rows
-            view.box_columns, view.box_rows = one.box_columns, one.box_rows
-            view.scale, view.bias = one.scale, one.bias
-            view.weights = library.table("int8_t", one.weights, keep)
-            view.order = library.table("uint8_t", one.order, keep)
-            view.floors = library.table("int32_t", one.floors, keep)
-            view.edges = library.table("int8_t", one.edges, keep)
-            view.edge_scale = library.table("float", one.edge_scale, keep)
-            view.edge_bias = library.table("float", one.edge_bias, keep)
-        keep.append(made)
-        return made
+        return Detection(self._tables.names[found.kind], edges, found.score, found.log_odds, marks)
 
 
 NOTHING = ScannerModel(
@@ -199,12 +133,14 @@ NOTHING = ScannerModel(
             weights=np.zeros((BLOCK, BLOCK, CHANNELS), np.int8),
             scale=1.0,
             bias=0,
-            order=np.arange(BLOCK, dtype=np.uint8),
-            floors=np.full(BLOCK, 2**31 - 1, np.int32),
+            coarse=np.zeros((1, 1, CHANNELS), np.int8),
+            coarse_bias=0,
+            order=np.zeros(1, np.uint8),
+            floors=np.full(1, 2**31 - 1, np.int32),
             edges=np.zeros((4, 1, 1, CHANNELS), np.int8),
             edge_scale=np.zeros(4, np.float32),
             edge_bias=np.zeros(4, np.float32),
         ),
     ),
 )
-"""A window that is given up in its first row everywhere."""
+"""A window that is given up everywhere."""

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from bslam.core.inputs import number, whole
 from bslam.core.raw import VisionLibrary, vision_library
+from bslam.core.scanner_tables import ScannerTables
 from bslam.errors import BslamError
 from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
 from bslam.rig import Camera
+from bslam.scannerfile import ScannerModel
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -120,12 +122,13 @@ class FrontEnd:
     def __init__(
         self,
         cameras: Sequence[Camera],
-        model: BeaconModel | None = None,
+        model: BeaconModel | ScannerModel | None = None,
         recogniser: Recogniser | None = None,
         threshold: float | None = None,
     ) -> None:
-        """`model`: the built-in one unless given; `recogniser`: of a user's own objects, besides;
-        `threshold`: of a candidate's score, in place of the model's.
+        """`model`: the built-in one unless given, or a scanner's of a user's own kinds; with the others:
+        `recogniser`: of a user's own objects, besides; `threshold`: of a candidate's score, in place of the
+        model's.
 
         BslamError if the library refuses model, recogniser or cameras.
         """
@@ -133,19 +136,19 @@ class FrontEnd:
         ffi, lib = self._library.ffi, self._library.lib
         self._cameras = tuple(cameras)
         self._keep: list[Any] = []
-        self._model = lib.built_in_model() if model is None else self._new_model(model)
-        if self._model == ffi.NULL:
-            raise BslamError("no built-in model: run `make train`, or give one")
         self._objects = () if recogniser is None else recogniser.objects
-        self._model = ffi.new("bslam_beacon_model_t *", self._model[0])
-        if recogniser is not None:
-            self._model.recogniser = self._recogniser(recogniser)
-        if threshold is not None:
-            self._model.pinhole.threshold = self._model.wide.threshold = threshold
         self._vision = ffi.new("bslam_vision_t *")
         array = ffi.new("bslam_camera_t[]", [self._library.camera(camera)[0] for camera in cameras])
+        if isinstance(model, ScannerModel):
+            tables = ScannerTables(self._library, model)
+            self._keep.append(tables)
+            self._kinds, self._model, init = tables.names, tables.model, lib.bslam_vision_init_scanner_sized
+        else:
+            self._model = self._detector_model(model, recogniser, threshold)
+            self._kinds = self._class_names(self._model)
+            init = lib.bslam_vision_init_sized
         self._library.ensure(
-            lib.bslam_vision_init_sized(
+            init(
                 self._vision,
                 *self._library.size_of("bslam_vision_t"),
                 self._model,
@@ -154,6 +157,23 @@ class FrontEnd:
             ),
             f"the front end refuses its model or one of its {len(self._cameras)} cameras",
         )
+
+    def _detector_model(
+        self, model: BeaconModel | None, recogniser: Recogniser | None, threshold: float | None
+    ) -> Any:
+        ffi = self._library.ffi
+        made = self._library.lib.built_in_model() if model is None else self._new_model(model)
+        if made == ffi.NULL:
+            raise BslamError("no built-in model: run `make train`, or give one")
+        made = ffi.new("bslam_beacon_model_t *", made[0])
+        if recogniser is not None:
+            made.recogniser = self._recogniser(recogniser)
+        if threshold is not None:
+            made.pinhole.threshold = made.wide.threshold = threshold
+        return made
+
+    def _class_names(self, model: Any) -> list[str]:
+        return [self._library.ffi.string(model.classes[i].name).decode() for i in range(model.class_count)]
 
     @staticmethod
     def _open() -> VisionLibrary:
@@ -204,7 +224,7 @@ class FrontEnd:
         return Turn(**{one.name: getattr(found, one.name) for one in fields(Turn)})
 
     def threshold(self, camera: int = 0) -> float:
-        """The score from which on a box in a camera's pictures is a candidate."""
+        """The score from which on a box in a camera's pictures is a candidate; of the built-in detector."""
         model, kind = self._model, self._cameras[self._checked_camera(camera)].lens.kind
         return float((model.pinhole if kind == "pinhole" else model.wide).threshold)
 
@@ -242,9 +262,7 @@ class FrontEnd:
 
     def _candidate(self, found: Any) -> Candidate:
         box = found.outline
-        name = ""
-        if found.beacon_class > 0:
-            name = self._library.ffi.string(self._model.classes[found.beacon_class - 1].name).decode()
+        name = self._kinds[found.beacon_class - 1] if found.beacon_class > 0 else ""
         return Candidate(
             outline=(box.left_px, box.top_px, box.right_px, box.bottom_px),
             bearing_rad=found.bearing_rad if found.has_bearing else None,

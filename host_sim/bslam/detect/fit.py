@@ -1,4 +1,4 @@
-"""One window's linear SVM, from pictures: examples, hard negatives over rounds, int8 weights, floors, edges.
+"""One window's linear SVM, from pictures: examples, hard negatives over rounds, int8 weights, edges.
 
 scikit-learn fits; the cells come from the scanner in C, so that what was trained is what runs.
 """
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from bslam.core.scanner import Level, Scanner
 from bslam.detect.boxes import Floats, overlaps
 from bslam.detect.clutter import clutter
+from bslam.detect.coarse import Coarse, Ground, fit_coarse
 from bslam.detect.examples import Example
+from bslam.detect.linear import fit_linear, quantised
 from bslam.detect.windows import (
     Change,
     Shape,
@@ -27,17 +29,8 @@ from bslam.detect.windows import (
     window_features,
     window_values,
 )
-from bslam.errors import BslamError
-from bslam.scannerfile import BLOCK, CHANNELS, LOWEST, Window
+from bslam.scannerfile import BLOCK, CHANNELS, Window
 
-try:
-    from sklearn.cluster import KMeans
-    from sklearn.svm import LinearSVC
-except ImportError:  # an extra
-    LinearSVC = None
-
-_COST: Final = 0.01
-_UNIT: Final = 128.0  # of a cell's values
 _CHANGES: Final = 8  # of an example
 _MOVED: Final = 0.05
 _SCALED: Final = 0.09
@@ -54,7 +47,6 @@ _ASPECT_SD: Final = 0.35  # of the logarithm: beyond, one window is not for all
 _ASPECTS_MAX: Final = 3
 _BOXES_A_SHAPE: Final = 6
 _NEGATIVES_MAX: Final = 16_000
-_TO_COME: Final = 0.5  # of examples get no more from the rows that are left
 
 
 @dataclass(frozen=True)
@@ -78,12 +70,18 @@ def shapes_of(boxes: Floats) -> list[tuple[Shape, NDArray[np.bool_]]]:
     groups = np.zeros(len(aspects), int)
     while _spread(aspects, groups) > _ASPECT_SD and count < min(_ASPECTS_MAX, len(aspects) // _BOXES_A_SHAPE):
         count += 1
-        groups = KMeans(count, n_init=5, random_state=0).fit(aspects[:, None]).labels_
+        groups = _clusters(aspects, count)
     found = []
     for group in range(count):
         middle = float(np.median(aspects[groups == group]))
         found.append((shape_for(np.exp(middle)), (groups == group) | (np.abs(aspects - middle) < _ASPECT_SD)))
     return found
+
+
+def _clusters(aspects: Floats, count: int) -> NDArray[np.int64]:
+    from sklearn.cluster import KMeans
+
+    return KMeans(count, n_init=5, random_state=0).fit(aspects[:, None]).labels_.astype(np.int64)
 
 
 def _spread(aspects: Floats, groups: NDArray[np.int64]) -> float:
@@ -92,8 +90,6 @@ def _spread(aspects: Floats, groups: NDArray[np.int64]) -> float:
 
 def fit_windows(kind: int, name: str, seen: Sequence[Seen], rng: np.random.Generator) -> list[Window]:
     """The windows of a class. BslamError if scikit-learn is missing."""
-    if LinearSVC is None:
-        raise BslamError("training needs scikit-learn; allowed: pip install 'bslam[detect]'")
     seen = [*seen, *look_at(clutter([one.example for one in seen], name, _CLUTTER, rng))]
     where = [(i, box) for i, one in enumerate(seen) for box in one.example.of(name)]
     boxes = np.array([box for _, box in where])
@@ -116,13 +112,16 @@ class _Fit:
 
     def window(self, where: Sequence[tuple[int, Floats]]) -> Window:
         """From which boxes of which pictures."""
-        examples = self._examples(where)
-        negatives = usual = self._random_windows()
+        larger = self._examples(where)
+        examples = larger[:, 1:, 1:]
+        negatives = self._random_windows()
         for _ in range(_ROUNDS):
-            weights, bias = _fit(examples, negatives)
+            weights, bias = fit_linear(examples, negatives)
             negatives = np.unique(np.concatenate([negatives, self._hard_windows(weights, bias)]), axis=0)
-        weights, bias = _fit(examples, negatives)
-        return self._quantised(weights, bias, examples, usual)
+        weights, bias = fit_linear(examples, negatives)
+        pictures = np.repeat([index for index, _ in where], _CHANGES)
+        grounds = [Ground.of(level, self._shape, places) for level, places in itertools.chain(*self._others)]
+        return self._quantised(weights, bias, fit_coarse(larger, pictures, grounds, self._shape, self._rng))
 
     def _examples(self, where: Sequence[tuple[int, Floats]]) -> NDArray[np.uint8]:
         scanner = Scanner()
@@ -169,13 +168,8 @@ class _Fit:
     def _none(self) -> NDArray[np.uint8]:
         return np.empty((0, self._shape.rows, self._shape.columns, CHANNELS), np.uint8)
 
-    def _quantised(
-        self, weights: NDArray[np.float32], bias: float, examples: NDArray[np.uint8], usual: NDArray[np.uint8]
-    ) -> Window:
-        scale = float(np.float32(np.abs(weights).max() / 127.0))
-        whole = np.rint(weights / scale).astype(np.int8)
-        whole_bias = round(bias / scale)
-        order, floors = _order_of(whole, whole_bias, scale, examples, usual)
+    def _quantised(self, weights: NDArray[np.float32], bias: float, coarse: Coarse) -> Window:
+        whole, whole_bias, scale = quantised(weights, bias)
         edges, edge_scale, edge_bias = self._edges()
         return Window(
             kind=self._kind,
@@ -184,8 +178,10 @@ class _Fit:
             weights=whole,
             scale=scale,
             bias=whole_bias,
-            order=order,
-            floors=floors,
+            coarse=coarse.weights,
+            coarse_bias=coarse.bias,
+            order=coarse.order,
+            floors=coarse.floors,
             edges=edges,
             edge_scale=edge_scale,
             edge_bias=edge_bias,
@@ -225,50 +221,3 @@ def _edge_shares(boxes: Floats, labelled: Floats) -> Floats:
     """How far labelled boxes' edges are from those of boxes, of their widths and heights."""
     sides = boxes[:, 2:] - boxes[:, :2]
     return (labelled - boxes) / np.concatenate([sides, sides], axis=1)
-
-
-def _fit(examples: NDArray[np.uint8], negatives: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
-    """Weights (rows, columns, CHANNELS) for cells, and bias."""
-    both = np.concatenate([examples, negatives])
-    x = both.reshape(len(both), -1).astype(np.float32) / _UNIT
-    y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])
-    mean = x.mean(axis=0)
-    weight = max(1.0, len(negatives) / len(examples) / 3.0)
-    machine = LinearSVC(C=_COST, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
-    weights = machine.fit(x - mean, y).coef_[0]
-    bias = float(machine.intercept_[0] - weights @ mean)
-    return (weights / _UNIT).reshape(examples.shape[1:]).astype(np.float32), bias
-
-
-def _order_of(
-    weights: NDArray[np.int8], bias: int, scale: float, examples: NDArray[np.uint8], usual: NDArray[np.uint8]
-) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """In which order rows are added, and below which sum a window is given up after each.
-
-    It is given up if the rows to come would have to add more than they do in most examples. Each time the row
-    is next that gives up most of what usually is seen.
-    """
-    its, others = (_row_sums(weights, cells) for cells in (examples, usual))
-    to_come = its.sum(axis=1)
-    left = list(range(len(weights)))
-    sums = np.full(len(others), bias)
-    order, floors = [], []
-    while left:
-        chosen: list[tuple[int, int, int]] = []
-        for row in left:
-            floor = int(LOWEST / scale - np.quantile(to_come - its[:, row], _TO_COME))
-            kept = int(np.count_nonzero(sums + others[:, row] >= floor))
-            chosen.append((kept, row, floor))
-        _, row, floor = min(chosen)
-        to_come = to_come - its[:, row]
-        sums = sums + others[:, row]
-        sums, others = sums[sums >= floor], others[sums >= floor]
-        left.remove(row)
-        order.append(row)
-        floors.append(floor)
-    return np.array(order, np.uint8), np.array(floors, np.int32)
-
-
-def _row_sums(weights: NDArray[np.int8], cells: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(n, rows): products of cells and weights, added within rows."""
-    return np.einsum("nrck,rck->nr", cells.astype(np.int64), weights.astype(np.int64))

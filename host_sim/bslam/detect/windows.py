@@ -30,8 +30,10 @@ class Shape:
     box_rows: float
 
     @property
-    def features(self) -> int:
-        return self.columns * self.rows * CHANNELS
+    def halved(self) -> Shape:
+        """Of means of BLOCK x BLOCK cells."""
+        sides = (self.columns // BLOCK, self.rows // BLOCK)
+        return Shape(*sides, self.box_columns / BLOCK, self.box_rows / BLOCK)
 
 
 def shape_for(aspect: float) -> Shape:
@@ -39,8 +41,12 @@ def shape_for(aspect: float) -> Shape:
     longest = (SIDE_MAX - 2 * _MARGIN) ** 2
     area = min(_AREA, longest * min(aspect, 1.0 / aspect))
     columns, rows = (area * aspect) ** 0.5, (area / aspect) ** 0.5
-    across, down = (min(SIDE_MAX, max(BLOCK, round(side + 2 * _MARGIN))) for side in (columns, rows))
+    across, down = (_even(side + 2 * _MARGIN) for side in (columns, rows))
     return Shape(across, down, columns, rows)
+
+
+def _even(side: float) -> int:
+    return min(SIDE_MAX, max(BLOCK, BLOCK * round(side / BLOCK)))
 
 
 def window_boxes(level: Level, shape: Shape) -> Floats:
@@ -83,6 +89,14 @@ def window_features(
     return np.ascontiguousarray(views[row, column].transpose(0, 2, 3, 1))
 
 
+def halved(cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Means of 2x2 cells (..., rows // 2, columns // 2, CHANNELS), rounded as the scanner does."""
+    rows, columns = cells.shape[-3] // BLOCK * BLOCK, cells.shape[-2] // BLOCK * BLOCK
+    whole = cells[..., :rows, :columns, :].astype(np.uint16)
+    across = (whole[..., ::2, :] + whole[..., 1::2, :]) // 2
+    return ((across[..., ::2, :, :] + across[..., 1::2, :, :]) // 2).astype(np.uint8)
+
+
 def blocks(features: NDArray[np.uint8]) -> NDArray[np.int32]:
     """Sums of blocks of cells (n, rows // BLOCK, columns // BLOCK, CHANNELS), that edges are read from."""
     n, rows, columns, _ = features.shape
@@ -104,9 +118,8 @@ class Change:
 def cropped(
     scanner: Scanner, frame: NDArray[np.uint8], box: Floats, shape: Shape, change: Change
 ) -> NDArray[np.uint8]:
-    """The cells (rows, columns, CHANNELS) of a window that frames a box of a picture just so.
-
-    Beyond the picture it goes on as at its edge.
+    """The cells of a window that frames a box of a picture just so, with one more row above and column left:
+    (1 + rows, 1 + columns, CHANNELS). Beyond the picture it goes on as at its edge.
     """
     left, top, right, bottom = box
     width, height = right - left, bottom - top
@@ -127,4 +140,4 @@ def cropped(
         small, at = small[:, ::-1], columns - shape.columns - _AROUND
     cells = scanner.first_level(np.ascontiguousarray(small))
     row, column = LEVEL_PAD + _AROUND, LEVEL_PAD + at
-    return cells[row : row + shape.rows, column : column + shape.columns].copy()
+    return cells[row - 1 : row + shape.rows, column - 1 : column + shape.columns].copy()

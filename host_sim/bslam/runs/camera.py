@@ -27,6 +27,7 @@ from bslam.errors import BslamError
 from bslam.log import Log, Sightings
 from bslam.rig import Rig
 from bslam.runs.compass import Compass
+from bslam.scannerfile import ScannerModel, scanner_text
 from bslam.world.arena import Arena, Beacon
 from bslam.world.camera import Renderer, Scene, dress
 from bslam.world.scenario import Mismatch, Scenario
@@ -57,6 +58,8 @@ class Threshold:
 # seeds 0:8.
 TOLD_THRESHOLD = Threshold(-0.15, -1.0)
 UNTOLD_THRESHOLD = Threshold(0.5, 0.5)
+# Of a user's own kinds: what is above the thresholds of the scanner's model.
+SCANNER_THRESHOLD = Threshold(-math.inf, -math.inf)
 NO_BEACON = -1  # identity of a sighting whose box no beacon fills
 _COVER = 0.3  # a beacon that fills less of a box than this is not what the box shows
 
@@ -135,13 +138,15 @@ class CameraStore:
 
     folder: Path
 
-    def drive(self, scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
+    def drive(
+        self, scenario: Scenario, seed: int, rig: Rig, model: ScannerModel | None = None
+    ) -> CameraDrive:
         """The drive from its file, or rendered now (about a minute for 5000 frames) and kept."""
-        path = self.folder / f"{scenario.name}_seed{seed}_{rig.name}_{_digest(scenario, rig)}.npz"
+        path = self.folder / f"{scenario.name}_seed{seed}_{rig.name}_{_digest(scenario, rig, model)}.npz"
         if path.is_file():
             with np.load(path) as file:
                 return CameraDrive(file["places"], file["seen"], file["turns"])
-        drive = watch(scenario, seed, rig)
+        drive = watch(scenario, seed, rig, model)
         self.folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=self.folder, suffix=".part", delete=False) as part:
             np.savez_compressed(part, places=drive.places, seen=drive.seen, turns=drive.turns)
@@ -157,15 +162,18 @@ def camera_log(
     rig: Rig,
     store: CameraStore,
     threshold: Threshold = UNTOLD_THRESHOLD,
+    model: ScannerModel | None = None,
 ) -> Log:
     """As `simulate`, but with sightings from images. Raises BslamError as that does.
 
-    threshold: what the detector is less sure of is left out; TOLD_THRESHOLD at least.
+    threshold: what the detector is less sure of is left out; TOLD_THRESHOLD at least, or SCANNER_THRESHOLD
+    with the `model` of a user's own kinds.
 
-    Its machines start from `rendered_seeds`, as a robot's do.
+    Classifiers of built-in kinds start from `rendered_seeds`, as a robot's do.
     """
     scenario = _checked(scenario, sigma_mps, noise, rig)
-    return _log_of(scenario, seed, rig, store.drive(scenario, seed, rig).surer_than(threshold))
+    drive = store.drive(scenario, seed, rig, model).surer_than(threshold)
+    return _log_of(scenario, seed, rig, drive, model is None)
 
 
 def unseen_log(
@@ -175,12 +183,14 @@ def unseen_log(
     noise: str | None,
     rig: Rig,
     threshold: Threshold = UNTOLD_THRESHOLD,
+    model: ScannerModel | None = None,
 ) -> tuple[Log, Iterator[Glance]]:
     """The same before anything is seen, so without sightings, and what its cameras will see, step by step."""
     scenario = _checked(scenario, sigma_mps, noise, rig)
     scene = dress(scenario, seed)
-    log = _log_of(scenario, seed, rig, CameraDrive(_places(scene), np.empty(0, SEEN), np.empty(0, TURNS)))
-    return log, _watch(scene, scenario, seed, rig, threshold)
+    nothing = CameraDrive(_places(scene), np.empty(0, SEEN), np.empty(0, TURNS))
+    log = _log_of(scenario, seed, rig, nothing, model is None)
+    return log, _watch(scene, scenario, seed, rig, threshold, model)
 
 
 def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig: Rig) -> Scenario:
@@ -198,7 +208,7 @@ def _checked(scenario: Scenario, sigma_mps: float | None, noise: str | None, rig
     return with_noise(scenario, sigma_mps, noise)
 
 
-def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
+def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive, are_built_in: bool) -> Log:
     log = simulate(replace(scenario, arena=drive.arena(scenario.arena)), seed)
     is_wide = any(one.lens.kind == "equidistant" for one in rig.cameras)
     robot = replace(
@@ -210,7 +220,8 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
         sighting_correlation_m=WIDE_CORRELATION_M if is_wide else CORRELATION_M,
         gyro_sigma_radps=VisualGyro.WIDE_SD_RADPS if is_wide else VisualGyro.SD_RADPS,
     )
-    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=rendered_seeds())
+    seeds = rendered_seeds() if are_built_in else None  # signatures of a box's cells are others
+    log = replace(log, sightings=drive.sightings(scenario.step_us), robot=robot, seeds=seeds)
     if len(drive.turns) == 0:
         return log
     eyes = Compass(log)
@@ -221,12 +232,13 @@ def _log_of(scenario: Scenario, seed: int, rig: Rig, drive: CameraDrive) -> Log:
     )
 
 
-def watch(scenario: Scenario, seed: int, rig: Rig) -> CameraDrive:
+def watch(scenario: Scenario, seed: int, rig: Rig, model: ScannerModel | None = None) -> CameraDrive:
     """Drive, render one frame a step, the cameras in turn, and keep what the front end sees in each."""
     scene = dress(scenario, seed)
     rows: list[tuple[Any, ...]] = []
     turns: list[tuple[Any, ...]] = []
-    for glance in _watch(scene, scenario, seed, rig, TOLD_THRESHOLD):
+    threshold = TOLD_THRESHOLD if model is None else SCANNER_THRESHOLD
+    for glance in _watch(scene, scenario, seed, rig, threshold, model):
         rows += glance.rows
         told = (math.nan,) * len(fields(Turn)) if glance.turn is None else astuple(glance.turn)
         turns.append((glance.step, glance.camera, *told))
@@ -242,11 +254,13 @@ def _places(scene: Scene) -> NDArray[np.float64]:
     return np.array([(one.beacon_id, *one.at) for one in scene.arena.beacons]).reshape(-1, 3)
 
 
-def _watch(scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: Threshold) -> Iterator[Glance]:
+def _watch(
+    scene: Scene, scenario: Scenario, seed: int, rig: Rig, threshold: Threshold, model: ScannerModel | None
+) -> Iterator[Glance]:
     """One frame a step."""
     path = true_drive(scenario, seed)
     renderers = [Renderer(scene, camera, [seed, index]) for index, camera in enumerate(rig.cameras)]
-    front_end, aim = FrontEnd(rig.cameras, threshold=threshold.least), Aim(rig)
+    front_end, aim = FrontEnd(rig.cameras, model, threshold=threshold.least), Aim(rig)
     step_s = scenario.step_us * 1e-6
     poses = np.stack([path.x_m, path.y_m, path.theta_rad], axis=1).tolist()
     for step, (x_m, y_m, theta_rad) in enumerate(poses):
@@ -316,14 +330,16 @@ def covering_beacon(outline: tuple[float, float, float, float], identity: NDArra
     return int(ids[counts.argmax()])
 
 
-def _digest(scenario: Scenario, rig: Rig) -> str:
-    """Of everything that decides what is seen: the scenario, the rig, and the code that renders and looks."""
+def _digest(scenario: Scenario, rig: Rig, model: ScannerModel | None) -> str:
+    """Of all that decides what is seen: scenario, rig, model, and the code that renders and looks."""
     if scenario.wheels.noise == "speedometer":  # what a reading errs by does not change the path
         scenario = replace(scenario, wheels=replace(scenario.wheels, sigma_mps=0.0, draw=0))
     words = hashlib.sha256(repr((scenario, rig, SEEN)).encode())
-    world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "bslam" / "vision"
-    code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.glob("*.[ch]")]
-    code += [*vision.with_name("svm").glob("svm.[ch]"), *(FIRMWARE_DIR / "models").glob("beacons*.h")]
+    if model is not None:
+        words.update(scanner_text(model).encode())
+    world, vision = Path(world_package.__file__).parent, FIRMWARE_DIR / "vision"
+    code = [*world.rglob("*.py"), *world.rglob("*.[ch]"), *vision.rglob("*.[ch]")]
+    code += [*(FIRMWARE_DIR / "base").glob("*.[ch]"), *(FIRMWARE_DIR / "models").glob("beacons*.h")]
     for path in sorted(code):
         words.update(path.read_bytes())
     return words.hexdigest()[:12]

@@ -19,6 +19,7 @@ from bslam.recording import Recording, load
 from bslam.recording.aslog import as_log
 from bslam.rig import load_rig
 from bslam.runs.camera import UNTOLD_THRESHOLD, CameraStore, Threshold, camera_log
+from bslam.scannerfile import ScannerModel, read_scanner
 from bslam.world.scenario import Scenario
 from bslam.world.simulate import load_scenario, simulate
 
@@ -134,18 +135,24 @@ class CameraSource(ScenarioSource):
     rig: str  # name or path of a TOML file
     store: Path  # where the rendered drives are kept
     threshold: Threshold = UNTOLD_THRESHOLD  # of the detector's score
+    model: Path | None = None  # of a user's own kinds; None: the built-in ones
 
     @property
     def shared(self) -> Hashable | None:  # type: ignore[override]
         moved = (self.sigma_mps, self.noise_draw) if self.noise == "actuation" else None
-        return self.scenario, self.seed, self.rig, self.noise, moved
+        return self.scenario, self.seed, self.rig, self.noise, moved, self.model
+
+    def scanner(self) -> ScannerModel | None:
+        """The model of a user's own kinds. Raises BslamError."""
+        return None if self.model is None else read_scanner(self.model)
 
     def prepare(self) -> None:
         self.load()
 
     def load(self) -> Log:
         rig, store = load_rig(self.rig), CameraStore(self.store)
-        return camera_log(self.redrawn(), self.seed, self.sigma_mps, self.noise, rig, store, self.threshold)
+        chosen = self.threshold, self.scanner()
+        return camera_log(self.redrawn(), self.seed, self.sigma_mps, self.noise, rig, store, *chosen)
 
 
 @dataclass(frozen=True)

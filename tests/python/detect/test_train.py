@@ -8,12 +8,20 @@ import pytest
 from sklearn.svm import LinearSVC
 
 from bslam.cli import main
-from bslam.core.scanner import Scanner
-from bslam.detect import fit
+from bslam.core.scanner import Level, Scanner
+from bslam.detect import linear
 from bslam.detect.boxes import overlaps
 from bslam.detect.examples import read_collection
 from bslam.detect.train import parts_of, with_threshold
-from bslam.detect.windows import Shape, blocks, row_values, window_boxes, window_features
+from bslam.detect.windows import (
+    Shape,
+    blocks,
+    halved,
+    row_values,
+    window_boxes,
+    window_features,
+    window_values,
+)
 from bslam.errors import BslamError
 from bslam.scannerfile import LOWEST, read_scanner
 
@@ -91,10 +99,9 @@ def reference(model, levels, shape):
     for window in model.windows:
         its = Shape(window.columns, window.rows, window.box_columns, window.box_rows)
         for level in levels:
-            sums = row_values(level, its, window.weights.astype(np.float32))[:, window.order].astype(np.int64)
-            sums = window.bias + np.cumsum(sums, axis=1)
-            scores = np.float32(window.scale) * sums[:, -1].astype(np.float32) if len(sums) else np.empty(0)
-            good = np.flatnonzero((sums >= window.floors).all(axis=1) & (scores >= np.float32(LOWEST)))
+            sums = window.bias + window_values(level, its, window.weights.astype(np.float32)).astype(np.int64)
+            scores = np.float32(window.scale) * sums.astype(np.float32)
+            good = np.flatnonzero(likely(window, its, level) & (scores >= np.float32(LOWEST)))
             if not len(good):
                 continue
             cells = blocks(window_features(level, its, good)).reshape(len(good), -1)
@@ -112,6 +119,18 @@ def reference(model, levels, shape):
         if all(overlaps(box[None], other[None])[0, 0] < 0.4 for _, other in kept):
             kept.append((score, box))
     return kept[:16]
+
+
+def likely(window, its, level):
+    """Which windows the coarse one lets through, row by row."""
+    rows, columns = level.cells.shape[0] - its.rows + 1, level.cells.shape[1] - its.columns + 1
+    if rows < 1 or columns < 1:
+        return np.empty(0, bool)
+    half = Level(halved(level.cells), 2 * level.cell_px)
+    sums = row_values(half, its.halved, window.coarse.astype(np.float32))[:, window.order].astype(np.int64)
+    passes = (window.coarse_bias + np.cumsum(sums, axis=1) >= window.floors).all(axis=1)
+    passes = passes.reshape((rows + 1) // 2, -1).repeat(2, axis=0).repeat(2, axis=1)
+    return passes[:rows, :columns].ravel()
 
 
 def test_header_holds_what_the_file_holds(trained, tmp_path):
@@ -168,20 +187,20 @@ def test_whole_weights_decide_as_scikit_learn_does(monkeypatch):
             machines.append(self)
             return super().fit(*arguments)
 
-    monkeypatch.setattr(fit, "LinearSVC", Kept)
+    monkeypatch.setattr(linear, "LinearSVC", Kept)
     examples = rng.integers(0, 256, (40, 6, 5, 8), dtype=np.uint8)
     negatives = rng.integers(0, 256, (300, 6, 5, 8), dtype=np.uint8)
     examples[..., 1] //= 4
-    weights, bias = fit._fit(examples, negatives)
+    weights, bias = linear.fit_linear(examples, negatives)
     both = np.concatenate([examples, negatives])
     mean = (both.reshape(len(both), -1).astype(np.float32) / 128).mean(axis=0)
     theirs = machines[0].decision_function(both.reshape(len(both), -1) / 128 - mean)
     ours = np.einsum("nrck,rck->n", both.astype(np.float64), weights) + bias
     assert ours == pytest.approx(theirs, abs=1e-3)
-    scale = np.abs(weights).max() / 127
-    whole = np.einsum("nrck,rck->n", both.astype(np.int64), np.rint(weights / scale).astype(np.int64))
+    tables, whole_bias, scale = linear.quantised(weights, bias)
+    whole = np.einsum("nrck,rck->n", both.astype(np.int64), tables.astype(np.int64))
     steps = both.reshape(len(both), -1).sum(axis=1) + 1
-    assert np.all(np.abs(scale * (whole + round(bias / scale)) - ours) <= scale * steps / 2)
+    assert np.all(np.abs(scale * (whole + whole_bias) - ours) <= scale * steps / 2)
 
 
 def test_each_part_shows_the_class_whatever_the_pictures_are_called(tmp_path):

@@ -28,7 +28,7 @@ def host(log):
     return {words: same_bits.fingerprints(log, RunOptions(**dict(words))) for words in WAYS}
 
 
-SMALL = ("stm32f405", "stm32f405_seeing", "microbit")
+SMALL = ("stm32f405", "stm32f405_seeing", "stm32f405_scanning", "microbit")
 BOARDS = [
     pytest.param(
         board,

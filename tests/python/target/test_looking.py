@@ -30,6 +30,7 @@ from bslam.link.messages import (
 from bslam.recording import load
 from bslam.recording.entries import Frame
 from bslam.rig import load_rig
+from bslam.scannerfile import read_scanner
 from bslam.target.client import Client
 from bslam.target.film import write_film
 from bslam.target.lines import ProcessLine, open_line
@@ -42,6 +43,7 @@ from tools.proofs.make_film import STEP_US, camera_record, make_film, smaller, t
 
 SILENCE_S = 60.0
 ROBOT = Path(__file__).parents[3] / "build" / "host" / "robot"
+MODELS = Path(__file__).parents[3] / "firmware" / "models"
 STEPS = (240, 300, 330, 420, 570)
 
 
@@ -127,10 +129,10 @@ def shots_of(film, camera, count=SHOTS):
     return np.frombuffer(data, "<u2").reshape(count, *sides)
 
 
-@pytest.fixture(params=["process", "qemu:mps2_an386", "qemu:stm32f405_seeing"])
+@pytest.fixture(params=["process", "qemu:mps2_an386", "qemu:stm32f405_seeing", "qemu:stm32f405_scanning"])
 def own_eyes(request, film, camera, tmp_path, monkeypatch):
-    """A robot that drives by a film, its camera, and the pictures that it takes in turn. The STM32F405's is
-    of full size, three pictures, which its flash has room for.
+    """A robot that drives by a film, what looks as it does, and the pictures that it takes in turn. The
+    STM32F405's are of full size, three of them, which its flash has room for.
     """
     if request.param == "process":
         monkeypatch.setenv("BSLAM_FILM", str(film))
@@ -141,8 +143,9 @@ def own_eyes(request, film, camera, tmp_path, monkeypatch):
         camera = load_rig("three60").cameras[1]
         make_film(tmp_path / "large", "paper_room", ROOM, camera, 3, TURN)
         target, shots = f"{request.param}:{tmp_path}/large", shots_of(tmp_path / "large", camera, 3)
+    model = read_scanner(MODELS / "rooms.json") if request.param.endswith("scanning") else None
     with RemoteSlam(open_line(target), None, 14) as robot:
-        yield robot, camera, shots
+        yield robot, FrontEnd([camera], model), shots
 
 
 def bearing_candidates(eyes, picture):
@@ -185,11 +188,11 @@ def readings_of(robot, count):
 
 
 def test_a_robot_with_a_camera_of_its_own_sees_and_maps_what_the_host_does(own_eyes):
-    robot, camera, shots = own_eyes
+    robot, eyes, shots = own_eyes
     params = robot.host_params
     told = gather((TURN + SHOTS) * 3 // 2, lambda: robot.reports(5.0))
     assert robot.reports_lost == 0
-    here, eyes = Slam(params, beacons_max=80, seeds=rendered_seeds()), FrontEnd([camera])
+    here = Slam(params, beacons_max=80, seeds=rendered_seeds())
     looks, count = 0, 0
     for step, one in enumerate(told, start=1):
         assert one.refused is None

@@ -4,61 +4,21 @@
 #include <string.h>
 
 #include "picture.h"
+#include "square_model.h"
 #include "vision/scan/scanner.h"
 
 #define WIDTH 160
 #define HEIGHT 120
-enum { COLUMNS = 6, ROWS = 6 };
 
 static bslam_scanner_t scanner;
 static uint16_t picture[HEIGHT][WIDTH];
-static int8_t weights[ROWS][COLUMNS][BSLAM_CHANNELS];
-static uint8_t order[ROWS];
-static int32_t floors[ROWS];
-static int8_t edges[BSLAM_EDGE_BYTES(COLUMNS, ROWS)];
-static float edge_scale[4], edge_bias[4];
-static bslam_window_t window;
-static bslam_scan_kind_t kind;
-static bslam_scanner_model_t model;
+static square_model_t square;
 
-/// A window that likes red in the middle and none around: a square of 4x4 cells.
 static int make_model(void **state)
 {
     (void)state;
-    for (int r = 0; r < ROWS; r++) {
-        order[r] = (uint8_t)(ROWS - 1 - r);
-        floors[r] = INT32_MIN;
-        for (int c = 0; c < COLUMNS; c++) {
-            const bool inside = r > 0 && c > 0 && r < ROWS - 1 && c < COLUMNS - 1;
-            weights[r][c][1] = inside ? 5 : -4;
-        }
-    }
-    memset(edges, 0, sizeof edges);
-    memset(edge_bias, 0, sizeof edge_bias);
-    memset(edge_scale, 0, sizeof edge_scale);
-    // 16 cells of 5 and 20 of -4 are 0 where all is grey, 128.
-    window = (bslam_window_t){.kind = 0,
-                              .columns = COLUMNS,
-                              .rows = ROWS,
-                              .box_columns = 4,
-                              .box_rows = 4,
-                              .weights = &weights[0][0][0],
-                              .scale = 0.001f,
-                              .bias = -3000,
-                              .order = order,
-                              .floors = floors,
-                              .edges = edges,
-                              .edge_scale = edge_scale,
-                              .edge_bias = edge_bias};
-    kind = (bslam_scan_kind_t){.name = "red square",
-                               .height_m = 0.5f,
-                               .threshold = 0,
-                               .slope = 2,
-                               .offset = 1,
-                               .middle_sd = 0.05f,
-                               .height_sd = 0.04f};
-    model = (bslam_scanner_model_t){.kind_count = 1, .kinds = &kind, .window_count = 1, .windows = &window};
-    assert_int_equal(bslam_scanner_init(&scanner, &model), BSLAM_OK);
+    square_model_make(&square);
+    assert_int_equal(bslam_scanner_init(&scanner, &square.model), BSLAM_OK);
     return 0;
 }
 
@@ -107,8 +67,8 @@ static void test_edges_move_a_box_and_no_farther_than_allowed(void **state)
     (void)state;
     draw(64, 40, 16);
     const bslam_box_t before = see()->items[0].box;
-    edge_bias[0] = -0.25f;
-    edge_bias[3] = 9.0f;
+    square.edge_bias[0] = -0.25f;
+    square.edge_bias[3] = 9.0f;
     const bslam_box_t after = see()->items[0].box;
     const double side = before.right_px - before.left_px;
     assert_near(after.left_px, before.left_px - 0.25 * side, 1e-3);
@@ -122,7 +82,7 @@ static void test_what_is_below_a_floor_is_given_up(void **state)
     (void)state;
     draw(64, 40, 16);
     assert_int_equal(see()->count, 1);
-    floors[0] = INT32_MAX;
+    square.floors[0] = INT32_MAX;
     assert_int_equal(see()->count, 0);
 }
 
@@ -210,7 +170,7 @@ static void test_picture_that_is_cut_short_or_looked_at_twice_shows_nothing(void
 static void test_more_boxes_than_there_is_room_for_are_counted(void **state)
 {
     (void)state;
-    kind.threshold = -1e6f;
+    square.kind.threshold = -1e6f;
     draw(64, 40, 16);
     const bslam_detections_t *found = see();
     assert_int_equal(found->count, BSLAM_CANDIDATES_MAX);
@@ -240,7 +200,7 @@ static void expect_refused(bslam_status_t status)
 {
     static bslam_scanner_t before;
     before = scanner;
-    assert_int_equal(bslam_scanner_init(&scanner, &model), status);
+    assert_int_equal(bslam_scanner_init(&scanner, &square.model), status);
     assert_memory_equal(&scanner, &before, sizeof before);
 }
 
@@ -255,98 +215,43 @@ static void expect_refused(bslam_status_t status)
 static void test_model_that_cannot_be_is_refused_and_nothing_changes(void **state)
 {
     (void)state;
-    WITH(model.kind_count, 0, BSLAM_E_COUNT);
-    WITH(model.kind_count, BSLAM_KINDS_MAX + 1, BSLAM_E_COUNT);
-    WITH(model.window_count, 0, BSLAM_E_COUNT);
-    WITH(model.window_count, BSLAM_WINDOWS_MAX + 1, BSLAM_E_COUNT);
-    WITH(window.kind, 1, BSLAM_E_COUNT);
-    WITH(window.columns, 1, BSLAM_E_COUNT);
-    WITH(window.columns, BSLAM_WINDOW_SIDE_MAX + 1, BSLAM_E_COUNT);
-    WITH(window.rows, 1, BSLAM_E_COUNT);
-    WITH(window.rows, BSLAM_WINDOW_SIDE_MAX + 1, BSLAM_E_COUNT);
-    WITH(order[2], ROWS, BSLAM_E_COUNT);
-    WITH(order[2], order[3], BSLAM_E_COUNT);
-    WITH(window.weights, NULL, BSLAM_E_PARAMETER);
-    WITH(window.order, NULL, BSLAM_E_PARAMETER);
-    WITH(window.floors, NULL, BSLAM_E_PARAMETER);
-    WITH(window.edges, NULL, BSLAM_E_PARAMETER);
-    WITH(window.edge_scale, NULL, BSLAM_E_PARAMETER);
-    WITH(window.edge_bias, NULL, BSLAM_E_PARAMETER);
-    WITH(window.bias, INT32_MAX, BSLAM_E_PARAMETER);
-    WITH(model.kinds, NULL, BSLAM_E_PARAMETER);
-    WITH(model.windows, NULL, BSLAM_E_PARAMETER);
-    WITH(window.scale, NAN, BSLAM_E_NOT_FINITE);
-    WITH(window.scale, 0.0f, BSLAM_E_PARAMETER);
-    WITH(window.box_columns, 0.0f, BSLAM_E_PARAMETER);
-    WITH(window.box_columns, COLUMNS + 1.0f, BSLAM_E_PARAMETER);
-    WITH(window.box_rows, NAN, BSLAM_E_PARAMETER);
-    WITH(edge_scale[1], INFINITY, BSLAM_E_NOT_FINITE);
-    WITH(edge_bias[3], NAN, BSLAM_E_NOT_FINITE);
-    WITH(kind.threshold, NAN, BSLAM_E_NOT_FINITE);
-    WITH(kind.height_m, -1.0f, BSLAM_E_PARAMETER);
-    WITH(kind.height_m, 11.0f, BSLAM_E_PARAMETER);
-    WITH(kind.name, NULL, BSLAM_E_PARAMETER);
-    WITH(kind.middle_sd, 0.0f, BSLAM_E_PARAMETER);
-    WITH(kind.height_sd, 0.0f, BSLAM_E_PARAMETER);
-    assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner - 1, BSLAM_VISION_HASH, &model),
+    WITH(square.model.kind_count, 0, BSLAM_E_COUNT);
+    WITH(square.model.kind_count, BSLAM_KINDS_MAX + 1, BSLAM_E_COUNT);
+    WITH(square.model.window_count, 0, BSLAM_E_COUNT);
+    WITH(square.model.window_count, BSLAM_WINDOWS_MAX + 1, BSLAM_E_COUNT);
+    WITH(square.window.kind, 1, BSLAM_E_COUNT);
+    WITH(square.window.columns, 1, BSLAM_E_COUNT);
+    WITH(square.window.columns, BSLAM_WINDOW_SIDE_MAX + 1, BSLAM_E_COUNT);
+    WITH(square.window.rows, 1, BSLAM_E_COUNT);
+    WITH(square.window.rows, BSLAM_WINDOW_SIDE_MAX + 1, BSLAM_E_COUNT);
+    WITH(square.order[2], SQUARE_ROWS / 2, BSLAM_E_COUNT);
+    WITH(square.order[2], square.order[1], BSLAM_E_COUNT);
+    WITH(square.window.weights, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.order, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.floors, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.edges, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.edge_scale, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.edge_bias, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.bias, INT32_MAX, BSLAM_E_PARAMETER);
+    WITH(square.model.kinds, NULL, BSLAM_E_PARAMETER);
+    WITH(square.model.windows, NULL, BSLAM_E_PARAMETER);
+    WITH(square.window.scale, NAN, BSLAM_E_NOT_FINITE);
+    WITH(square.window.scale, 0.0f, BSLAM_E_PARAMETER);
+    WITH(square.window.box_columns, 0.0f, BSLAM_E_PARAMETER);
+    WITH(square.window.box_columns, SQUARE_COLUMNS + 1.0f, BSLAM_E_PARAMETER);
+    WITH(square.window.box_rows, NAN, BSLAM_E_PARAMETER);
+    WITH(square.edge_scale[1], INFINITY, BSLAM_E_NOT_FINITE);
+    WITH(square.edge_bias[3], NAN, BSLAM_E_NOT_FINITE);
+    WITH(square.kind.threshold, NAN, BSLAM_E_NOT_FINITE);
+    WITH(square.kind.height_m, -1.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.height_m, 11.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.name, NULL, BSLAM_E_PARAMETER);
+    WITH(square.kind.middle_sd, 0.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.height_sd, 0.0f, BSLAM_E_PARAMETER);
+    assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner - 1, BSLAM_VISION_HASH, &square.model),
                      BSLAM_E_SIZE);
-    assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner, BSLAM_VISION_HASH + 1, &model),
+    assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner, BSLAM_VISION_HASH + 1, &square.model),
                      BSLAM_E_SIZE);
-}
-
-static void test_sighting_is_where_the_thing_is(void **state)
-{
-    (void)state;
-    const bslam_camera_t camera = unit_pinhole();
-    // 0.5 m high, its middle as high as the camera, 2 m ahead and 1 m to the right.
-    bslam_direction_t top = {2, -1, 0.25f}, bottom = {2, -1, -0.25f}, left = {2, -0.9f, 0},
-                      right = {2, -1.1f, 0};
-    bslam_detection_t found = {.kind = 0, .log_odds = 3};
-    bslam_real_t unused;
-    assert_int_equal(bslam_camera_project(&camera, &top, &unused, &found.box.top_px), BSLAM_OK);
-    assert_int_equal(bslam_camera_project(&camera, &bottom, &unused, &found.box.bottom_px), BSLAM_OK);
-    assert_int_equal(bslam_camera_project(&camera, &left, &found.box.left_px, &unused), BSLAM_OK);
-    assert_int_equal(bslam_camera_project(&camera, &right, &found.box.right_px, &unused), BSLAM_OK);
-    bslam_sighting_t seen;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_OK);
-    assert_near(seen.bearing_rad, atan2(-1, 2), 1e-3);
-    assert_true(seen.has_range);
-    assert_near(seen.range_m, sqrt(5), 0.01);
-    assert_near(seen.range_sd_m, sqrt(5) * hypot(0.04, 0.5 / (found.box.bottom_px - found.box.top_px)), 1e-3);
-    const double width_rad = atan2(1.1, 2) - atan2(0.9, 2);
-    assert_near(seen.bearing_sd_rad, width_rad * hypot(0.05, 0.5 / (found.box.right_px - found.box.left_px)),
-                1e-4);
-    assert_int_equal(seen.label, BSLAM_LABEL_NONE);
-    assert_int_equal(seen.beacon_class, 1);
-    assert_near(seen.score, 3, 0);
-
-    found.marks = BSLAM_MARK_CUT_TOP;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_OK);
-    assert_false(seen.has_range);
-    found.marks = BSLAM_MARK_CUT_RIGHT;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_OK);
-    assert_true(seen.has_range);
-    assert_true(seen.bearing_sd_rad > 0.5 * width_rad);
-    found.marks = 0;
-    kind.height_m = 0;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_OK);
-    assert_false(seen.has_range);
-}
-
-static void test_sighting_of_no_kind_or_direction_is_refused_and_nothing_changes(void **state)
-{
-    (void)state;
-    const bslam_camera_t camera = unit_pinhole();
-    const bslam_sighting_t before = {.range_m = 7};
-    bslam_sighting_t seen = before;
-    bslam_detection_t found = {.kind = 1, .box = {10, 10, 20, 20}};
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_E_RANGE);
-    found.kind = -1;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_E_RANGE);
-    found.kind = 0;
-    found.box.left_px = NAN;
-    assert_int_equal(bslam_scanner_sighting(&scanner, &camera, &found, &seen), BSLAM_E_NOT_FINITE);
-    assert_memory_equal(&seen, &before, sizeof seen);
 }
 
 static void test_cells_are_given_row_by_row_for_training(void **state)
@@ -385,9 +290,6 @@ int main(void)
         cmocka_unit_test_setup(test_size_or_format_not_allowed_is_refused_and_nothing_changes, make_model),
         cmocka_unit_test_setup(test_model_that_cannot_be_is_refused_and_nothing_changes, make_model),
         cmocka_unit_test_setup(test_cells_are_given_row_by_row_for_training, make_model),
-        cmocka_unit_test_setup(test_sighting_is_where_the_thing_is, make_model),
-        cmocka_unit_test_setup(test_sighting_of_no_kind_or_direction_is_refused_and_nothing_changes,
-                               make_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

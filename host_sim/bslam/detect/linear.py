@@ -1,0 +1,41 @@
+"""A linear SVM over cells, by scikit-learn."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bslam.errors import BslamError
+
+try:
+    from sklearn.svm import LinearSVC
+except ImportError:  # an extra
+    LinearSVC = None
+
+_COST: Final = 0.01
+_UNIT: Final = 128.0  # of a cell's values
+
+
+def fit_linear(
+    examples: NDArray[np.uint8], negatives: NDArray[np.uint8]
+) -> tuple[NDArray[np.float32], float]:
+    """Weights (rows, columns, CHANNELS) for cells, and bias. BslamError if scikit-learn is missing."""
+    if LinearSVC is None:
+        raise BslamError("training needs scikit-learn; allowed: pip install 'bslam[detect]'")
+    both = np.concatenate([examples, negatives])
+    x = both.reshape(len(both), -1).astype(np.float32) / _UNIT
+    y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])
+    mean = x.mean(axis=0)
+    weight = max(1.0, len(negatives) / len(examples) / 3.0)
+    machine = LinearSVC(C=_COST, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
+    weights = machine.fit(x - mean, y).coef_[0]
+    bias = float(machine.intercept_[0] - weights @ mean)
+    return (weights / _UNIT).reshape(examples.shape[1:]).astype(np.float32), bias
+
+
+def quantised(weights: NDArray[np.float32], bias: float) -> tuple[NDArray[np.int8], int, float]:
+    """Weights and bias as whole numbers, and what one of them stands for."""
+    scale = float(np.float32(np.abs(weights).max() / 127.0))
+    return np.rint(weights / scale).astype(np.int8), round(bias / scale), scale
