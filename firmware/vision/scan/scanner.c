@@ -14,6 +14,10 @@ enum { SIDE_MIN = 32, WIDTH_STEP = 8, EDGES = 4, BLOCK = 2 };
 enum { BIAS_MAX = 1 << 30 };
 /// Boxes of one kind that overlap as much, of both together, are one thing's.
 static const float OVERLAP_MAX = 0.4f;
+/// A window's score differs from that of the next by hardly more.
+static const float FAR_BELOW = 2;
+/// Windows whose score is farther below the best one's say nothing of where its edges are.
+static const float MERGED_BELOW = 1;
 /// An edge is no farther from its window's box than this, of width or height.
 static const float EDGE_MAX = 0.4f;
 /// A box that ends so near to the picture's edge may go on outside.
@@ -298,14 +302,10 @@ static void note_hit(bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
     }
 }
 
-static void take_window(bslam_scanner_instance_t *instance, const bslam_level_t *level, const view_t *view,
-                        int32_t column, int32_t top)
+static void note_window(bslam_scanner_instance_t *instance, const bslam_level_t *level, const view_t *view,
+                        int32_t column, int32_t top, float score)
 {
     const bslam_window_t *window = view->window;
-    const float score = window->scale * (float)value_at(view, column);
-    if (score < instance->model->kinds[window->kind].threshold) {
-        return;
-    }
     float edges[EDGES];
     edges_at(view, column, edges);
     const float middle_x = (float)(2 * (column - BSLAM_LEVEL_PAD) + window->columns) / 2 * level->cell_px;
@@ -325,6 +325,37 @@ static void take_window(bslam_scanner_instance_t *instance, const bslam_level_t 
     }
 }
 
+/// The window's score; what is above its kind's threshold is noted.
+static float take_window(bslam_scanner_instance_t *instance, const bslam_level_t *level, const view_t *view,
+                         int32_t column, int32_t top)
+{
+    const bslam_window_t *window = view->window;
+    const float score = window->scale * (float)value_at(view, column);
+    if (score >= instance->model->kinds[window->kind].threshold) {
+        note_window(instance, level, view, column, top, score);
+    }
+    return score;
+}
+
+/// The four windows of a place of the coarse one, or where the first is far below its kind's threshold, that
+/// one.
+static void take_place(bslam_scanner_instance_t *instance, const bslam_level_t *level,
+                       const view_t fine[BLOCK], int32_t column, int32_t top, bool both)
+{
+    const bslam_window_t *window = fine[0].window;
+    const bool has_next = column + window->columns < level->columns;
+    const float least = instance->model->kinds[window->kind].threshold - FAR_BELOW;
+    if (take_window(instance, level, &fine[0], column, top) < least) {
+        return;
+    }
+    for (int32_t i = 1; i < BLOCK * BLOCK; i++) {
+        const int32_t down = i / BLOCK, across = i % BLOCK;
+        if ((down == 0 || both) && (across == 0 || has_next)) {
+            (void)take_window(instance, level, &fine[down], column + across, top + down);
+        }
+    }
+}
+
 /// Windows of an upper row, and of the one below it if `both`: those where the coarse one is likely.
 static void scan_rows(bslam_scanner_instance_t *instance, const bslam_level_t *level,
                       const bslam_window_t *window, int32_t top, bool both)
@@ -338,12 +369,7 @@ static void scan_rows(bslam_scanner_instance_t *instance, const bslam_level_t *l
     const int32_t last = level->columns - window->columns;
     for (int32_t column = 0; column <= last; column += BLOCK) {
         if (is_likely(&coarse, column / BLOCK)) {
-            for (int32_t down = 0; down <= (both ? 1 : 0); down++) {
-                take_window(instance, level, &fine[down], column, top + down);
-                if (column < last) {
-                    take_window(instance, level, &fine[down], column + 1, top + down);
-                }
-            }
+            take_place(instance, level, fine, column, top, both);
         }
     }
 }
@@ -452,21 +478,43 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
     };
 }
 
-/// Of boxes that overlap the best remain.
+/// The mean box of what shows the same thing as the best, by how much each is above what is far below it. All
+/// of them are dropped.
+static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t *best)
+{
+    const bslam_hit_t first = *best;
+    bslam_hit_t mean = {.score = first.score, .kind = first.kind};
+    float sum = 0;
+    for (int32_t i = 0; i < instance->hit_count; i++) {
+        bslam_hit_t *hit = &instance->hits[i];
+        if (is_same_thing(hit, &first)) {
+            const float above = hit->score - first.score + MERGED_BELOW, weight = above > 0 ? above : 0;
+            sum += weight;
+            mean.left_px += weight * hit->left_px;
+            mean.top_px += weight * hit->top_px;
+            mean.right_px += weight * hit->right_px;
+            mean.bottom_px += weight * hit->bottom_px;
+            hit->kind = -1;
+        }
+    }
+    mean.left_px /= sum;
+    mean.top_px /= sum;
+    mean.right_px /= sum;
+    mean.bottom_px /= sum;
+    return mean;
+}
+
+/// Of boxes that overlap one remains.
 static void report_best(bslam_scanner_instance_t *instance)
 {
     bslam_detections_t *found = &instance->found;
     for (bslam_hit_t *best = best_left(instance); best != NULL; best = best_left(instance)) {
+        const bslam_hit_t thing = merged(instance, best);
         if (found->count < BSLAM_CANDIDATES_MAX) {
-            found->items[found->count] = detection_of(instance, best);
+            found->items[found->count] = detection_of(instance, &thing);
             found->count++;
         } else {
             found->dropped++;
-        }
-        const bslam_hit_t taken = *best;
-        for (int32_t i = 0; i < instance->hit_count; i++) {
-            bslam_hit_t *hit = &instance->hits[i];
-            hit->kind = is_same_thing(hit, &taken) ? -1 : hit->kind;
         }
     }
 }

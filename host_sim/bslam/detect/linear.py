@@ -29,7 +29,7 @@ def fit_linear(
     y = np.concatenate([np.ones(len(examples)), -np.ones(len(negatives))])
     mean = x.mean(axis=0)
     weight = max(1.0, len(negatives) / len(examples) / 3.0)
-    machine = LinearSVC(C=_COST, class_weight={1: weight, -1: 1.0}, tol=1e-3, max_iter=4000, random_state=0)
+    machine = LinearSVC(C=_COST, class_weight={1: weight, -1: 1.0}, tol=1e-2, dual=False)
     weights = machine.fit(x - mean, y).coef_[0]
     bias = float(machine.intercept_[0] - weights @ mean)
     return (weights / _UNIT).reshape(examples.shape[1:]).astype(np.float32), bias

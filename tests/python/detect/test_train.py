@@ -8,11 +8,12 @@ import pytest
 from sklearn.svm import LinearSVC
 
 from bslam.cli import main
+from bslam.commands import detect
 from bslam.core.scanner import Level, Scanner
 from bslam.detect import linear
 from bslam.detect.boxes import overlaps
 from bslam.detect.examples import read_collection
-from bslam.detect.train import parts_of, with_threshold
+from bslam.detect.train import parts_of, train, with_threshold
 from bslam.detect.windows import (
     Shape,
     blocks,
@@ -101,7 +102,7 @@ def reference(model, levels, shape):
         for level in levels:
             sums = window.bias + window_values(level, its, window.weights.astype(np.float32)).astype(np.int64)
             scores = np.float32(window.scale) * sums.astype(np.float32)
-            good = np.flatnonzero(likely(window, its, level) & (scores >= np.float32(LOWEST)))
+            good = np.flatnonzero(looked_at(window, its, level, scores) & (scores >= np.float32(LOWEST)))
             if not len(good):
                 continue
             cells = blocks(window_features(level, its, good)).reshape(len(good), -1)
@@ -114,11 +115,28 @@ def reference(model, levels, shape):
             boxes = np.clip(boxes, 0, [shape[1], shape[0]] * 2)
             hits += list(zip(scores[good].tolist(), boxes, strict=True))
     hits.sort(key=lambda hit: -hit[0])
-    kept = []
-    for score, box in hits[:128]:
-        if all(overlaps(box[None], other[None])[0, 0] < 0.4 for _, other in kept):
-            kept.append((score, box))
-    return kept[:16]
+    hits, found = hits[:128], []
+    while hits:
+        best, first = hits[0]
+        same = [overlaps(first[None], box[None])[0, 0] >= 0.4 for _, box in hits]
+        weights = [max(0.0, score - best + 1) for score, _ in hits]
+        its = [(weight, box) for weight, (_, box), one in zip(weights, hits, same, strict=True) if one]
+        found.append((best, np.average([box for _, box in its], axis=0, weights=[one for one, _ in its])))
+        hits = [hit for hit, one in zip(hits, same, strict=True) if not one]
+    return found[:16]
+
+
+def looked_at(window, its, level, scores):
+    """Which windows the coarse one lets through, row by row; of four the first alone if far below."""
+    passes = likely(window, its, level)
+    if not len(passes):
+        return passes
+    columns = level.cells.shape[1] - its.columns + 1
+    scores = scores.reshape(-1, columns)
+    near = (scores[::2, ::2] >= np.float32(LOWEST) - 2).repeat(2, axis=0).repeat(2, axis=1)
+    near = near[: len(scores), :columns]
+    near[::2, ::2] = True
+    return passes & near.ravel()
 
 
 def likely(window, its, level):
@@ -237,7 +255,7 @@ def test_class_in_too_few_pictures_is_refused(tmp_path, capsys):
     assert not (tmp_path / "m.json").exists()
 
 
-def test_model_that_finds_less_than_half_is_not_written_unless_asked_for(tmp_path, capsys):
+def test_model_that_finds_less_than_half_is_not_written_unless_asked_for(tmp_path, capsys, monkeypatch):
     folder = write_folder(tmp_path / "blind", 10, 1)
     text = (folder / "labels.csv").read_text().splitlines()
     rng = np.random.default_rng(0)
@@ -248,6 +266,14 @@ def test_model_that_finds_less_than_half_is_not_written_unless_asked_for(tmp_pat
         moved.append(f"{name},{kind},{left},{top},{left + 40},{top + 80},,")
     (folder / "labels.csv").write_text("\n".join(moved) + "\n")
     words = ["detect", "train", str(folder), "--out", str(tmp_path / "m.json")]
+    steps = []
+
+    def once(*arguments):
+        """The same training for both commands."""
+        steps.extend([] if steps else train(*arguments))
+        return steps
+
+    monkeypatch.setattr(detect, "train", once)
     assert main(words) == 1
     assert "nothing written: 'panel' is found by itself in less than half" in capsys.readouterr().out
     assert not (tmp_path / "m.json").exists() and not (tmp_path / "m.h").exists()
