@@ -21,3 +21,8 @@ bench-vision: ## count the instructions a pixel of the vision front end (valgrin
 bench-learner: ## count the instructions of learning on the robot (valgrind); renders what is learned first
 	@tools/setup.sh bench
 	@$(PYTHON) -m tools.bench.bench_learner
+
+.PHONY: bench-pictures
+bench-pictures: ## find objects beside OpenCV's HOG, a small network and AprilTag: PICTURES="DIR DIR"
+	@tools/setup.sh bench
+	@$(PYTHON) -m tools.bench.peers.pictures $(PICTURES)

@@ -2986,7 +2986,6 @@ static const bslam_beacon_model_t bslam_beacons_model = {
         {1, 11, true, bslam_beacons_wide_verdict_weights, NULL, NULL, bslam_beacons_wide_verdict_bias},  // verdict
         0.48930198f,  // threshold
     },  // wide
-    NULL,  // recogniser
 };
 
 #endif

@@ -44,7 +44,7 @@
 #error "BSLAM_CANDIDATES_MAX is 1 to 64"
 #endif
 
-/// 1: the built-in kinds of beacons can be found, and turns told. 0: only a user's own
+/// 1: the built-in kinds of beacons can be found, and turns between pictures. 0: only a user's own
 /// (bslam_vision_init_scanner): 55 KB of flash less, and 25 KB of RAM for QVGA.
 #ifndef BSLAM_VISION_BUILT_IN
 #define BSLAM_VISION_BUILT_IN 1

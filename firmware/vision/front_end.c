@@ -12,7 +12,7 @@
 #include "vision/detection/features.h"
 #include "vision/detection/prefilter.h"
 #include "vision/detection/vertical_edges.h"
-#include "vision/classifiers/recogniser.h"
+#include "vision/classifiers/beacon_model.h"
 #include "base/scalar.h"
 
 /// A cell is black below this in every channel, saturated from the other on. The frame is unusable if more
@@ -57,9 +57,6 @@ bslam_status_t bslam_front_end_init(bslam_front_end_t *vision, const bslam_beaco
                                     const bslam_camera_t *cameras, int32_t camera_count)
 {
     bslam_status_t status = bslam_beacon_model_check(model);
-    if (status == BSLAM_OK && model->recogniser != NULL) {
-        status = bslam_recogniser_check(model->recogniser);
-    }
     if (status == BSLAM_OK) {
         status = bslam_zoom_check(cameras, camera_count);
     }
@@ -331,33 +328,20 @@ static void doubt_cut(const bslam_front_end_t *vision, const bslam_frame_t *fram
     candidate->bearing_sd_rad = bslam_sqrt(variance);
 }
 
-/// Direction, distance and signature of a candidate; of a recognised object the distance is by its own
-/// height.
+/// Direction, distance and signature of a candidate.
 static bslam_status_t measure_one(const bslam_front_end_t *vision, const bslam_frame_t *frame,
                                   bslam_candidate_t *candidate)
 {
     const bslam_camera_t *camera = &vision->cameras[vision->camera];
-    const bslam_recogniser_t *recogniser = vision->model->recogniser;
     const bslam_size_t size = size_of(&vision->model->classes[candidate->beacon_class - 1]);
     const bslam_box_t rough = candidate->outline;
-    candidate->object = BSLAM_OBJECT_NONE;
-    candidate->object_margin = 0;
     const bslam_status_t status = bslam_measure(frame, camera, &rough, &size, candidate);
-    if (status != BSLAM_OK) {
-        return status;
+    if (status == BSLAM_OK) {
+        try_second_class(vision, frame, &rough, candidate);
+        doubt_class(vision, candidate);
+        doubt_cut(vision, frame, &rough, candidate);
     }
-    try_second_class(vision, frame, &rough, candidate);
-    doubt_class(vision, candidate);
-    doubt_cut(vision, frame, &rough, candidate);
-    if (recogniser == NULL) {
-        return status;
-    }
-    candidate->object = bslam_recognise(recogniser, candidate->signature, &candidate->object_margin);
-    if (candidate->object == BSLAM_OBJECT_NONE) {
-        return status;
-    }
-    const bslam_size_t own_size = size_of(&recogniser->objects[candidate->object]);
-    return bslam_measure(frame, camera, &rough, &own_size, candidate);
+    return status;
 }
 
 /// What a candidate's score loses because it is smaller than its kind, to the pixel. For small kinds only: on

@@ -2,7 +2,7 @@
 #ifndef BSLAM_VISION_INTERNAL_H
 #define BSLAM_VISION_INTERNAL_H
 
-#include "vision/classifiers/recogniser.h"
+#include "vision/classifiers/beacon_model.h"
 #include "vision/gyro/visual_gyro.h"
 #include "vision/instance.h"
 #include "vision/scan/scanner.h"

@@ -1,7 +1,7 @@
 /// What was trained, as constant tables and views on them: part of vision.h.
 ///
 /// A model is a header of such tables: models/beacons.h comes with the library, `make train` and
-/// tools/training/train_beacons.py write others. The library copies nothing and checks a model once, in
+/// `bslam detect train` write others. The library copies nothing and checks a model once, in
 /// bslam_vision_init. Weights are always float or bytes, in the double build too: what was trained is what
 /// runs. docs/MATH-CAMERA.md has the decision functions.
 #ifndef BSLAM_VISION_MODEL_H
@@ -22,9 +22,8 @@ enum {
     BSLAM_CLOSE_FEATURES = BSLAM_PATCH_FEATURES + BSLAM_BLOB_FEATURES
 };
 
-/// Kinds of beacons in a model, and objects of a recogniser, at most.
+/// Kinds of beacons in a model, at most.
 #define BSLAM_CLASSES_MAX 16
-#define BSLAM_OBJECTS_MAX 64
 
 // ---- support vector machines ------------------------------------------------------------------------------
 
@@ -187,20 +186,12 @@ typedef struct bslam_detector_model {
     float threshold;           ///< a proposal whose verdict is below it is no candidate
 } bslam_detector_model_t;
 
-/// Objects of a user's own, recognised by their signatures.
-typedef struct bslam_recogniser {
-    bslam_svm_t svm;  ///< one row an object, linear, BSLAM_SIGNATURE_SIZE
-    const bslam_beacon_class_t *objects;
-    float reject_margin;  ///< the best row's value is at least this, or the object is none of them
-} bslam_recogniser_t;
-
 /// Everything trained.
 typedef struct bslam_beacon_model {
     int32_t class_count;
     const bslam_beacon_class_t *classes;  ///< class c of a candidate is classes[c - 1]
     bslam_detector_model_t pinhole;
-    bslam_detector_model_t wide;           ///< lenses beyond 120 degrees
-    const bslam_recogniser_t *recogniser;  ///< NULL: none
+    bslam_detector_model_t wide;  ///< lenses beyond 120 degrees
 } bslam_beacon_model_t;
 
 #endif

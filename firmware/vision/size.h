@@ -22,7 +22,7 @@
 #define BSLAM_VISION_SIZE_CAMERA (3188 + (BSLAM_REAL_DOUBLE ? 96 : 52))
 
 /// A candidate, and what is thought of a box before.
-#define BSLAM_VISION_SIZE_CANDIDATE (BSLAM_REAL_DOUBLE ? 400 : 352)
+#define BSLAM_VISION_SIZE_CANDIDATE (BSLAM_REAL_DOUBLE ? 384 : 344)
 #define BSLAM_VISION_SIZE_FOUND \
     (BSLAM_CANDIDATES_MAX * BSLAM_VISION_SIZE_CANDIDATE + 24 * ((169 + BSLAM_VISION_SIZE_POINTER) / 8 * 8))
 /// Scratch that one stage after the other uses: sums of rows, tables of channels, runs of cells, candidates.

@@ -172,9 +172,6 @@ enum {
     BSLAM_MARK_HIDDEN = 256      ///< narrower than its kind: something is before it, its direction is rough
 };
 
-/// No object of the model's recogniser.
-#define BSLAM_OBJECT_NONE (-1)
-
 /// A thing that is probably a beacon.
 typedef struct bslam_candidate {
     bslam_box_t outline;
@@ -191,8 +188,6 @@ typedef struct bslam_candidate {
     uint8_t second_class;  ///< the next likely one; BSLAM_CLASS_NONE if there is none
     float class_margin;    ///< value of the class less that of the next; negative if its place decided
     float score;           ///< detector's decision value: larger is surer
-    int16_t object;        ///< index in the model's recogniser; BSLAM_OBJECT_NONE: none of its objects
-    float object_margin;   ///< what the recogniser says for the likeliest object
     uint16_t marks;
     float misplaced_sds;  ///< by how many standard deviations it hangs where its kind does not; 0: not at all
     float signature[BSLAM_SIGNATURE_SIZE];

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm
 from bslam.scannerfile import ScannerModel
 
 COLUMNS = 110
@@ -92,7 +92,7 @@ class Header:
         )
 
     def classes(self, name: str, classes: Sequence[BeaconClass]) -> str:
-        """Add a table of kinds or objects; its name."""
+        """Add a table of kinds; its name."""
         rows = [[c_string(one.name), *map(c_float, astuple(one)[1:])] for one in classes]
         return self.rows("bslam_beacon_class_t", name, rows)
 
@@ -157,17 +157,6 @@ def check_name(name: str) -> None:
     if not NAME.fullmatch(name):
         allowed = "small letters, digits and _, a letter first: it becomes a name in C"
         raise BslamError(f"header {name}.h: the name is not allowed; allowed: {allowed}")
-
-
-def recogniser_header(recogniser: Recogniser, name: str) -> str:
-    """The header of a user's recogniser: `static const bslam_recogniser_t bslam_<name>`."""
-    check_name(name)
-    header = Header(f"BSLAM_MODELS_{name.upper()}_H", ["vision/vision.h"], recogniser.notes)
-    svm = header.svm(name, recogniser.svm)
-    objects = header.classes(f"{name}_objects", recogniser.objects)
-    fields = {"svm": svm, "objects": objects, "reject_margin": c_float(recogniser.reject_margin)}
-    header.constant("bslam_recogniser_t", f"bslam_{name}", named_initialiser(fields))
-    return header.text()
 
 
 def scanner_header(model: ScannerModel, name: str) -> str:

@@ -1,9 +1,8 @@
-"""Trained models: what a support vector machine and a user's recogniser hold, and the file they stand in.
+"""Trained models: what a support vector machine and a kind of beacon hold, and how a model's file is read.
 
 The file is JSON, so that it can be read, compared and kept in version control. Reading is strict: a file that
-is cut short, of another version, with a number that is none, or made for another feature vector is refused
-whole, and the error names file, key, value and what is allowed. Numbers have nine significant digits, which
-give every float back to the bit.
+is cut short, of another version, or with a number that is none is refused whole, and the error names file,
+key, value and what is allowed. Numbers have nine significant digits, which give every float back to the bit.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,6 @@ from numpy.typing import NDArray
 
 from bslam.errors import BslamError
 
-FORMAT = "bslam recogniser"
-VERSION = 1
-ROWS_MAX = 255
 SIZE_MAX_M = 10.0
 
 
@@ -97,7 +93,7 @@ class HingedSvm:
 
 @dataclass(frozen=True)
 class BeaconClass:
-    """A kind of beacon, or one object of a user's.
+    """A kind of beacon.
 
     height_m 0: not known. depth_m: how far it stands out from the wall; 0: flat, or not known. top_low_m to
     top_high_m: how high its upper side is above the floor; 0: not known. looks_sd: by what part a distance
@@ -120,88 +116,16 @@ class BeaconClass:
     scale_sd: float = 0.0
 
 
-@dataclass(frozen=True)
-class Recogniser:
-    """A user's own objects, told by their signatures: row r of the machine is for objects[r]."""
-
-    svm: Svm
-    objects: tuple[BeaconClass, ...]
-    reject_margin: float
-    notes: Mapping[str, str] = field(
-        default_factory=dict
-    )  # how it came about: training set, settings, figures
-
-
-def write_recogniser(path: Path, recogniser: Recogniser) -> None:
-    """Write the model file; the same recogniser gives the same bytes."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(recogniser_text(recogniser), encoding="utf-8")
-
-
-def recogniser_text(recogniser: Recogniser) -> str:
-    """The content of the model file."""
-    svm = recogniser.svm
-    if svm.byte_scale is not None:
-        raise ValueError("a model file holds float weights; bytes are made when the header is written")
-    rows = ",\n".join(f"  {_numbers(row)}" for row in svm.weights)
-    head = {
-        "format": FORMAT,
-        "version": VERSION,
-        "notes": dict(recogniser.notes),
-        "objects": [asdict(one) for one in recogniser.objects],
-        "features": svm.features,
-        "reject_margin": _rounded(recogniser.reject_margin),
-    }
-    opening = json.dumps(head, indent=1, ensure_ascii=False).removesuffix("\n}")
-    return f'{opening},\n "bias": {_numbers(svm.bias)},\n "weights": [\n{rows}\n ]\n}}\n'
-
-
-def read_recogniser(path: Path, features: int) -> Recogniser:
-    """The recogniser in a model file; `features` is the length of the signature that this program computes.
-
-    Raises BslamError that names file, key, value and what is allowed.
-    """
-    document = Document(path, load_document(path))
-    document.equal("format", FORMAT)
-    document.equal("version", VERSION)
-    document.equal("features", features)
-    objects = tuple(
-        BeaconClass(one.text("name"), *(one.number(key, 0.0, SIZE_MAX_M) for key in ("height_m", "depth_m")))
-        for one in document.children("objects", ROWS_MAX)
-    )
-    rows = len(objects)
-    notes = document.mapping("notes")
-    return Recogniser(
-        svm=Svm(
-            features, False, document.array("weights", (rows, features)), document.array("bias", (rows,))
-        ),
-        objects=objects,
-        reject_margin=document.number("reject_margin", -1e12, 1e12),
-        notes={str(key): str(value) for key, value in notes.items()},
-    )
-
-
-def _numbers(values: NDArray[Any]) -> str:
-    return "[" + ", ".join(f"{value:.9g}" for value in values.tolist()) + "]"
-
-
-def _rounded(value: float) -> float:
-    """To the nearest float32, which is what the C core compares with."""
-    return float(f"{float(np.float32(value)):.9g}")
-
-
 def load_document(path: Path) -> Mapping[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise BslamError(f"{path}: cannot be read: {error}; allowed: a UTF-8 text file") from error
     except ValueError as error:
-        allowed = "a whole model file, as tools/training/train_beacons.py writes it"
+        allowed = "a whole model file, as bslam detect train writes it"
         raise BslamError(f"{path}: not JSON, or cut short: {error}; allowed: {allowed}") from error
     if not isinstance(document, dict):
-        raise BslamError(
-            f"{path}: holds no table; allowed: a model file, as tools/training/train_beacons.py writes it"
-        )
+        raise BslamError(f"{path}: holds no table; allowed: a model file, as bslam detect train writes it")
     return document
 
 
@@ -263,37 +187,32 @@ class Document:
                 raise self._error(f"{key}[{index}]", one, "a table")
         return [Document(self.path, one, f"{self.prefix}{key}[{i}].") for i, one in enumerate(value)]
 
-    def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """Finite float32 numbers of a shape of one or two dimensions."""
-        value = self._get(key, f"{shape[0]} entries")
-        self._check_nested(key, value, shape)
+    def array(self, key: str, count: int) -> NDArray[np.float32]:
+        """So many finite numbers."""
+        value = self._list(key, count)
+        for index, one in enumerate(value):
+            if not _is_number(one) or not abs(one) <= 1e12:
+                raise self._error(f"{key}[{index}]", one, "a number from -1e12 to 1e12")
         return np.array(value, dtype=np.float32)
 
     def integers(
         self, key: str, count: int, dtype: type[np.signedinteger[Any] | np.unsignedinteger[Any]]
     ) -> NDArray[Any]:
         """So many whole numbers that the dtype holds."""
-        value = self._get(key, f"a list of {count}")
+        value = self._list(key, count)
         limits = np.iinfo(dtype)
         low, high = int(limits.min), int(limits.max)
-        if not isinstance(value, list) or len(value) != count:
-            shown = f"{len(value)} entries" if isinstance(value, list) else value
-            raise self._error(key, shown, f"a list of {count}")
         for index, one in enumerate(value):
             if type(one) is not int or not low <= one <= high:
                 raise self._error(f"{key}[{index}]", one, f"a whole number from {low} to {high}")
         return np.array(value, dtype=dtype)
 
-    def _check_nested(self, key: str, value: object, shape: tuple[int, ...]) -> None:
-        if not shape:
-            if not _is_number(value) or not abs(value) <= 1e12:  # type: ignore[arg-type]
-                raise self._error(key, value, "a number from -1e12 to 1e12")
-            return
-        if not isinstance(value, list) or len(value) != shape[0]:
-            count = f"{len(value)} entries" if isinstance(value, list) else value
-            raise self._error(key, count, f"a list of {shape[0]}")
-        for index, one in enumerate(value):
-            self._check_nested(f"{key}[{index}]", one, shape[1:])
+    def _list(self, key: str, count: int) -> list[Any]:
+        value = self._get(key, f"a list of {count}")
+        if not isinstance(value, list) or len(value) != count:
+            shown = f"{len(value)} entries" if isinstance(value, list) else value
+            raise self._error(key, shown, f"a list of {count}")
+        return value
 
 
 def _is_number(value: object) -> bool:

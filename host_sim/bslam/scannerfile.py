@@ -146,8 +146,8 @@ def _window(table: Document, kinds: int) -> Window:
         order=order,
         floors=table.integers("floors", rows // BLOCK, np.int32),
         edges=table.integers("edges", 4 * int(np.prod(blocks)), np.int8).reshape(4, *blocks),
-        edge_scale=table.array("edge_scale", (4,)),
-        edge_bias=table.array("edge_bias", (4,)),
+        edge_scale=table.array("edge_scale", 4),
+        edge_bias=table.array("edge_bias", 4),
     )
 
 

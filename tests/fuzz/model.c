@@ -10,7 +10,6 @@
 
 enum {
     CHANGES_MAX = 12,
-    OBJECTS = 3,
     KNOTS = BSLAM_BLOB_FEATURES * BSLAM_KNOTS,
     ROWS = BSLAM_CLASSES_MAX + 2,
     FUSED = BSLAM_CLASSES_MAX + 4  // of the verdict; the fusion has one less
@@ -21,8 +20,6 @@ enum {
 static struct {
     bslam_beacon_model_t model;
     bslam_beacon_class_t classes[BSLAM_CLASSES_MAX];
-    bslam_recogniser_t recogniser;
-    bslam_beacon_class_t objects[BSLAM_SVM_ROWS_MAX];
     float cell_weights[BSLAM_CELL_FEATURES];
     float cell_bias[1];
     float offset[BSLAM_BLOB_FEATURES];
@@ -39,8 +36,6 @@ static int8_t kinds_bytes[BSLAM_ADDITIVE_BYTES(ROWS, BSLAM_BLOB_FEATURES, BSLAM_
 static float fusion_weights[BSLAM_SVM_WEIGHTS(FUSED, true)];
 static int8_t close_bytes[BSLAM_HINGED_BYTES(ROWS, BSLAM_CLOSE_FEATURES)];
 static float verdict_weights[BSLAM_SVM_WEIGHTS(FUSED, true)];
-static float object_weights[BSLAM_SVM_ROWS_MAX * BSLAM_SIGNATURE_SIZE];
-static float object_bias[BSLAM_SVM_ROWS_MAX];
 
 static void prepare(void)
 {
@@ -87,15 +82,6 @@ static void prepare(void)
     detector->close.byte_scale = made.close_scale;
     detector->close.bias = made.close_bias;
     detector->verdict.weights = verdict_weights;
-    whole.recogniser = (bslam_recogniser_t){.svm = {.rows = OBJECTS,
-                                                    .features = BSLAM_SIGNATURE_SIZE,
-                                                    .weights = object_weights,
-                                                    .bias = object_bias},
-                                            .objects = made.objects};
-    for (int i = 0; i < BSLAM_SVM_ROWS_MAX; i++) {
-        whole.objects[i].height_m = 0.5f;
-        object_weights[i * BSLAM_SIGNATURE_SIZE + i % BSLAM_SIGNATURE_SIZE] = 1.0f;
-    }
 }
 
 // ---- changes ----------------------------------------------------------------------------------------------
@@ -211,7 +197,6 @@ static void change_table(fuzz_input_t *input)
         {&made.model.pinhole.screen_threshold, 1},
         {&made.model.pinhole.any_threshold, 1},
         {&made.model.pinhole.threshold, 1},
-        {&made.recogniser.reject_margin, 1},
         {&made.model.pinhole.glance_threshold, 1},
         {&made.model.pinhole.fusion_threshold, 1},
         {made.close_scale, (unsigned)bslam_beacons_model.class_count + 2},
@@ -225,7 +210,7 @@ static void change_table(fuzz_input_t *input)
 static void change(fuzz_input_t *input)
 {
     bslam_detector_model_t *detector = &made.model.pinhole;
-    switch (fuzz_u8(input) % 14) {
+    switch (fuzz_u8(input) % 11) {
     case 0:
         made.model.class_count = (int32_t)fuzz_u8(input) - 1;
         break;
@@ -233,33 +218,24 @@ static void change(fuzz_input_t *input)
         change_class(input, &made.classes[fuzz_u8(input) % BSLAM_CLASSES_MAX]);
         break;
     case 2:
-        change_class(input, &made.objects[fuzz_u8(input) % OBJECTS]);
-        break;
-    case 3:
         change_svm(input, &detector->cell);
         break;
-    case 4:
+    case 3:
         change_svm(input, &detector->screen);
         break;
-    case 5:
+    case 4:
         change_svm(input, &detector->fusion);
         break;
-    case 6:
-        change_svm(input, &made.recogniser.svm);
-        break;
-    case 7:
+    case 5:
         change_additive(input, &detector->kinds);
         break;
-    case 8:
-        made.model.recogniser = &made.recogniser;
-        break;
-    case 9:
+    case 6:
         change_svm(input, &detector->glance);
         break;
-    case 10:
+    case 7:
         change_svm(input, &detector->verdict);
         break;
-    case 11:
+    case 8:
         change_hinged(input, &detector->close);
         break;
     default:
@@ -269,13 +245,6 @@ static void change(fuzz_input_t *input)
 }
 
 // ---- what must hold ---------------------------------------------------------------------------------------
-
-static bslam_status_t check(void)
-{
-    const bslam_status_t status = bslam_beacon_model_check(&made.model);
-    return status == BSLAM_OK && made.model.recogniser != NULL ? bslam_recogniser_check(&made.recogniser)
-                                                               : status;
-}
 
 static void look(bslam_vision_t *vision)
 {
@@ -301,7 +270,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         change(&input);
     }
     const bslam_camera_t camera = fuzz_camera(BSLAM_LENS_PINHOLE);
-    const bslam_status_t status = check();
+    const bslam_status_t status = bslam_beacon_model_check(&made.model);
     bslam_front_end_t *inside = &bslam_vision_instance(&vision)->front_end;
     inside->model = NULL;
     fuzz_require(bslam_vision_init(&vision, &made.model, &camera, 1) == status);

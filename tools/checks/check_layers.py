@@ -103,7 +103,7 @@ PYTHON_MAY_IMPORT: dict[str, frozenset[str]] = {
     "calibration": EVALUATION | {"rig", "world"},
     "logcheck": EVALUATION | {"logcheck", "view"},
     "runs": RUNS,
-    "faults": RUNS | {"link", "modelfile"},
+    "faults": RUNS | {"link"},
     "view": LOG | {"moment"},
     "detect": LOG | {"core", "datasets", "rig", "scannerfile", "view"},
 }

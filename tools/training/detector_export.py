@@ -16,7 +16,6 @@ def beacons_header(model: BeaconModel, notes: Mapping[str, str]) -> str:
         "classes": header.classes("bslam_beacons_classes", model.classes),
         "pinhole": _detector(header, "bslam_beacons_pinhole", model.pinhole),
         "wide": _detector(header, "bslam_beacons_wide", model.wide),
-        "recogniser": "NULL",
     }
     header.constant("bslam_beacon_model_t", "bslam_beacons_model", named_initialiser(fields))
     return header.text()

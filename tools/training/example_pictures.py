@@ -1,15 +1,13 @@
 """Takes pictures of a rendered room and labels them: to try what is trained from pictures without a camera.
 
-Writes --count pictures and labels.csv into FOLDER. Every beacon that is whole and well seen has a box and a
-name of its own, unless it is in one picture only; with --kinds the name of its kind, for `bslam detect`.
-Another --seed takes other pictures of that room.
-`.venv/bin/python -m tools.training.example_pictures FOLDER [--world 1] [--count 20] [--seed 0] [--kinds]`
+Writes --count pictures and labels.csv, for `bslam detect`, into FOLDER. Every beacon that is whole and well
+seen has a box with the name of its kind. Another --seed takes other pictures of that room.
+`.venv/bin/python -m tools.training.example_pictures FOLDER [--world 1] [--count 20] [--seed 0]`
 """
 
 import argparse
 import csv
 import math
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +21,6 @@ BETWEEN_S = 10.0  # light and white balance change from picture to picture
 SLANT_RAD_MAX = math.radians(75.0)
 VISIBLE_PX_MIN = 100
 HIDDEN_MAX = 0.4
-PICTURES_MIN = 2
-
-
-def name_of(seen: Seen) -> str:
-    """What the user calls it."""
-    return f"{seen.kind} {seen.beacon_id}"
 
 
 def is_well_seen(seen: Seen) -> bool:
@@ -38,13 +30,8 @@ def is_well_seen(seen: Seen) -> bool:
     return whole and seen.visible_px >= VISIBLE_PX_MIN and seen.slant_rad < SLANT_RAD_MAX
 
 
-def take(
-    folder: Path, world: int, count: int, seed: int, least: int = PICTURES_MIN, by_kind: bool = False
-) -> list[list[str]]:
-    """Take `count` pictures into a folder; the rows of its labels.csv.
-
-    Objects in fewer than `least` pictures get no box. by_kind: the name is the kind's.
-    """
+def take(folder: Path, world: int, count: int, seed: int) -> list[list[str]]:
+    """Take `count` pictures into a folder; the rows of its labels.csv."""
     folder.mkdir(parents=True, exist_ok=True)
     scene = make_world(world, "test")
     renderer = Renderer(scene, load_rig("three60").cameras[0], [world, seed])
@@ -57,22 +44,16 @@ def take(
             name = f"{seed}_{len(views):02}.png"
             Image.fromarray(frame.rgb).save(folder / name)
             views[name] = seen
-    often = Counter(one.beacon_id for seen in views.values() for one in seen)
-    rows = []
-    for name, seen in views.items():
-        boxes = [_row(name, one, scene, by_kind) for one in seen if often[one.beacon_id] >= least]
-        rows += boxes or [[name, *[""] * (len(COLUMNS) - 1)]]
+    rows = [_row(name, one, scene) for name, seen in views.items() for one in seen]
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([COLUMNS, *rows])
     return rows
 
 
-def _row(picture: str, seen: Seen, scene: Scene, by_kind: bool) -> list[str]:
+def _row(picture: str, seen: Seen, scene: Scene) -> list[str]:
     look = next(one for one in scene.beacons if one.beacon_id == seen.beacon_id)
     edges = [f"{edge + 0.5:.2f}" for edge in seen.box]
-    if by_kind:
-        return [picture, seen.kind, *edges, f"{look.height_m:g}", ""]
-    return [picture, name_of(seen), *edges, f"{look.height_m:g}", f"{look.depth_m:g}"]
+    return [picture, seen.kind, *edges, f"{look.height_m:g}", ""]
 
 
 def main() -> None:
@@ -83,12 +64,10 @@ def main() -> None:
     parser.add_argument("--world", type=int, default=1, help="which room (default: 1)")
     parser.add_argument("--count", type=int, default=20, help="pictures (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="where they are taken from (default: 0)")
-    parser.add_argument("--kinds", action="store_true", help="names of kinds, not of objects")
     words = parser.parse_args()
-    least = 1 if words.kinds else PICTURES_MIN
-    rows = take(words.folder, words.world, words.count, words.seed, least, words.kinds)
-    objects = {row[1] for row in rows if row[1]}
-    print(f"{words.folder}: {words.count} pictures, {len(rows)} lines in labels.csv, {len(objects)} objects")
+    rows = take(words.folder, words.world, words.count, words.seed)
+    kinds = {row[1] for row in rows}
+    print(f"{words.folder}: {words.count} pictures, {len(rows)} boxes in labels.csv, {len(kinds)} kinds")
 
 
 if __name__ == "__main__":

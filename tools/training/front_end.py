@@ -73,7 +73,8 @@ class FrontEnd(vision.FrontEnd):
         return open_library()
 
     def _inside(self) -> Any:
-        return self._library.ffi.cast("bslam_front_end_t *", self._vision)
+        ffi = self._library.ffi
+        return ffi.addressof(ffi.cast("bslam_vision_instance_t *", self._vision), "front_end")
 
     def signature(self, box: tuple[float, float, float, float]) -> NDArray[np.float32] | None:
         """The signature (71,) of what a box (left, top, right, bottom, px) in the last frame holds.
@@ -101,7 +102,7 @@ class FrontEnd(vision.FrontEnd):
         rough = library.new_filled("bslam_box_t", **sides)
         sizes = {name: value for name, value in asdict(kind).items() if name != "name"}
         size = library.new_filled("bslam_size_t", **sizes)
-        found = library.new_filled("bslam_candidate_t", object=-1)
+        found = library.new_filled("bslam_candidate_t")
         status = library.lib.bslam_front_end_measure(self._inside(), rough, size, found)
         return found if status == library.lib.BSLAM_OK else None
 

@@ -78,7 +78,6 @@ bslam_candidate_t bslam_box_candidate(const bslam_scan_kind_t *kind, const bslam
         .second_class = BSLAM_CLASS_NONE,
         .class_margin = found->log_odds,
         .score = found->log_odds,
-        .object = BSLAM_OBJECT_NONE,
         .marks = found->marks,
     };
     sides_t sides;

@@ -17,7 +17,6 @@ enum {
     BSLAM_BOX_ASPECT = 65,
     BSLAM_BOX_SIGNATURE = 66
 };
-_Static_assert((int)BSLAM_BOX_SIGNATURE <= BSLAM_SIGNATURE_SIZE, "there is room for it");
 
 /// Points across a box, and with one beyond it on either side, of the ring.
 enum { BSLAM_BOX_GRID = 16, BSLAM_BOX_POINTS = BSLAM_BOX_GRID + 2 };

@@ -9,9 +9,8 @@ from collections import Counter
 from pathlib import Path
 
 from bslam.commands.arguments import positive_count
-from bslam.core.vision import SIGNATURE_SIZE, Candidate, FrontEnd, Seeing
+from bslam.core.vision import Candidate, FrontEnd, Seeing
 from bslam.errors import BslamError
-from bslam.modelfile import read_recogniser
 from bslam.rig import load_rig
 from bslam.runs.camera import NO_BEACON, covering_beacon
 from bslam.runs.output import write_atomically
@@ -22,12 +21,12 @@ from bslam.world.simulate import load_scenario
 SUMMARY = "what the camera front end sees: boxes, names, directions and distances drawn into frames"
 EXAMPLES = """examples:
   bslam look paper_room --seed 3 --rig wide180 --frames 12
-  bslam look my_pictures/ --model firmware/models/my_beacons.json
+  bslam look my_pictures/
   bslam look drive.mp4 --rig out/calibrate/camera.toml --every 2
 
 SOURCE is a scenario (a name, or the path of a TOML file), a folder of pictures, or a video. Writes each frame
-and a contact sheet into --out. Green boxes: on a beacon of the simulated room, or recognised as an object of
---model; red: on none; yellow: there is nothing to compare with."""
+and a contact sheet into --out. Green boxes: on a beacon of the simulated room; red: on none; yellow: there is
+nothing to compare with. Your own kinds: bslam detect run."""
 
 _SHEET = "contact_sheet.png"
 _FRAMES = 12
@@ -40,9 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rig",
         metavar="RIG",
         help="the cameras, a name or a TOML file (default: three60 for a scenario, 60 degrees for pictures)",
-    )
-    parser.add_argument(
-        "--model", type=Path, metavar="FILE", help="your own objects: the .json of train_beacons.py"
     )
     parser.add_argument("--seed", type=int, default=0, help="of a simulated drive (default: 0)")
     parser.add_argument(
@@ -65,9 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
-    recogniser = None if arguments.model is None else read_recogniser(arguments.model, SIGNATURE_SIZE)
     source = _open(arguments)
-    front_end = FrontEnd(source.cameras, recogniser=recogniser)
+    front_end = FrontEnd(source.cameras)
     pictures, reasons = [], Counter[str]()
     for shot in source.shots:
         seeing = front_end.see(shot.rgb, shot.camera, shot.moved)
@@ -110,14 +105,7 @@ def _mark(candidate: Candidate, shot: Shot) -> Mark:
     if shot.identity is not None:
         on_beacon = covering_beacon(candidate.outline, shot.identity) != NO_BEACON
         colour = RIGHT if on_beacon else WRONG
-    elif candidate.object is not None:
-        colour = RIGHT
-    return Mark(candidate.outline, (_name(candidate), _place(candidate)), colour)
-
-
-def _name(candidate: Candidate) -> str:
-    """A user's own object by its name, else the kind."""
-    return candidate.object or candidate.kind
+    return Mark(candidate.outline, (candidate.kind, _place(candidate)), colour)
 
 
 def _place(candidate: Candidate) -> str:
@@ -130,14 +118,12 @@ def _place(candidate: Candidate) -> str:
 
 def _words(candidate: Candidate) -> str:
     """A line about a candidate."""
-    parts = [f"{_name(candidate)}:", _place(candidate)]
+    parts = [f"{candidate.kind}:", _place(candidate)]
     if candidate.bearing_rad is not None and candidate.bearing_sd_rad is not None:
         parts.append(f"+- {math.degrees(candidate.bearing_sd_rad):.1f}°")
     if candidate.range_m is not None and candidate.range_sd_m is not None:
         parts.append(f"+- {candidate.range_sd_m:.2f} m")
     parts.append(f"score {candidate.score:.2f}")
-    if candidate.object is not None:
-        parts.append(f"recognised with {candidate.object_margin:.2f}")
     if candidate.marks:
         parts.append(f"({', '.join(sorted(candidate.marks))})")
     return " ".join(parts)

@@ -13,7 +13,7 @@ from bslam.core.inputs import number, whole
 from bslam.core.raw import VisionLibrary, vision_library
 from bslam.core.scanner_tables import ScannerTables
 from bslam.errors import BslamError
-from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Recogniser, Svm
+from bslam.modelfile import AdditiveSvm, BeaconClass, HingedSvm, Svm
 from bslam.rig import Camera
 from bslam.scannerfile import ScannerModel
 
@@ -91,8 +91,6 @@ class Candidate:
     marks: frozenset[str]
     misplaced_sds: float  # by how many standard deviations it hangs where its kind does not
     signature: NDArray[np.float32]  # (71,)
-    object: str | None  # of the recogniser's, None: none of them
-    object_margin: float  # what the recogniser says for the likeliest
     told: Told | None  # None: it has no direction
 
 
@@ -123,20 +121,17 @@ class FrontEnd:
         self,
         cameras: Sequence[Camera],
         model: BeaconModel | ScannerModel | None = None,
-        recogniser: Recogniser | None = None,
         threshold: float | None = None,
     ) -> None:
-        """`model`: the built-in one unless given, or a scanner's of a user's own kinds; with the others:
-        `recogniser`: of a user's own objects, besides; `threshold`: of a candidate's score, in place of the
-        model's.
+        """`model`: the built-in one unless given, or a scanner's of a user's own kinds. `threshold`: of a
+        candidate's score, in place of the model's; not with a scanner's.
 
-        BslamError if the library refuses model, recogniser or cameras.
+        BslamError if the library refuses model or cameras.
         """
         self._library = self._open()
         ffi, lib = self._library.ffi, self._library.lib
         self._cameras = tuple(cameras)
         self._keep: list[Any] = []
-        self._objects = () if recogniser is None else recogniser.objects
         self._vision = ffi.new("bslam_vision_t *")
         array = ffi.new("bslam_camera_t[]", [self._library.camera(camera)[0] for camera in cameras])
         if isinstance(model, ScannerModel):
@@ -144,7 +139,7 @@ class FrontEnd:
             self._keep.append(tables)
             self._kinds, self._model, init = tables.names, tables.model, lib.bslam_vision_init_scanner_sized
         else:
-            self._model = self._detector_model(model, recogniser, threshold)
+            self._model = self._detector_model(model, threshold)
             self._kinds = self._class_names(self._model)
             init = lib.bslam_vision_init_sized
         self._library.ensure(
@@ -158,16 +153,12 @@ class FrontEnd:
             f"the front end refuses its model or one of its {len(self._cameras)} cameras",
         )
 
-    def _detector_model(
-        self, model: BeaconModel | None, recogniser: Recogniser | None, threshold: float | None
-    ) -> Any:
+    def _detector_model(self, model: BeaconModel | None, threshold: float | None) -> Any:
         ffi = self._library.ffi
         made = self._library.lib.built_in_model() if model is None else self._new_model(model)
         if made == ffi.NULL:
             raise BslamError("no built-in model: run `make train`, or give one")
         made = ffi.new("bslam_beacon_model_t *", made[0])
-        if recogniser is not None:
-            made.recogniser = self._recogniser(recogniser)
         if threshold is not None:
             made.pinhole.threshold = made.wide.threshold = threshold
         return made
@@ -277,8 +268,6 @@ class FrontEnd:
             marks=frozenset(name for bit, name in enumerate(MARKS) if found.marks >> bit & 1),
             misplaced_sds=found.misplaced_sds,
             signature=self._library.copy_of(found.signature, SIGNATURE_SIZE, np.float32),
-            object=self._objects[found.object].name if found.object >= 0 else None,
-            object_margin=found.object_margin,
             told=self._told(found) if found.has_bearing else None,
         )
 
@@ -302,16 +291,6 @@ class FrontEnd:
         table = ffi.new("bslam_beacon_class_t[]", rows)
         self._keep += [*names, table]
         return table
-
-    def _recogniser(self, recogniser: Recogniser) -> Any:
-        made = self._library.new_filled(
-            "bslam_recogniser_t",
-            svm=self._library.svm(recogniser.svm, self._keep),
-            objects=self._classes(recogniser.objects),
-            reject_margin=recogniser.reject_margin,
-        )
-        self._keep.append(made)
-        return made
 
     def _detector(self, model: DetectorModel) -> Any:
         library, keep = self._library, self._keep

@@ -13,6 +13,7 @@ import numpy as np
 
 from bslam.core.appearance import SIGNATURE_SIZE
 from bslam.core.builds import SIZE_CLASSES
+from bslam.core.scanner import NOTHING
 from bslam.core.slam import Slam
 from bslam.errors import BslamError
 from bslam.faults.flash import Flash
@@ -29,7 +30,7 @@ from bslam.faults.promise import (
 )
 from bslam.maps.blob import KeptMap, parse
 from bslam.maps.merge import merge
-from bslam.modelfile import FORMAT, VERSION, read_recogniser
+from bslam.scannerfile import read_scanner, scanner_text
 
 
 def _map_full(protected: bool) -> Measured:
@@ -287,38 +288,27 @@ def _full_store(protected: bool) -> Measured:
 
 
 def _bad_model(protected: bool) -> Measured:
-    """Files of a recogniser that are cut short, of another version, or hold what is no number."""
-    good = {
-        "format": FORMAT,
-        "version": VERSION,
-        "notes": {},
-        "objects": [
-            {"name": "door", "height_m": 2.0, "depth_m": 0.1},
-            {"name": "box", "height_m": 1.0, "depth_m": 0.1},
-        ],
-        "features": 3,
-        "reject_margin": 0.0,
-        "bias": [0.0, 0.0],
-        "weights": [[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]],
-    }
-    text = json.dumps(good)
-    bad = [text[:cut] for cut in range(0, len(text), 5)]
+    """Files of a scanner that are cut short, of another version, or hold what is no number."""
+    text = scanner_text(NOTHING)
+    good = json.loads(text)
+    bad = [text[:cut] for cut in range(0, len(text) - 1, 5)]
+    bad += [json.dumps(good | {key: 99}) for key in ("version", "channels")]
+    window = good["windows"][0]
     for key, value in (
-        ("version", 99),
-        ("features", 4),
-        ("weights", [[1.0, math.nan, 3.0]]),
-        ("bias", [0.0]),
+        ("scale", math.nan),
+        ("edge_bias", [0.0]),
+        ("weights", [128] * len(window["weights"])),
     ):
-        bad.append(json.dumps(good | {key: value}))
+        bad.append(json.dumps(good | {"windows": [window | {key: value}]}))
     taken = 0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "model.json")
         path.write_text(text)
-        read_recogniser(path, 3)
+        read_scanner(path)
         for one in bad:
             path.write_text(one)
             try:
-                read_recogniser(path, 3) if protected else json.loads(one)
+                read_scanner(path) if protected else json.loads(one)
                 taken += 1
             except (BslamError, ValueError):
                 pass

@@ -41,7 +41,7 @@ def test_a_file_gives_the_model_back_to_the_bit(tmp_path):
     ("change", "said"),
     [
         (lambda d: d.update(version=1), "key version: 1 is not allowed; allowed: 2"),
-        (lambda d: d.update(format="bslam recogniser"), "key format"),
+        (lambda d: d.update(format="bslam log"), "key format"),
         (lambda d: d.update(channels=10), "key channels: 10 is not allowed; allowed: 8"),
         (lambda d: d.pop("windows"), "key windows: is missing"),
         (lambda d: d["windows"][0]["weights"].pop(), "key windows[0].weights: '191 entries' is not allowed"),

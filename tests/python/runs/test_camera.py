@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from bslam.runs import camera
 from bslam.runs.camera import Aim, CameraStore, camera_log, covering_beacon, unseen_log
 from bslam.runs.eye import Eye
 from bslam.runs.runner import run_log
+from bslam.scannerfile import read_scanner
 from bslam.world.simulate import load_scenario, simulate, true_drive
 
 RIG = load_rig("three60")
@@ -32,8 +34,6 @@ def candidate(outline=(0.0, 0.0, 320.0, 240.0), bearing_rad=0.1, range_m=2.0):
         beacon_class=1,
         kind="door",
         class_margin=1.0,
-        object=None,
-        object_margin=0.0,
         score=1.0,
         marks=frozenset(),
         misplaced_sds=0.0,
@@ -42,14 +42,17 @@ def candidate(outline=(0.0, 0.0, 320.0, 240.0), bearing_rad=0.1, range_m=2.0):
     )
 
 
+MODELS = Path(__file__).parents[3] / "firmware" / "models"
+
+
 class FakeFrontEnd:
     """Sees the same in every frame, and writes down which camera it was."""
 
     looks: ClassVar[tuple[Candidate, ...]] = ()
     calls: ClassVar[list[tuple[int, bool]]] = []
 
-    def __init__(self, cameras, threshold):
-        assert len(cameras) == 3 and threshold == camera.TOLD_THRESHOLD.least
+    def __init__(self, cameras, model, threshold):
+        assert len(cameras) == 3 and model is None and threshold == camera.TOLD_THRESHOLD.least
         self.seen_before: set[int] = set()
 
     def see(self, rgb, camera, moved):
@@ -218,3 +221,18 @@ def test_camera_log_leaves_out_what_the_detector_is_less_sure_of(short, tmp_path
     assert len(camera_log(short, 1, None, None, RIG, store).sightings.time_us) == 8
     told = camera_log(short, 1, None, None, RIG, store, camera.TOLD_THRESHOLD)
     assert len(told.sightings.time_us) == 24
+
+
+def test_a_user_s_own_kinds_are_seen_and_kept_apart_from_the_built_in_ones(tmp_path):
+    model, store = read_scanner(MODELS / "rooms.json"), CameraStore(tmp_path)
+    drive = replace(load_scenario("paper_room"), steps=120)
+    log = camera_log(drive, 0, None, None, RIG, store, camera.SCANNER_THRESHOLD, model)
+    seen = log.sightings
+    assert len(seen.time_us) > 4 and log.seeds is None and log.odometry.gyro_radps is None
+    assert set(seen.beacon_class.tolist()) <= {1, 2, 3} and seen.signature.any(axis=1).all()
+    other = replace(model, kinds=tuple(replace(one, threshold=1e3) for one in model.kinds))
+    none = camera_log(drive, 0, None, None, RIG, store, camera.SCANNER_THRESHOLD, other)
+    assert len(none.sightings.time_us) == 0 and len(list(tmp_path.glob("*.npz"))) == 2
+    unseen, glances = unseen_log(drive, 0, None, None, RIG, camera.SCANNER_THRESHOLD, model)
+    assert unseen.seeds is None
+    assert sum(len(one.rows) for one in glances) == len(seen.time_us)

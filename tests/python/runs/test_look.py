@@ -19,7 +19,7 @@ GREEN, RED = (tuple(bytes.fromhex(colour[1:])) for colour in (RIGHT, WRONG))
 
 
 def candidate(box, **changes):
-    """A thing seen, not recognised."""
+    """A thing seen."""
     values = {
         "outline": box,
         "bearing_rad": 0.1,
@@ -34,8 +34,6 @@ def candidate(box, **changes):
         "marks": frozenset(),
         "misplaced_sds": 0.0,
         "signature": np.zeros(71, np.float32),
-        "object": None,
-        "object_margin": 0.0,
         "told": Told(0.01, 0.05, 0.02),
     }
     return Candidate(**(values | changes))
@@ -44,11 +42,11 @@ def candidate(box, **changes):
 @pytest.fixture
 def seen(monkeypatch):
     """What a front end that stands in for the C one says of every frame; what it was asked is kept."""
-    state = SimpleNamespace(seeing=Seeing((), "nothing"), looked=[], recogniser=None)
+    state = SimpleNamespace(seeing=Seeing((), "nothing"), looked=[])
 
     class FrontEnd:
-        def __init__(self, cameras, recogniser=None):
-            state.cameras, state.recogniser = cameras, recogniser
+        def __init__(self, cameras):
+            state.cameras = cameras
 
         def see(self, rgb, camera, moved):
             state.looked.append((rgb.shape, camera, moved))
@@ -148,14 +146,7 @@ def test_look_says_name_place_and_marks(seen, pictures, tmp_path, capsys):
     seen.seeing = Seeing(
         (
             candidate((10, 10, 50, 90)),
-            candidate(
-                (60, 10, 90, 90),
-                object="my red box",
-                object_margin=0.8,
-                range_m=None,
-                range_sd_m=None,
-                range_noise_sd_m=None,
-            ),
+            candidate((60, 10, 90, 90), kind="poster", range_m=None, range_sd_m=None, range_noise_sd_m=None),
             candidate((0, 10, 9, 90), bearing_rad=None, range_m=None, marks=frozenset({"cut_left"})),
         ),
         "seen",
@@ -163,7 +154,7 @@ def test_look_says_name_place_and_marks(seen, pictures, tmp_path, capsys):
     assert main(["look", str(pictures), "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "01_a.png: 3 seen\n  door: 2.50 m +5.7° +- 0.6° +- 0.05 m score 0.70\n" in printed
-    assert "  my red box: +5.7° +- 0.6° score 0.70 recognised with 0.80\n" in printed
+    assert "  poster: +5.7° +- 0.6° score 0.70\n" in printed
     assert "  door: not measured score 0.70 (cut_left)\n" in printed
 
 
@@ -193,7 +184,6 @@ def test_every_reason_of_the_core_has_words():
     [
         (["nowhere"], "nowhere"),
         (["{folder}", "--rig", "nowhere"], "rig 'nowhere': there is no such rig or file"),
-        (["{folder}", "--model", "none.json"], "none.json: cannot be read"),
         (["{empty}"], "no picture in it; allowed: files named .png"),
         (["{video}"], "cannot be read as a video"),
         (

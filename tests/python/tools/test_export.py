@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from bslam import cheader as export
+from bslam.core.scanner import NOTHING
 from bslam.core.vision import BeaconModel
 from bslam.errors import BslamError
-from bslam.modelfile import BeaconClass, Recogniser
+from bslam.scannerfile import ScannerModel
 from tools.training import fit
 from tools.training.built_in import built_in_detector
 from tools.training.compiled import (
@@ -77,47 +78,52 @@ def test_machines_that_come_with_the_library_decide_by_their_tables(lens: str, p
     assert worst_difference(machine, x, wanted) <= TOLERANCE
 
 
-def recogniser(seed: int = 3) -> Recogniser:
-    x, targets = samples(71, seed)
-    objects = (BeaconClass('red "box"', 0.6), BeaconClass("T\u00fcr ??/", 2.0), BeaconClass("c\\d"))
-    return Recogniser(fit.fit(x, targets, 1.0).svm, objects, 0.25, {"training set": "random " * 40})
+def scanner(seed: int = 3) -> ScannerModel:
+    """What finds nothing, but with random weights and with names that C does not take as they are."""
+    window = NOTHING.windows[0]
+    random = np.random.default_rng(seed)
+    weights = random.integers(-127, 128, window.weights.shape, dtype=np.int8)
+    names = {'red "box"': 0.6, "T\u00fcr ??/": 2.0, "c\\d": 0.0}
+    kinds = tuple(replace(NOTHING.kinds[0], name=name, height_m=size) for name, size in names.items())
+    return ScannerModel(kinds, (replace(window, weights=weights),), {"training set": "random " * 40})
 
 
-def test_recogniser_header_twice_gives_the_same_bytes() -> None:
-    assert export.recogniser_header(recogniser(), "mine") == export.recogniser_header(recogniser(), "mine")
+def test_scanner_header_twice_gives_the_same_bytes() -> None:
+    assert export.scanner_header(scanner(), "mine") == export.scanner_header(scanner(), "mine")
 
 
-def test_recogniser_header_comment_tells_models_apart() -> None:
-    first, second = (export.recogniser_header(recogniser(seed), "mine") for seed in (3, 4))
+def test_scanner_header_comment_tells_models_apart() -> None:
+    first, second = (export.scanner_header(scanner(seed), "mine") for seed in (3, 4))
     digest = [line for line in first.splitlines() if line.startswith("// weights: sha256 ")]
     assert len(digest) == 1 and digest[0] not in second
     assert "// training set: random random" in first
     assert max(map(len, first.splitlines())) <= export.COLUMNS
 
 
-def test_recogniser_header_compiles_and_keeps_names_and_numbers(tmp_path: Path) -> None:
-    one = recogniser()
-    export.write_header(tmp_path / "mine.h", export.recogniser_header(one, "mine"))
+def test_scanner_header_compiles_and_keeps_names_and_numbers(tmp_path: Path) -> None:
+    one = scanner()
+    export.write_header(tmp_path / "mine.h", export.scanner_header(one, "mine"))
     library = compile_library(
         tmp_path,
         '#include "mine.h"\n'
-        "const char *name(int i);\nfloat height(int i);\nfloat margin(void);\n"
-        "const char *name(int i) { return bslam_mine.objects[i].name; }\n"
-        "float height(int i) { return bslam_mine.objects[i].height_m; }\n"
-        "float margin(void) { return bslam_mine.reject_margin; }\n",
+        "const char *name(int i);\nfloat height(int i);\nint weight(int i);\n"
+        "const char *name(int i) { return bslam_mine.kinds[i].name; }\n"
+        "float height(int i) { return bslam_mine.kinds[i].height_m; }\n"
+        "int weight(int i) { return bslam_mine.windows[0].weights[i]; }\n",
     )
     library.name.restype = ctypes.c_char_p
-    library.height.restype = library.margin.restype = ctypes.c_float
-    for index, wanted in enumerate(one.objects):
+    library.height.restype = ctypes.c_float
+    for index, wanted in enumerate(one.kinds):
         assert library.name(index).decode() == wanted.name
         assert library.height(index) == np.float32(wanted.height_m)
-    assert library.margin() == 0.25
+    weights = one.windows[0].weights.ravel().tolist()
+    assert [library.weight(index) for index in range(len(weights))] == weights
 
 
 @pytest.mark.parametrize("name", ["Mine", "9lives", "my-beacons", "", "a b"])
-def test_recogniser_header_name_that_c_does_not_allow_is_refused(name: str) -> None:
+def test_scanner_header_name_that_c_does_not_allow_is_refused(name: str) -> None:
     with pytest.raises(BslamError, match=r"name is not allowed; allowed: small letters"):
-        export.recogniser_header(recogniser(), name)
+        export.scanner_header(scanner(), name)
 
 
 @pytest.mark.parametrize("value", [1.0, -2.0, 0.1, 1e-7, -3.4e38, 1e20, 123456.789, 0.0, np.pi])

@@ -41,7 +41,6 @@ static void test_candidate_is_where_the_thing_is(void **state)
     assert_near(one.range_sd_m, sqrt(5) * hypot(share, 0.02), 1e-3);
     assert_int_equal(one.beacon_class, 1);
     assert_int_equal(one.second_class, BSLAM_CLASS_NONE);
-    assert_int_equal(one.object, BSLAM_OBJECT_NONE);
     assert_near(one.score, 3, 0);
 }
 
