@@ -5,9 +5,11 @@
 
 #include "link/crc16.h"
 #include "robot/param_store.h"
-#define HAS_SEEDS (ROBOT_VISION && BSLAM_APPEARANCE && BSLAM_VISION_BUILT_IN)
-#if HAS_SEEDS
+#if ROBOT_VISION && BSLAM_APPEARANCE && !defined(ROBOT_KINDS)
+#define HAS_SEEDS 1
 #include "models/seeds.h"
+#else
+#define HAS_SEEDS 0
 #endif
 
 /// No reset takes longer.

@@ -42,7 +42,9 @@ bslam_status_t bslam_vision_init_scanner_sized(bslam_vision_t *vision, size_t vi
     }
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
     const bslam_status_t status = bslam_rig_scanner_init(&instance->scanner, model, cameras, camera_count);
-    instance->scans = instance->scans || status == BSLAM_OK;
+    if (status == BSLAM_OK) {
+        instance->scans = true;
+    }
     return status;
 }
 

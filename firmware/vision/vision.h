@@ -81,6 +81,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_camera_check(const bslam_camera_t *camera)
 
 // ---- pictures ---------------------------------------------------------------------------------------------
 
+#if BSLAM_VISION_BUILT_IN
 /// Makes an instance ready. The model stays where it is and must outlive the instance; the cameras are
 /// copied. BSLAM_E_SIZE: library and application were compiled with other sizes (config.h); nothing was
 /// written then. BSLAM_E_COUNT: camera_count is not 1 to BSLAM_CAMERAS_MAX, or a count of the model is not as
@@ -96,9 +97,11 @@ BSLAM_MUST_CHECK bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, 
                                                         const bslam_beacon_model_t *model,
                                                         const bslam_camera_t *cameras, int32_t camera_count);
 
+#endif
+
 /// The same for a user's own kinds, which `bslam detect train` wrote: MODEL.h. It needs no horizon and no
-/// colour of the walls, and remembers nothing from picture to picture. BSLAM_E_COUNT, BSLAM_E_NOT_FINITE,
-/// BSLAM_E_PARAMETER: as bslam_scanner_init, too.
+/// colour of the walls, and remembers nothing from picture to picture: robot_moved makes no difference. What
+/// is wrong with the model has bslam_scanner_init's statuses.
 #define bslam_vision_init_scanner(vision, model, cameras, camera_count) \
     bslam_vision_init_scanner_sized((vision), sizeof *(vision), BSLAM_VISION_HASH, (model), (cameras), \
                                     (camera_count))
@@ -186,8 +189,9 @@ typedef struct bslam_candidate {
     bool has_range;
     uint8_t beacon_class;  ///< 1 + index in the model's class table; BSLAM_CLASS_NONE if unsure
     uint8_t second_class;  ///< the next likely one; BSLAM_CLASS_NONE if there is none
-    float class_margin;    ///< value of the class less that of the next; negative if its place decided
-    float score;           ///< detector's decision value: larger is surer
+    float class_margin;    ///< value of the class less that of the next; negative if its place decided; a
+                           ///< scanner's: the score
+    float score;           ///< detector's decision value: larger is surer; a scanner's: logarithm of the odds
     uint16_t marks;
     float misplaced_sds;  ///< by how many standard deviations it hangs where its kind does not; 0: not at all
     float signature[BSLAM_SIGNATURE_SIZE];
@@ -248,7 +252,7 @@ typedef struct bslam_detection {
 typedef struct bslam_detections {
     bslam_vision_reason_t reason;
     int32_t count;
-    int32_t dropped;  ///< boxes on other things: there was no room
+    int32_t dropped;  ///< boxes on other things: there was no room; not those of windows beyond the 128 best
     bslam_detection_t items[BSLAM_CANDIDATES_MAX];
 } bslam_detections_t;
 
@@ -273,7 +277,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_scanner_begin(bslam_scanner_t *scanner, bs
 /// The next row, uppermost first. BSLAM_E_COUNT: the picture has all its rows already, or none has begun.
 BSLAM_MUST_CHECK bslam_status_t bslam_scanner_row(bslam_scanner_t *scanner, const void *pixels);
 
-/// Looks at the picture: windows of all sizes, of boxes that overlap by .4 or more the best. Where rows are
+/// Looks at the picture: windows of all sizes, boxes of a kind that overlap by .4 become one. Where rows are
 /// missing nothing is found, and the reason says so. docs/SIZES.md has the cost.
 const bslam_detections_t *bslam_scanner_end(bslam_scanner_t *scanner);
 

@@ -12,6 +12,8 @@ _Static_assert(_Alignof(bslam_scanner_instance_t) <= _Alignof(bslam_scanner_t), 
 enum { SIDE_MIN = 32, WIDTH_STEP = 8, EDGES = 4, BLOCK = 2 };
 /// With all products of a window still a number of 32 bits.
 enum { BIAS_MAX = 1 << 30 };
+/// Of a scale, a slope, an offset: so that scores and odds are numbers.
+static const float NUMBER_MAX = 1e6f;
 /// Boxes of one kind that overlap as much, of both together, are one thing's.
 static const float OVERLAP_MAX = 0.4f;
 /// A window's score differs from that of the next by hardly more.
@@ -78,10 +80,15 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
     if (!bslam_is_number(window->scale)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bool is_good = window->scale > 0 && is_bias(window->bias) && is_bias(window->coarse_bias) &&
-                         is_share(window->box_columns, window->columns) &&
+    const bool is_good = window->scale > 0 && window->scale <= NUMBER_MAX && is_bias(window->bias) &&
+                         is_bias(window->coarse_bias) && is_share(window->box_columns, window->columns) &&
                          is_share(window->box_rows, window->rows);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
+}
+
+static bool is_small(float number)
+{
+    return number >= -NUMBER_MAX && number <= NUMBER_MAX;
 }
 
 static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
@@ -94,7 +101,8 @@ static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
         }
     }
     const bool is_good = kind->name != NULL && kind->height_m >= 0 && kind->height_m <= 10 &&
-                         kind->middle_sd > 0 && kind->height_sd > 0;
+                         kind->middle_sd > 0 && kind->height_sd > 0 && is_small(kind->slope) &&
+                         is_small(kind->offset);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
 }
 
@@ -274,9 +282,16 @@ static void edges_at(const view_t *view, int32_t column, float edges[EDGES])
     }
 }
 
-static float within(float value, float most)
+static float overlap(float low_a, float high_a, float low_b, float high_b)
 {
-    return value < 0 ? 0 : value > most ? most : value;
+    const float low = low_a > low_b ? low_a : low_b, high = high_a < high_b ? high_a : high_b;
+    return high > low ? high - low : 0;
+}
+
+static float log_odds(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
+{
+    const bslam_scan_kind_t *kind = &instance->model->kinds[hit->kind];
+    return kind->slope * hit->score + kind->offset;
 }
 
 /// Where the weakest of all hits stands.
@@ -284,7 +299,8 @@ static bslam_hit_t *weakest(bslam_scanner_instance_t *instance)
 {
     bslam_hit_t *least = &instance->hits[0];
     for (int32_t i = 1; i < BSLAM_HITS_MAX; i++) {
-        least = instance->hits[i].score < least->score ? &instance->hits[i] : least;
+        bslam_hit_t *hit = &instance->hits[i];
+        least = log_odds(instance, hit) < log_odds(instance, least) ? hit : least;
     }
     return least;
 }
@@ -297,7 +313,7 @@ static void note_hit(bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
         return;
     }
     bslam_hit_t *least = weakest(instance);
-    if (hit->score > least->score) {
+    if (log_odds(instance, hit) > log_odds(instance, least)) {
         *least = *hit;
     }
 }
@@ -311,16 +327,17 @@ static void note_window(bslam_scanner_instance_t *instance, const bslam_level_t 
     const float middle_x = (float)(2 * (column - BSLAM_LEVEL_PAD) + window->columns) / 2 * level->cell_px;
     const float middle_y = (float)(2 * (top - BSLAM_LEVEL_PAD) + window->rows) / 2 * level->cell_px;
     const float width = window->box_columns * level->cell_px, height = window->box_rows * level->cell_px;
-    const float most_x = (float)instance->width_px, most_y = (float)instance->height_px;
     const bslam_hit_t hit = {
-        .left_px = within(middle_x + (edges[0] - 0.5f) * width, most_x),
-        .top_px = within(middle_y + (edges[1] - 0.5f) * height, most_y),
-        .right_px = within(middle_x + (edges[2] + 0.5f) * width, most_x),
-        .bottom_px = within(middle_y + (edges[3] + 0.5f) * height, most_y),
+        .left_px = middle_x + (edges[0] - 0.5f) * width,
+        .top_px = middle_y + (edges[1] - 0.5f) * height,
+        .right_px = middle_x + (edges[2] + 0.5f) * width,
+        .bottom_px = middle_y + (edges[3] + 0.5f) * height,
         .score = score,
         .kind = window->kind,
     };
-    if (hit.right_px > hit.left_px && hit.bottom_px > hit.top_px) {
+    const float shown_x = overlap(hit.left_px, hit.right_px, 0, (float)instance->width_px);
+    const float shown_y = overlap(hit.top_px, hit.bottom_px, 0, (float)instance->height_px);
+    if (shown_x > 0 && shown_y > 0) {
         note_hit(instance, &hit);
     }
 }
@@ -422,12 +439,6 @@ static void scan_level(bslam_scanner_instance_t *instance, const bslam_level_t *
 
 // ---- boxes ------------------------------------------------------------------------------------------------
 
-static float overlap(float low_a, float high_a, float low_b, float high_b)
-{
-    const float low = low_a > low_b ? low_a : low_b, high = high_a < high_b ? high_a : high_b;
-    return high > low ? high - low : 0;
-}
-
 static float area(const bslam_hit_t *hit)
 {
     return (hit->right_px - hit->left_px) * (hit->bottom_px - hit->top_px);
@@ -438,12 +449,6 @@ static bool is_same_thing(const bslam_hit_t *a, const bslam_hit_t *b)
     const float both = overlap(a->left_px, a->right_px, b->left_px, b->right_px) *
                        overlap(a->top_px, a->bottom_px, b->top_px, b->bottom_px);
     return a->kind == b->kind && both >= OVERLAP_MAX * (area(a) + area(b) - both);
-}
-
-static float log_odds(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
-{
-    const bslam_scan_kind_t *kind = &instance->model->kinds[hit->kind];
-    return kind->slope * hit->score + kind->offset;
 }
 
 /// By odds, which kinds can be compared by.
@@ -462,6 +467,11 @@ static bslam_hit_t *best_left(bslam_scanner_instance_t *instance)
     return best;
 }
 
+static float within(float value, float most)
+{
+    return value < 0 ? 0 : value > most ? most : value;
+}
+
 static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
 {
     const float right = (float)instance->width_px - CUT_PX, bottom = (float)instance->height_px - CUT_PX;
@@ -469,8 +479,10 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
                           (hit->right_px > right ? BSLAM_MARK_CUT_RIGHT : 0) |
                           (hit->top_px < CUT_PX ? BSLAM_MARK_CUT_TOP : 0) |
                           (hit->bottom_px > bottom ? BSLAM_MARK_CUT_BOTTOM : 0);
+    const float most_x = (float)instance->width_px, most_y = (float)instance->height_px;
     return (bslam_detection_t){
-        .box = {hit->left_px - 0.5f, hit->top_px - 0.5f, hit->right_px - 0.5f, hit->bottom_px - 0.5f},
+        .box = {within(hit->left_px, most_x) - 0.5f, within(hit->top_px, most_y) - 0.5f,
+                within(hit->right_px, most_x) - 0.5f, within(hit->bottom_px, most_y) - 0.5f},
         .kind = hit->kind,
         .score = hit->score,
         .log_odds = log_odds(instance, hit),
@@ -479,7 +491,7 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
 }
 
 /// The mean box of what shows the same thing as the best, by how much each is above what is far below it. All
-/// of them are dropped.
+/// of them are dropped, and what is the same as the mean.
 static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t *best)
 {
     const bslam_hit_t first = *best;
@@ -501,10 +513,13 @@ static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t 
     mean.top_px /= sum;
     mean.right_px /= sum;
     mean.bottom_px /= sum;
+    for (int32_t i = 0; i < instance->hit_count; i++) {
+        bslam_hit_t *hit = &instance->hits[i];
+        hit->kind = is_same_thing(hit, &mean) ? -1 : hit->kind;
+    }
     return mean;
 }
 
-/// Of boxes that overlap one remains.
 static void report_best(bslam_scanner_instance_t *instance)
 {
     bslam_detections_t *found = &instance->found;

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from bslam.core.scanner import Level
 from bslam.detect.linear import fit_linear, quantised
 from bslam.detect.windows import Shape, halved, window_features, window_values
-from bslam.scannerfile import BLOCK
+from bslam.errors import BslamError
+from bslam.scannerfile import BLOCK, CHANNELS
 
 _ROUNDS: Final = 2
 _RANDOM: Final = 6  # windows of each picture and size, to begin with
@@ -69,14 +70,15 @@ def fit_coarse(
     moved = np.concatenate(
         [halved(examples[:, y : y + shape.rows, x : x + shape.columns]) for y, x in starts]
     )
-    parts = np.tile(pictures % _PARTS, len(starts))
+    numbers = np.unique(pictures, return_inverse=True)[1]
+    parts = np.tile(numbers * _PARTS // (numbers.max() + 1), len(starts))  # neighbours are alike
     negatives = usual = _random(grounds, its, rng)
     for _ in range(_ROUNDS):
         weights, bias = fit_linear(moved, negatives)
         negatives = np.unique(np.concatenate([negatives, _hard(grounds, its, weights, bias)]), axis=0)
     weights, bias = fit_linear(moved, negatives)
     whole, whole_bias, scale = quantised(weights, bias)
-    left, biases = _left_out(moved, parts, negatives, bias)
+    left, biases = _left_out(moved, parts, negatives)
     order, floors = _order(left, biases, _row_sums(usual, weights), bias)
     return Coarse(whole, whole_bias, order, np.floor(floors / scale).astype(np.int32))
 
@@ -89,11 +91,15 @@ def _random(grounds: Sequence[Ground], its: Shape, rng: np.random.Generator) -> 
             found.append(
                 window_features(one.level, its, rng.choice(places, min(len(places), _RANDOM), replace=False))
             )
+    if not found:
+        raise BslamError(
+            f"no place in {len(grounds)} sizes of pictures is free of the thing; allowed: add pictures"
+        )
     return np.concatenate(found)
 
 
 def _hard(grounds: Sequence[Ground], its: Shape, weights: NDArray[np.float32], bias: float) -> Cells:
-    found = []
+    found = [np.empty((0, its.rows, its.columns, CHANNELS), np.uint8)]
     for one in grounds:
         if one.free.any():
             values = np.where(one.free, window_values(one.level, its, weights) + bias, -np.inf)
@@ -103,15 +109,15 @@ def _hard(grounds: Sequence[Ground], its: Shape, weights: NDArray[np.float32], b
 
 
 def _left_out(
-    moved: Cells, parts: NDArray[np.int64], negatives: Cells, bias: float
+    moved: Cells, parts: NDArray[np.int64], negatives: Cells
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What rows add up to in examples that were left out (n, rows), and the bias there (n,)."""
-    sums, biases = np.zeros(moved.shape[:2]), np.full(len(moved), bias)
+    sums, biases = np.zeros(moved.shape[:2]), np.zeros(len(moved))
     for part in np.unique(parts):
         its = parts == part
-        if not its.all():
-            weights, biases[its] = fit_linear(moved[~its], negatives)
-            sums[its] = _row_sums(moved[its], weights)
+        rest = moved[~its] if not its.all() else moved  # a thing in one picture is known by it
+        weights, biases[its] = fit_linear(rest, negatives)
+        sums[its] = _row_sums(moved[its], weights)
     return sums, biases
 
 

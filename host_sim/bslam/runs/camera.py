@@ -274,7 +274,8 @@ def _watch(
         measured = [one for one in seeing.candidates if is_used(one, threshold)]
         rows = [_row(step, one, picture.identity) for one in measured]
         yield Glance(step, camera, picture.rgb, tuple(measured), rows, seeing.turn)
-        surest = (one.bearing_rad for one in measured if one.score >= UNTOLD_THRESHOLD.whole)
+        sure = UNTOLD_THRESHOLD.whole if model is None else threshold.whole
+        surest = (one.bearing_rad for one in measured if one.score >= sure)
         surest_rad = [bearing_rad for bearing_rad in surest if bearing_rad is not None]
         aim.turn(surest_rad, step * step_s, step_s)
 

@@ -96,7 +96,7 @@ def test_scanner_in_c_decides_as_whole_numbers_in_numpy_do(trained):
 
 def reference(model, levels, shape):
     """Scores and boxes of what remains, surest first."""
-    hits = []
+    hits, most = [], [shape[1], shape[0]] * 2
     for window in model.windows:
         its = Shape(window.columns, window.rows, window.box_columns, window.box_rows)
         for level in levels:
@@ -112,8 +112,9 @@ def reference(model, levels, shape):
             boxes = window_boxes(level, its)[good]
             sides = np.tile(boxes[:, 2:] - boxes[:, :2], 2)
             boxes = boxes + np.clip(edges, -0.4, 0.4) * sides
-            boxes = np.clip(boxes, 0, [shape[1], shape[0]] * 2)
-            hits += list(zip(scores[good].tolist(), boxes, strict=True))
+            within = np.clip(boxes, 0, most)
+            shown = np.all(within[:, 2:] > within[:, :2], axis=1)
+            hits += list(zip(scores[good][shown].tolist(), boxes[shown], strict=True))
     hits.sort(key=lambda hit: -hit[0])
     hits, found = hits[:128], []
     while hits:
@@ -121,8 +122,10 @@ def reference(model, levels, shape):
         same = [overlaps(first[None], box[None])[0, 0] >= 0.4 for _, box in hits]
         weights = [max(0.0, score - best + 1) for score, _ in hits]
         its = [(weight, box) for weight, (_, box), one in zip(weights, hits, same, strict=True) if one]
-        found.append((best, np.average([box for _, box in its], axis=0, weights=[one for one, _ in its])))
-        hits = [hit for hit, one in zip(hits, same, strict=True) if not one]
+        mean = np.average([box for _, box in its], axis=0, weights=[one for one, _ in its])
+        found.append((best, np.clip(mean, 0, most)))
+        left = [hit for hit, one in zip(hits, same, strict=True) if not one]
+        hits = [hit for hit in left if overlaps(mean[None], hit[1][None])[0, 0] < 0.4]
     return found[:16]
 
 

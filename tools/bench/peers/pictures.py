@@ -223,7 +223,9 @@ def say(words: str) -> None:
     print(words, file=sys.stderr, flush=True)
 
 
-NOTE = f"""AP is average precision at an overlap (IoU) of .5 and .3, in pictures left out of the training.
+NOTE = f"""bslam's products are at most so many.
+
+AP is average precision at an overlap (IoU) of .5 and .3, in pictures left out of the training.
 Recall is at an overlap of .5: at a precision of .9, and at .1 false ones a picture. By the *middle* rule a
 thing is found if the middle of what is found lies in its box: FOMO finds middles, no boxes. All train on
 the same {FOLDS - 1} of {FOLDS} parts, and on clutter of the kind that bslam makes of them. HOG has as many

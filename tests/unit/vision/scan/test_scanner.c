@@ -96,6 +96,20 @@ static void test_thing_at_the_edge_is_marked_and_ends_there(void **state)
     assert_near(found->items[0].box.left_px, -0.5, 1e-6);
 }
 
+static void test_thing_that_goes_on_outside_is_marked_wherever_windows_put_its_edges(void **state)
+{
+    (void)state;
+    for (int top = -6; top <= 0; top++) {
+        draw(64, top, 32);
+        const bslam_detections_t *found = see();
+        assert_true(found->count >= 1);
+        assert_true(found->items[0].box.top_px >= -0.5);
+        if (found->items[0].box.top_px < 0.5) {
+            assert_int_equal(found->items[0].marks, BSLAM_MARK_CUT_TOP);
+        }
+    }
+}
+
 static void test_two_things_are_two_and_the_surer_one_is_first(void **state)
 {
     (void)state;
@@ -170,12 +184,18 @@ static void test_picture_that_is_cut_short_or_looked_at_twice_shows_nothing(void
 static void test_more_boxes_than_there_is_room_for_are_counted(void **state)
 {
     (void)state;
-    square.kind.threshold = -1e6f;
-    draw(64, 40, 16);
+    draw(0, 0, 0);
+    for (int i = 0; i < 20; i++) {
+        for (int k = 0; k < 16 * 16; k++) {
+            picture[8 + 28 * (i / 5) + k / 16][8 + 30 * (i % 5) + k % 16] = 31 << 11 | 8 << 5 | 4;
+        }
+    }
     const bslam_detections_t *found = see();
     assert_int_equal(found->count, BSLAM_CANDIDATES_MAX);
     assert_true(found->dropped > 0);
-    assert_near(found->items[0].box.left_px, 63.5, 4);  // the best remains
+    for (int i = 1; i < found->count; i++) {
+        assert_true(found->items[i - 1].log_odds >= found->items[i].log_odds);  // the best remain
+    }
 }
 
 static void test_size_or_format_not_allowed_is_refused_and_nothing_changes(void **state)
@@ -248,6 +268,9 @@ static void test_model_that_cannot_be_is_refused_and_nothing_changes(void **stat
     WITH(square.kind.name, NULL, BSLAM_E_PARAMETER);
     WITH(square.kind.middle_sd, 0.0f, BSLAM_E_PARAMETER);
     WITH(square.kind.height_sd, 0.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.slope, 2e6f, BSLAM_E_PARAMETER);
+    WITH(square.kind.offset, -2e6f, BSLAM_E_PARAMETER);
+    WITH(square.window.scale, 2e6f, BSLAM_E_PARAMETER);
     assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner - 1, BSLAM_VISION_HASH, &square.model),
                      BSLAM_E_SIZE);
     assert_int_equal(bslam_scanner_init_sized(&scanner, sizeof scanner, BSLAM_VISION_HASH + 1, &square.model),
@@ -282,6 +305,8 @@ int main(void)
         cmocka_unit_test_setup(test_edges_move_a_box_and_no_farther_than_allowed, make_model),
         cmocka_unit_test_setup(test_what_is_below_a_floor_is_given_up, make_model),
         cmocka_unit_test_setup(test_thing_at_the_edge_is_marked_and_ends_there, make_model),
+        cmocka_unit_test_setup(test_thing_that_goes_on_outside_is_marked_wherever_windows_put_its_edges,
+                               make_model),
         cmocka_unit_test_setup(test_two_things_are_two_and_the_surer_one_is_first, make_model),
         cmocka_unit_test_setup(test_formats_give_the_same, make_model),
         cmocka_unit_test_setup(test_light_that_shows_nothing_has_its_reason, make_model),
