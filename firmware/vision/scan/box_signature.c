@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-_Static_assert((int)BSLAM_BOX_SIGNATURE <= BSLAM_SIGNATURE_SIZE, "there is room for it");
+_Static_assert(BSLAM_BOX_SIGNATURE <= BSLAM_SIGNATURE_SIZE, "there is room for it");
 
 enum { GRID = BSLAM_BOX_GRID, POINTS = BSLAM_BOX_POINTS };
 /// The ring is so many points away from the box.

@@ -39,9 +39,19 @@ static bool is_share(float box, int32_t cells)
     return box > 0 && box <= (float)cells;
 }
 
+static bool is_small(float number)
+{
+    return number >= -NUMBER_MAX && number <= NUMBER_MAX;
+}
+
 static bool is_bias(int32_t bias)
 {
     return bias >= -BIAS_MAX && bias <= BIAS_MAX;
+}
+
+static bool has_small_numbers(const bslam_window_t *window)
+{
+    return is_small(window->scale) && is_bias(window->bias) && is_bias(window->coarse_bias);
 }
 
 static bool has_tables(const bslam_window_t *window)
@@ -80,15 +90,10 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
     if (!bslam_is_number(window->scale)) {
         return BSLAM_E_NOT_FINITE;
     }
-    const bool is_good = window->scale > 0 && window->scale <= NUMBER_MAX && is_bias(window->bias) &&
-                         is_bias(window->coarse_bias) && is_share(window->box_columns, window->columns) &&
+    const bool is_good = window->scale > 0 && has_small_numbers(window) &&
+                         is_share(window->box_columns, window->columns) &&
                          is_share(window->box_rows, window->rows);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
-}
-
-static bool is_small(float number)
-{
-    return number >= -NUMBER_MAX && number <= NUMBER_MAX;
 }
 
 static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
