@@ -33,8 +33,8 @@ static const uint8_t TONE[256] = {
     150, 151, 151, 151, 151, 152, 152, 152, 152, 152, 153, 153, 153, 153, 153, 154, 154, 154, 154, 154,
     155, 155, 155, 155, 155, 156, 156, 156, 156, 156, 157, 157, 157, 157, 157, 158, 158, 158, 158, 158,
     159, 159, 159, 159, 159, 159, 160, 160, 160, 160, 160, 161, 161, 161, 161, 161};
-/// A normal curve over half of the grid, 64 in its middle.
-static const uint8_t CENTRE[GRID / 2] = {14, 21, 28, 37, 46, 54, 60, 64};
+/// A normal curve over the grid, 64 in its middle.
+static const uint8_t CENTRE[GRID] = {14, 21, 28, 37, 46, 54, 60, 64, 64, 60, 54, 46, 37, 28, 21, 14};
 
 typedef bslam_box_tone_t tone_t;
 typedef bslam_box_points_t points_t;
@@ -161,18 +161,13 @@ static int32_t eroded(const points_t *points, int32_t y, int32_t x)
     return least;
 }
 
-static int32_t centre(int32_t i)
-{
-    return CENTRE[i < GRID / 2 ? i : GRID - 1 - i];
-}
-
 static void weigh(points_t *points)
 {
     int64_t light = 0, warmth = 0;
     for (int32_t y = 0; y < GRID; y++) {
         for (int32_t x = 0; x < GRID; x++) {
             const tone_t its = points->tones[y + 1][x + 1];
-            const int32_t weight = (eroded(points, y, x) + LEAST) * (centre(y) * centre(x) >> 6);
+            const int32_t weight = (eroded(points, y, x) + LEAST) * (CENTRE[y] * CENTRE[x] >> 6);
             points->weights[y][x] = (uint16_t)weight;
             points->weight += weight;
             light += (int64_t)weight * its.light;
