@@ -218,7 +218,8 @@ def _run(arguments: argparse.Namespace) -> int:
         right += sum(one.colour == RIGHT for one in marks)
         wrong += sum(one.colour == WRONG for one in marks)
         rows += [(look.name, one.kind, f"{one.score:.4f}", *_in_picture(one, look)) for one in seen.items]
-        what = f"{len(seen.items)} found" if seen.items else f"nothing found: {seen.reason}"
+        why = "" if seen.reason == "nothing" else f": {seen.reason}"
+        what = f"{len(seen.items)} found" if seen.items else f"nothing found{why}"
         if seen.dropped:
             what += f", {seen.dropped} weaker boxes dropped"
         print(f"{look.name}: {what}")
