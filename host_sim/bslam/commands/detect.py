@@ -90,6 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the command; the exit status."""
+    if arguments.rig is not None and (arguments.action != "run" or Path(arguments.sources[0]).is_dir()):
+        raise BslamError(f"--rig {arguments.rig}: pictures need none; allowed: run of a scenario or a video")
     return {"train": _train, "run": _run, "test": _test, "import": _import}[arguments.action](arguments)
 
 

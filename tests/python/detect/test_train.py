@@ -322,3 +322,9 @@ def test_missing_or_wrong_inputs_are_named(trained, tmp_path, capsys):
         assert said in capsys.readouterr().err
     collection = read_collection([trained / "learn"])
     assert collection.heights_m == {"panel": 0.5}
+
+
+@pytest.mark.parametrize("action", ["train", "test", "run"])
+def test_a_rig_where_nothing_asks_for_one_is_refused(tmp_path, capsys, action):
+    assert main(["detect", action, str(tmp_path), "--rig", "three60"]) != 0
+    assert "--rig three60: pictures need none" in capsys.readouterr().err
