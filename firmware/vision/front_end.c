@@ -88,8 +88,7 @@ bslam_status_t bslam_front_end_begin(bslam_front_end_t *vision, int32_t camera, 
         return BSLAM_E_RANGE;
     }
     const bslam_camera_t *lens = &vision->cameras[camera];
-    if ((int64_t)width_px * lens->zoom != lens->width_px ||
-        (int64_t)height_px * lens->zoom != lens->height_px) {
+    if (!bslam_zoom_is_size(lens, width_px, height_px)) {
         return BSLAM_E_RANGE;
     }
     const bool gives_up = is_unfinished(vision);

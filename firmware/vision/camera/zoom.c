@@ -35,6 +35,12 @@ bslam_camera_t bslam_zoom_camera(bslam_camera_t camera)
     return camera;
 }
 
+bool bslam_zoom_is_size(const bslam_camera_t *zoomed, int32_t width_px, int32_t height_px)
+{
+    return (int64_t)width_px * zoomed->zoom == zoomed->width_px &&
+           (int64_t)height_px * zoomed->zoom == zoomed->height_px;
+}
+
 static bool has_room(const bslam_camera_t *camera)
 {
     const int32_t zoom = camera->zoom > 1 ? camera->zoom : 1;

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "base/bounds.h"
+
 _Static_assert(BSLAM_BOX_SIGNATURE <= BSLAM_SIGNATURE_SIZE, "there is room for it");
 
 enum { GRID = BSLAM_BOX_GRID, POINTS = BSLAM_BOX_POINTS };
@@ -39,11 +41,6 @@ static const uint8_t CENTRE[GRID] = {14, 21, 28, 37, 46, 54, 60, 64, 64, 60, 54,
 typedef bslam_box_tone_t tone_t;
 typedef bslam_box_points_t points_t;
 
-static int32_t within(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
 static int32_t apart(int32_t a, int32_t b)
 {
     return a < b ? b - a : a - b;
@@ -62,7 +59,7 @@ static int32_t root_of(int64_t square)
 
 static int32_t tone_of(int32_t value)
 {
-    return TONE[within(value, 0, UINT8_MAX)];
+    return TONE[bslam_clamp(value, 0, UINT8_MAX)];
 }
 
 /// Red, green and blue of a cell, whose colours are differences of them, as tones.
@@ -94,7 +91,7 @@ static int32_t octave_for(const bslam_channels_t *channels, int32_t width, int32
 static int32_t cell_at(int32_t point, int32_t first, int32_t length, int32_t cell_px, int32_t count)
 {
     const int32_t k = point == 0 ? -OUT : point == POINTS - 1 ? GRID - 1 + OUT : point - 1;
-    return within((first * 32 + (2 * k + 1) * length) / (512 * cell_px), 0, count - 1);
+    return bslam_clamp((first * 32 + (2 * k + 1) * length) / (512 * cell_px), 0, count - 1);
 }
 
 static int32_t sixteenths(bslam_real_t px)
@@ -142,7 +139,7 @@ static void fill_mask(points_t *points)
                 const int32_t away = distance(its, around[i]);
                 least = away < least ? away : least;
             }
-            points->mask[y][x] = (uint8_t)within((least - NEAR) * FULL / (FAR - NEAR), 0, FULL);
+            points->mask[y][x] = (uint8_t)bslam_clamp((least - NEAR) * FULL / (FAR - NEAR), 0, FULL);
         }
     }
 }
@@ -187,7 +184,7 @@ typedef struct bin {
 
 static bin_t bin_of(int32_t value, int32_t first, int32_t step, int32_t count)
 {
-    const int32_t at = within((value - first) * SHARES / step, 0, SHARES * (count - 1));
+    const int32_t at = bslam_clamp((value - first) * SHARES / step, 0, SHARES * (count - 1));
     const int32_t low = at / SHARES < count - 2 ? at / SHARES : count - 2;
     return (bin_t){low, at - low * SHARES};
 }
@@ -302,7 +299,6 @@ void bslam_box_signature(const bslam_channels_t *channels, const bslam_box_t *bo
     const int32_t sides = points->height + points->width;
     values[BSLAM_BOX_ASPECT] = sides > 0 ? ASPECT_GAIN * (points->height - points->width) / sides : 0;
     for (int32_t i = 0; i < BSLAM_SIGNATURE_SIZE; i++) {
-        const float value = (float)values[i] / UNIT;
-        signature[i] = value < -1 ? -1 : value > 1 ? 1 : value;
+        signature[i] = bslam_clampf((float)values[i] / UNIT, -1, 1);
     }
 }

@@ -35,8 +35,7 @@ bslam_status_t bslam_rig_scanner_begin(bslam_rig_scanner_t *rig, int32_t camera,
         return BSLAM_E_RANGE;
     }
     const bslam_camera_t *lens = &rig->cameras[camera];
-    if ((int64_t)width_px * lens->zoom != lens->width_px ||
-        (int64_t)height_px * lens->zoom != lens->height_px) {
+    if (!bslam_zoom_is_size(lens, width_px, height_px)) {
         return BSLAM_E_RANGE;
     }
     const bool gives_up = rig->reason == BSLAM_VISION_UNFINISHED && rig->rows_seen > 0;

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "base/bounds.h"
 #include "base/scalar.h"
 #include "vision/pixels/bytes.h"
 
@@ -283,7 +284,7 @@ static void edges_at(const view_t *view, int32_t column, float edges[EDGES])
             }
         }
         const float edge = window->edge_scale[e] * (float)sum + window->edge_bias[e];
-        edges[e] = edge > EDGE_MAX ? EDGE_MAX : edge < -EDGE_MAX ? -EDGE_MAX : edge;
+        edges[e] = bslam_clampf(edge, -EDGE_MAX, EDGE_MAX);
     }
 }
 
@@ -472,11 +473,6 @@ static bslam_hit_t *best_left(bslam_scanner_instance_t *instance)
     return best;
 }
 
-static float within(float value, float most)
-{
-    return value < 0 ? 0 : value > most ? most : value;
-}
-
 static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, const bslam_hit_t *hit)
 {
     const float right = (float)instance->width_px - CUT_PX, bottom = (float)instance->height_px - CUT_PX;
@@ -486,8 +482,9 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
                           (hit->bottom_px > bottom ? BSLAM_MARK_CUT_BOTTOM : 0);
     const float most_x = (float)instance->width_px, most_y = (float)instance->height_px;
     return (bslam_detection_t){
-        .box = {within(hit->left_px, most_x) - 0.5f, within(hit->top_px, most_y) - 0.5f,
-                within(hit->right_px, most_x) - 0.5f, within(hit->bottom_px, most_y) - 0.5f},
+        .box = {bslam_clampf(hit->left_px, 0, most_x) - 0.5f, bslam_clampf(hit->top_px, 0, most_y) - 0.5f,
+                bslam_clampf(hit->right_px, 0, most_x) - 0.5f,
+                bslam_clampf(hit->bottom_px, 0, most_y) - 0.5f},
         .kind = hit->kind,
         .score = hit->score,
         .log_odds = log_odds(instance, hit),
