@@ -1,7 +1,8 @@
 """Takes pictures of a rendered room and labels them: to try what is trained from pictures without a camera.
 
 Writes --count pictures and labels.csv, for `bslam detect`, into FOLDER. Every beacon that is whole and well
-seen has a box with the name of its kind. Another --seed takes other pictures of that room.
+seen has a box with the name of its kind. The room is --world's, or that of a drive of a --scenario: then a
+robot can drive by what was trained. Another --seed takes other pictures of that room.
 `.venv/bin/python -m tools.training.example_pictures FOLDER [--world 1] [--count 20] [--seed 0]`
 """
 
@@ -15,7 +16,8 @@ from PIL import Image
 
 from bslam.datasets.labels import COLUMNS
 from bslam.rig import load_rig
-from bslam.world.camera import Renderer, Scene, Seen, free_pose, make_world
+from bslam.world.camera import Renderer, Scene, Seen, dress, free_pose, make_world
+from bslam.world.scenario import load_scenario
 
 BETWEEN_S = 10.0  # light and white balance change from picture to picture
 SLANT_RAD_MAX = math.radians(75.0)
@@ -30,10 +32,9 @@ def is_well_seen(seen: Seen) -> bool:
     return whole and seen.visible_px >= VISIBLE_PX_MIN and seen.slant_rad < SLANT_RAD_MAX
 
 
-def take(folder: Path, world: int, count: int, seed: int) -> list[list[str]]:
-    """Take `count` pictures into a folder; the rows of its labels.csv."""
+def take(folder: Path, scene: Scene, world: int, count: int, seed: int) -> list[list[str]]:
+    """Take `count` pictures of a room into a folder; the rows of its labels.csv."""
     folder.mkdir(parents=True, exist_ok=True)
-    scene = make_world(world, "test")
     renderer = Renderer(scene, load_rig("three60").cameras[0], [world, seed])
     random = np.random.default_rng([world, seed])
     views: dict[str, list[Seen]] = {}
@@ -62,10 +63,15 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("--world", type=int, default=1, help="which room (default: 1)")
+    parser.add_argument("--scenario", help="the room of a drive of this scenario; --world is the drive's seed")
     parser.add_argument("--count", type=int, default=20, help="pictures (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="where they are taken from (default: 0)")
     words = parser.parse_args()
-    rows = take(words.folder, words.world, words.count, words.seed)
+    if words.scenario is None:
+        scene = make_world(words.world, "test")
+    else:
+        scene = dress(load_scenario(words.scenario), words.world)
+    rows = take(words.folder, scene, words.world, words.count, words.seed)
     kinds = {row[1] for row in rows}
     print(f"{words.folder}: {words.count} pictures, {len(rows)} boxes in labels.csv, {len(kinds)} kinds")
 

@@ -111,11 +111,12 @@ static inline uint32_t bytes_set(uint32_t bytes)
     return bslam_bytes_mean(bytes, UINT32_MAX);
 }
 
-/// Seven sixteenths of each byte: the tangent of 23.6 degrees.
-static inline uint32_t flat_of(uint32_t bytes)
+/// What the smaller difference stays below where the larger is each byte: seven sixteenths of it, the tangent
+/// of 23.6 degrees, and 1 more, so none beside the least one is no slope.
+static inline uint32_t flat_below(uint32_t bytes)
 {
     const uint32_t half = bslam_bytes_mean(bytes, 0), quarter = bslam_bytes_mean(half, 0);
-    return bslam_bytes_mean(half, bslam_bytes_mean(half, quarter));
+    return bslam_bytes_mean(half, bslam_bytes_mean(half, quarter)) + 0x01010101U;
 }
 
 /// Adds the edges of four pixels to their cell's sums. Luma of the neighbours of each.
@@ -126,8 +127,8 @@ static inline void sum_four(uint16_t *sums, uint32_t left, uint32_t right, uint3
     const uint32_t down = bslam_bytes_less(below, above) | upward;
     const uint32_t more = bslam_bytes_less(down, across);  // larger + half of the smaller
     const uint32_t length = bslam_bytes_plus(across + more, bslam_bytes_mean(down - more, 0));
-    const uint32_t is_across = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_of(across), down)));
-    const uint32_t is_down = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_of(down), across)));
+    const uint32_t is_across = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_below(across), down)));
+    const uint32_t is_down = bslam_bytes_filled(bytes_set(bslam_bytes_less(flat_below(down), across)));
     const uint32_t rises = bslam_bytes_filled(bytes_set(leftward) ^ bytes_set(upward));
     const uint32_t slanted = length & ~(is_across | is_down);
     sums[0] = (uint16_t)bslam_bytes_sum(length & is_across, sums[0]);
