@@ -5,7 +5,7 @@
 BOARDS := $(patsubst firmware/port/%/board.mk,%,$(wildcard firmware/port/*/board.mk))
 
 # Of a board that scans: the header that `bslam detect train` wrote.
-KINDS ?= firmware/models/rooms.h
+KINDS ?= firmware/models/own_room.h
 
 # What boards may use.
 PORT_SOURCES := $(wildcard firmware/port/*.c firmware/port/cortex_m/*.c)

@@ -5,7 +5,7 @@
 #include "bench/text.h"
 #include "vision/vision.h"
 #include "models/beacons.h"
-#include "models/rooms.h"
+#include "models/own_room.h"
 #include "port/port.h"
 
 #define WIDTH_PX 320
@@ -81,7 +81,7 @@ int main(void)
         const ticks_t ticks = look(PICTURES->frames[f]);
         tell("frame ", f, ticks.rows + ticks.end);
     }
-    if (bslam_vision_init_scanner(&vision, &bslam_rooms, camera, 1) != BSLAM_OK) {
+    if (bslam_vision_init_scanner(&vision, &bslam_own_room, camera, 1) != BSLAM_OK) {
         return 1;
     }
     for (uint32_t f = 0; f < PICTURES->count; f++) {

@@ -12,6 +12,7 @@
 #include "vision/detection/features.h"
 #include "vision/detection/prefilter.h"
 #include "vision/detection/vertical_edges.h"
+#include "vision/measurement/distance.h"
 #include "vision/classifiers/beacon_model.h"
 #include "base/scalar.h"
 
@@ -394,6 +395,7 @@ __attribute__((noinline)) static void measure(bslam_front_end_t *vision, const b
             const bslam_beacon_class_t *kind = &vision->model->classes[candidate.beacon_class - 1];
             candidate.score -= smallness(view, kind, &candidate);
             if (candidate.score >= threshold) {
+                candidate.range_noise_sd_m *= (bslam_real_t)bslam_distance_doubt(candidate.score);
                 candidate.outline =
                     bslam_zoom_out_box(candidate.outline, vision->cameras[vision->camera].zoom);
                 kept = insert(vision->candidates, kept, &candidate);

@@ -132,6 +132,7 @@ typedef struct bslam_window {
 typedef struct bslam_scan_kind {
     const char *name;
     float height_m;   ///< of all of them; 0: not known, direction only
+    float width_m;    ///< of their front, as they are seen from ahead; 0: not known
     float threshold;  ///< what is below it is not reported
     float slope;      ///< logarithm of the odds that what is reported is one: slope * f + offset
     float offset;

@@ -1,20 +1,12 @@
 #include "vision/vision.h"
 
 #include "base/scalar.h"
-#include "base/bounds.h"
 
 // What a thing's directions have in common for a whole drive and no front end can know; and the same of its
 // distances, as a part of them. Tried on drives 0:8 of the paper's room, the latter on 1020:1036 and
 // 1040:1060.
 static const bslam_real_t BEARING_BIAS_RAD = BSLAM_R(0.004);
 static const bslam_real_t RANGE_BIAS = BSLAM_R(0.01);
-
-// How many times a distance's noise is told: what the detector is less sure of is measured worse. So much at
-// a score of 0, so much less a unit of it, between so many. Fitted to things in training worlds.
-static const float UNSURE = 1.6f;
-static const float UNSURE_BY_SCORE = 0.5f;
-static const float UNSURE_LEAST = 0.9f;
-static const float UNSURE_MOST = 1.7f;
 
 static bslam_real_t hypotenuse(bslam_real_t a, bslam_real_t b)
 {
@@ -33,11 +25,8 @@ bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate)
         .signature = candidate->signature,
     };
     if (candidate->has_range) {
-        const float unsure =
-            bslam_clampf(UNSURE - UNSURE_BY_SCORE * candidate->score, UNSURE_LEAST, UNSURE_MOST);
         sighting.range_m = candidate->range_m;
-        sighting.range_sd_m =
-            hypotenuse((bslam_real_t)unsure * candidate->range_noise_sd_m, RANGE_BIAS * candidate->range_m);
+        sighting.range_sd_m = hypotenuse(candidate->range_noise_sd_m, RANGE_BIAS * candidate->range_m);
         sighting.range_scale_sd = candidate->range_scale_sd;
     }
     return sighting;

@@ -182,8 +182,8 @@ typedef struct bslam_candidate {
     bslam_real_t bearing_sd_rad;
     bslam_real_t range_m;  ///< horizontal distance from the camera; read only if has_range
     bslam_real_t range_sd_m;
-    bslam_real_t range_noise_sd_m;  ///< the part of it that is another one in each picture; the rest is the
-                                    ///< thing's
+    bslam_real_t range_noise_sd_m;  ///< the part that is another one in each picture: more, the lower the
+                                    ///< score is of what a detector of built-in kinds found
     bslam_real_t range_scale_sd;    ///< by what part all distances of the thing err alike
     bool has_bearing;
     bool has_range;
@@ -201,9 +201,8 @@ typedef struct bslam_candidate {
 const bslam_candidate_t *bslam_vision_candidates(const bslam_vision_t *vision, int32_t *count);
 
 /// A candidate with has_bearing as a sighting, without identity; its signature stays where it is. The noise
-/// is what changes from picture to picture, a distance's more of it the lower the score is, and a little that
-/// nothing in a picture can tell; what repeats in each distance of the thing is range_scale_sd. MATH-CAMERA
-/// "Sighting noise". O(1).
+/// is what changes from picture to picture, and a little that nothing in a picture can tell; what repeats in
+/// each distance of the thing is range_scale_sd. MATH-CAMERA "Sighting noise". O(1).
 bslam_sighting_t bslam_sighting_of(const bslam_candidate_t *candidate);
 
 /// Those of all candidates that have a bearing, in their order; returns how many. Their signatures are good

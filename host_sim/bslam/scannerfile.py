@@ -18,7 +18,7 @@ from bslam.errors import BslamError
 from bslam.modelfile import SIZE_MAX_M, Document, load_document
 
 FORMAT = "bslam scanner"
-VERSION = 2
+VERSION = 3
 CHANNELS = 8
 """Values of a cell, as BSLAM_CHANNELS in firmware/vision/model.h."""
 LOWEST = -0.6
@@ -32,10 +32,11 @@ BLOCK = 2
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of thing that is found, as bslam_scan_kind_t describes it. height_m 0: not known."""
+    """A kind of thing that is found, as bslam_scan_kind_t describes it. height_m, width_m 0: not known."""
 
     name: str
     height_m: float
+    width_m: float
     threshold: float
     slope: float
     offset: float
@@ -118,6 +119,7 @@ def _kind(table: Document) -> Kind:
     return Kind(
         name=table.text("name"),
         height_m=table.number("height_m", 0.0, SIZE_MAX_M),
+        width_m=table.number("width_m", 0.0, SIZE_MAX_M),
         threshold=table.number("threshold", -1e6, 1e6),
         slope=table.number("slope", 0.0, 1e6),
         offset=table.number("offset", -1e6, 1e6),

@@ -63,7 +63,9 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("--world", type=int, default=1, help="which room (default: 1)")
-    parser.add_argument("--scenario", help="the room of a drive of this scenario; --world is the drive's seed")
+    parser.add_argument(
+        "--scenario", help="the room of a drive of this scenario; --world is the drive's seed"
+    )
     parser.add_argument("--count", type=int, default=20, help="pictures (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="where they are taken from (default: 0)")
     words = parser.parse_args()

@@ -1,5 +1,6 @@
 #include "vision/scan/box_candidate.h"
 
+#include "base/bounds.h"
 #include "base/scalar.h"
 #include "base/trig.h"
 #include "vision/camera/lens.h"
@@ -8,6 +9,10 @@
 static const bslam_real_t PIXEL_SD = BSLAM_R(0.5);
 /// How much of a height's error is alike in all distances of one thing: labels and looks of it are the same.
 static const float SHARED = 0.5f;
+/// Standard deviation of the middle and of the height of a box that is round a part of a thing, of itself.
+static const bslam_real_t MISSED_SD = BSLAM_R(0.3);
+static const float ODDS_MAX = 20;
+enum { SQUARES = 10 };
 enum {
     CUT_BESIDE = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT,
     CUT_ABOVE = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM
@@ -39,17 +44,41 @@ static bool look_at_sides(const bslam_camera_t *camera, const bslam_box_t *box, 
            bslam_camera_unproject(camera, x, box->bottom_px, &sides->bottom) == BSLAM_OK;
 }
 
+static bslam_real_t width_rad(const sides_t *sides)
+{
+    return bslam_abs(bslam_angle_wrap(bslam_direction_bearing_rad(&sides->left) -
+                                      bslam_direction_bearing_rad(&sides->right)));
+}
+
+/// Standard deviation of a part of a box that has `sd` where the box is right, and is right by its odds.
+static bslam_real_t doubted(float sd, float log_odds)
+{
+    float odds = 1.0f + bslam_clampf(log_odds, -ODDS_MAX, ODDS_MAX) / (1 << SQUARES);
+    for (int32_t i = 0; i < SQUARES; i++) {
+        odds *= odds;  // exp, the same bits everywhere
+    }
+    return hypotenuse((bslam_real_t)sd, MISSED_SD * bslam_sqrt(1 / (1 + (bslam_real_t)odds)));
+}
+
 static void measure_bearing(const bslam_scan_kind_t *kind, const sides_t *sides, bslam_candidate_t *candidate)
 {
     const bslam_box_t *box = &candidate->outline;
-    const bslam_real_t width_rad = bslam_angle_wrap(bslam_direction_bearing_rad(&sides->left) -
-                                                    bslam_direction_bearing_rad(&sides->right));
     // What goes on beyond the picture has its middle somewhere else.
-    const bslam_real_t share = (candidate->marks & CUT_BESIDE) != 0 ? BSLAM_R(0.5) : kind->middle_sd;
+    const bslam_real_t share =
+        (candidate->marks & CUT_BESIDE) != 0 ? BSLAM_R(0.5) : doubted(kind->middle_sd, candidate->score);
     const bslam_real_t pixel = PIXEL_SD / (box->right_px - box->left_px);
     candidate->has_bearing = true;
     candidate->bearing_rad = bslam_direction_bearing_rad(&sides->middle);
-    candidate->bearing_sd_rad = bslam_abs(width_rad) * hypotenuse(share, pixel);
+    candidate->bearing_sd_rad = width_rad(sides) * hypotenuse(share, pixel);
+}
+
+/// How much farther the middle of a front is than its nearer end, which the box is as high as: by how much
+/// narrower it is seen than from ahead.
+static bslam_real_t nearer_end_m(const bslam_scan_kind_t *kind, const sides_t *sides, bslam_real_t range_m)
+{
+    const bslam_real_t seen_m = width_rad(sides) * range_m;
+    const bslam_real_t along2 = (bslam_real_t)kind->width_m * kind->width_m - seen_m * seen_m;
+    return along2 > 0 ? bslam_sqrt(along2) / 2 : 0;
 }
 
 /// From how much steeper the upper side is seen than the lower one.
@@ -61,8 +90,11 @@ static void measure_range(const bslam_scan_kind_t *kind, const sides_t *sides, b
         (candidate->marks & CUT_ABOVE) == 0 && kind->height_m > 0 && steeper > 0 && bslam_is_number(steeper);
     if (candidate->has_range) {
         const bslam_real_t pixel = PIXEL_SD / (box->bottom_px - box->top_px);
-        const bslam_real_t noise = hypotenuse(kind->height_sd, pixel);
+        const bslam_real_t noise = hypotenuse(doubted(kind->height_sd, candidate->score), pixel);
         candidate->range_m = kind->height_m / steeper;
+        if ((candidate->marks & CUT_BESIDE) == 0) {
+            candidate->range_m += nearer_end_m(kind, sides, candidate->range_m);
+        }
         candidate->range_noise_sd_m = candidate->range_m * noise;
         candidate->range_scale_sd = SHARED * kind->height_sd;
         candidate->range_sd_m = candidate->range_m * hypotenuse(noise, candidate->range_scale_sd);

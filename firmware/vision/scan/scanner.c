@@ -17,6 +17,7 @@ enum { BIAS_MAX = 1 << 30 };
 static const float NUMBER_MAX = 1e6f;
 /// Boxes of one kind that overlap as much, of both together, are one thing's.
 static const float OVERLAP_MAX = 0.4f;
+static const float PART_MAX = 0.65f;
 /// A window's score differs from that of the next by hardly more.
 static const float FAR_BELOW = 2;
 /// Windows whose score is farther below the best one's say nothing of where its edges are.
@@ -99,7 +100,7 @@ static bslam_status_t check_window(const bslam_scanner_model_t *model, const bsl
 
 static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
 {
-    const float values[] = {kind->height_m, kind->threshold, kind->slope,
+    const float values[] = {kind->height_m, kind->width_m,   kind->threshold, kind->slope,
                             kind->offset,   kind->middle_sd, kind->height_sd};
     for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
         if (!bslam_is_number(values[i])) {
@@ -107,8 +108,8 @@ static bslam_status_t check_kind(const bslam_scan_kind_t *kind)
         }
     }
     const bool is_good = kind->name != NULL && kind->height_m >= 0 && kind->height_m <= 10 &&
-                         kind->middle_sd > 0 && kind->height_sd > 0 && is_small(kind->slope) &&
-                         is_small(kind->offset);
+                         kind->width_m >= 0 && kind->width_m <= 10 && kind->middle_sd > 0 &&
+                         kind->height_sd > 0 && is_small(kind->slope) && is_small(kind->offset);
     return is_good ? BSLAM_OK : BSLAM_E_PARAMETER;
 }
 
@@ -450,11 +451,23 @@ static float area(const bslam_hit_t *hit)
     return (hit->right_px - hit->left_px) * (hit->bottom_px - hit->top_px);
 }
 
-static bool is_same_thing(const bslam_hit_t *a, const bslam_hit_t *b)
+static float shared(const bslam_hit_t *a, const bslam_hit_t *b)
 {
-    const float both = overlap(a->left_px, a->right_px, b->left_px, b->right_px) *
-                       overlap(a->top_px, a->bottom_px, b->top_px, b->bottom_px);
-    return a->kind == b->kind && both >= OVERLAP_MAX * (area(a) + area(b) - both);
+    return overlap(a->left_px, a->right_px, b->left_px, b->right_px) *
+           overlap(a->top_px, a->bottom_px, b->top_px, b->bottom_px);
+}
+
+static bool is_same_place(const bslam_hit_t *a, const bslam_hit_t *b)
+{
+    const float both = shared(a, b);
+    return both >= OVERLAP_MAX * (area(a) + area(b) - both);
+}
+
+/// Whether one is a part of the other.
+static bool is_part(const bslam_hit_t *a, const bslam_hit_t *b)
+{
+    const float first = area(a), second = area(b);
+    return a->kind == b->kind && shared(a, b) >= PART_MAX * (first < second ? first : second);
 }
 
 /// By odds, which kinds can be compared by.
@@ -493,7 +506,7 @@ static bslam_detection_t detection_of(const bslam_scanner_instance_t *instance, 
 }
 
 /// The mean box of what shows the same thing as the best, by how much each is above what is far below it. All
-/// of them are dropped, and what is the same as the mean.
+/// of them are dropped, and what is there of any kind: one thing is of one.
 static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t *best)
 {
     const bslam_hit_t first = *best;
@@ -501,7 +514,7 @@ static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t 
     float sum = 0;
     for (int32_t i = 0; i < instance->hit_count; i++) {
         bslam_hit_t *hit = &instance->hits[i];
-        if (is_same_thing(hit, &first)) {
+        if (hit->kind == first.kind && is_same_place(hit, &first)) {
             const float above = hit->score - first.score + MERGED_BELOW, weight = above > 0 ? above : 0;
             sum += weight;
             mean.left_px += weight * hit->left_px;
@@ -517,7 +530,7 @@ static bslam_hit_t merged(bslam_scanner_instance_t *instance, const bslam_hit_t 
     mean.bottom_px /= sum;
     for (int32_t i = 0; i < instance->hit_count; i++) {
         bslam_hit_t *hit = &instance->hits[i];
-        hit->kind = is_same_thing(hit, &mean) ? -1 : hit->kind;
+        hit->kind = is_same_place(hit, &mean) || is_part(hit, &mean) ? -1 : hit->kind;
     }
     return mean;
 }

@@ -124,7 +124,7 @@ class Scanner:
 
 
 NOTHING = ScannerModel(
-    kinds=(Kind("nothing", 0.0, 0.0, 1.0, 0.0, 1.0, 1.0),),
+    kinds=(Kind("nothing", 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0),),
     windows=(
         Window(
             kind=0,

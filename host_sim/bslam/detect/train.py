@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,7 @@ AREA_MIN_PX2: Final = 400
 HIT: Final = 0.5
 """Overlap from which on a detection is of the thing."""
 _SD_MIN: Final = 0.01
+_FRONT: Final = 0.9  # part of the labelled boxes that are no wider, to their height, than from ahead
 
 
 @dataclass(frozen=True)
@@ -117,21 +119,22 @@ def _fit_one(name: str, kind: int, examples: Sequence[Example], seed: int) -> li
     return fit_windows(kind, name, look_at(examples), np.random.default_rng([seed, kind]))
 
 
-def lowest_kinds(names: Sequence[str]) -> tuple[Kind, ...]:
-    """Kinds that report all that is kept."""
-    return tuple(Kind(name, 0.0, LOWEST, 1.0, 0.0, 1.0, 1.0) for name in names)
+def lowest_kind(name: str) -> Kind:
+    """A kind that reports all that is kept."""
+    return Kind(name, 0.0, 0.0, LOWEST, 1.0, 0.0, 1.0, 1.0)
 
 
 def _look_at_left(
     collection: Collection, parts: Sequence[int], windows: Mapping[int | None, Sequence[Window]]
 ) -> Left:
     found: dict[str, list[Found]] = {kind: [] for kind in collection.kinds}
-    for part in range(FOLDS):
-        scanner = Scanner(ScannerModel(lowest_kinds(collection.kinds), tuple(windows[part])))
+    for part, (index, kind) in product(range(FOLDS), enumerate(collection.kinds)):
+        # Each kind by itself: below their thresholds, others would hide what it finds.
+        its_windows = tuple(replace(one, kind=0) for one in windows[part] if one.kind == index)
+        scanner = Scanner(ScannerModel((lowest_kind(kind),), its_windows))
         for one, its in zip(collection.examples, parts, strict=True):
             if its == part:
-                for kind, what in find(scanner, one, collection.kinds).items():
-                    found[kind].append(what)
+                found[kind].append(find(scanner, one, [kind])[kind])
     return Left({kind: tuple(its) for kind, its in found.items()})
 
 
@@ -153,9 +156,16 @@ def _kind(name: str, height_m: float, left: Left, false_a_picture: float) -> Kin
     slope, offset = _odds(its)
     middle_sd, height_sd = _box_noise(left.found[name])
     threshold = its.threshold_at(false_a_picture)
-    return Kind(
-        name, height_m, threshold if np.isfinite(threshold) else 1.0, slope, offset, middle_sd, height_sd
-    )
+    if not np.isfinite(threshold):
+        threshold = 1.0
+    width_m = height_m * _front_aspect(left.found[name])
+    return Kind(name, height_m, width_m, threshold, slope, offset, middle_sd, height_sd)
+
+
+def _front_aspect(found: Sequence[Found]) -> float:
+    """Width to height of what is labelled, as it is from ahead: but for outliers, the widest."""
+    boxes = np.concatenate([one.labelled for one in found])
+    return float(np.quantile((boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1]), _FRONT))
 
 
 def _odds(its: Curve) -> tuple[float, float]:

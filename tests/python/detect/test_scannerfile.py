@@ -27,7 +27,7 @@ def model():
         edge_scale=rng.random(4, dtype=np.float32),
         edge_bias=rng.random(4, dtype=np.float32),
     )
-    kind = Kind('Türschild "A"', 0.25, 0.5, 2.0, -1.0, 0.0625, 0.125)
+    kind = Kind('Türschild "A"', 0.25, 0.75, 0.5, 2.0, -1.0, 0.0625, 0.125)
     return ScannerModel((kind,), (window,), {"trained by": "a test"})
 
 
@@ -40,7 +40,7 @@ def test_a_file_gives_the_model_back_to_the_bit(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.update(version=1), "key version: 1 is not allowed; allowed: 2"),
+        (lambda d: d.update(version=1), "key version: 1 is not allowed; allowed: 3"),
         (lambda d: d.update(format="bslam log"), "key format"),
         (lambda d: d.update(channels=10), "key channels: 10 is not allowed; allowed: 8"),
         (lambda d: d.pop("windows"), "key windows: is missing"),

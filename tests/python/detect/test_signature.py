@@ -33,7 +33,7 @@ def red_model():
         edge_scale=np.zeros(4, np.float32),
         edge_bias=np.zeros(4, np.float32),
     )
-    return ScannerModel((Kind("red", 0.3, 0.0, 1.0, 0.0, 0.05, 0.05),), (window,))
+    return ScannerModel((Kind("red", 0.3, 0.0, 0.0, 1.0, 0.0, 0.05, 0.05),), (window,))
 
 
 def scene(wall, things, seed=0):

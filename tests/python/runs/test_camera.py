@@ -224,12 +224,12 @@ def test_camera_log_leaves_out_what_the_detector_is_less_sure_of(short, tmp_path
 
 
 def test_a_user_s_own_kinds_are_seen_and_kept_apart_from_the_built_in_ones(tmp_path):
-    model, store = read_scanner(MODELS / "rooms.json"), CameraStore(tmp_path)
+    model, store = read_scanner(MODELS / "own_room.json"), CameraStore(tmp_path)
     drive = replace(load_scenario("paper_room"), steps=120)
     log = camera_log(drive, 0, None, None, RIG, store, camera.SCANNER_THRESHOLD, model)
     seen = log.sightings
     assert len(seen.time_us) > 4 and log.seeds is None and np.isnan(log.odometry.gyro_radps).all()
-    assert set(seen.beacon_class.tolist()) <= {1, 2, 3} and seen.signature.any(axis=1).all()
+    assert set(seen.beacon_class.tolist()) <= {1, 2, 3, 4, 5} and seen.signature.any(axis=1).all()
     other = replace(model, kinds=tuple(replace(one, threshold=1e3) for one in model.kinds))
     none = camera_log(drive, 0, None, None, RIG, store, camera.SCANNER_THRESHOLD, other)
     assert len(none.sightings.time_us) == 0 and len(list(tmp_path.glob("*.npz"))) == 2

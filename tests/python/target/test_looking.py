@@ -112,7 +112,7 @@ def test_pictures_that_cannot_be_are_refused(camera, pictures):
 # ---- a robot with wheels and a camera of its own, which a film moves ---------------------------------------
 
 TURN, SHOTS = 24, 4
-ROOM = 3  # the seed of one whose pictures show something
+ROOM, OWN_ROOM = 3, 0  # seeds of one whose pictures show something, and of what own_room.json is of
 
 
 @pytest.fixture(scope="module")
@@ -141,9 +141,10 @@ def own_eyes(request, film, camera, tmp_path, monkeypatch):
         target, shots = f"{request.param}:{film}", shots_of(film, camera)
     else:
         camera = load_rig("three60").cameras[1]
-        make_film(tmp_path / "large", "paper_room", ROOM, camera, 3, TURN)
+        room = OWN_ROOM if request.param.endswith("scanning") else ROOM
+        make_film(tmp_path / "large", "paper_room", room, camera, 3, TURN)
         target, shots = f"{request.param}:{tmp_path}/large", shots_of(tmp_path / "large", camera, 3)
-    model = read_scanner(MODELS / "rooms.json") if request.param.endswith("scanning") else None
+    model = read_scanner(MODELS / "own_room.json") if request.param.endswith("scanning") else None
     with RemoteSlam(open_line(target), None, 14) as robot:
         yield robot, FrontEnd([camera], model), shots
 

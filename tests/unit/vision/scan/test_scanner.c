@@ -125,6 +125,25 @@ static void test_two_things_are_two_and_the_surer_one_is_first(void **state)
     assert_true(found->items[0].box.right_px < found->items[1].box.left_px);
 }
 
+static void test_one_thing_is_of_the_kind_with_the_best_odds(void **state)
+{
+    (void)state;
+    draw(64, 40, 16);
+    bslam_scan_kind_t kinds[2] = {square.kind, square.kind};
+    bslam_window_t windows[2] = {square.window, square.window};
+    windows[1].kind = 1;
+    const bslam_scanner_model_t both = {
+        .kind_count = 2, .kinds = kinds, .window_count = 2, .windows = windows};
+    for (int32_t better = 0; better < 2; better++) {
+        kinds[better].offset = 1.5f;
+        kinds[1 - better].offset = 1;
+        assert_int_equal(bslam_scanner_init(&scanner, &both), BSLAM_OK);
+        const bslam_detections_t *found = see();
+        assert_int_equal(found->count, 1);
+        assert_int_equal(found->items[0].kind, better);
+    }
+}
+
 static void test_formats_give_the_same(void **state)
 {
     (void)state;
@@ -268,6 +287,7 @@ static void test_model_that_cannot_be_is_refused_and_nothing_changes(void **stat
     WITH(square.kind.name, NULL, BSLAM_E_PARAMETER);
     WITH(square.kind.middle_sd, 0.0f, BSLAM_E_PARAMETER);
     WITH(square.kind.height_sd, 0.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.width_m, -1.0f, BSLAM_E_PARAMETER);
     WITH(square.kind.slope, 2e6f, BSLAM_E_PARAMETER);
     WITH(square.kind.offset, -2e6f, BSLAM_E_PARAMETER);
     WITH(square.window.scale, 2e6f, BSLAM_E_PARAMETER);
@@ -308,6 +328,7 @@ int main(void)
         cmocka_unit_test_setup(test_thing_that_goes_on_outside_is_marked_wherever_windows_put_its_edges,
                                make_model),
         cmocka_unit_test_setup(test_two_things_are_two_and_the_surer_one_is_first, make_model),
+        cmocka_unit_test_setup(test_one_thing_is_of_the_kind_with_the_best_odds, make_model),
         cmocka_unit_test_setup(test_formats_give_the_same, make_model),
         cmocka_unit_test_setup(test_light_that_shows_nothing_has_its_reason, make_model),
         cmocka_unit_test_setup(test_picture_that_is_cut_short_or_looked_at_twice_shows_nothing, make_model),
