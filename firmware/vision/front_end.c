@@ -12,7 +12,6 @@
 #include "vision/detection/features.h"
 #include "vision/detection/prefilter.h"
 #include "vision/detection/vertical_edges.h"
-#include "vision/measurement/distance.h"
 #include "vision/classifiers/beacon_model.h"
 #include "base/scalar.h"
 
@@ -40,13 +39,6 @@
 /// From this margin on the other kind is so rare, below 4 %, that a filter's gate is the better remedy: a
 /// standard deviation would take from all what few deserve.
 #define CLASS_SURE 1.0f
-/// What a candidate of a kind no higher than SMALL_KIND_M loses where it is lower than its kind: so much for
-/// each unit of the natural logarithm beyond SMALL_FREE, SMALL_LOSS_MAX at most, since the floor line errs
-/// too.
-#define SMALL_KIND_M 0.5f
-#define SMALL_FREE 0.5f
-#define SMALL_LOSS 4.0f
-#define SMALL_LOSS_MAX 2.0f
 
 static const bslam_detector_model_t *detector_for(const bslam_beacon_model_t *model,
                                                   const bslam_camera_t *camera)
@@ -344,44 +336,12 @@ static bslam_status_t measure_one(const bslam_front_end_t *vision, const bslam_f
     return status;
 }
 
-/// What a candidate's score loses because it is smaller than its kind, to the pixel. For small kinds only: on
-/// walls hang many things that look like those and are smaller still, call points for signs say, and the
-/// detector's own boxes end at cells.
-static float smallness(const bslam_view_t *view, const bslam_beacon_class_t *kind,
-                       const bslam_candidate_t *candidate)
-{
-    const unsigned cut =
-        BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT | BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM;
-    if (!(kind->height_m > 0) || kind->height_m > SMALL_KIND_M || (candidate->marks & cut) != 0U) {
-        return 0.0f;
-    }
-    const float height_m = bslam_height_on_wall_m(view, &candidate->outline);
-    if (!(height_m > 0)) {
-        return 0.0f;
-    }
-    const float loss = SMALL_LOSS * (bslam_log(kind->height_m / height_m) - SMALL_FREE);
-    return bslam_clampf(loss, 0.0f, SMALL_LOSS_MAX);
-}
-
-/// Puts a candidate behind those that are at least as sure; returns how many there are then.
-static int32_t insert(bslam_candidate_t *candidates, int32_t count, const bslam_candidate_t *candidate)
-{
-    int32_t at = count;
-    for (; at > 0 && candidates[at - 1].score < candidate->score; at--) {
-        candidates[at] = candidates[at - 1];
-    }
-    candidates[at] = *candidate;
-    return count + 1;
-}
-
 /// Measures the candidates; one that has no outline is of no use. Through a wide lens a thing's sides are
 /// bent, and the box around the straight ones that measuring finds is too narrow: there the detector's stays.
 /// So it does where the outline is of something else. Not to be inlined: its candidates would be on the stack
 /// while proposals are judged.
-__attribute__((noinline)) static void measure(bslam_front_end_t *vision, const bslam_view_t *view,
-                                              float threshold)
+__attribute__((noinline)) static void measure(bslam_front_end_t *vision, const bslam_frame_t *frame)
 {
-    const bslam_frame_t *frame = view->frame;
     const bool is_wide = vision->cameras[vision->camera].lens == BSLAM_LENS_EQUIDISTANT;
     int32_t kept = 0;
     for (int32_t i = 0; i < vision->candidate_count; i++) {
@@ -392,14 +352,9 @@ __attribute__((noinline)) static void measure(bslam_front_end_t *vision, const b
             if (is_wide || !agrees) {
                 candidate.outline = found;
             }
-            const bslam_beacon_class_t *kind = &vision->model->classes[candidate.beacon_class - 1];
-            candidate.score -= smallness(view, kind, &candidate);
-            if (candidate.score >= threshold) {
-                candidate.range_noise_sd_m *= (bslam_real_t)bslam_distance_doubt(candidate.score);
-                candidate.outline =
-                    bslam_zoom_out_box(candidate.outline, vision->cameras[vision->camera].zoom);
-                kept = insert(vision->candidates, kept, &candidate);
-            }
+            candidate.outline = bslam_zoom_out_box(candidate.outline, vision->cameras[vision->camera].zoom);
+            vision->candidates[kept] = candidate;
+            kept++;
         }
     }
     vision->candidate_count = kept;
@@ -426,7 +381,7 @@ static void look(bslam_front_end_t *vision, const bslam_frame_t *frame, bool rob
     vision->candidate_count = bslam_detector_judge(
         detector, vision->model->classes, vision->model->class_count, &view, &vision->proposals,
         vision->opinions, vision->candidates, &vision->candidates_dropped);
-    measure(vision, &view, detector->threshold);
+    measure(vision, frame);
 }
 
 bslam_status_t bslam_front_end_end(bslam_front_end_t *vision, bool robot_moved)

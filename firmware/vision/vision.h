@@ -182,8 +182,8 @@ typedef struct bslam_candidate {
     bslam_real_t bearing_sd_rad;
     bslam_real_t range_m;  ///< horizontal distance from the camera; read only if has_range
     bslam_real_t range_sd_m;
-    bslam_real_t range_noise_sd_m;  ///< the part that is another one in each picture: more, the lower the
-                                    ///< score is of what a detector of built-in kinds found
+    bslam_real_t range_noise_sd_m;  ///< the part of it that is another one in each picture; the rest is the
+                                    ///< thing's
     bslam_real_t range_scale_sd;    ///< by what part all distances of the thing err alike
     bool has_bearing;
     bool has_range;

@@ -107,18 +107,6 @@ static float foot_m(const bslam_view_t *view, const rays_t *rays)
     return is_below ? (float)view->camera->z_m / -rays->bottom.slope : 25.0f;
 }
 
-float bslam_height_on_wall_m(const bslam_view_t *view, const bslam_box_t *box)
-{
-    const bslam_real_t u_px = (box->left_px + box->right_px) / 2;
-    const ray_t top = ray_at(view, u_px, box->top_px), bottom = ray_at(view, u_px, box->bottom_px);
-    const int32_t first = (int32_t)(box->left_px / BSLAM_CELL_PX);
-    const int32_t end = (int32_t)(box->right_px / BSLAM_CELL_PX) + 1;
-    float share;
-    return top.exists && bottom.exists
-               ? line_distance_m(view, first, end, &share) * (top.slope - bottom.slope)
-               : 0.0f;
-}
-
 /// Size and place in metres, by the floor line. 12 features.
 static float *place_features(const bslam_view_t *view, const bslam_proposal_t *p, const rays_t *rays,
                              float *x)

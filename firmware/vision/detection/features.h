@@ -17,10 +17,6 @@ enum {
 /// Natural logarithm to 0.01, of numbers from 1e-4 to 1e4; those outside count as the nearest inside.
 float bslam_log(float x);
 
-/// How high a box (px of the frame as it is looked at) is, in metres, if it hangs on the wall whose floor
-/// line is seen below it. 0: no floor line is seen there, or the lens sees no upright object.
-float bslam_height_on_wall_m(const bslam_view_t *view, const bslam_box_t *box);
-
 /// The features of a proposal, all finite; tools/training sees them in this order.
 void bslam_blob_features(const bslam_view_t *view, const bslam_proposal_t *proposal,
                          float features[BSLAM_BLOB_FEATURES]);

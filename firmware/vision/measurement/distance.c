@@ -1,7 +1,6 @@
 #include "vision/measurement/distance.h"
 
 #include "vision/measurement/body.h"
-#include "base/bounds.h"
 #include "base/scalar.h"
 
 // How well an edge is found where it is sure which edge (pixels), and how much of the outline's doubts about
@@ -14,17 +13,6 @@ static const bslam_real_t HORIZON_SD_PX = BSLAM_R(0.7);
 // A round thing's width may be off by this part, and contradict its height by so many standard deviations.
 static const bslam_real_t WIDTH_SD = BSLAM_R(0.04);
 static const bslam_real_t WIDTH_SDS = 2;
-// What the detector is less sure of is measured worse: so many times at a score of 0, so much less a unit of
-// it, between so many. Fitted to things in training worlds.
-static const float UNSURE = 1.6f;
-static const float UNSURE_BY_SCORE = 0.5f;
-static const float UNSURE_LEAST = 0.9f;
-static const float UNSURE_MOST = 1.7f;
-
-float bslam_distance_doubt(float score)
-{
-    return bslam_clampf(UNSURE - UNSURE_BY_SCORE * score, UNSURE_LEAST, UNSURE_MOST);
-}
 
 bslam_real_t bslam_camera_pixel(const bslam_outline_t *o, const bslam_camera_t *camera)
 {

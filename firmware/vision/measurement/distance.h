@@ -30,9 +30,6 @@ bslam_ahead_t bslam_ahead_of_body(const bslam_outline_t *outline, const bslam_ca
 bool bslam_width_agrees(const bslam_outline_t *outline, const bslam_camera_t *camera,
                         const bslam_size_t *size, const bslam_ahead_t *ahead);
 
-/// How many times its noise a distance is told with, by the detector's score of what is measured.
-float bslam_distance_doubt(float score);
-
 /// How wide the front is, meters.
 bslam_real_t bslam_front_width_m(const bslam_outline_t *outline, const bslam_ahead_t *ahead);
 

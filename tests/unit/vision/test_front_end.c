@@ -515,44 +515,6 @@ static void test_end_direction_of_what_is_cut_off_is_less_sure_where_the_kind_is
                 2 * chance * (double)(narrow.bearing_rad - wide.bearing_rad), 0.005);
 }
 
-/// The score of a square so many pixels high, 2.29 m away, taken for a thing so high; -1 if it is none.
-static float score_of(int side_px, float height_m)
-{
-    const bslam_beacon_class_t kind = {.name = "kind", .height_m = height_m};
-    const bslam_beacon_class_t kinds[UNIT_MODEL_CLASSES] = {kind, kind};
-    const bslam_camera_t camera = camera_at(0);
-    model.classes = kinds;
-    start_with(&camera);
-    paint_room();
-    paint(140, 60, 140 + side_px, 60 + side_px, 200, 30, 30);
-    assert_int_equal(show(0, true), BSLAM_OK);
-    const int32_t count = vision.candidate_count;
-    const bslam_candidate_t *found = vision.candidates;
-    for (int i = 1; i < count; i++) {
-        assert_true(found[i].score <= found[i - 1].score);
-    }
-    for (int i = 0; i < count; i++) {
-        if (found[i].outline.top_px > 59 && found[i].outline.top_px < 60) {
-            return found[i].score;
-        }
-    }
-    return -1;
-}
-
-/// Call points look like signs, and are a third as high.
-static void test_end_what_is_smaller_than_its_small_kind_is_less_sure(void **state)
-{
-    take_all(UNIT_MODEL_CLASSES);
-    const float unjudged = score_of(16, 0.51f);  // as wide and as high, of a kind that is not small
-    assert_true(unjudged >= 3);
-    assert_near(unjudged - score_of(16, 0.3f), 4 * (log(0.3 / (16 * 2.29 / 277.1)) - 0.5), 0.1);
-    assert_near(unjudged - score_of(16, 0.49f), 2, 1e-5);
-    assert_true(score_of(36, 0.51f) == score_of(36, 0.3f));
-    model.pinhole.threshold = unjudged - 1.0f;
-    assert_true(score_of(16, 0.51f) == unjudged);
-    assert_true(score_of(16, 0.49f) == -1);
-}
-
 /// Whether a candidate's outline is the box of a proposal, as the detector had it.
 static bool is_of_the_detector(const bslam_candidate_t *candidate)
 {
@@ -859,7 +821,6 @@ int main(void)
         TEST(test_end_candidate_becomes_its_second_kind_where_that_can_be_measured),
         TEST(test_end_direction_of_what_is_cut_off_is_less_sure_where_the_kind_is),
         TEST(test_end_distance_is_less_sure_where_the_kind_is),
-        TEST(test_end_what_is_smaller_than_its_small_kind_is_less_sure),
         TEST(test_end_outline_is_the_measured_one_but_through_a_wide_lens_the_detector_s),
         TEST(test_end_outline_of_something_else_is_not_taken),
         TEST(test_end_zoomed_camera_sees_what_a_doubled_picture_shows),

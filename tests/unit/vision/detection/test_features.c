@@ -51,20 +51,6 @@ static void test_features_sizes_are_metres_at_the_wall(void **state)
                 1e-3);
 }
 
-static void test_height_on_wall_is_by_the_floor_line_below_the_box(void **state)
-{
-    unit_made_view(&made, WALL_M);
-    const bslam_box_t inside = {BSLAM_R(141.5), BSLAM_R(81.5), BSLAM_R(177.5), BSLAM_R(109.5)};
-    assert_near(bslam_height_on_wall_m(&made.view, &inside), (double)WALL_M * 28 / (double)MADE_FOCAL_PX,
-                1e-3);
-    const bslam_box_t beyond = {BSLAM_R(-9.5), BSLAM_R(81.5), BSLAM_R(329.5), BSLAM_R(109.5)};
-    assert_true(bslam_height_on_wall_m(&made.view, &beyond) > 0);
-    for (int column = 0; column < MADE_COLUMNS; column++) {
-        made.floor_line.distance_m[column] = column < 35 || column > 44 ? real(WALL_M) : 0;
-    }
-    assert_true(bslam_height_on_wall_m(&made.view, &inside) == 0);
-}
-
 static void test_features_by_horizon_and_foot_need_no_floor_line(void **state)
 {
     const bslam_proposal_t proposal = box(35, 20, 45, 41);  // stands 0.5 * 280 / 44 = 3.18 m away
@@ -138,7 +124,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_features_logarithm_is_one_to_a_hundredth),
         cmocka_unit_test(test_features_sizes_are_metres_at_the_wall),
-        cmocka_unit_test(test_height_on_wall_is_by_the_floor_line_below_the_box),
         cmocka_unit_test(test_features_by_horizon_and_foot_need_no_floor_line),
         cmocka_unit_test(test_features_of_the_mirrored_picture_are_the_same),
         cmocka_unit_test(test_features_are_finite_without_anything_known),

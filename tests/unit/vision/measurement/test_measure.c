@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-#include "vision/measurement/distance.h"
 #include "vision/measurement/measure.h"
 #include "picture.h"
 
@@ -592,22 +591,9 @@ static void test_measure_refuses_bad_input_and_leaves_the_candidate(void **state
     assert_memory_equal(&candidate, &before, sizeof before);
 }
 
-static void test_distance_is_doubted_by_the_score_within_bounds(void **state)
-{
-    (void)state;
-    static const struct {
-        float score;
-        double times;
-    } cases[] = {{-1, 1.7}, {0, 1.6}, {0.5f, 1.35}, {1.4f, 0.9}, {9, 0.9}};
-    for (int i = 0; i < COUNT_OF(cases); i++) {
-        assert_near(bslam_distance_doubt(cases[i].score), cases[i].times, 1e-6);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_distance_is_doubted_by_the_score_within_bounds),
         cmocka_unit_test(test_measure_tells_direction_and_distance_of_a_known_object),
         cmocka_unit_test(test_measure_through_a_wide_turned_pitched_camera),
         cmocka_unit_test(test_measure_around_the_back_wraps_the_direction),
