@@ -3,7 +3,7 @@
 # protocol.
 
 library_files = $(sort $(foreach folder,$(1),$(wildcard $(addsuffix .$(2),firmware/$(folder)/* \
-    firmware/$(folder)/*/*))))
+    firmware/$(folder)/*/* firmware/$(folder)/*/*/*))))
 BASE_SOURCES := $(call library_files,base,c)
 LIBRARIES := bslam vision link
 LIBRARY_SOURCES_bslam := $(BASE_SOURCES) $(call library_files,bslam,c)
@@ -11,6 +11,8 @@ LIBRARY_SOURCES_vision := $(BASE_SOURCES) $(call library_files,vision,c)
 LIBRARY_SOURCES_link := $(BASE_SOURCES) $(call library_files,link,c)
 CORE_SOURCES := $(sort $(foreach library,$(LIBRARIES),$(LIBRARY_SOURCES_$(library))))
 CORE_HEADERS := $(call library_files,base bslam vision link,h)
+# Of sources $(1) those that a build with flags $(2) takes: without built-in kinds none of their folder.
+sources_for = $(filter-out $(if $(filter -DBSLAM_VISION_BUILT_IN=0,$(2)),firmware/vision/built_in/%),$(1))
 
 # The application on top of them, but for its main loop; and what it has on this computer.
 ROBOT_SOURCES := $(patsubst %,firmware/robot/%.c,robot health camera_input gyro_wait param_store \

@@ -56,7 +56,7 @@ SMALLER := -fno-tree-loop-distribute-patterns -fno-move-loop-invariants -fno-inl
 
 # The rules for one core: $(1) is its name.
 define core_rules
-CORE_OBJECTS_$(1) := $(CORE_SOURCES:%.c=build/$(1)/%.o)
+CORE_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(call sources_for,$(CORE_SOURCES),$(SIZES)))
 CORE_COMPILE_$(1) := $(call TOOLS_FOR,$(1))gcc $(C_STANDARD) $(C_INCLUDES) $(call FLAGS_FOR,$(1)) -Os -g \
     $(SMALLER) -fno-math-errno -DBSLAM_SETTING_MEANINGS=0 $(SIZES) \
     -ffunction-sections -fdata-sections \
@@ -72,7 +72,7 @@ library-$(1): $$(CORE_ARCHIVES_$(1))
 
 $$(CORE_ARCHIVES_$(1)): build/$(1)/lib%.a: $$(CORE_OBJECTS_$(1))
 	@rm -f $$@
-	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$(LIBRARY_SOURCES_$$*:%.c=build/$(1)/%.o)
+	@$(call TOOLS_FOR,$(1))ar rcs $$@ $$(filter $$(LIBRARY_SOURCES_$$*:%.c=build/$(1)/%.o),$$^)
 
 $$(CORE_OBJECTS_$(1)): build/$(1)/%.o: %.c mk/config.mk mk/firmware.mk
 	@mkdir -p $$(@D)

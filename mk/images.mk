@@ -37,7 +37,8 @@ BOARD_CC_$(1) := $(call TOOLS_FOR,$(BOARD_CORE_$(1)))gcc $(call FLAGS_FOR,$(BOAR
 BOARD_COMPILE_$(1) := $$(BOARD_CC_$(1)) $(C_STANDARD) $(C_INCLUDES) $(IMAGE_FLAGS) $(BOARD_FLAGS_$(1)) \
     $(C_WARNINGS) $(C_WARNINGS_FLOAT)
 BOARD_OBJECTS_$(1) := $(patsubst %.c,build/$(1)/%.o,$(ROBOT_SOURCES) $(BOARD_SOURCES_$(1)) \
-    $(sort $(foreach library,$(or $(BOARD_LIBRARIES_$(1)),$(LIBRARIES)),$(LIBRARY_SOURCES_$(library)))))
+    $(call sources_for,$(sort $(foreach library,$(or $(BOARD_LIBRARIES_$(1)),$(LIBRARIES)), \
+    $(LIBRARY_SOURCES_$(library)))),$(BOARD_FLAGS_$(1))))
 BOARD_ALL_$(1) := $(PROGRAMS) $(BOARD_PROGRAMS_$(1))
 BOARD_MK_$(1) := mk/config.mk mk/firmware.mk mk/images.mk firmware/port/$(1)/board.mk
 

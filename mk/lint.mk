@@ -1,8 +1,8 @@
 # Style, layers, namespaces and complexity. Every check reads; only `make format` writes.
 
 C_TEST_FILES := $(wildcard tools/bench/*.c tests/unit/*.[ch] tests/unit/*/*.[ch] tests/unit/*/*/*.[ch] \
-    tests/bench/*.[ch] tests/bench/peers/*.[ch] tests/bench/peers/*.cpp tests/fuzz/*.[ch] \
-    tests/sketches/*.c* tests/soak/*.[ch])
+    tests/unit/*/*/*/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch] tests/bench/peers/*.cpp \
+    tests/fuzz/*.[ch] tests/sketches/*.c* tests/soak/*.[ch])
 ROBOT_FILES := $(wildcard firmware/robot/*.[ch] firmware/robot/rtos/*.c firmware/bench/*.[ch] \
     firmware/port/*.[ch] firmware/port/*/*.[ch])
 CAMERA_SOURCES := $(wildcard host_sim/bslam/world/camera/*.c)

@@ -1,7 +1,7 @@
 # C unit tests: tests/unit/<path>/test_<module>.c mirrors firmware/<path>/<module>.c. Each is a CMocka program
 # linked with its own library and no other, built under sanitizers twice: float (the target) and double.
 
-UNIT_SOURCES := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
+UNIT_SOURCES := $(sort $(wildcard $(addsuffix /test_*.c,tests/unit/* tests/unit/*/* tests/unit/*/*/*)))
 # The library of a test, by its first folder; what a test of all of them links.
 UNIT_LIBRARY_base := bslam
 UNIT_LIBRARY_port := bslam

@@ -45,7 +45,7 @@
 #endif
 
 /// 1: the built-in kinds of beacons can be found, and turns between pictures. 0: only a user's own
-/// (bslam_vision_init_scanner), in less flash and RAM: docs/SIZES.md, Images.
+/// (bslam_vision_init_scanner), in less flash and RAM: docs/SIZES.md, Images. Leave vision/built_in out then.
 #ifndef BSLAM_VISION_BUILT_IN
 #define BSLAM_VISION_BUILT_IN 1
 #endif

@@ -2,10 +2,12 @@
 #ifndef BSLAM_VISION_INSTANCE_H
 #define BSLAM_VISION_INSTANCE_H
 
-#include "vision/front_end.h"
 #include "vision/scan/rig_scanner.h"
+#if BSLAM_VISION_BUILT_IN
+#include "vision/built_in/front_end.h"
+#endif
 #if BSLAM_VISION_TURNS
-#include "vision/gyro/frame_rotation.h"
+#include "vision/built_in/gyro/frame_rotation.h"
 #endif
 
 typedef struct bslam_vision_instance {
@@ -31,22 +33,6 @@ static inline const bslam_vision_instance_t *bslam_const_vision_instance(const b
 {
     const void *memory = vision;
     return memory;
-}
-
-/// Whether a scanner looks. Constant where there is nothing else, so that nothing else is linked.
-static inline bool bslam_vision_scans(const bslam_vision_instance_t *instance)
-{
-    return !BSLAM_VISION_BUILT_IN || instance->scans;
-}
-
-static inline bslam_front_end_t *bslam_vision_front_end(bslam_vision_instance_t *instance)
-{
-#if BSLAM_VISION_BUILT_IN
-    return &instance->front_end;
-#else
-    (void)instance;
-    return NULL;
-#endif
 }
 
 #endif

@@ -2,8 +2,8 @@
 #ifndef BSLAM_VISION_INTERNAL_H
 #define BSLAM_VISION_INTERNAL_H
 
-#include "vision/classifiers/beacon_model.h"
-#include "vision/gyro/visual_gyro.h"
+#include "vision/built_in/classifiers/beacon_model.h"
+#include "vision/built_in/gyro/visual_gyro.h"
 #include "vision/instance.h"
 #include "vision/scan/scanner.h"
 

@@ -6,14 +6,15 @@
 #include "vision/instance.h"
 
 _Static_assert(sizeof(bslam_candidate_t) <= BSLAM_VISION_SIZE_CANDIDATE, "size.h: a candidate");
-_Static_assert(sizeof(bslam_run_t) * BSLAM_RUNS_MAX <= BSLAM_VISION_SIZE_RUNS, "size.h: runs of cells");
-_Static_assert(sizeof(bslam_thumbnail_t) <= BSLAM_VISION_SIZE_THUMBNAIL, "size.h: the picture");
-_Static_assert(sizeof(bslam_proposals_t) <= BSLAM_VISION_SIZE_PROPOSALS, "size.h: boxes");
-_Static_assert(sizeof(bslam_front_end_t) <= BSLAM_VISION_SIZE_FRONT_END, "size.h: the front end");
 _Static_assert(sizeof(bslam_rig_scanner_t) <= BSLAM_VISION_SIZE_RIG_SCANNER, "size.h: the scanner of a rig");
 _Static_assert(sizeof(bslam_vision_instance_t) <= sizeof(bslam_vision_t), "size.h: the sum");
 
 #if BSLAM_VISION_BUILT_IN
+_Static_assert(sizeof(bslam_run_t) * BSLAM_RUNS_MAX <= BSLAM_VISION_SIZE_RUNS, "size.h: runs of cells");
+_Static_assert(sizeof(bslam_thumbnail_t) <= BSLAM_VISION_SIZE_THUMBNAIL, "size.h: the picture");
+_Static_assert(sizeof(bslam_proposals_t) <= BSLAM_VISION_SIZE_PROPOSALS, "size.h: boxes");
+_Static_assert(sizeof(bslam_front_end_t) <= BSLAM_VISION_SIZE_FRONT_END, "size.h: the front end");
+
 bslam_status_t bslam_vision_init_sized(bslam_vision_t *vision, size_t vision_bytes, uint32_t sizes_hash,
                                        const bslam_beacon_model_t *model, const bslam_camera_t *cameras,
                                        int32_t camera_count)
@@ -52,31 +53,46 @@ bslam_status_t bslam_vision_begin(bslam_vision_t *vision, int32_t camera, bslam_
                                   int32_t width_px, int32_t height_px)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return bslam_vision_scans(instance)
-               ? bslam_rig_scanner_begin(&instance->scanner, camera, format, width_px, height_px)
-               : bslam_front_end_begin(bslam_vision_front_end(instance), camera, format, width_px, height_px);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        return bslam_front_end_begin(&instance->front_end, camera, format, width_px, height_px);
+    }
+#endif
+    return bslam_rig_scanner_begin(&instance->scanner, camera, format, width_px, height_px);
 }
 
 bslam_status_t bslam_vision_row(bslam_vision_t *vision, const void *pixels)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return bslam_vision_scans(instance) ? bslam_rig_scanner_row(&instance->scanner, pixels)
-                                        : bslam_front_end_row(bslam_vision_front_end(instance), pixels);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        return bslam_front_end_row(&instance->front_end, pixels);
+    }
+#endif
+    return bslam_rig_scanner_row(&instance->scanner, pixels);
 }
 
 bslam_status_t bslam_vision_end(bslam_vision_t *vision, bool robot_moved)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return bslam_vision_scans(instance) ? bslam_rig_scanner_end(&instance->scanner)
-                                        : bslam_front_end_end(bslam_vision_front_end(instance), robot_moved);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        return bslam_front_end_end(&instance->front_end, robot_moved);
+    }
+#endif
+    (void)robot_moved;  // a scanner remembers nothing
+    return bslam_rig_scanner_end(&instance->scanner);
 }
 
 bslam_status_t bslam_vision_point(bslam_vision_t *vision, int32_t camera, bslam_real_t yaw_rad)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return bslam_vision_scans(instance)
-               ? bslam_rig_scanner_point(&instance->scanner, camera, yaw_rad)
-               : bslam_front_end_point(bslam_vision_front_end(instance), camera, yaw_rad);
+#if BSLAM_VISION_BUILT_IN
+    if (!instance->scans) {
+        return bslam_front_end_point(&instance->front_end, camera, yaw_rad);
+    }
+#endif
+    return bslam_rig_scanner_point(&instance->scanner, camera, yaw_rad);
 }
 
 // ---- what is seen -----------------------------------------------------------------------------------------
@@ -155,13 +171,13 @@ bslam_vision_counters_t bslam_vision_counters(const bslam_vision_t *vision)
 bool bslam_vision_turn(bslam_vision_t *vision, bslam_turn_t *turn)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    return !bslam_vision_scans(instance) && bslam_turns_see(&instance->turns, &instance->front_end, turn);
+    return !instance->scans && bslam_turns_see(&instance->turns, &instance->front_end, turn);
 }
 
 void bslam_vision_forget_turns(bslam_vision_t *vision)
 {
     bslam_vision_instance_t *instance = bslam_vision_instance(vision);
-    if (!bslam_vision_scans(instance)) {
+    if (!instance->scans) {
         bslam_turns_init(&instance->turns, &instance->front_end);
     }
 }

@@ -341,6 +341,7 @@ typedef union bslam_visual_gyro {
     bslam_real_t alignment_of_numbers;
 } bslam_visual_gyro_t;
 
+#if BSLAM_VISION_BUILT_IN
 /// Nothing known yet. least_sd_radps: what a rate errs by where all goes well, above 0. BSLAM_E_SIZE: as
 /// bslam_vision_init.
 #define bslam_visual_gyro_init(gyro, least_sd_radps) \
@@ -371,6 +372,7 @@ BSLAM_MUST_CHECK bslam_status_t bslam_visual_gyro_take(bslam_visual_gyro_t *gyro
 /// know the rate to about 0.4 rad/s. It may be asked after each picture of a step; the last answer counts as
 /// reported.
 bool bslam_visual_gyro_rate(bslam_visual_gyro_t *gyro, bslam_real_t *rate_radps, bslam_real_t *sd_radps);
+#endif
 
 #ifdef __cplusplus
 }

@@ -45,7 +45,7 @@ SIGHTING_NUMBERS = ("bearing_sd_rad", "range_sd_m", "range_scale_sd", "score")
 CLASS = "beacon_class"
 """Column of sightings that a detector may leave out: the kind of beacon."""
 SIGNATURE_SIZE = 71
-"""Values of a signature: how a sighting looks (firmware/vision/measurement/signature.h)."""
+"""Values of a signature: how a sighting looks (firmware/vision/built_in/measurement/signature.h)."""
 SIGNATURES = "signatures.npy"
 """The file of a log folder that holds them, one a row of sightings.csv."""
 SEEDS = "seeds.npy"

@@ -23,7 +23,7 @@ SIZE_MAX_M = 10.0
 
 
 def weights_in_row(features: int, quadratic: bool) -> int:
-    """As BSLAM_SVM_WEIGHTS in firmware/vision/classifiers/svm.h."""
+    """As BSLAM_SVM_WEIGHTS in firmware/vision/built_in/classifiers/svm.h."""
     return features + (features * (features + 1) // 2 if quadratic else 0)
 
 

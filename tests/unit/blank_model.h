@@ -2,7 +2,7 @@
 #ifndef UNIT_BLANK_MODEL_H
 #define UNIT_BLANK_MODEL_H
 
-#include "vision/classifiers/beacon_model.h"
+#include "vision/built_in/classifiers/beacon_model.h"
 
 #define UNIT_MODEL_CLASSES 2
 

@@ -2,7 +2,7 @@
 #ifndef UNIT_MADE_VIEW_H
 #define UNIT_MADE_VIEW_H
 
-#include "vision/detection/features.h"
+#include "vision/built_in/detection/features.h"
 #include "base/scalar.h"
 
 enum {

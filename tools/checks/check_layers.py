@@ -29,7 +29,10 @@ VISION = frozenset(
     {"base", "vision/config.h", "vision/frame.h", "vision/model.h", "vision/size.h", "vision/vision.h"}
 )
 PIXELS = VISION | {"vision/camera", "vision/pixels"}
-DETECTION = PIXELS | {"vision/classifiers", "vision/detection"}
+# The chain for built-in kinds, which not every build has: the scanner and what it stands on do without it.
+BUILT_IN = PIXELS | {"vision/built_in/pixels"}
+DETECTION = BUILT_IN | {"vision/built_in/classifiers", "vision/built_in/detection"}
+MEASURED = DETECTION | {"vision/built_in/measurement"}
 C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "base": frozenset(),
     "bslam": SLAM | {"bslam/recovery", "bslam/store"},
@@ -42,14 +45,16 @@ C_MAY_INCLUDE: dict[str, frozenset[str]] = {
     "bslam/slam": SLAM,
     "bslam/store": SLAM,
     "bslam/recovery": SLAM,
-    "vision": DETECTION | {"vision/measurement", "vision/gyro", "vision/scan"},
+    "vision": MEASURED | {"vision/built_in", "vision/built_in/gyro", "vision/scan"},
     "vision/camera": VISION,
     "vision/pixels": PIXELS,
-    "vision/classifiers": PIXELS,
-    "vision/detection": DETECTION,
-    "vision/measurement": PIXELS,
     "vision/scan": PIXELS,
-    "vision/gyro": DETECTION | {"vision/measurement", "vision/front_end.h"},
+    "vision/built_in": MEASURED,
+    "vision/built_in/pixels": BUILT_IN,
+    "vision/built_in/classifiers": PIXELS,
+    "vision/built_in/detection": DETECTION,
+    "vision/built_in/measurement": PIXELS,
+    "vision/built_in/gyro": MEASURED | {"vision/built_in"},
     "link": frozenset({"base"}),
     "models": frozenset({"bslam/bslam.h", "vision/vision.h"}),
     "port": frozenset({"base", "bslam/bslam.h", "vision/vision.h"}),

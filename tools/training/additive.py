@@ -1,4 +1,4 @@
-"""Additive machines (firmware/vision/classifiers/additive.h): their expansion into tents, fit, bytes.
+"""Additive machines (firmware/vision/built_in/classifiers/additive.h): expansion into tents, fit, bytes.
 
 The objective is that of scikit-learn's LinearSVC(dual=False) on the scaled expansion: |w|²/2 + C x the sum of
 squared hinge losses, the bias among the weights.

@@ -20,7 +20,7 @@ FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 TOLERANCE = 1e-5
 """Largest difference allowed, as a share of 1 + sum |w_k phi_k(x)|: float32 decides, double trained."""
 
-_SHIM = """#include "vision/classifiers/svm.h"
+_SHIM = """#include "vision/built_in/classifiers/svm.h"
 #include "{header}"
 int check(int features);
 int rows(void);
@@ -49,7 +49,7 @@ def compile_library(folder: Path, source: str) -> ctypes.CDLL:
     flags = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
     flags += ["-Wno-unused-const-variable"]  # a header holds more than one machine
     command = [os.environ.get("CC", "cc"), *flags, f"-I{FIRMWARE}", f"-I{folder}", "-shared", "-fPIC"]
-    command += [str(file), str(FIRMWARE / "vision/classifiers/svm.c"), "-o", str(library), "-lm"]
+    command += [str(file), str(FIRMWARE / "vision/built_in/classifiers/svm.c"), "-o", str(library), "-lm"]
     subprocess.run(command, check=True, capture_output=True, text=True)
     return ctypes.CDLL(str(library))
 

@@ -1,9 +1,9 @@
 """Linear and quadratic support vector machines fitted by scikit-learn, in the form that the C core takes.
 
 A quadratic machine is a linear one on the features and their products in pairs (`expand`, in the order of
-firmware/vision/classifiers/svm.h). Features are standardised for the fit; offset and scale are folded into
-the weights, so the C core needs neither. Quadratic weights that shall become bytes want features of about
-unit range to begin with: one byte scale serves a row.
+firmware/vision/built_in/classifiers/svm.h). Features are standardised for the fit; offset and scale are
+folded into the weights, so the C core needs neither. Quadratic weights that shall become bytes want features
+of about unit range to begin with: one byte scale serves a row.
 """
 
 from __future__ import annotations

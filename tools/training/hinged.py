@@ -1,4 +1,4 @@
-"""Hinged machines (firmware/vision/classifiers/hinged.h): their expansion, their fit, their bytes.
+"""Hinged machines (firmware/vision/built_in/classifiers/hinged.h): their expansion, their fit, their bytes.
 
 The objective is that of scikit-learn's LinearSVC(dual=False) on the scaled expansion: |w|²/2 + C x the sum of
 squared hinge losses, the bias among the weights.

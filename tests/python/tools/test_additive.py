@@ -80,7 +80,7 @@ def test_compiled_header_decides_as_python(machine: AdditiveSvm, tmp_path: Path)
     library = compile_library(
         tmp_path,
         """#include "machine.h"
-#include "vision/classifiers/additive.c"
+#include "vision/built_in/classifiers/additive.c"
 void decide(const float *x, float *values);
 void decide(const float *x, float *values)
 {

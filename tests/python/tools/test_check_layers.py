@@ -17,7 +17,8 @@ def write(root: Path, path: str, text: str) -> None:
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A small repository in which every layer is respected."""
-    for layer in ("base", "bslam/linalg", "bslam/model", "bslam/ekf", "bslam/slam", "link", "vision"):
+    estimator = ("bslam/linalg", "bslam/model", "bslam/ekf", "bslam/slam")
+    for layer in ("base", *estimator, "link", "vision", "vision/built_in"):
         name = layer.split("/")[-1]
         write(tmp_path, f"firmware/{layer}/{name}.h", "#include <stdint.h>\n")
     write(tmp_path, "firmware/bslam/bslam.h", '#include "base/base.h"\n')
@@ -55,6 +56,8 @@ def findings(root: Path, capsys: pytest.CaptureFixture[str], *options: str) -> l
         ("bslam/slam/whole.c", '#include "bslam/instance.h"', "bslam/slam may not include bslam/instance.h"),
         ("bslam/vision.c", '#include "vision/vision.h"', "bslam may not include vision/vision.h"),
         ("vision/map.c", '#include "bslam/bslam.h"', "vision may not include bslam/bslam.h"),
+        ("vision/scan/a.c", '#include "vision/built_in/built_in.h"', "vision/scan may not include"),
+        ("vision/camera/a.c", '#include "vision/built_in/built_in.h"', "vision/camera may not include"),
         ("robot/inside.c", '#include "bslam/ekf/ekf.h"', "robot may not include bslam/ekf/ekf.h"),
         ("port/board/up.c", '#include "bslam/instance.h"', "port may not include bslam/instance.h"),
         ("bslam/model/short.c", '#include "model.h"', "is not a full path"),

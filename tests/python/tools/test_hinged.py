@@ -70,7 +70,7 @@ def test_compiled_header_decides_as_python(machine: HingedSvm, tmp_path: Path) -
     (tmp_path / "machine.h").write_text(header.text(), encoding="utf-8")
     library = compile_library(
         tmp_path,
-        '#include "machine.h"\n#include "vision/classifiers/hinged.c"\n'
+        '#include "machine.h"\n#include "vision/built_in/classifiers/hinged.c"\n'
         "void decide(const uint8_t *x, float *values);\n"
         "void decide(const uint8_t *x, float *values) { bslam_hinged_decide(&machine, x, values); }\n",
     )

@@ -153,7 +153,7 @@ def _header(task: Task, *, small: bool) -> list[str]:
     svm = fit.fit(x, fit.one_vs_rest(labels, len(task.sets)), COST).svm
     header = export.Header("MACHINE_H", ["vision/vision.h"], {})
     header.constant("bslam_svm_t", "machine", header.svm("table", fit.quantised(svm) if small else svm))
-    core = str(ROOT / "firmware/vision/classifiers/svm.c")
+    core = str(ROOT / "firmware/vision/built_in/classifiers/svm.c")
     return [*_compiled_in(header.text()), core, f"-I{ROOT / 'firmware'}"]
 
 
