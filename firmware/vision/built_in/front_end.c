@@ -6,6 +6,7 @@
 
 #include "base/bounds.h"
 #include "vision/pixels/bytes.h"
+#include "base/logarithm.h"
 #include "base/trig.h"
 #include "vision/camera/zoom.h"
 #include "vision/built_in/detection/features.h"

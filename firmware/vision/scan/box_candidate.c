@@ -1,6 +1,6 @@
 #include "vision/scan/box_candidate.h"
 
-#include "base/bounds.h"
+#include "base/logarithm.h"
 #include "base/scalar.h"
 #include "base/trig.h"
 #include "vision/camera/lens.h"
@@ -11,8 +11,6 @@ static const bslam_real_t PIXEL_SD = BSLAM_R(0.5);
 static const float SHARED = 0.5f;
 /// Standard deviation of the middle and of the height of a box that is round a part of a thing, of itself.
 static const bslam_real_t MISSED_SD = BSLAM_R(0.3);
-static const float ODDS_MAX = 20;
-enum { SQUARES = 10 };
 enum {
     CUT_BESIDE = BSLAM_MARK_CUT_LEFT | BSLAM_MARK_CUT_RIGHT,
     CUT_ABOVE = BSLAM_MARK_CUT_TOP | BSLAM_MARK_CUT_BOTTOM
@@ -53,11 +51,9 @@ static bslam_real_t width_rad(const sides_t *sides)
 /// Standard deviation of a part of a box that has `sd` where the box is right, and is right by its odds.
 static bslam_real_t doubted(float sd, float log_odds)
 {
-    float odds = 1.0f + bslam_clampf(log_odds, -ODDS_MAX, ODDS_MAX) / (1 << SQUARES);
-    for (int32_t i = 0; i < SQUARES; i++) {
-        odds *= odds;  // exp, the same bits everywhere
-    }
-    return hypotenuse((bslam_real_t)sd, MISSED_SD * bslam_sqrt(1 / (1 + (bslam_real_t)odds)));
+    const float rarer = bslam_falling(log_odds > 0 ? log_odds : -log_odds);
+    const float wrong = (log_odds > 0 ? rarer : 1.0f) / (1.0f + rarer);
+    return hypotenuse((bslam_real_t)sd, MISSED_SD * bslam_sqrt((bslam_real_t)wrong));
 }
 
 static void measure_bearing(const bslam_scan_kind_t *kind, const sides_t *sides, bslam_candidate_t *candidate)

@@ -3,13 +3,14 @@
 #include <math.h>
 
 #include "picture.h"
+#include "base/logarithm.h"
 #include "vision/scan/box_candidate.h"
 
 static const bslam_scan_kind_t post = {
     .name = "post", .height_m = 0.5f, .slope = 1, .middle_sd = 0.05f, .height_sd = 0.04f};
 
-/// What a box at logarithmic odds of 3 adds to its noise: it is wrong, by 0.3 of itself, one time in 21.
-#define MISSED (0.3 * sqrt(1 / (1 + exp(3))))
+/// What a box at logarithmic odds of 3 adds to its noise: it is wrong, by 0.3 of itself, one time in 17.
+#define MISSED (0.3 * sqrt(1 / (1 + 1 / (double)bslam_falling(3))))
 
 /// What is 0.5 m high, its middle as high as the camera, 2 m ahead and 1 m to the right.
 static bslam_detection_t seen_by(const bslam_camera_t *camera)
@@ -70,7 +71,7 @@ static void test_doubtful_box_is_noisier_in_both(void **state)
     (void)state;
     const bslam_camera_t camera = unit_pinhole();
     bslam_detection_t found = seen_by(&camera);
-    found.log_odds = 40;
+    found.log_odds = 1e6f;
     const bslam_candidate_t sure = bslam_box_candidate(&post, &camera, &found);
     found.log_odds = 0;
     const bslam_candidate_t doubtful = bslam_box_candidate(&post, &camera, &found);
