@@ -62,13 +62,15 @@ $(CAMERA_STAMP): $(CAMERA_DIR)/build.py $(wildcard $(CAMERA_DIR)/*.[ch]) $(VENV)
 RUN_LOG := MRCLAM_Dataset6
 RUN_DATA := $(or $(BSLAM_DATA),$(wildcard ../shared/data))
 
-.PHONY: run
 OWN_THINGS := firmware/models/own_room.json
+
+.PHONY: run
 run: setup-run ## the main job: the paper's room, by sightings and by images, then a real log if at hand
 	$(BSLAM) run paper_room --seeds 0:1 --out out/run
 	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --out out/run_camera
 	$(BSLAM) detect run paper_room --model $(OWN_THINGS) --out out/run_own_things
-	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --model $(OWN_THINGS) --sigma 0.05 --out out/run_own_things
+	$(BSLAM) run paper_room --seeds 0:1 --sensor camera --model $(OWN_THINGS) --sigma 0.05 \
+	    --out out/run_own_things
 ifneq ($(wildcard $(RUN_DATA)/mrclam/$(RUN_LOG)),)
 	$(BSLAM) replay mrclam $(RUN_LOG) --robot 3 --out out/replay
 else

@@ -1,5 +1,5 @@
 /// What the vision front end costs on this board, in ticks of port_ticks for each frame: one line each,
-/// "frame number ticks candidates"; then a scanner's of three kinds: "rows number ticks candidates" while
+/// "frame number ticks candidates"; then a scanner's of five kinds: "rows number ticks candidates" while
 /// they come in, "scan number ticks candidates" for the rest. sizes_doc.py puts the pictures at PICTURES: the
 /// camera's lens (0 pinhole, 1 equidistant), how many frames, and the frames, 320x240 in RGB565.
 #include "bench/text.h"

@@ -41,7 +41,7 @@ VISION_FUNCTIONS = ("bslam_vision_row", "bslam_vision_end")
 VISION_PARTS = {
     "frame": "built-in kinds",
     "rows": "a scanner's channels, as rows come",
-    "scan": "a scanner's windows: three kinds",
+    "scan": "a scanner's windows: five kinds",
 }
 """What firmware/bench/cost_vision.c prints, and what it is."""
 PARTS = {
