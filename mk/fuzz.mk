@@ -2,7 +2,7 @@
 # (tests/fuzz/sizes.h). clang's libFuzzer makes inputs up (`make fuzz`); `make test` replays those that are
 # kept in tests/fuzz/corpus/<target>.bin, compiled with the compiler of the other tests.
 
-FUZZ_TARGETS := link map model image api drive session
+FUZZ_TARGETS := link map model scanner image api drive session
 FUZZ_HELPERS := tests/fuzz/input.c tests/fuzz/fuzz.c tests/fuzz/picture.c tests/soak/definite.c
 FUZZ_ROBOT := $(ROBOT_SOURCES)
 FUZZ_LIBRARY := $(CORE_SOURCES) $(FUZZ_ROBOT) $(FUZZ_HELPERS)

@@ -36,9 +36,18 @@ BUILT_OF = PROGRAMS / "sources"
 CORPUS = ROOT / "tests/fuzz/corpus"
 LEDGER = ROOT / "tests/fuzz/ledger.csv"
 OUT = ROOT / "out/fuzz"
-TARGETS = ("link", "map", "model", "image", "api", "drive", "session")
+TARGETS = ("link", "map", "model", "scanner", "image", "api", "drive", "session")
 # What input a target makes the most of; the longer, the slower.
-LENGTHS = {"link": 20, "map": 64, "model": 48, "image": 64, "api": 96, "drive": 14, "session": 160}
+LENGTHS = {
+    "link": 20,
+    "map": 64,
+    "model": 48,
+    "scanner": 48,
+    "image": 64,
+    "api": 96,
+    "drive": 14,
+    "session": 160,
+}
 GOAL_EACH = 1_000_000
 GOAL_ALL = 200_000_000
 # So many of these are needed for the sum; the link's parser is the fastest by far.

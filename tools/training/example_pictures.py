@@ -3,7 +3,7 @@
 Writes --count pictures and labels.csv, for `bslam detect`, into FOLDER. Every beacon that is whole and well
 seen has a box with the name of its kind. The room is --world's, or that of a drive of a --scenario: then a
 robot can drive by what was trained. Another --seed takes other pictures of that room.
-`.venv/bin/python -m tools.training.example_pictures FOLDER [--world 1] [--count 20] [--seed 0]`
+`.venv/bin/python -m tools.training.example_pictures FOLDER [--scenario NAME] [--world 1] [--count 20]`
 """
 
 import argparse

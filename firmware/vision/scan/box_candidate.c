@@ -87,13 +87,14 @@ static void measure_range(const bslam_scan_kind_t *kind, const sides_t *sides, b
     if (candidate->has_range) {
         const bslam_real_t pixel = PIXEL_SD / (box->bottom_px - box->top_px);
         const bslam_real_t noise = hypotenuse(doubted(kind->height_sd, candidate->score), pixel);
-        candidate->range_m = kind->height_m / steeper;
-        if ((candidate->marks & CUT_BESIDE) == 0) {
-            candidate->range_m += nearer_end_m(kind, sides, candidate->range_m);
-        }
-        candidate->range_noise_sd_m = candidate->range_m * noise;
+        const bslam_real_t near_m = kind->height_m / steeper;
+        const bslam_real_t more_m =
+            (candidate->marks & CUT_BESIDE) == 0 ? nearer_end_m(kind, sides, near_m) : 0;
+        candidate->range_m = near_m + more_m;
+        candidate->range_noise_sd_m = hypotenuse(candidate->range_m * noise, more_m / 2);
         candidate->range_scale_sd = SHARED * kind->height_sd;
-        candidate->range_sd_m = candidate->range_m * hypotenuse(noise, candidate->range_scale_sd);
+        candidate->range_sd_m =
+            hypotenuse(candidate->range_noise_sd_m, candidate->range_m * candidate->range_scale_sd);
     }
 }
 

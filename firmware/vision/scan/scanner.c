@@ -15,8 +15,9 @@ enum { SIDE_MIN = 32, WIDTH_STEP = 8, EDGES = 4, BLOCK = 2 };
 enum { BIAS_MAX = 1 << 30 };
 /// Of a scale, a slope, an offset: so that scores and odds are numbers.
 static const float NUMBER_MAX = 1e6f;
-/// Boxes of one kind that overlap as much, of both together, are one thing's.
+/// Boxes that overlap as much, of both together, are one thing's.
 static const float OVERLAP_MAX = 0.4f;
+/// Of two boxes of a kind that have so much of the smaller one in common, one is of a part.
 static const float PART_MAX = 0.65f;
 /// A window's score differs from that of the next by hardly more.
 static const float FAR_BELOW = 2;

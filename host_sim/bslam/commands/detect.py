@@ -22,12 +22,12 @@ from bslam.detect.boxes import curve, overlaps
 from bslam.detect.examples import Example, read_collection
 from bslam.detect.imports import import_labels
 from bslam.detect.page import Figures, page
-from bslam.detect.train import HIT, Trained, find, train, with_threshold
+from bslam.detect.train import HIT, Trained, alone, find, train
 from bslam.errors import BslamError
 from bslam.rig import load_rig
 from bslam.runs.output import write_atomically
 from bslam.runs.shots import VIDEOS, simulated, video
-from bslam.scannerfile import LOWEST, ScannerModel, read_scanner, scanner_text
+from bslam.scannerfile import ScannerModel, read_scanner, scanner_text
 from bslam.view.frames import RIGHT, UNKNOWN, WRONG, Mark, annotate, contact_sheet, png
 from bslam.world.simulate import load_scenario
 
@@ -173,10 +173,9 @@ def _test(arguments: argparse.Namespace) -> int:
             f"{arguments.sources[0]}: labels {', '.join(collection.kinds)}; the model finds "
             f"{', '.join(kinds)}; allowed: pictures with labels of its classes"
         )
-    scanner = Scanner(with_threshold(model, LOWEST))
-    found = [find(scanner, one, kinds) for one in collection.examples]
-    for kind in model.kinds:
-        its = [one[kind.name] for one in found]
+    for index, kind in enumerate(model.kinds):
+        scanner = alone(model, index)
+        its = [find(scanner, one, kind.name) for one in collection.examples]
         without = curve([one for one in its if not len(one.labelled)], HIT)
         print(Figures(kind, curve(its, _LOOSE), curve(its, HIT), without).words())
     missing = sorted(set(collection.kinds) - set(kinds))
@@ -211,19 +210,21 @@ class _Look:
 def _run(arguments: argparse.Namespace) -> int:
     model = _model(arguments)
     out = arguments.out or Path("out") / "detect"
-    scanner = Scanner(with_threshold(model, LOWEST) if arguments.all else model)
+    scanners = [alone(model, i) for i in range(len(model.kinds))] if arguments.all else [Scanner(model)]
     rows: list[Sequence[object]] = []
     pictures, right, wrong = [], 0, 0
     for look in _looks(arguments):
-        seen = scanner.see(look.rgb)
-        marks = [_mark(one, look) for one in seen.items]
+        views = [scanner.see(look.rgb) for scanner in scanners]
+        items = [one for view in views for one in view.items]
+        dropped = sum(view.dropped for view in views)
+        marks = [_mark(one, look) for one in items]
         right += sum(one.colour == RIGHT for one in marks)
         wrong += sum(one.colour == WRONG for one in marks)
-        rows += [(look.name, one.kind, f"{one.score:.4f}", *_in_picture(one, look)) for one in seen.items]
-        why = "" if seen.reason == "nothing" else f": {seen.reason}"
-        what = f"{len(seen.items)} found" if seen.items else f"nothing found{why}"
-        if seen.dropped:
-            what += f", {seen.dropped} weaker boxes dropped"
+        rows += [(look.name, one.kind, f"{one.score:.4f}", *_in_picture(one, look)) for one in items]
+        why = "" if views[0].reason == "nothing" else f": {views[0].reason}"
+        what = f"{len(items)} found" if items else f"nothing found{why}"
+        if dropped:
+            what += f", {dropped} weaker boxes dropped"
         print(f"{look.name}: {what}")
         pictures.append(annotate(look.rgb, marks, f"{look.name}: {what}"))
     table = io.StringIO()

@@ -16,6 +16,7 @@ from bslam.detect.boxes import Curve, Found, curve, overlaps
 from bslam.detect.examples import Collection, Example
 from bslam.detect.fit import fit_windows, look_at
 from bslam.errors import BslamError
+from bslam.modelfile import SIZE_MAX_M
 from bslam.scannerfile import KINDS_MAX, LOWEST, WINDOWS_MAX, Kind, ScannerModel, Window
 
 FOLDS: Final = 4
@@ -111,7 +112,7 @@ def train(collection: Collection, false_a_picture: float, seed: int = 0) -> Iter
             f"{count} windows; allowed: {WINDOWS_MAX}, so fewer classes, or boxes of fewer shapes"
         )
     left = _look_at_left(collection, parts, windows)
-    kinds = tuple(_kind(name, collection.heights_m[name], left, false_a_picture) for name in names)
+    kinds = tuple(_kind(name, collection, left, false_a_picture) for name in names)
     yield Trained(ScannerModel(kinds, tuple(windows[None])), left)
 
 
@@ -119,53 +120,57 @@ def _fit_one(name: str, kind: int, examples: Sequence[Example], seed: int) -> li
     return fit_windows(kind, name, look_at(examples), np.random.default_rng([seed, kind]))
 
 
-def lowest_kind(name: str) -> Kind:
-    """A kind that reports all that is kept."""
-    return Kind(name, 0.0, 0.0, LOWEST, 1.0, 0.0, 1.0, 1.0)
+def alone(model: ScannerModel, kind: int) -> Scanner:
+    """A scanner of one of its kinds that reports all that is kept. Other kinds, below their thresholds, would
+    hide what it finds.
+    """
+    windows = tuple(replace(one, kind=0) for one in model.windows if one.kind == kind)
+    return Scanner(ScannerModel((replace(model.kinds[kind], threshold=LOWEST),), windows))
 
 
 def _look_at_left(
     collection: Collection, parts: Sequence[int], windows: Mapping[int | None, Sequence[Window]]
 ) -> Left:
     found: dict[str, list[Found]] = {kind: [] for kind in collection.kinds}
+    kinds = tuple(Kind(name, 0.0, 0.0, LOWEST, 1.0, 0.0, 1.0, 1.0) for name in collection.kinds)
     for part, (index, kind) in product(range(FOLDS), enumerate(collection.kinds)):
-        # Each kind by itself: below their thresholds, others would hide what it finds.
-        its_windows = tuple(replace(one, kind=0) for one in windows[part] if one.kind == index)
-        scanner = Scanner(ScannerModel((lowest_kind(kind),), its_windows))
+        scanner = alone(ScannerModel(kinds, tuple(windows[part])), index)
         for one, its in zip(collection.examples, parts, strict=True):
             if its == part:
-                found[kind].append(find(scanner, one, [kind])[kind])
+                found[kind].append(find(scanner, one, kind))
     return Left({kind: tuple(its) for kind, its in found.items()})
 
 
-def find(scanner: Scanner, example: Example, kinds: Sequence[str]) -> dict[str, Found]:
-    """What a scanner finds of each class in a picture, beside what is there."""
-    seen = scanner.see(example.frame).items
-    return {
-        kind: Found(
-            np.array([one.box for one in seen if one.kind == kind]).reshape(-1, 4),
-            np.array([one.score for one in seen if one.kind == kind]),
-            example.of(kind),
-        )
-        for kind in kinds
-    }
+def find(scanner: Scanner, example: Example, kind: str) -> Found:
+    """What a scanner finds of a class in a picture, beside what is there."""
+    seen = [one for one in scanner.see(example.frame).items if one.kind == kind]
+    boxes = np.array([one.box for one in seen]).reshape(-1, 4)
+    return Found(boxes, np.array([one.score for one in seen]), example.of(kind))
 
 
-def _kind(name: str, height_m: float, left: Left, false_a_picture: float) -> Kind:
+def _kind(name: str, collection: Collection, left: Left, false_a_picture: float) -> Kind:
     its = left.curve(name)
     slope, offset = _odds(its)
     middle_sd, height_sd = _box_noise(left.found[name])
     threshold = its.threshold_at(false_a_picture)
     if not np.isfinite(threshold):
         threshold = 1.0
-    width_m = height_m * _front_aspect(left.found[name])
+    height_m = collection.heights_m[name]
+    width_m = min(height_m * _front_aspect(collection.examples, name), SIZE_MAX_M)
     return Kind(name, height_m, width_m, threshold, slope, offset, middle_sd, height_sd)
 
 
-def _front_aspect(found: Sequence[Found]) -> float:
-    """Width to height of what is labelled, as it is from ahead: but for outliers, the widest."""
-    boxes = np.concatenate([one.labelled for one in found])
-    return float(np.quantile((boxes[:, 2] - boxes[:, 0]) / (boxes[:, 3] - boxes[:, 1]), _FRONT))
+def _front_aspect(examples: Sequence[Example], name: str) -> float:
+    """Width to height of a class from ahead: but for outliers, the widest box that no picture cuts off. 0 if
+    each does.
+    """
+    aspects = []
+    for one in examples:
+        height, width = one.frame.shape[:2]
+        left, top, right, bottom = one.of(name).T
+        whole = (left > 1) & (top > 1) & (right < width - 1) & (bottom < height - 1)
+        aspects += ((right - left) / (bottom - top))[whole].tolist()
+    return float(np.quantile(aspects, _FRONT)) if aspects else 0.0
 
 
 def _odds(its: Curve) -> tuple[float, float]:
@@ -195,8 +200,3 @@ def _box_noise(found: Sequence[Found]) -> tuple[float, float]:
 def _robust_sd(values: Sequence[float]) -> float:
     """By the share of normal values within a deviation; 0.2 where there are too few to tell."""
     return max(_SD_MIN, float(np.quantile(np.abs(values), 0.683))) if len(values) >= 5 else 0.2
-
-
-def with_threshold(model: ScannerModel, threshold: float) -> ScannerModel:
-    """The same model with one threshold for all kinds."""
-    return replace(model, kinds=tuple(replace(one, threshold=threshold) for one in model.kinds))

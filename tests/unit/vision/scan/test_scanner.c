@@ -288,6 +288,8 @@ static void test_model_that_cannot_be_is_refused_and_nothing_changes(void **stat
     WITH(square.kind.middle_sd, 0.0f, BSLAM_E_PARAMETER);
     WITH(square.kind.height_sd, 0.0f, BSLAM_E_PARAMETER);
     WITH(square.kind.width_m, -1.0f, BSLAM_E_PARAMETER);
+    WITH(square.kind.width_m, 10.5f, BSLAM_E_PARAMETER);
+    WITH(square.kind.width_m, NAN, BSLAM_E_NOT_FINITE);
     WITH(square.kind.slope, 2e6f, BSLAM_E_PARAMETER);
     WITH(square.kind.offset, -2e6f, BSLAM_E_PARAMETER);
     WITH(square.window.scale, 2e6f, BSLAM_E_PARAMETER);
