@@ -6,6 +6,7 @@ import asyncio
 import errno
 import logging
 import os
+import signal
 import socket
 import sys
 import webbrowser
@@ -27,7 +28,8 @@ def serve(page: Callable[[Document], None], port: int, say: Callable[[str], None
     """
     logging.getLogger("bokeh").setLevel(logging.ERROR)  # it tells of every visit
     port = _free_port(port)
-    asyncio.set_event_loop(asyncio.new_event_loop())
+    loop = asyncio.new_event_loop()
+    asyncio.set_event_loop(loop)
     # Only pages that this server has sent may talk to it, whatever else the browser shows.
     origins = [f"{ADDRESS}:{port}", f"localhost:{port}"]
     server = Server({"/": page}, address=ADDRESS, port=port, allow_websocket_origin=origins)
@@ -36,9 +38,12 @@ def serve(page: Callable[[Document], None], port: int, say: Callable[[str], None
     say(url)
     if browse and has_screen():
         server.io_loop.add_callback(webbrowser.open, url)
+    # An exception that Ctrl-C raises is lost where it meets a callback of the interpreter's own.
+    before = signal.signal(signal.SIGINT, lambda *_: loop.call_soon_threadsafe(server.io_loop.stop))
     try:
         server.io_loop.start()
     finally:
+        signal.signal(signal.SIGINT, before)
         server.unlisten()
         server.stop(wait=False)
 
