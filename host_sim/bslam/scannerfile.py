@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bslam.errors import BslamError
-from bslam.modelfile import SIZE_MAX_M, Document, load_document
+from bslam.modelfile import SIZE_MAX_M as SIZE_MAX_M
+from bslam.modelfile import Document, load_document
 
 FORMAT = "bslam scanner"
 VERSION = 3

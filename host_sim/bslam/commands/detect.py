@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bslam.cheader import check_name, scanner_header
 from bslam.commands.arguments import positive_count
-from bslam.core.scanner import Detection, Scanner
+from bslam.core.scanner import Detection, Detections, Scanner
 from bslam.datasets.labels import FILE
 from bslam.datasets.pictures import SUFFIXES, load_picture
 from bslam.detect.boxes import curve, overlaps
@@ -214,17 +214,15 @@ def _run(arguments: argparse.Namespace) -> int:
     rows: list[Sequence[object]] = []
     pictures, right, wrong = [], 0, 0
     for look in _looks(arguments):
-        views = [scanner.see(look.rgb) for scanner in scanners]
-        items = [one for view in views for one in view.items]
-        dropped = sum(view.dropped for view in views)
-        marks = [_mark(one, look) for one in items]
+        seen = _see(scanners, look.rgb)
+        marks = [_mark(one, look) for one in seen.items]
         right += sum(one.colour == RIGHT for one in marks)
         wrong += sum(one.colour == WRONG for one in marks)
-        rows += [(look.name, one.kind, f"{one.score:.4f}", *_in_picture(one, look)) for one in items]
-        why = "" if views[0].reason == "nothing" else f": {views[0].reason}"
-        what = f"{len(items)} found" if items else f"nothing found{why}"
-        if dropped:
-            what += f", {dropped} weaker boxes dropped"
+        rows += [(look.name, one.kind, f"{one.score:.4f}", *_in_picture(one, look)) for one in seen.items]
+        why = "" if seen.reason == "nothing" else f": {seen.reason}"
+        what = f"{len(seen.items)} found" if seen.items else f"nothing found{why}"
+        if seen.dropped:
+            what += f", {seen.dropped} weaker boxes dropped"
         print(f"{look.name}: {what}")
         pictures.append(annotate(look.rgb, marks, f"{look.name}: {what}"))
     table = io.StringIO()
@@ -235,6 +233,13 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"beside labels: {right} right, {wrong} wrong")
     print(f"{len(rows)} boxes in {len(pictures)} pictures; files in {out}: boxes.csv, contact_sheet.png")
     return 0
+
+
+def _see(scanners: Sequence[Scanner], rgb: NDArray[np.uint8]) -> Detections:
+    """What all of them see in a picture."""
+    views = [scanner.see(rgb) for scanner in scanners]
+    items = tuple(one for view in views for one in view.items)
+    return replace(views[0], items=items, dropped=sum(view.dropped for view in views))
 
 
 def _looks(arguments: argparse.Namespace) -> Iterator[_Look]:

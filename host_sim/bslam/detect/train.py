@@ -16,8 +16,7 @@ from bslam.detect.boxes import Curve, Found, curve, overlaps
 from bslam.detect.examples import Collection, Example
 from bslam.detect.fit import fit_windows, look_at
 from bslam.errors import BslamError
-from bslam.modelfile import SIZE_MAX_M
-from bslam.scannerfile import KINDS_MAX, LOWEST, WINDOWS_MAX, Kind, ScannerModel, Window
+from bslam.scannerfile import KINDS_MAX, LOWEST, SIZE_MAX_M, WINDOWS_MAX, Kind, ScannerModel, Window
 
 FOLDS: Final = 4
 PICTURES_MIN: Final = 2 * FOLDS
