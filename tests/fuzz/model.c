@@ -246,18 +246,6 @@ static void change(fuzz_input_t *input)
 
 // ---- what must hold ---------------------------------------------------------------------------------------
 
-static void look(bslam_vision_t *vision)
-{
-    uint8_t row[FUZZ_ROW_BYTES];
-    fuzz_require(bslam_vision_begin(vision, 0, BSLAM_PIXELS_RGB888, FUZZ_WIDTH, FUZZ_HEIGHT) == BSLAM_OK);
-    for (int32_t y = 0; y < FUZZ_HEIGHT; y++) {
-        fuzz_room_row(y, row);
-        fuzz_require(bslam_vision_row(vision, row) == BSLAM_OK);
-    }
-    fuzz_require(bslam_vision_end(vision, true) == BSLAM_OK);
-    fuzz_require_candidates(vision);
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static bslam_vision_t vision;
@@ -276,7 +264,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fuzz_require(bslam_vision_init(&vision, &made.model, &camera, 1) == status);
     fuzz_require((inside->model == NULL) == (status != BSLAM_OK));
     if (status == BSLAM_OK) {
-        look(&vision);
+        fuzz_look_at_room(&vision);
     }
     return 0;
 }

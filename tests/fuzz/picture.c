@@ -102,3 +102,15 @@ void fuzz_require_candidates(const bslam_vision_t *vision)
         require_candidate(vision, &candidates[i]);
     }
 }
+
+void fuzz_look_at_room(bslam_vision_t *vision)
+{
+    uint8_t row[FUZZ_ROW_BYTES];
+    fuzz_require(bslam_vision_begin(vision, 0, BSLAM_PIXELS_RGB888, FUZZ_WIDTH, FUZZ_HEIGHT) == BSLAM_OK);
+    for (int32_t y = 0; y < FUZZ_HEIGHT; y++) {
+        fuzz_room_row(y, row);
+        fuzz_require(bslam_vision_row(vision, row) == BSLAM_OK);
+    }
+    fuzz_require(bslam_vision_end(vision, true) == BSLAM_OK);
+    fuzz_require_candidates(vision);
+}

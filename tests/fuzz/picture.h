@@ -28,4 +28,7 @@ void fuzz_room_row(int32_t y, uint8_t row[FUZZ_ROW_BYTES]);
 /// Holds of a finished frame: all that candidates say is finite and within its range.
 void fuzz_require_candidates(const bslam_vision_t *vision);
 
+/// Looks at such a room, of which that holds.
+void fuzz_look_at_room(bslam_vision_t *vision);
+
 #endif
