@@ -110,6 +110,8 @@ def read_frames(folder: Path) -> dict[str, int]:
     """Bytes of stack by function, of the compiler's .su files; without names that several files use."""
     sizes: dict[str, set[int]] = {}
     for path in folder.rglob("*.su"):
+        if not (Path(__file__).parents[2] / path.relative_to(folder)).with_suffix(".c").is_file():
+            continue  # of a source that is gone
         for line in path.read_text(encoding="utf-8").splitlines():
             place, size, kind = line.split("\t")
             if "dynamic" in kind and "bounded" not in kind:

@@ -33,6 +33,25 @@ def test_a_program_links_the_library(tmp_path):
     assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
 
 
+def test_a_robot_of_its_own_kinds_leaves_the_built_in_ones_out(tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES C)\n"
+        f"add_subdirectory({FIRMWARE} bslam)\nadd_executable(user main.c)\n"
+        "target_link_libraries(user PRIVATE bslam::vision)\n"
+        "target_compile_definitions(vision PUBLIC BSLAM_VISION_BUILT_IN=0)\n"
+    )
+    (tmp_path / "main.c").write_text(
+        '#include "vision/vision.h"\nstatic bslam_vision_t eyes;\nint main(void)\n{\n'
+        "    return bslam_vision_begin(&eyes, 0, BSLAM_PIXELS_RGB565, 320, 240) == BSLAM_OK;\n}\n"
+    )
+    cmake("-S", tmp_path, "-B", tmp_path / "build")
+    cmake("--build", tmp_path / "build", "--target", "user")
+    assert subprocess.run([tmp_path / "build" / "user"]).returncode == 0
+    archive = next((tmp_path / "build").rglob("libvision.a"))
+    members = subprocess.run(["ar", "t", archive], capture_output=True, text=True).stdout
+    assert "scanner.c.o" in members and "front_end.c.o" not in members
+
+
 def test_the_toolchain_file_builds_for_a_core(tmp_path):
     toolchain = FIRMWARE / "cmake" / "cortex-m.cmake"
     words = [f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DBSLAM_CORE=m0plus", "-DCMAKE_BUILD_TYPE=MinSizeRel"]

@@ -24,8 +24,6 @@ static const bslam_real_t SIDE_MIN_PX = 5;
 // errors in training worlds.
 static const bslam_real_t BEARING_FLOOR_RAD = BSLAM_R(0.0008);
 static const bslam_real_t RANGE_FLOOR = BSLAM_R(0.01);
-// A distance's noise is so many times that on drives.
-static const bslam_real_t DRIVEN_TIMES = BSLAM_R(1.2);
 static const bslam_real_t BEARING_DOUBT = BSLAM_R(0.3);
 // Of a wide object's width, for what is not flat or not level about it; and pixels by its square, for turns.
 static const bslam_real_t BEARING_BY_WIDTH = BSLAM_R(0.008);
@@ -167,7 +165,7 @@ static void measure_outline(const bslam_outline_t *o, const bslam_camera_t *came
         return;
     }
     const bslam_ahead_t ahead = bslam_ahead_of_body(o, camera, size);
-    const bslam_real_t times = DRIVEN_TIMES * contradiction(&ahead);
+    const bslam_real_t times = contradiction(&ahead);
     const bslam_real_t noise_var = ahead.noise_var * times * times;
     const bslam_real_t relative_var =
         RANGE_FLOOR * RANGE_FLOOR + ahead.relative_var + (noise_var - ahead.noise_var);

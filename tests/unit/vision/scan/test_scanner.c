@@ -144,6 +144,19 @@ static void test_one_thing_is_of_the_kind_with_the_best_odds(void **state)
     }
 }
 
+static void test_box_of_a_part_is_dropped(void **state)
+{
+    (void)state;
+    draw(64, 40, 16);
+    bslam_window_t windows[2] = {square.window, square.window};
+    windows[1].box_columns /= 2;  // a quarter of the thing, and within it
+    windows[1].box_rows /= 2;
+    const bslam_scanner_model_t both = {
+        .kind_count = 1, .kinds = &square.kind, .window_count = 2, .windows = windows};
+    assert_int_equal(bslam_scanner_init(&scanner, &both), BSLAM_OK);
+    assert_int_equal(see()->count, 1);
+}
+
 static void test_formats_give_the_same(void **state)
 {
     (void)state;
@@ -331,6 +344,7 @@ int main(void)
                                make_model),
         cmocka_unit_test_setup(test_two_things_are_two_and_the_surer_one_is_first, make_model),
         cmocka_unit_test_setup(test_one_thing_is_of_the_kind_with_the_best_odds, make_model),
+        cmocka_unit_test_setup(test_box_of_a_part_is_dropped, make_model),
         cmocka_unit_test_setup(test_formats_give_the_same, make_model),
         cmocka_unit_test_setup(test_light_that_shows_nothing_has_its_reason, make_model),
         cmocka_unit_test_setup(test_picture_that_is_cut_short_or_looked_at_twice_shows_nothing, make_model),
